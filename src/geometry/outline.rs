@@ -1,0 +1,65 @@
+//! The outline of a blade, shared by the flat rest mesh and by the texture drawn for it.
+//!
+//! Along the midrib t runs from 0 (base) to 1 (tip); the half-width is `½W · t^a (1 − t)^b`, normalised to ½W at its
+//! widest, t = a / (a + b). Area = L·W·B(a + 1, b + 1)/norm with the Beta function B.
+//!
+//! A leaf's image shows the blade with its tip at the top and its base at the bottom, the midrib on the middle column,
+//! length and width filling the image but for [`MARGIN`] on each side.
+
+use crate::math::{Vec2, vec2};
+
+/// Margin around the blade in its image, on each side, as a fraction of the blade's length and width.
+pub const MARGIN: f32 = 0.04;
+
+/// Texture coordinates of the point `x` (of the blade's full width, −½..½, right positive) and `t` (of its length).
+pub fn uv(x: f32, t: f32) -> Vec2 {
+    let scale = 1.0 / (1.0 + 2.0 * MARGIN);
+    vec2(0.5 + x * scale, 1.0 - (t + MARGIN) * scale)
+}
+
+/// A blade's outline.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum Outline {
+    /// `t^a (1 − t)^b`.
+    Power {
+        /// Exponent at the base: small is blunt, above 1 is drawn out.
+        a: f32,
+        /// Exponent at the tip.
+        b: f32,
+    },
+    /// The whole rectangle of the image: for photographs and for lobed leaves, whose alpha cuts the shape.
+    Full,
+}
+
+impl Outline {
+    /// Half-width at `t` ∈ [0, 1] as a fraction of the full width, 0..½.
+    pub fn half_width(self, t: f32) -> f32 {
+        match self {
+            Self::Full => 0.5,
+            Self::Power { a, b } => {
+                let peak = a / (a + b);
+                let norm = peak.powf(a) * (1.0 - peak).powf(b);
+                0.5 * t.clamp(0.0, 1.0).powf(a) * (1.0 - t.clamp(0.0, 1.0)).powf(b) / norm
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Source: area over L·W of the classic shapes (Beta function), to three digits.
+    #[test]
+    fn areas_are_those_of_the_beta_function() {
+        for (a, b, area) in
+            [(0.55, 1.1, 0.676), (0.6, 0.6, 0.757), (0.7, 1.4, 0.631), (2.0, 0.5, 0.532), (0.5, 0.5, 0.785)]
+        {
+            let o = Outline::Power { a, b };
+            let n = 20_000;
+            let sum: f32 = (0..n).map(|i| 2.0 * o.half_width((i as f32 + 0.5) / n as f32)).sum::<f32>() / n as f32;
+            assert!((sum - area).abs() < 2e-3, "{a} {b}: {sum}");
+        }
+    }
+}

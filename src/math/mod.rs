@@ -1,0 +1,26 @@
+//! Vectors, frames and the four-band spectrum. Everything else stands on this room.
+
+mod frame;
+mod spectrum;
+
+pub use frame::Frame;
+pub use glam::{Mat3, Quat, Vec2, Vec3, vec2, vec3};
+pub use spectrum::Spectrum;
+
+/// Hermite step: 0 below `a`, 1 above `b`, smooth between.
+pub fn smoothstep(a: f32, b: f32, x: f32) -> f32 {
+    let t = ((x - a) / (b - a)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// Linear blend: `a` at t = 0, `b` at t = 1.
+pub fn lerp(a: f32, b: f32, t: f32) -> f32 {
+    a + (b - a) * t
+}
+
+/// Unit vector from zenith angle and azimuth (radians): azimuth clockwise from north (+y), z up.
+pub fn direction(zenith: f32, azimuth: f32) -> Vec3 {
+    let (sz, cz) = zenith.sin_cos();
+    let (sa, ca) = azimuth.sin_cos();
+    vec3(sz * sa, sz * ca, cz)
+}

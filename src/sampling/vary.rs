@@ -1,0 +1,501 @@
+//! What a page may say where a number stands: the number itself, or a distribution that every field draws afresh.
+//!
+//! ```
+//! use furrow::sampling::vary::{Positive, Vary};
+//! let spacing: Vary<Positive> = ron::from_str("Normal(mean: 0.20, sd: 0.02, min: 0.1, max: 0.3)").unwrap();
+//! let age: Vary<Positive> = ron::from_str("24").unwrap();
+//! assert!(ron::from_str::<Vary<Positive>>("Uniform(-3, 2)").is_err());
+//! ```
+//!
+//! The bound is part of the type, so an impossible value is an error at its place in the file. RON tells neither where a
+//! custom error lies nor whether a number or a name comes next; both are read off the raw text of the value here, and
+//! [`Fault`] carries the place outward through serde's string-only errors.
+
+use super::rng::Stream;
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de, ser};
+use std::fmt;
+use std::marker::PhantomData;
+
+/// What a number must be.
+pub trait Bound: Copy + Clone + fmt::Debug + PartialEq {
+    /// Smallest value.
+    const MIN: f64 = f64::NEG_INFINITY;
+    /// Largest value.
+    const MAX: f64 = f64::INFINITY;
+    /// True where the smallest value itself is not allowed.
+    const ABOVE_MIN: bool = false;
+    /// True where only whole numbers make sense.
+    const WHOLE: bool = false;
+    /// In words, after "must be".
+    const WORDS: &'static str;
+
+    /// Whether `x` will do.
+    fn holds(x: f64) -> bool {
+        x.is_finite()
+            && x <= Self::MAX
+            && (x > Self::MIN || (x == Self::MIN && !Self::ABOVE_MIN))
+            && (!Self::WHOLE || x.fract() == 0.0)
+    }
+}
+
+macro_rules! bounds {
+    ($($(#[$doc:meta])* $name:ident { $($body:tt)* })*) => {$(
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq)]
+        pub struct $name;
+        impl Bound for $name { $($body)* }
+    )*};
+}
+
+bounds! {
+    /// Any finite number.
+    Finite { const WORDS: &'static str = "a finite number"; }
+    /// Above zero.
+    Positive { const MIN: f64 = 0.0; const ABOVE_MIN: bool = true; const WORDS: &'static str = "above 0"; }
+    /// Zero or above.
+    NonNegative { const MIN: f64 = 0.0; const WORDS: &'static str = "0 or above"; }
+    /// Between 0 and 1.
+    Fraction { const MIN: f64 = 0.0; const MAX: f64 = 1.0; const WORDS: &'static str = "between 0 and 1"; }
+    /// A whole number, 0 or above.
+    Count { const MIN: f64 = 0.0; const MAX: f64 = 1e6; const WHOLE: bool = true; const WORDS: &'static str = "a whole number from 0 to 1000000"; }
+    /// A whole number, 1 or above.
+    PositiveCount { const MIN: f64 = 1.0; const MAX: f64 = 1e6; const WHOLE: bool = true; const WORDS: &'static str = "a whole number from 1 to 1000000"; }
+    /// Degrees of elevation above the horizon.
+    Elevation { const MIN: f64 = -90.0; const MAX: f64 = 90.0; const WORDS: &'static str = "between -90 and 90 degrees"; }
+}
+
+/// A problem inside one value: the byte range within the value's raw text, and words. Travels through serde as a string.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fault {
+    /// Bytes of the raw value.
+    pub raw_len: usize,
+    /// Where the fault begins, in bytes from the value's start.
+    pub start: usize,
+    /// Where it ends.
+    pub end: usize,
+    /// What is wrong.
+    pub message: String,
+}
+
+const MARK: char = '\u{1}';
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{MARK}{}:{}:{}{MARK}{}", self.raw_len, self.start, self.end, self.message)
+    }
+}
+
+impl Fault {
+    /// Reads back what `Display` wrote; `None` for any other message.
+    pub fn parse(text: &str) -> Option<Self> {
+        let (head, message) = text.strip_prefix(MARK)?.split_once(MARK)?;
+        let mut numbers = head.split(':').map(str::parse);
+        let mut next = || numbers.next()?.ok();
+        Some(Self { raw_len: next()?, start: next()?, end: next()?, message: message.to_owned() })
+    }
+}
+
+/// Reads one value by its raw text; what `read` refuses becomes an error at that text.
+pub fn from_raw<'de, D: Deserializer<'de>, T>(
+    deserializer: D,
+    read: impl FnOnce(&str) -> Result<T, Fault>,
+) -> Result<T, D::Error> {
+    let raw = <&ron::value::RawValue>::deserialize(deserializer)?.get_ron();
+    read(raw).map_err(de::Error::custom)
+}
+
+/// Parses RON inside a value, keeping the place of an error.
+pub fn parse_in<T: de::DeserializeOwned>(raw: &str) -> Result<T, Fault> {
+    ron::from_str(raw).map_err(|e| {
+        let at = |p: ron::error::Position| offset_of(raw, p.line, p.col);
+        let (start, end) = (at(e.span.start), at(e.span.end));
+        Fault { raw_len: raw.len(), start, end: end.max(start), message: e.code.to_string() }
+    })
+}
+
+/// The byte offset of a line and column (both from 1, columns in characters); the text's end when it lies beyond.
+pub fn offset_of(text: &str, line: usize, column: usize) -> usize {
+    let start = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum::<usize>();
+    let rest = &text[start.min(text.len())..];
+    start + rest.char_indices().nth(column.saturating_sub(1)).map_or(rest.len(), |(i, _)| i)
+}
+
+/// A fault that covers the whole value.
+pub fn whole(raw: &str, message: impl Into<String>) -> Fault {
+    Fault { raw_len: raw.len(), start: 0, end: raw.trim_end().len(), message: message.into() }
+}
+
+fn starts_with_name(raw: &str) -> bool {
+    let t = raw.trim_start();
+    t.starts_with(|c: char| c.is_alphabetic() || c == '_') && !t.starts_with("inf") && !t.starts_with("NaN")
+}
+
+/// A fixed number within its bound.
+///
+/// ```
+/// use furrow::sampling::vary::{Num, Positive};
+/// assert_eq!(ron::from_str::<Num<Positive>>("2.5").unwrap().get(), 2.5);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Num<B: Bound = Finite>(f64, PhantomData<B>);
+
+impl<B: Bound> Num<B> {
+    /// For defaults and tests; `x` must be within the bound.
+    pub const fn new(x: f64) -> Self {
+        Self(x, PhantomData)
+    }
+
+    /// The number.
+    pub const fn get(self) -> f64 {
+        self.0
+    }
+
+    /// The number, single precision.
+    pub const fn f32(self) -> f32 {
+        self.0 as f32
+    }
+}
+
+impl<'de, B: Bound> Deserialize<'de> for Num<B> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        from_raw(deserializer, |raw| {
+            let x: f64 = parse_in(raw)?;
+            if B::holds(x) {
+                Ok(Self::new(x))
+            } else {
+                Err(whole(raw, format!("{x} is out of range: it must be {}", B::WORDS)))
+            }
+        })
+    }
+}
+
+impl<B: Bound> Serialize for Num<B> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_f64(self.0)
+    }
+}
+
+/// The distributions, as they are written.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum Distribution {
+    /// Uniform between the two.
+    Uniform(f64, f64),
+    /// Normal, cut to `min..=max`.
+    Normal {
+        /// Mean before cutting.
+        mean: f64,
+        /// Standard deviation before cutting.
+        sd: f64,
+        /// Smallest value.
+        #[serde(default = "lowest")]
+        min: f64,
+        /// Largest value.
+        #[serde(default = "highest")]
+        max: f64,
+    },
+    /// exp of a normal: `median · exp(sigma · z)`, cut to `min..=max`.
+    LogNormal {
+        /// Median before cutting.
+        median: f64,
+        /// Standard deviation of the logarithm.
+        sigma: f64,
+        /// Smallest value.
+        #[serde(default = "lowest")]
+        min: f64,
+        /// Largest value.
+        #[serde(default = "highest")]
+        max: f64,
+    },
+    /// Each with the same chance.
+    Choice(Vec<f64>),
+    /// Each value with its weight.
+    Weighted(Vec<(f64, f64)>),
+}
+
+const fn lowest() -> f64 {
+    f64::MIN
+}
+
+const fn highest() -> f64 {
+    f64::MAX
+}
+
+/// A number that is fixed or drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Vary<B: Bound = Finite> {
+    /// Always this.
+    Fixed(Num<B>),
+    /// Drawn from this.
+    Drawn(Distribution),
+}
+
+impl<B: Bound> Vary<B> {
+    /// Always `x`.
+    pub const fn fixed(x: f64) -> Self {
+        Self::Fixed(Num::new(x))
+    }
+
+    /// Uniform in `lo..hi`.
+    pub const fn uniform(lo: f64, hi: f64) -> Self {
+        Self::Drawn(Distribution::Uniform(lo, hi))
+    }
+
+    /// One value.
+    pub fn draw(&self, stream: &mut Stream) -> f64 {
+        let x = match self {
+            Self::Fixed(x) => x.get(),
+            Self::Drawn(Distribution::Uniform(lo, hi)) => stream.range(*lo, *hi),
+            Self::Drawn(Distribution::Normal { mean, sd, min, max }) => {
+                cut::<B>(*min, *max, || mean + sd * stream.normal())
+            }
+            Self::Drawn(Distribution::LogNormal { median, sigma, min, max }) => {
+                cut::<B>(*min, *max, || median * (sigma * stream.normal()).exp())
+            }
+            Self::Drawn(Distribution::Choice(of)) => of[stream.index(of.len())],
+            Self::Drawn(Distribution::Weighted(of)) => {
+                let mut left = stream.uniform() * of.iter().map(|(_, w)| w).sum::<f64>();
+                let last = of.len() - 1;
+                of.iter()
+                    .position(|(_, w)| {
+                        left -= w;
+                        left < 0.0
+                    })
+                    .map_or(of[last].0, |i| of[i].0)
+            }
+        };
+        if B::WHOLE { x.round() } else { x }
+    }
+
+    /// One value, single precision.
+    pub fn draw32(&self, stream: &mut Stream) -> f32 {
+        self.draw(stream) as f32
+    }
+
+    fn check(distribution: &Distribution) -> Result<(), String> {
+        let within = |name: &str, x: f64| {
+            if B::holds(x) { Ok(()) } else { Err(format!("{name} {x} is out of range: it must be {}", B::WORDS)) }
+        };
+        let spread = |name: &str, x: f64| {
+            if x.is_finite() && x >= 0.0 {
+                Ok(())
+            } else {
+                Err(format!("{name} {x} is out of range: it must be 0 or above"))
+            }
+        };
+        let ordered =
+            |min: f64, max: f64| if min < max { Ok(()) } else { Err(format!("min {min} is not below max {max}")) };
+        match distribution {
+            Distribution::Uniform(lo, hi) => {
+                within("the lower end", *lo)?;
+                within("the upper end", *hi)?;
+                if lo <= hi { Ok(()) } else { Err(format!("the lower end {lo} is above the upper end {hi}")) }
+            }
+            Distribution::Normal { mean, sd, min, max } => {
+                within("mean", *mean)?;
+                spread("sd", *sd)?;
+                ordered(*min, *max)?;
+                if (min..=max).contains(&mean) { Ok(()) } else { Err(format!("mean {mean} lies outside min..max")) }
+            }
+            Distribution::LogNormal { median, sigma, min, max } => {
+                within("median", *median)?;
+                if *median <= 0.0 {
+                    return Err(format!("median {median} is out of range: it must be above 0"));
+                }
+                spread("sigma", *sigma)?;
+                ordered(*min, *max)?;
+                if (min..=max).contains(&median) {
+                    Ok(())
+                } else {
+                    Err(format!("median {median} lies outside min..max"))
+                }
+            }
+            Distribution::Choice(of) => {
+                if of.is_empty() {
+                    return Err("an empty choice: there is nothing to draw".into());
+                }
+                of.iter().try_for_each(|x| within("the choice", *x))
+            }
+            Distribution::Weighted(of) => {
+                if !of.iter().any(|(_, w)| *w > 0.0) {
+                    return Err("an empty choice: no weight is above 0".into());
+                }
+                of.iter().try_for_each(|(x, w)| within("the choice", *x).and_then(|()| spread("the weight", *w)))
+            }
+        }
+    }
+}
+
+/// Draws until the value lies within both ranges, so that the shape between the cuts stays; the median of what remains is
+/// inside by the page's checks, so a hundred misses in a row only happen at the far end of a bound, where it clamps.
+fn cut<B: Bound>(min: f64, max: f64, mut draw: impl FnMut() -> f64) -> f64 {
+    for _ in 0..100 {
+        let x = draw();
+        if x >= min && x <= max && (B::holds(x) || (B::WHOLE && B::holds(x.round()))) {
+            return x;
+        }
+    }
+    draw().clamp(min, max).clamp(B::MIN, B::MAX)
+}
+
+impl<'de, B: Bound> Deserialize<'de> for Vary<B> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        from_raw(deserializer, |raw| {
+            if starts_with_name(raw) {
+                let distribution: Distribution = parse_in(raw)?;
+                Self::check(&distribution).map_err(|message| whole(raw, message))?;
+                Ok(Self::Drawn(distribution))
+            } else {
+                let x: f64 = parse_in(raw)?;
+                if B::holds(x) {
+                    Ok(Self::fixed(x))
+                } else {
+                    Err(whole(raw, format!("{x} is out of range: it must be {}", B::WORDS)))
+                }
+            }
+        })
+    }
+}
+
+impl<B: Bound> Serialize for Vary<B> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Fixed(x) => x.serialize(serializer),
+            Self::Drawn(Distribution::Normal { mean, sd, min, max }) => {
+                bell(serializer, 1, "Normal", ("mean", *mean), ("sd", *sd), *min, *max)
+            }
+            Self::Drawn(Distribution::LogNormal { median, sigma, min, max }) => {
+                bell(serializer, 2, "LogNormal", ("median", *median), ("sigma", *sigma), *min, *max)
+            }
+            Self::Drawn(distribution) => distribution.serialize(serializer),
+        }
+    }
+}
+
+/// Writes a bell without the ends that were not given.
+fn bell<S: Serializer>(
+    s: S,
+    index: u32,
+    name: &'static str,
+    centre: (&'static str, f64),
+    spread: (&'static str, f64),
+    min: f64,
+    max: f64,
+) -> Result<S::Ok, S::Error> {
+    use ser::SerializeStructVariant;
+    let ends = usize::from(min != f64::MIN) + usize::from(max != f64::MAX);
+    let mut v = s.serialize_struct_variant("Distribution", index, name, 2 + ends)?;
+    v.serialize_field(centre.0, &centre.1)?;
+    v.serialize_field(spread.0, &spread.1)?;
+    if min != f64::MIN {
+        v.serialize_field("min", &min)?;
+    }
+    if max != f64::MAX {
+        v.serialize_field("max", &max)?;
+    }
+    v.end()
+}
+
+/// A thing that is fixed, or one of several with the same chance: `"a.png"` or `Choice(["a.png", "b.png"])`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pick<T>(Vec<T>);
+
+impl<T> Pick<T> {
+    /// Always `x`.
+    pub fn fixed(x: T) -> Self {
+        Self(vec![x])
+    }
+
+    /// One of them.
+    pub fn draw(&self, stream: &mut Stream) -> &T {
+        // A fixed thing takes a number too: making it a choice later moves nothing else in the stream.
+        let i = stream.index(self.0.len());
+        &self.0[i]
+    }
+
+    /// All of them.
+    pub fn all(&self) -> &[T] {
+        &self.0
+    }
+}
+
+impl<'de, T: de::DeserializeOwned> Deserialize<'de> for Pick<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        #[derive(Deserialize)]
+        enum Many<T> {
+            Choice(Vec<T>),
+        }
+        from_raw(deserializer, |raw| {
+            if !raw.trim_start().starts_with("Choice") {
+                return parse_in(raw).map(Self::fixed);
+            }
+            let Many::Choice(of) = parse_in(raw)?;
+            if of.is_empty() { Err(whole(raw, "an empty choice: there is nothing to draw")) } else { Ok(Self(of)) }
+        })
+    }
+}
+
+impl<T: Serialize> Serialize for Pick<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self.0.as_slice() {
+            [one] => one.serialize(serializer),
+            many => serializer.serialize_newtype_variant("Pick", 0, "Choice", many),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::rng::Purpose;
+    use super::*;
+
+    fn stream() -> Stream {
+        Stream::of(3, 0, Purpose::Test, 0)
+    }
+
+    #[test]
+    fn a_page_may_fix_or_draw_any_number() {
+        for (text, lo, hi) in [
+            ("3", 3.0, 3.0),
+            ("Uniform(1, 2)", 1.0, 2.0),
+            ("Normal(mean: 5, sd: 9, min: 4, max: 7)", 4.0, 7.0),
+            ("LogNormal(median: 2, sigma: 3)", 0.0, f64::MAX),
+            ("Choice([4, 5])", 4.0, 5.0),
+            ("Weighted([(1, 0), (2, 3)])", 2.0, 2.0),
+        ] {
+            let v: Vary<NonNegative> = ron::from_str(text).unwrap();
+            let again: Vary<NonNegative> = ron::from_str(&ron::to_string(&v).unwrap()).unwrap();
+            assert_eq!(v, again, "{text}");
+            let mut s = stream();
+            assert!((0..500).map(|_| v.draw(&mut s)).all(|x| x >= lo && x <= hi), "{text}");
+        }
+    }
+
+    #[test]
+    fn impossible_numbers_are_refused() {
+        for text in [
+            "-1",
+            "NaN",
+            "inf",
+            "Uniform(2, 1)",
+            "Uniform(-1, 1)",
+            "Choice([])",
+            "Weighted([(1, 0)])",
+            "Normal(mean: 1, sd: -1)",
+            "Normal(mean: 1, sd: 1, min: 3, max: 2)",
+            "LogNormal(median: 0, sigma: 1)",
+            "Unifrom(1, 2)",
+            "\"a\"",
+        ] {
+            assert!(ron::from_str::<Vary<NonNegative>>(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn counts_are_whole() {
+        assert!(ron::from_str::<Vary<Count>>("2.5").is_err());
+        let v: Vary<Count> = Vary::uniform(1.0, 6.0);
+        let mut s = stream();
+        assert!((0..50).all(|_| v.draw(&mut s).fract() == 0.0));
+    }
+}

@@ -1,0 +1,3 @@
+//! Images decoded once, the noise they are drawn with, and the maps derived from them.
+
+pub mod noise;
