@@ -99,6 +99,8 @@ pub fn clear_sky(zenith_deg: f64, optical_depth: f64) -> ClearSky {
     let mass = air_mass(zenith);
     let (z, along_mass) = bracket(&ZENITHS_DEG.map(air_mass), mass);
     let (_, along_log_mass) = bracket(&ZENITHS_DEG.map(|z| air_mass(z).ln()), mass.ln());
+    // Below the table's lowest sun the share is held: its slope there would soon take it below zero.
+    let along_log_mass = along_log_mass.min(1.0);
     let (d, along_depth) = bracket(&DEPTHS, optical_depth);
     let share_axis = |tau: f64| (tau + 0.05).ln();
     let (_, along_log_depth) = bracket(&DEPTHS.map(share_axis), share_axis(optical_depth));
@@ -112,7 +114,7 @@ pub fn clear_sky(zenith_deg: f64, optical_depth: f64) -> ClearSky {
         };
         let beam = bilinear(log_beam, d, z, along_depth, along_mass).exp();
         direct[band] = beam as f32;
-        let share = bilinear(share, d, z, along_log_depth, along_log_mass).max(0.0);
+        let share = bilinear(share, d, z, along_log_depth, along_log_mass);
         diffuse[band] = (share * (OUTSIDE[band] - beam) / mass) as f32;
     }
     ClearSky { direct_normal: direct.into(), diffuse_horizontal: diffuse.into() }

@@ -37,7 +37,6 @@ use serde::{Deserialize, Serialize};
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(clippy::large_enum_variant, reason = "a page has one camera")]
 pub enum CameraDesc {
     /// The JAI AD-130GE of the Bonirob robot, 1296 × 966 pixels of 3.75 µm, looking down. Everything has a default.
     JaiAd130 {
@@ -179,7 +178,10 @@ mod bare {
 
     #[expect(clippy::ref_option, reason = "serde calls it with a reference to the field")]
     pub(super) fn serialize<S: Serializer, T: Serialize>(of: &Option<T>, s: S) -> Result<S::Ok, S::Error> {
-        of.as_ref().map_or_else(|| s.serialize_unit(), |of| of.serialize(s))
+        match of {
+            Some(of) => of.serialize(s),
+            None => s.serialize_unit(),
+        }
     }
 }
 

@@ -217,7 +217,7 @@ impl Camera {
                     let s = f64::from(j) / f64::from(STEPS);
                     self.distortion.stretch([at[0] * s, at[1] * s]) <= 0.0
                 });
-                if !(error < 1e-6) || folds {
+                if error.is_nan() || error > 1e-6 || folds {
                     return Err(Error::Scene(
                         "the lens distortion folds the image over before its corners\n help: check the coefficients' signs and \
                          that they belong to this focal length"
