@@ -18,6 +18,8 @@ pub(super) struct Section {
     pub(super) profile: Profile,
     /// Width of the stem's top over that of its base.
     pub(super) taper: f32,
+    /// How far each internode strays from the one below, one standard deviation of the direction.
+    pub(super) wander: f32,
     /// How far out leaves are seated: oldest and youngest layer, of the stem's radius.
     pub(super) seat: (f32, f32),
 }
@@ -59,8 +61,9 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
         nodes.push((point, direction_now));
         radii.push(radius * lerp(1.0, section.taper, share));
         // Each internode wanders a little and turns back to the light.
-        let wander = vec3(stream.normal() as f32, stream.normal() as f32, 0.0) * if *rise > below { 0.06 } else { 0.0 };
-        direction_now = (direction_now + wander + Vec3::Z * 0.08).normalize_or(Vec3::Z);
+        let wander = vec3(stream.normal() as f32, stream.normal() as f32, 0.0)
+            * if *rise > below { section.wander } else { 0.0 };
+        direction_now = (direction_now + wander + Vec3::Z * (0.8 * section.wander)).normalize_or(Vec3::Z);
         below = *rise;
     }
     if nodes.is_empty() {

@@ -15,6 +15,8 @@ use std::f32::consts::FRAC_PI_2;
 
 /// Corners round a stalk.
 const SIDES: u32 = 9;
+/// Shortest cell of a blade's mesh, metres: about what four pixels of a field camera see.
+const CELL: f32 = 0.9e-3;
 /// A chain never comes nearer to the soil than this, metres: a leaf that would, lies on it.
 const LYING: f32 = 0.003;
 
@@ -48,7 +50,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
     let relief = relief(leaf, &mut stream);
     let rest = match &leaf.kind.shape {
         Shape::Sheet { outline } => {
-            let (rows, columns) = (leaf.kind.rows.get() as usize, leaf.kind.columns.get() as usize);
+            let (rows, columns) = cells(leaf);
             let mut sheet = blade::sheet(*outline, leaf.width, rows, columns, &skeleton);
             relief.apply(&mut sheet, leaf.blade);
             sheet.rest
@@ -72,6 +74,13 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
     organs.push(Organ { kind, leaf: leaf.number, skin: leaf.kind.stalk_skin.clone(), mesh });
 }
 
+/// Cells along and across the blade: those of the kind, but none shorter than [`CELL`], so that a bud costs little.
+fn cells(leaf: &LeafNow<'_>) -> (usize, usize) {
+    let (rows, columns) = (leaf.kind.rows.get(), leaf.kind.columns.get());
+    let fit = f64::from(leaf.blade / CELL).max(8.0).min(rows);
+    (fit.round() as usize, (columns * (fit / rows).sqrt()).round().max(4.0).min(columns) as usize)
+}
+
 fn measures(leaf: &LeafNow<'_>) -> Measures {
     let n = leaf.kind.joints.get() as usize;
     let veins: Vec<f32> = (1..=n).map(|k| k as f32 / (n as f32 + 1.0)).collect();
@@ -82,7 +91,13 @@ fn measures(leaf: &LeafNow<'_>) -> Measures {
         }
         _ => None,
     };
-    Measures { stalk: leaf.stalk, stalk_joints: if leaf.stalk > 0.0 { 4 } else { 1 }, length: leaf.blade, veins, secondaries }
+    Measures {
+        stalk: leaf.stalk,
+        stalk_joints: if leaf.stalk > 0.0 { 4 } else { 1 },
+        length: leaf.blade,
+        veins,
+        secondaries,
+    }
 }
 
 /// The frame of ST1 in plant coordinates: vein along the stalk, y out of the upper side, which faces the axis.
@@ -114,11 +129,8 @@ fn pose(skeleton: &mut Skeleton, leaf: &LeafNow<'_>, root: Pose, stream: &mut St
     let sag: Vec<f32> = (base..along.len() - 1)
         .map(|k| {
             let s = along[k] / leaf.blade;
-            let moment: f32 = (0..12)
-                .map(|i| (i as f32 + 0.5) / 12.0)
-                .filter(|t| *t > s)
-                .map(|t| shape(t) * (t - s))
-                .sum();
+            let moment: f32 =
+                (0..12).map(|i| (i as f32 + 0.5) / 12.0).filter(|t| *t > s).map(|t| shape(t) * (t - s)).sum();
             moment / (1.0 - 0.75 * s).powi(3)
         })
         .collect();
@@ -146,9 +158,7 @@ fn pose(skeleton: &mut Skeleton, leaf: &LeafNow<'_>, root: Pose, stream: &mut St
     }
     // The sides hang a little where the blade is level, and each is its own.
     let hang = 0.12 * leaf.bend * elevation.cos();
-    skeleton.bend_branches(|_, _| {
-        (wobble * stream.normal() as f32, 1.5 * wobble * stream.normal() as f32 - hang)
-    });
+    skeleton.bend_branches(|_, _| (wobble * stream.normal() as f32, 1.5 * wobble * stream.normal() as f32 - hang));
 }
 
 fn relief(leaf: &LeafNow<'_>, stream: &mut Stream) -> Relief {
@@ -219,4 +229,3 @@ fn stalk(leaf: &LeafNow<'_>, skeleton: &Skeleton, relief: &Relief, lower: Lower,
     tube::sweep(&mut rest, &rings, SIDES, |p| skeleton.weights_on_chain(p.y));
     rest
 }
-
