@@ -17,7 +17,7 @@ use std::f32::consts::FRAC_PI_2;
 const SIDES: u32 = 9;
 /// Shortest cell of a blade's mesh, metres: about what four pixels of a field camera see.
 const CELL: f32 = 0.9e-3;
-/// A chain never comes nearer to the soil than this, metres: a leaf that would, lies on it.
+/// A chain never comes nearer to the soil than this, metres: a leaf that would, lies on it. A low crown halves it.
 const LYING: f32 = 0.003;
 
 /// Where a leaf stands on its axis.
@@ -136,6 +136,7 @@ fn pose(skeleton: &mut Skeleton, leaf: &LeafNow<'_>, root: Pose, stream: &mut St
         .collect();
     let total: f32 = sag.iter().sum::<f32>().max(1e-6);
     let mut height = root.origin.z;
+    let lying = LYING.min(0.5 * height);
     let mut elevation = root.rotation.col(0).z.clamp(-1.0, 1.0).asin();
     for k in 0..along.len() - 1 {
         let (designed, load) = if k < base {
@@ -148,7 +149,7 @@ fn pose(skeleton: &mut Skeleton, leaf: &LeafNow<'_>, root: Pose, stream: &mut St
         // A young stalk's base is held by its neighbours.
         bend += wobble * stream.normal() as f32 * if k == 0 { 0.4 } else { 1.0 };
         let link = along[k + 1] - along[k];
-        let lowest = ((LYING - height) / link.max(1e-6)).clamp(-1.0, 0.9).asin();
+        let lowest = ((lying - height) / link.max(1e-6)).clamp(-1.0, 0.2).asin();
         if k > 0 || lowest < 0.0 {
             bend = bend.max(lowest - elevation);
         }
@@ -205,6 +206,8 @@ fn stalk(leaf: &LeafNow<'_>, skeleton: &Skeleton, relief: &Relief, lower: Lower,
                     // The base widens over its first sixth to clasp the stem.
                     let flare = lerp(leaf.kind.stalk_base.f32(), 1.0, s.powf(0.7)) + 0.25 * smoothstep(0.2, 0.0, s);
                     let wide = tip_radius * flare;
+                    // The channel runs out into the midrib.
+                    let channel = channel * lerp(1.0, 0.5, smoothstep(0.75, 1.0, s));
                     rings.push(ring(y, (wide, wide * lerp(0.7, 0.85, s)), channel, 0.0));
                 }
                 Lower::Sheath(radius) => {
@@ -219,8 +222,9 @@ fn stalk(leaf: &LeafNow<'_>, skeleton: &Skeleton, relief: &Relief, lower: Lower,
     let reach = leaf.kind.rib.f32() * leaf.blade;
     if reach > 0.0 {
         let wide = if let Lower::Sheath(radius) = lower { 0.7 * radius } else { tip_radius };
-        for i in 1..=8 {
-            let s = i as f32 / 8.0;
+        // Without a stalk the rib begins at the stem.
+        for i in u8::from(leaf.stalk > 0.0)..=8 {
+            let s = f32::from(i) / 8.0;
             let r = wide * lerp(0.8, 0.06, s.sqrt());
             // Sunk so that the blade lies on its flat top.
             rings.push(ring(s * reach, (r, r), -0.3, 0.15 * r));
