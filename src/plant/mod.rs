@@ -1,1 +1,261 @@
-//! To be furnished.
+//! Plants, grown from a species page: botany without optics.
+//!
+//! A [`PlantDesc`] says how a species looks at its stages; [`grow`] makes one [`Plant`] of it, for an age and a stream of
+//! random numbers. The same stream gives the same plant at every age, larger or smaller. Leaf i draws only from its own
+//! stream, so nothing that happens to one leaf moves another.
+//!
+//! | file | idea |
+//! |---|---|
+//! | `stage` | stages and layers; what lies between two stages |
+//! | `kind` | what all leaves of a kind share |
+//! | `skeleton` | the leaf's kinematic tree, Denavit–Hartenberg |
+//! | `blade` | outline → flat rest mesh with skin weights |
+//! | `skin` | relief, linear blend skinning |
+//! | `tube`, `axis`, `leaf` | stems and stalks; the growth axis; one whole leaf |
+//! | `rosette`, `whorl`, `erect`, `dissected`, `tuft` | growth forms |
+//!
+//! A new growth form is a file with a `grow(&Growth) -> Vec<Organ>` and one line in [`Form`].
+
+mod axis;
+pub mod blade;
+mod dissected;
+mod erect;
+mod kind;
+mod leaf;
+mod organ;
+mod rosette;
+pub mod skeleton;
+pub mod skin;
+mod stage;
+mod tube;
+mod tuft;
+mod whorl;
+
+pub use kind::{LeafKind, Shape};
+pub use organ::{Organ, OrganKind};
+pub use stage::{BUD, LayerDesc, StageDesc};
+
+use crate::sampling::Stream;
+use crate::sampling::vary::{self, Finite, Positive, Vary};
+use serde::{Deserialize, Deserializer, Serialize};
+use std::collections::BTreeMap;
+
+macro_rules! forms {
+    ($($(#[$doc:meta])* $name:ident => $file:ident,)*) => {
+        /// How a plant stands.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+        pub enum Form { $($(#[$doc])* $name,)* }
+
+        impl Form {
+            fn grow(self, growth: &stage::Growth<'_>) -> Vec<Organ> {
+                match self { $(Self::$name => $file::grow(growth),)* }
+            }
+        }
+    };
+}
+
+forms! {
+    /// All leaves on one crown at the soil.
+    Rosette => rosette,
+    /// Whorls of leaves without stalks on a square stem.
+    Whorl => whorl,
+    /// Stalked leaves on an upright stem.
+    Erect => erect,
+    /// A rosette of finely divided leaves.
+    Dissected => dissected,
+    /// A grass: sheaths, arching blades in two ranks, side shoots.
+    Tuft => tuft,
+}
+
+/// A species' plant, as it is written.
+///
+/// ```
+/// let plant: furrow::plant::PlantDesc = ron::from_str(r#"(
+///     form: Rosette,
+///     kinds: {
+///         "cotyledon": (shape: Sheet(outline: Power(a: 0.45, b: 0.45)), organ: Cotyledon),
+///         "leaf": (shape: Sheet(outline: Power(a: 0.55, b: 1.0)), wave: 0.015),
+///     },
+///     stages: [
+///         (bbch: 10, days: 4, hypocotyl_mm: 10, stem_mm: 1.5, layers: [
+///             (kind: "cotyledon", leaves: 2, blade_mm: 20, width_mm: 7, stalk_mm: 4, angle_deg: 70),
+///         ]),
+///         (bbch: 12, days: 15, hypocotyl_mm: 10, stem_mm: 2, layers: [
+///             (kind: "cotyledon", leaves: 2, blade_mm: 24, width_mm: 8, stalk_mm: 5, angle_deg: 80),
+///             (kind: "leaf", leaves: 2, alpha: 0.5, blade_mm: Uniform(30, 38), width_mm: 20, stalk_mm: 12,
+///              angle_deg: Uniform(40, 55), bend_deg: 20, fold_deg: 25),
+///         ]),
+///     ],
+/// )"#).unwrap();
+/// assert!(ron::from_str::<furrow::plant::PlantDesc>("(form: Rosette, kinds: {}, stages: [])").is_err());
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PlantDesc {
+    /// How it stands.
+    pub form: Form,
+    /// Its kinds of leaves. A kind's name is also its blades' key in the table of skins.
+    pub kinds: BTreeMap<String, LeafKind>,
+    /// Its stages, youngest first.
+    pub stages: Vec<StageDesc>,
+    /// Factor on all sizes of one plant.
+    pub vigour: Vary<Positive>,
+    /// Factor on the sizes of one leaf, the paper's r.
+    pub size: Vary<Positive>,
+    /// How far a leaf strays from its place in the layer.
+    pub azimuth_deg: Vary<Finite>,
+    /// How far the axis leans.
+    pub lean_deg: Vary<Finite>,
+    /// Skin of the hypocotyl; empty: `"stalk"`.
+    pub hypocotyl_skin: String,
+    /// Skin of the stem; empty: `"stalk"`.
+    pub stem_skin: String,
+}
+
+/// The same fields, before they were checked against each other.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename = "PlantDesc")]
+struct Written {
+    form: Form,
+    kinds: BTreeMap<String, LeafKind>,
+    stages: Vec<StageDesc>,
+    #[serde(default = "vigour")]
+    vigour: Vary<Positive>,
+    #[serde(default = "size")]
+    size: Vary<Positive>,
+    #[serde(default = "azimuth")]
+    azimuth_deg: Vary<Finite>,
+    #[serde(default = "lean")]
+    lean_deg: Vary<Finite>,
+    #[serde(default)]
+    hypocotyl_skin: String,
+    #[serde(default)]
+    stem_skin: String,
+}
+
+fn vigour() -> Vary<Positive> {
+    Vary::uniform(0.94, 1.06)
+}
+
+fn size() -> Vary<Positive> {
+    Vary::uniform(0.93, 1.07)
+}
+
+fn azimuth() -> Vary<Finite> {
+    Vary::uniform(-10.0, 10.0)
+}
+
+fn lean() -> Vary<Finite> {
+    Vary::uniform(0.0, 5.0)
+}
+
+impl<'de> Deserialize<'de> for PlantDesc {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        vary::from_raw(deserializer, |raw| {
+            let w: Written = vary::parse_in(raw)?;
+            let desc = Self {
+                form: w.form,
+                kinds: w.kinds,
+                stages: w.stages,
+                vigour: w.vigour,
+                size: w.size,
+                azimuth_deg: w.azimuth_deg,
+                lean_deg: w.lean_deg,
+                hypocotyl_skin: w.hypocotyl_skin,
+                stem_skin: w.stem_skin,
+            };
+            desc.check().map_err(|message| vary::whole(raw, message))?;
+            Ok(desc)
+        })
+    }
+}
+
+impl PlantDesc {
+    /// What does not fit together, in words. A page that was read has passed this.
+    pub fn check(&self) -> Result<(), String> {
+        if self.stages.is_empty() {
+            return Err("a plant needs at least one stage".into());
+        }
+        let kinds = || self.kinds.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
+        for stage in &self.stages {
+            let leaves: f64 = stage.layers.iter().map(|l| l.leaves.get()).sum();
+            if leaves > 1000.0 {
+                return Err(format!("{leaves} leaves at BBCH {}: at most 1000 can be numbered", stage.bbch));
+            }
+            if let Some(layer) = stage.layers.iter().find(|l| !self.kinds.contains_key(&l.kind)) {
+                return Err(format!("no kind of leaf is called \"{}\"; there are: {}", layer.kind, kinds()));
+            }
+        }
+        for pair in self.stages.windows(2) {
+            let [from, to] = pair else { continue };
+            let at = format!("between BBCH {} and {}", from.bbch, to.bbch);
+            if to.bbch <= from.bbch || to.days.get() <= from.days.get() {
+                return Err(format!("{at}: stages must rise in bbch and in days"));
+            }
+            if to.layers.len() < from.layers.len() {
+                return Err(format!("{at}: layers are lost; write blade_mm: 0 for a leaf that is gone"));
+            }
+            if from.layers.iter().zip(&to.layers).any(|(a, b)| a.kind != b.kind || a.leaves != b.leaves) {
+                return Err(format!("{at}: a layer changes its kind or its number of leaves"));
+            }
+        }
+        Ok(())
+    }
+
+    /// The keys that this plant's organs use in the table of skins.
+    pub fn skins(&self) -> Vec<String> {
+        let own = |s: &str| if s.is_empty() { "stalk".to_owned() } else { s.to_owned() };
+        let mut keys = vec![own(&self.hypocotyl_skin), own(&self.stem_skin)];
+        for (name, kind) in &self.kinds {
+            keys.push(if kind.skin.is_empty() { name.clone() } else { kind.skin.clone() });
+            keys.push(kind.stalk_skin.clone());
+        }
+        keys.sort();
+        keys.dedup();
+        keys
+    }
+
+    /// Days after emergence of the first and the last stage.
+    pub fn days(&self) -> (f32, f32) {
+        let day = |s: Option<&StageDesc>| s.map_or(0.0, |s| s.days.f32());
+        (day(self.stages.first()), day(self.stages.last()))
+    }
+}
+
+/// How old a plant is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Stage {
+    /// Days after emergence. Outside the page's stages: the nearest of them.
+    Age(f32),
+    /// BBCH code. Between two stages of the page: their blend.
+    Bbch(u32),
+}
+
+/// One plant: its organs in plant coordinates (metres, growth axis +z, origin where the stem meets the soil).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plant {
+    /// Its organs: axis first, then leaf by leaf.
+    pub organs: Vec<Organ>,
+    /// The stage it has reached.
+    pub bbch: u32,
+    /// Days after emergence.
+    pub age_days: f32,
+    /// Its highest point, metres.
+    pub height: f32,
+    /// Radius of the upright cylinder about the origin that holds it, metres.
+    pub radius: f32,
+}
+
+/// Grows one plant.
+pub fn grow(desc: &PlantDesc, stage: Stage, stream: &Stream) -> Plant {
+    let Some(growth) = stage::growth(desc, stage, stream) else {
+        return Plant { organs: Vec::new(), bbch: 0, age_days: 0.0, height: 0.0, radius: 0.0 };
+    };
+    let organs = desc.form.grow(&growth);
+    let corners = || organs.iter().flat_map(|o| &o.mesh.positions);
+    let height = corners().fold(0.0_f32, |h, p| h.max(p.z));
+    let radius = corners().fold(0.0_f32, |r, p| r.max(p.x.hypot(p.y)));
+    Plant { organs, bbch: growth.bbch, age_days: growth.age_days, height, radius }
+}
+
+#[cfg(test)]
+mod tests;

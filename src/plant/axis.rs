@@ -1,0 +1,115 @@
+//! The growth axis g: the hypocotyl, the stem above it, and the seats of the leaves.
+
+use super::leaf::Seat;
+use super::organ::{Organ, OrganKind};
+use super::stage::{Growth, LeafNow};
+use super::tube::{self, Profile, Ring};
+use crate::math::{Frame, Vec3, direction, lerp, vec3};
+use crate::sampling::Purpose;
+use std::f32::consts::FRAC_PI_2;
+
+/// How far everything that stands in the soil continues below it, metres.
+pub(super) const ROOT: f32 = 0.008;
+
+/// How a form builds its axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Section {
+    /// Cross-section of the stem above the seed leaves.
+    pub(super) profile: Profile,
+    /// Width of the stem's top over that of its base.
+    pub(super) taper: f32,
+    /// How far out leaves are seated: oldest and youngest layer, of the stem's radius.
+    pub(super) seat: (f32, f32),
+}
+
+/// The axis of a plant.
+pub(super) struct Axis {
+    /// One point a layer, and the axis' direction there.
+    nodes: Vec<(Vec3, Vec3)>,
+    radii: Vec<f32>,
+    section: Section,
+}
+
+impl Axis {
+    /// Where a leaf stands: inside the stem's skin, on its own side.
+    pub(super) fn seat(&self, leaf: &LeafNow<'_>) -> Seat {
+        let last = self.nodes.len().saturating_sub(1);
+        let (point, axis) = self.nodes[leaf.layer.min(last)];
+        let out = direction(FRAC_PI_2, leaf.azimuth);
+        let share = leaf.layer as f32 / last.max(1) as f32;
+        let r = self.radii[leaf.layer.min(last)] * lerp(self.section.seat.0, self.section.seat.1, share);
+        Seat { point: point + (out - axis * out.dot(axis)) * r, axis }
+    }
+}
+
+/// Grows hypocotyl and stem.
+pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Section) -> Axis {
+    let mut stream = growth.stream.child(Purpose::Plant, 1);
+    let lean = growth.desc.lean_deg.draw32(&mut stream).to_radians();
+    let towards = stream.range32(0.0, std::f32::consts::TAU);
+    let mut direction_now = direction(lean, towards);
+    let radius = (0.5 * growth.stem).max(2e-4);
+    let base = direction_now * growth.hypocotyl;
+    let top_rise = growth.rise.last().copied().unwrap_or(0.0);
+    let (mut nodes, mut radii) = (Vec::new(), Vec::new());
+    let (mut point, mut below) = (base, 0.0);
+    for rise in &growth.rise {
+        point += direction_now * (rise - below);
+        let share = if top_rise > 0.0 { rise / top_rise } else { 0.0 };
+        nodes.push((point, direction_now));
+        radii.push(radius * lerp(1.0, section.taper, share));
+        // Each internode wanders a little and turns back to the light.
+        let wander = vec3(stream.normal() as f32, stream.normal() as f32, 0.0) * if *rise > below { 0.06 } else { 0.0 };
+        direction_now = (direction_now + wander + Vec3::Z * 0.08).normalize_or(Vec3::Z);
+        below = *rise;
+    }
+    if nodes.is_empty() {
+        nodes.push((base, direction_now));
+        radii.push(radius);
+    }
+    let skin = |own: &str| if own.is_empty() { "stalk".to_owned() } else { own.to_owned() };
+    let foot = -ROOT / nodes[0].1.z.max(0.3);
+    let mut rings: Vec<Ring> = [foot, 0.0, growth.hypocotyl * 0.5, growth.hypocotyl]
+        .into_iter()
+        .map(|h| ring(nodes[0].1 * h, nodes[0].1, radius, Profile::Channelled(1.0)))
+        .collect();
+    let stemless = top_rise < 0.5 * radius;
+    if stemless {
+        dome(&mut rings, nodes[0].1, radius);
+    }
+    let mesh = tube::rigid(&rings, 10);
+    organs.push(Organ { kind: OrganKind::Hypocotyl, leaf: 0, skin: skin(&growth.desc.hypocotyl_skin), mesh });
+    if !stemless {
+        let mut rings: Vec<Ring> = Vec::with_capacity(2 * nodes.len() + 4);
+        for (i, ((p, d), r)) in nodes.iter().zip(&radii).enumerate() {
+            if i > 0 && p.distance(nodes[i - 1].0) < 1e-5 {
+                continue;
+            }
+            // Nodes are a little thicker than the stem between them.
+            rings.push(ring(*p - *d * (1.2 * r), *d, *r, section.profile));
+            rings.push(ring(*p, *d, 1.12 * r, section.profile));
+        }
+        // The first ring sinks into the hypocotyl, so the joint shows no gap.
+        if let (Some((_, d)), Some(r)) = (nodes.last(), radii.last()) {
+            dome(&mut rings, *d, *r);
+        }
+        let mesh = tube::rigid(&rings, 12);
+        organs.push(Organ { kind: OrganKind::Stem, leaf: 0, skin: skin(&growth.desc.stem_skin), mesh });
+    }
+    Axis { nodes, radii, section }
+}
+
+fn ring(centre: Vec3, along: Vec3, radius: f32, profile: Profile) -> Ring {
+    let frame = Frame::with_tangent(along, Vec3::X);
+    // up × right must point along the tube.
+    Ring { centre, right: frame.x, up: -frame.y, radii: (radius, radius), profile }
+}
+
+/// Closes the last ring by a half sphere.
+fn dome(rings: &mut Vec<Ring>, along: Vec3, radius: f32) {
+    let Some(last) = rings.last().copied() else { return };
+    for (rise, wide) in [(0.5, 0.87), (0.87, 0.5), (1.0, 0.02)] {
+        let wide = radius * wide;
+        rings.push(Ring { centre: last.centre + along * (radius * rise), radii: (wide, wide), ..last });
+    }
+}

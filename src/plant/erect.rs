@@ -1,0 +1,20 @@
+//! Upright stems with stalked leaves, first in crossed pairs, then in a spiral: goosefoot.
+
+use super::axis::{self, Section};
+use super::leaf::{self, Lower};
+use super::organ::Organ;
+use super::stage::Growth;
+use super::tube::Profile;
+
+/// Round, tapering.
+const SECTION: Section = Section { profile: Profile::Channelled(1.0), taper: 0.55, seat: (0.7, 0.5) };
+
+/// Grows an upright plant.
+pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {
+    let mut organs = Vec::with_capacity(2 + 2 * growth.leaves.len());
+    let axis = axis::grow(&mut organs, growth, SECTION);
+    for leaf in &growth.leaves {
+        leaf::grow(&mut organs, leaf, axis.seat(leaf), Lower::Petiole);
+    }
+    organs
+}

@@ -1,0 +1,222 @@
+//! One leaf: its skeleton takes a posture, and blade and stalk are bent by it.
+
+use super::blade::{self, Rest};
+use super::dissected;
+use super::kind::Shape;
+use super::organ::{Organ, OrganKind};
+use super::skeleton::{Measures, Pose, Skeleton};
+use super::skin::{self, Relief};
+use super::stage::LeafNow;
+use super::tube::{self, Profile, Ring};
+use crate::geometry::outline::Outline;
+use crate::math::{Mat3, Vec3, direction, lerp, smoothstep, vec3};
+use crate::sampling::Stream;
+use std::f32::consts::FRAC_PI_2;
+
+/// Corners round a stalk.
+const SIDES: u32 = 9;
+/// A chain never comes nearer to the soil than this, metres: a leaf that would, lies on it.
+const LYING: f32 = 0.003;
+
+/// Where a leaf stands on its axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seat {
+    /// Where the stalk begins, metres.
+    pub(super) point: Vec3,
+    /// The growth axis there, unit.
+    pub(super) axis: Vec3,
+}
+
+/// What the lower part of a leaf is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Lower {
+    /// A stalk.
+    Petiole,
+    /// A tube of this radius round the stem, metres.
+    Sheath(f32),
+}
+
+/// Adds a leaf's organs.
+pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lower: Lower) {
+    // One stream for the posture, one for the relief: what the relief draws never moves the posture.
+    let mut stream = leaf.stream.child(crate::sampling::Purpose::Leaf, 100);
+    let mut skeleton = Skeleton::new(&measures(leaf));
+    let root = stand(leaf, seat, &mut stream);
+    pose(&mut skeleton, leaf, root, &mut stream);
+    let motions = skeleton.motions(root);
+    let mut stream = leaf.stream.child(crate::sampling::Purpose::Leaf, 101);
+    let relief = relief(leaf, &mut stream);
+    let rest = match &leaf.kind.shape {
+        Shape::Sheet { outline } => {
+            let (rows, columns) = (leaf.kind.rows.get() as usize, leaf.kind.columns.get() as usize);
+            let mut sheet = blade::sheet(*outline, leaf.width, rows, columns, &skeleton);
+            relief.apply(&mut sheet, leaf.blade);
+            sheet.rest
+        }
+        Shape::Pinnate { pairs, lobes, segment_mm } => {
+            let counts = (pairs.draw(&mut stream) as usize, lobes.draw(&mut stream) as usize);
+            let segment = segment_mm.draw32(&mut stream) * 1e-3;
+            dissected::blade(counts, segment, leaf.width, &skeleton, &mut stream)
+        }
+    };
+    let skin = if leaf.kind.skin.is_empty() { leaf.kind_name } else { &leaf.kind.skin };
+    let kind = leaf.kind.organ;
+    organs.push(Organ { kind, leaf: leaf.number, skin: skin.to_owned(), mesh: skin::skin(rest, &motions) });
+    let rest = stalk(leaf, &skeleton, &relief, lower, &mut stream);
+    if rest.triangles.is_empty() {
+        return;
+    }
+    let mut mesh = skin::skin(rest, &motions);
+    tube::close_seams(&mut mesh, SIDES, 0);
+    let kind = if lower == Lower::Petiole { OrganKind::Petiole } else { OrganKind::Sheath };
+    organs.push(Organ { kind, leaf: leaf.number, skin: leaf.kind.stalk_skin.clone(), mesh });
+}
+
+fn measures(leaf: &LeafNow<'_>) -> Measures {
+    let n = leaf.kind.joints.get() as usize;
+    let veins: Vec<f32> = (1..=n).map(|k| k as f32 / (n as f32 + 1.0)).collect();
+    let angle = leaf.kind.vein_angle_deg.f32().to_radians();
+    let secondaries = match leaf.kind.shape {
+        Shape::Sheet { outline } if (0.1..1.5).contains(&angle) => {
+            Some((angle, veins.iter().map(|t| (outline.half_width(*t) * leaf.width).max(1e-5)).collect()))
+        }
+        _ => None,
+    };
+    Measures { stalk: leaf.stalk, stalk_joints: if leaf.stalk > 0.0 { 4 } else { 1 }, length: leaf.blade, veins, secondaries }
+}
+
+/// The frame of ST1 in plant coordinates: vein along the stalk, y out of the upper side, which faces the axis.
+fn stand(leaf: &LeafNow<'_>, seat: Seat, stream: &mut Stream) -> Pose {
+    let out = direction(FRAC_PI_2, leaf.azimuth);
+    let out = (out - seat.axis * out.dot(seat.axis)).normalize_or(Vec3::X);
+    let (sin, cos) = leaf.angle.sin_cos();
+    let vein = seat.axis * cos + out * sin;
+    let up = seat.axis * sin - out * cos;
+    let roll = leaf.kind.roll_deg.draw32(stream).to_radians();
+    let rotation = Mat3::from_cols(vein, up, vein.cross(up)) * Mat3::from_rotation_x(roll);
+    Pose { rotation, origin: seat.point }
+}
+
+/// Bends the joints: the angle between stalk and blade, gravity, chance, and the soil below.
+///
+/// Gravity: the moment of what lies beyond joint k is Σ mⱼ·(sⱼ − sₖ)·cos φ, φ the elevation there; the midrib's stiffness
+/// falls towards the tip as (1 − 0.75 s)³. Their ratio is scaled so that a blade held level bends by `bend` in all, and is
+/// added to the joint's angle; so are the random bends.
+fn pose(skeleton: &mut Skeleton, leaf: &LeafNow<'_>, root: Pose, stream: &mut Stream) {
+    let wobble = leaf.kind.wobble_deg.f32().to_radians();
+    let stalk_bend = leaf.kind.stalk_bend_deg.draw32(stream).to_radians();
+    let base = skeleton.base();
+    let along: Vec<f32> = skeleton.along().to_vec();
+    let shape = |t: f32| match leaf.kind.shape {
+        Shape::Sheet { outline: outline @ Outline::Power { .. } } => outline.half_width(t),
+        _ => 0.25,
+    };
+    let sag: Vec<f32> = (base..along.len() - 1)
+        .map(|k| {
+            let s = along[k] / leaf.blade;
+            let moment: f32 = (0..12)
+                .map(|i| (i as f32 + 0.5) / 12.0)
+                .filter(|t| *t > s)
+                .map(|t| shape(t) * (t - s))
+                .sum();
+            moment / (1.0 - 0.75 * s).powi(3)
+        })
+        .collect();
+    let total: f32 = sag.iter().sum::<f32>().max(1e-6);
+    let mut height = root.origin.z;
+    let mut elevation = root.rotation.col(0).z.clamp(-1.0, 1.0).asin();
+    for k in 0..along.len() - 1 {
+        let (designed, load) = if k < base {
+            (0.0, stalk_bend / base as f32)
+        } else {
+            let pitch = if k == base { -leaf.pitch } else { 0.0 };
+            (pitch, leaf.bend * sag[k - base] / total)
+        };
+        let mut bend = designed - load * (elevation + designed).cos().max(0.0);
+        // A young stalk's base is held by its neighbours.
+        bend += wobble * stream.normal() as f32 * if k == 0 { 0.4 } else { 1.0 };
+        let link = along[k + 1] - along[k];
+        let lowest = ((LYING - height) / link.max(1e-6)).clamp(-1.0, 0.9).asin();
+        if k > 0 || lowest < 0.0 {
+            bend = bend.max(lowest - elevation);
+        }
+        elevation += bend;
+        height += link * elevation.sin();
+        skeleton.joints[k].bend = bend;
+    }
+    // The sides hang a little where the blade is level, and each is its own.
+    let hang = 0.12 * leaf.bend * elevation.cos();
+    skeleton.bend_branches(|_, _| {
+        (wobble * stream.normal() as f32, 1.5 * wobble * stream.normal() as f32 - hang)
+    });
+}
+
+fn relief(leaf: &LeafNow<'_>, stream: &mut Stream) -> Relief {
+    let kind = leaf.kind;
+    let angle = kind.vein_angle_deg.f32().to_radians();
+    Relief {
+        fold: leaf.fold,
+        fold_tip: 0.5 * leaf.fold,
+        curl: kind.curl_deg.draw32(stream).to_radians(),
+        wave: kind.wave.draw32(stream),
+        period: kind.wave_period.draw32(stream),
+        quilt: kind.quilt.draw32(stream),
+        pairs: kind.vein_pairs.f32(),
+        slant: if angle > 0.1 { angle.tan().recip() } else { 0.0 },
+        asymmetry: kind.asymmetry.draw32(stream),
+        sway: kind.sway.draw32(stream),
+        twist: kind.twist_deg.draw32(stream).to_radians(),
+        seed: stream.seed32(),
+    }
+}
+
+/// The stalk in the flat leaf's coordinates, and the midrib that it becomes under the blade.
+fn stalk(leaf: &LeafNow<'_>, skeleton: &Skeleton, relief: &Relief, lower: Lower, stream: &mut Stream) -> Rest {
+    let mut rest = Rest::default();
+    if leaf.stalk <= 0.0 && leaf.kind.rib.get() == 0.0 {
+        return rest;
+    }
+    let tip_radius = 0.5 * leaf.kind.stalk_width.f32() * leaf.blade;
+    let channel = -leaf.kind.channel.draw32(stream).clamp(-1.0, 0.9);
+    let mut rings = Vec::with_capacity(20);
+    let ring = |y: f32, radii: (f32, f32), top: f32, sink: f32| Ring {
+        centre: relief.carry(vec3(0.0, y, -sink), leaf.blade),
+        right: Vec3::X,
+        up: Vec3::Z,
+        radii,
+        profile: Profile::Channelled(top),
+    };
+    if leaf.stalk > 0.0 {
+        for i in 0..=10 {
+            let s = i as f32 / 10.0;
+            let y = -leaf.stalk * (1.0 - s);
+            match lower {
+                Lower::Petiole => {
+                    // The base widens over its first sixth to clasp the stem.
+                    let flare = lerp(leaf.kind.stalk_base.f32(), 1.0, s.powf(0.7)) + 0.25 * smoothstep(0.2, 0.0, s);
+                    let wide = tip_radius * flare;
+                    rings.push(ring(y, (wide, wide * lerp(0.7, 0.85, s)), channel, 0.0));
+                }
+                Lower::Sheath(radius) => {
+                    // The sheath opens towards its blade.
+                    let open = smoothstep(0.75, 1.0, s);
+                    let r = radius * lerp(1.0, 0.9, s);
+                    rings.push(ring(y, (r * (1.0 + 0.2 * open), r), lerp(1.0, -0.4, open), 0.0));
+                }
+            }
+        }
+    }
+    let reach = leaf.kind.rib.f32() * leaf.blade;
+    if reach > 0.0 {
+        let wide = if let Lower::Sheath(radius) = lower { 0.7 * radius } else { tip_radius };
+        for i in 1..=8 {
+            let s = i as f32 / 8.0;
+            let r = wide * lerp(0.8, 0.06, s.sqrt());
+            // Sunk so that the blade lies on its flat top.
+            rings.push(ring(s * reach, (r, r), -0.3, 0.15 * r));
+        }
+    }
+    tube::sweep(&mut rest, &rings, SIDES, |p| skeleton.weights_on_chain(p.y));
+    rest
+}
+

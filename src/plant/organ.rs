@@ -1,0 +1,33 @@
+//! The words of botany: what a plant is made of. One organ is one geometry of the scene, so it is also the finest label.
+
+use crate::geometry::Mesh;
+
+/// What an organ is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+pub enum OrganKind {
+    /// The flat part of a true leaf.
+    Blade,
+    /// The stalk of a leaf, with the raised midrib that continues it under the blade.
+    Petiole,
+    /// The flat part of a seed leaf.
+    Cotyledon,
+    /// The stem below the seed leaves, with the crown that a rosette carries on it.
+    Hypocotyl,
+    /// The stem above the seed leaves.
+    Stem,
+    /// The lower part of a grass leaf, rolled round the stem.
+    Sheath,
+}
+
+/// One organ of one plant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Organ {
+    /// What it is.
+    pub kind: OrganKind,
+    /// The leaf it belongs to, counted from 1 in order of appearance, seed leaves first; 0 for stem and hypocotyl.
+    pub leaf: u16,
+    /// Its key in the species page's table of skins.
+    pub skin: String,
+    /// Its shape in plant coordinates: metres, growth axis +z, origin where the stem meets the soil.
+    pub mesh: Mesh,
+}

@@ -1,0 +1,237 @@
+//! Growth stages as they are written, and what lies between two of them.
+//!
+//! A plant is a growth axis with layers of leaves: a layer has `leaves` = N_l leaves, the i-th at azimuth
+//! π(2i/N_l + α). N_l, the number of layers and the sizes belong to species and stage; α and the factor on the sizes are
+//! random. Source: Di Cicco et al. 2017, "Automatic model based dataset generation for fast and accurate crop and weeds
+//! detection", IROS, §III-B. Stages are numbered by the BBCH scale (Meier 2001, "Growth stages of mono- and
+//! dicotyledonous plants").
+//!
+//! Between two stages every number is blended by age. A layer that only the later stage has grows from nothing, upright
+//! and folded like the bud that it is; a leaf shorter than [`BUD`] is still hidden and not there.
+
+use super::kind::LeafKind;
+use super::{PlantDesc, Stage};
+use crate::math::lerp;
+use crate::sampling::vary::{Bound, Finite, NonNegative, Num, PositiveCount, Vary};
+use crate::sampling::{Purpose, Stream};
+use serde::{Deserialize, Serialize};
+use std::f32::consts::PI;
+
+/// Blades shorter than this are hidden in the bud, metres.
+pub const BUD: f32 = 0.002;
+
+/// One layer of leaves at one stage.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LayerDesc {
+    /// Which kind of leaf, a key of the plant's `kinds`.
+    pub kind: String,
+    /// N_l: leaves in the layer.
+    #[serde(default = "one")]
+    pub leaves: Num<PositiveCount>,
+    /// α in half turns.
+    #[serde(default = "vary::<Finite>")]
+    pub alpha: Vary<Finite>,
+    /// Length of the blade; 0 once the leaf is gone.
+    pub blade_mm: Vary<NonNegative>,
+    /// Width of the blade.
+    pub width_mm: Vary<NonNegative>,
+    /// Length of the stalk; of a grass: of the sheath.
+    #[serde(default = "vary::<NonNegative>")]
+    pub stalk_mm: Vary<NonNegative>,
+    /// Angle between growth axis and stalk at its base.
+    pub angle_deg: Vary<NonNegative>,
+    /// Angle between stalk and blade, positive outward and down.
+    #[serde(default = "vary::<Finite>")]
+    pub pitch_deg: Vary<Finite>,
+    /// How far gravity bends the blade from base to tip when it is held level.
+    #[serde(default = "vary::<Finite>")]
+    pub bend_deg: Vary<Finite>,
+    /// Angle by which each half rises from the midrib at the base; the tip keeps half of it.
+    #[serde(default = "vary::<Finite>")]
+    pub fold_deg: Vary<Finite>,
+    /// Stem between the layer below and this one.
+    #[serde(default = "vary::<NonNegative>")]
+    pub internode_mm: Vary<NonNegative>,
+}
+
+/// One stage.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StageDesc {
+    /// BBCH code.
+    pub bbch: u32,
+    /// Days after emergence, the middle of the stage.
+    pub days: Num<NonNegative>,
+    /// Height of the first layer above the soil.
+    pub hypocotyl_mm: Vary<NonNegative>,
+    /// Width of the stem at the soil.
+    pub stem_mm: Vary<NonNegative>,
+    /// Side shoots, each a smaller copy of the main one.
+    #[serde(default = "vary::<NonNegative>")]
+    pub tillers: Vary<NonNegative>,
+    /// Layers from the oldest to the youngest, seed leaves first. A later stage may only add layers at the end.
+    pub layers: Vec<LayerDesc>,
+}
+
+fn one() -> Num<PositiveCount> {
+    Num::new(1.0)
+}
+
+fn vary<B: Bound>() -> Vary<B> {
+    Vary::fixed(0.0)
+}
+
+/// One leaf as it is today. Metres and radians.
+#[derive(Clone, Debug)]
+pub(super) struct LeafNow<'a> {
+    /// From 1.
+    pub(super) number: u16,
+    /// From 0.
+    pub(super) layer: usize,
+    pub(super) kind_name: &'a str,
+    pub(super) kind: &'a LeafKind,
+    /// Clockwise from north.
+    pub(super) azimuth: f32,
+    pub(super) blade: f32,
+    pub(super) width: f32,
+    pub(super) stalk: f32,
+    pub(super) angle: f32,
+    pub(super) pitch: f32,
+    pub(super) bend: f32,
+    pub(super) fold: f32,
+    /// This leaf's own numbers.
+    pub(super) stream: Stream,
+}
+
+/// The plant as it is today, before anything has a shape.
+#[derive(Clone, Debug)]
+pub(super) struct Growth<'a> {
+    pub(super) desc: &'a PlantDesc,
+    pub(super) bbch: u32,
+    pub(super) age_days: f32,
+    /// Height of the first layer, metres.
+    pub(super) hypocotyl: f32,
+    /// Width of the stem at the soil, metres.
+    pub(super) stem: f32,
+    pub(super) tillers: usize,
+    /// Height of each layer over the first, metres.
+    pub(super) rise: Vec<f32>,
+    pub(super) leaves: Vec<LeafNow<'a>>,
+    /// The plant's own numbers.
+    pub(super) stream: &'a Stream,
+}
+
+/// Two neighbouring stages and the way from the first to the second.
+struct Between<'a> {
+    from: &'a StageDesc,
+    to: &'a StageDesc,
+    u: f32,
+}
+
+impl<'a> Between<'a> {
+    fn find(stages: &'a [StageDesc], stage: Stage) -> Option<Self> {
+        let key = |s: &StageDesc| match stage {
+            Stage::Age(_) => s.days.f32(),
+            Stage::Bbch(_) => s.bbch as f32,
+        };
+        let x = match stage {
+            Stage::Age(days) => days,
+            Stage::Bbch(code) => code as f32,
+        };
+        let after = stages.partition_point(|s| key(s) <= x);
+        let from = stages.get(after.saturating_sub(1))?;
+        let to = stages.get(after).unwrap_or(from);
+        let span = key(to) - key(from);
+        let u = if span > 0.0 { ((x - key(from)) / span).clamp(0.0, 1.0) } else { 0.0 };
+        Some(Self { from, to, u })
+    }
+
+    /// A number on the way: both ends are drawn from the same random numbers, so a plant that is large at one stage is
+    /// large at the next. `absent` stands for a layer that the earlier stage does not have.
+    fn draw<B: Bound, T>(
+        &self,
+        ends: (Option<&T>, &T),
+        absent: Option<f32>,
+        stream: &Stream,
+        slot: u64,
+        pick: impl Fn(&T) -> &Vary<B>,
+    ) -> f32 {
+        let draw = |desc| pick(desc).draw32(&mut stream.child(Purpose::Leaf, slot));
+        let to = draw(ends.1);
+        if self.u == 0.0 && ends.0.is_some_and(|from| std::ptr::eq(from, ends.1)) {
+            return to;
+        }
+        lerp(ends.0.map_or(absent.unwrap_or(to), draw), to, self.u)
+    }
+}
+
+/// What the plant of `stream` looks like at `stage`; `None` without stages.
+pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream) -> Option<Growth<'a>> {
+    const MM: f32 = 1e-3;
+    let between = Between::find(&desc.stages, stage)?;
+    let Between { from, to, u } = between;
+    let whole = (Some(from), to);
+    let own = stream.child(Purpose::Plant, 0);
+    let vigour = desc.vigour.draw32(&mut own.child(Purpose::Plant, 0));
+    let spin = own.child(Purpose::Plant, 1).range32(0.0, 2.0 * PI);
+    let hypocotyl = between.draw(whole, None, &own, 2, |s| &s.hypocotyl_mm) * MM;
+    let stem = between.draw(whole, None, &own, 3, |s| &s.stem_mm) * MM;
+    let tillers = between.draw(whole, None, &own, 4, |s| &s.tillers).round() as usize;
+    let (mut leaves, mut rise, mut height, mut number) = (Vec::new(), Vec::new(), 0.0, 0);
+    for (k, layer) in to.layers.iter().enumerate() {
+        let before = from.layers.get(k);
+        let ends = (before, layer);
+        let shared = own.child(Purpose::Plant, 16 + k as u64);
+        height += between.draw(ends, Some(0.0), &shared, 0, |l| &l.internode_mm) * MM * vigour;
+        rise.push(height);
+        let alpha = between.draw(ends, None, &shared, 1, |l| &l.alpha);
+        let n = layer.leaves.get() as u32;
+        for i in 0..n {
+            number += 1;
+            let mut stream = stream.child(Purpose::Leaf, u64::from(number));
+            let size = desc.size.draw32(&mut stream) * vigour;
+            let jitter = desc.azimuth_deg.draw32(&mut stream).to_radians();
+            let blade = between.draw(ends, Some(0.0), &stream, 1, |l| &l.blade_mm) * MM * size;
+            let Some((name, kind)) = desc.kinds.get_key_value(&layer.kind) else { continue };
+            if blade < BUD {
+                continue;
+            }
+            let grown = before.map_or(u, |_| 1.0);
+            let angle = between.draw(ends, None, &stream, 4, |l| &l.angle_deg).to_radians();
+            let fold = between.draw(ends, None, &stream, 7, |l| &l.fold_deg).to_radians();
+            leaves.push(LeafNow {
+                number,
+                layer: k,
+                kind_name: name,
+                kind,
+                azimuth: spin + PI * (2.0 * i as f32 / n as f32 + alpha) + jitter,
+                blade,
+                width: between.draw(ends, Some(0.0), &stream, 2, |l| &l.width_mm) * MM * size,
+                stalk: between.draw(ends, Some(0.0), &stream, 3, |l| &l.stalk_mm) * MM * size,
+                angle: angle * lerp(0.5, 1.0, grown),
+                pitch: between.draw(ends, None, &stream, 5, |l| &l.pitch_deg).to_radians(),
+                bend: between.draw(ends, Some(0.0), &stream, 6, |l| &l.bend_deg).to_radians(),
+                fold: lerp(fold.max(0.9), fold, grown),
+                stream,
+            });
+        }
+    }
+    Some(Growth {
+        desc,
+        bbch: match stage {
+            Stage::Bbch(code) => code.clamp(from.bbch, to.bbch),
+            Stage::Age(_) => from.bbch,
+        },
+        age_days: match stage {
+            Stage::Age(days) => days,
+            Stage::Bbch(_) => lerp(from.days.f32(), to.days.f32(), u),
+        },
+        hypocotyl,
+        stem,
+        tillers,
+        rise,
+        leaves,
+        stream,
+    })
+}

@@ -1,0 +1,70 @@
+//! Grasses: nested sheaths, each with an arching blade, in two ranks; later side shoots from the same base.
+
+use super::axis::ROOT;
+use super::leaf::{self, Lower, Seat};
+use super::organ::Organ;
+use super::stage::{Growth, LeafNow};
+use crate::math::{Vec3, direction, lerp};
+use crate::sampling::Purpose;
+use std::f32::consts::{FRAC_PI_2, PI};
+
+/// Size of a side shoot over that of the main one.
+const TILLER: (f32, f32) = (0.45, 0.7);
+/// Side shoots stop here, whatever a page asks for.
+const MOST: usize = 24;
+
+/// Grows a tuft.
+pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {
+    let mut organs = Vec::with_capacity(2 * growth.leaves.len() * (1 + growth.tillers.min(MOST)));
+    let mut number = growth.leaves.last().map_or(0, |leaf| leaf.number);
+    let mut stream = growth.stream.child(Purpose::Plant, 1);
+    let lean = growth.desc.lean_deg.draw32(&mut stream).to_radians();
+    let axis = direction(lean, stream.range32(0.0, 2.0 * PI));
+    shoot(&mut organs, growth, axis, Vec3::ZERO, growth.leaves.iter().cloned());
+    for k in 0..growth.tillers.min(MOST) {
+        let mut stream = growth.stream.child(Purpose::Plant, 100 + k as u64);
+        let size = stream.range32(TILLER.0, TILLER.1) * 0.93_f32.powi(k as i32);
+        // A side shoot breaks out of the axil of an older leaf, across the ranks.
+        let towards = growth.leaves.first().map_or(0.0, |l| l.azimuth) + PI * (k % 2) as f32 + stream.range32(-0.7, 0.7);
+        let axis = direction(stream.range32(0.35, 0.75), towards);
+        let base = direction(FRAC_PI_2, towards) * (0.5 * growth.stem);
+        let turn = FRAC_PI_2 + stream.range32(-0.5, 0.5);
+        // Its leaves are as many as the main shoot has, less the oldest, which it had no time for.
+        let leaves: Vec<_> = growth.leaves.iter().skip(1 + growth.leaves.len() / 3).collect();
+        let leaves: Vec<LeafNow<'_>> = leaves
+            .into_iter()
+            .map(|leaf| {
+                number += 1;
+                LeafNow {
+                    number,
+                    azimuth: leaf.azimuth + turn,
+                    blade: leaf.blade * size,
+                    width: leaf.width * size.sqrt(),
+                    stalk: leaf.stalk * size,
+                    stream: growth.stream.child(Purpose::Leaf, u64::from(number)),
+                    ..leaf.clone()
+                }
+            })
+            .collect();
+        shoot(&mut organs, growth, axis, base, leaves.into_iter());
+    }
+    organs
+}
+
+/// One shoot: sheaths one within the other, the outermost the oldest.
+fn shoot<'a>(
+    organs: &mut Vec<Organ>,
+    growth: &Growth<'_>,
+    axis: Vec3,
+    base: Vec3,
+    leaves: impl ExactSizeIterator<Item = LeafNow<'a>>,
+) {
+    let count = leaves.len().max(1) as f32;
+    let foot = ROOT / axis.z.max(0.3);
+    for (k, leaf) in leaves.enumerate() {
+        let radius = 0.5 * growth.stem * lerp(1.0, 0.55, k as f32 / count);
+        // The sheath stands in the soil; its length counts from there up.
+        let leaf = LeafNow { stalk: leaf.stalk + foot, ..leaf };
+        leaf::grow(organs, &leaf, Seat { point: base - axis * foot, axis }, Lower::Sheath(radius));
+    }
+}

@@ -1,0 +1,1 @@
+//! Textures drawn by the program from a recipe.

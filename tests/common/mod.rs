@@ -1,0 +1,4 @@
+//! Shared by the system tests.
+#![allow(dead_code)]
+
+pub mod scenes;
