@@ -28,7 +28,7 @@ pub(super) struct Blend {
 #[derive(Clone, Debug)]
 struct Tile {
     noise: Perlin,
-    share: f32,
+    log_share: f32,
     // Each ground lays its tiles another way round, so that no two show the same clod.
     rotation: Vec2,
     offset: Vec2,
@@ -50,7 +50,7 @@ impl Blend {
                     noise: Perlin::new(s.seed32()),
                     rotation: Vec2::from_angle(s.range32(0.0, std::f32::consts::TAU)) / layer.size_m.f32(),
                     offset: vec2(s.uniform32(), s.uniform32()),
-                    share: layer.share.draw32(&mut s),
+                    log_share: layer.share.draw32(&mut s).ln(),
                     low,
                     relief: high - low,
                     clods: layer.clods.f32(),
@@ -79,11 +79,15 @@ impl Blend {
     }
 
     /// The weights from the layers' noises and their heights (0..1).
+    #[inline]
     pub(super) fn weights(&self, noise: Weights, heights: Weights) -> Weights {
         let mut w = [0.0; MAX_LAYERS];
         let n = self.tiles.len();
-        let score =
-            |i: usize| self.sharpness * (noise[i] + self.height * (heights[i] - 0.5)) + self.tiles[i].share.ln();
+        if n == 1 {
+            w[0] = 1.0;
+            return w;
+        }
+        let score = |i: usize| self.sharpness * (noise[i] + self.height * (heights[i] - 0.5)) + self.tiles[i].log_share;
         let top = (0..n).map(score).fold(f32::MIN, f32::max);
         for (i, w) in w.iter_mut().enumerate().take(n) {
             *w = (score(i) - top).exp();

@@ -12,7 +12,7 @@ use crate::sampling::{Purpose, Stream};
 
 /// How aggregates break.
 pub(super) const CUT: Cut =
-    Cut { planes: (7, 12), distance: (0.62, 0.98), sharpness: (9.0, 18.0), lumps: 0.16, rough: 0.14 };
+    Cut { planes: (6, 10), distance: (0.52, 0.92), sharpness: (12.0, 36.0), lumps: 0.2, rough: 0.2 };
 
 /// Different shapes; each is turned and stretched anew for every clod.
 const SHAPES: usize = 24;
@@ -24,10 +24,16 @@ const GROUPS: usize = 7;
 const AXES: (f32, f32) = (0.77, 0.55);
 
 /// Shortest clod, mm, of each level of detail: a pixel is about 0.25 mm.
-const FROM_MM: [f32; LEVELS] = [0.0, 3.3, 6.5, 12.0, 30.0];
+const FROM_MM: [f32; LEVELS] = [0.0, 4.0, 8.0, 14.0, 30.0];
 
-/// How much brighter a clod is that lies loosely on top, where it dries first, than one half sunk.
-const LOOSE_GAIN: f32 = 0.12;
+/// Logarithm of how much brighter clods are than the moister ground between them (1.1–1.25 when it dries), on average.
+const DRY_GAIN: f32 = 0.13;
+
+/// How much more so a clod is that lies loosely on top than one half sunk.
+const LOOSE_GAIN: f32 = 0.14;
+
+/// Share of the small clods that fall on a larger one and stay there; the others are shaken off.
+const STAY: f32 = 0.2;
 
 /// One clod before it is laid.
 struct Candidate {
@@ -59,13 +65,19 @@ pub fn clods(ground: &Ground, pile: &mut Pile, clear: &[(Vec2, f32)]) -> Vec<(f3
         let sink = sink(clod.mm, s.uniform32());
         let tint = ground.law.tint_sigma * s.normal() as f32 + LOOSE_GAIN * (0.35 - sink) / 0.15;
 
+        let stays = s.uniform32();
+
         let radius = 0.5 * (axes.x + axes.y);
-        let at = if clod.mm < 15.0 { pile.settle(clod.at, radius, 0.75) } else { clod.at };
+        let at = if clod.mm < 15.0 { pile.settle(clod.at, radius, 0.75) } else { Some(clod.at) };
+        let Some(at) = at else { continue };
         if clear.iter().any(|(p, r)| p.distance(at) < r + 0.5 * radius) || !pile.area().contains(at) {
             continue;
         }
         let (support, _) = pile.support(at, radius);
         let height = pose.high - pose.low;
+        if stays > STAY && support - ground.height(at.x, at.y) > 0.6 * height {
+            continue;
+        }
         let centre = at.extend(support - sink * height - pose.low);
         let mesh = &mut groups[group(tint, ground.law.tint_sigma)];
         let slack = 0.06 * height;
@@ -113,7 +125,7 @@ fn sink(mm: f32, u: f32) -> f32 {
     0.2 + 0.1 * (mm / 15.0).min(1.0) + 0.2 * u
 }
 
-/// The group of a logarithm of brightness: even steps over ±2.2 of its standard deviations.
+/// The group of a logarithm of brightness beside the mean clod's: even steps over ±2.2 of its standard deviations.
 fn group(tint: f32, sigma: f32) -> usize {
     let reach = 2.2 * (sigma * sigma + LOOSE_GAIN * LOOSE_GAIN * 0.25).sqrt();
     let t = (tint / reach.max(1e-6)).clamp(-1.0, 1.0) * 0.5 + 0.5;
@@ -122,5 +134,5 @@ fn group(tint: f32, sigma: f32) -> usize {
 
 fn group_tint(group: usize, sigma: f32) -> f32 {
     let reach = 2.2 * (sigma * sigma + LOOSE_GAIN * LOOSE_GAIN * 0.25).sqrt();
-    (((group as f32 + 0.5) / GROUPS as f32 * 2.0 - 1.0) * reach).exp()
+    (((group as f32 + 0.5) / GROUPS as f32 * 2.0 - 1.0) * reach + DRY_GAIN).exp()
 }

@@ -164,10 +164,10 @@ impl Crumbs {
         let top = a * 0.55 * (0.8 + 0.4 * u[2]);
         // Sunk by 20–50 % of its height.
         let centre = top * (0.6 - 0.6 * u[3]);
-        let face = |v: f32, w: f32| Vec2::from_angle(v * std::f32::consts::TAU) * (0.3 + 0.7 * w);
+        let face = |v: f32, w: f32| Vec2::from_angle(v * std::f32::consts::TAU) * (0.4 + 0.9 * w);
         let (f, g) = (face(u[4], u[5]), face(u[6], u[7]));
         // The sum of two uniforms less one has standard deviation 0.408.
-        let tint = ((u[8] + u[9] - 1.0) / 0.408 * sigma).exp();
+        let tint = ((u[8] + u[9] - 1.0) / 0.408 * 1.5 * sigma).exp();
         let tint = (tint * 128.0).clamp(1.0, 255.0) as u8;
 
         let q = (p - raster.origin) / raster.step;
@@ -182,7 +182,9 @@ impl Crumbs {
                 if inside <= 0.0 {
                     continue;
                 }
-                let z = centre + top * inside.sqrt().min(0.85 + f.dot(d)).min(0.9 + g.dot(d));
+                // Steeper at the rim and flatter on top than an ellipsoid.
+                let dome = inside.sqrt() * (1.35 - 0.35 * inside);
+                let z = centre + top * dome.min(0.75 + f.dot(d)).min(0.85 + g.dot(d));
                 let k = y as usize * raster.width + x as usize;
                 if z > self.height[k] {
                     self.height[k] = z;

@@ -184,14 +184,15 @@ pub struct CrumbsDesc {
 
 impl Default for CrumbsDesc {
     fn default() -> Self {
-        Self { min_mm: Num::new(1.0), amount: Vary::fixed(0.8) }
+        Self { min_mm: Num::new(1.2), amount: Vary::fixed(0.7) }
     }
 }
 
 /// Aggregates: the number longer than L goes as L^−D.
 ///
 /// Source: Aubertot et al. 1999, Soil Sci. Soc. Am. J. 63:1377 (sugar-beet seedbeds): D 3.8–4.0, axes 1 : 0.77 : 0.55
-/// whatever the size; 9400 m⁻² above 5 mm then cover 30 % of the ground.
+/// whatever the size; 9400 m⁻² above 5 mm then cover 30 % of the ground. That is the whole tilled layer: tines bring
+/// coarse aggregates to the surface, so the default is smaller.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ClodsDesc {
@@ -216,13 +217,13 @@ pub struct ClodsDesc {
 impl Default for ClodsDesc {
     fn default() -> Self {
         Self {
-            over_5mm_per_m2: Vary::uniform(6000.0, 12000.0),
+            over_5mm_per_m2: Vary::uniform(8000.0, 14000.0),
             min_mm: Num::new(2.5),
             max_mm: Num::new(45.0),
-            exponent: Vary::uniform(3.4, 3.9),
+            exponent: Vary::uniform(2.8, 3.5),
             clustering: Vary::fixed(0.45),
             cluster_m: Vary::fixed(0.12),
-            sorting: Num::new(0.15),
+            sorting: Num::new(0.1),
             tint_sigma: Num::new(0.08),
         }
     }
@@ -300,7 +301,7 @@ impl Default for LitterDesc {
             sticks_per_m2: Vary::uniform(0.0, 4.0),
             stick_mm: Vary::uniform(30.0, 120.0),
             stick_width_mm: Vary::uniform(1.5, 5.0),
-            bits_per_m2: Vary::uniform(40.0, 200.0),
+            bits_per_m2: Vary::uniform(60.0, 350.0),
             bit_mm: Vary::Drawn(crate::sampling::vary::Distribution::LogNormal {
                 median: 4.0,
                 sigma: 0.5,

@@ -101,13 +101,17 @@ impl Ground {
 
     /// Relief and layers.
     fn raise<L: LayerMaps>(&mut self, maps: &[L], relief: &Relief) {
+        let raster = self.raster();
+        let inside: Vec<Vec<f32>> =
+            (0..self.blend.layers()).map(|k| slowly(raster, self.every(), |p| self.blend.noise(k, p))).collect();
         for j in 0..self.grid.rows() {
             for i in 0..self.grid.columns() {
                 let p = vec2(self.grid.x.at[i], self.grid.y.at[j]);
                 let cell = self.grid.x.spacing(i).max(self.grid.y.spacing(j));
+                let fine = self.fine_index(i, j);
                 let mut noise = [0.0; MAX_LAYERS];
                 for (k, n) in noise.iter_mut().enumerate().take(self.blend.layers()) {
-                    *n = self.blend.noise(k, p);
+                    *n = fine.map_or_else(|| self.blend.noise(k, p), |v| inside[k][v]);
                 }
                 let heights = self.blend.heights(maps, p);
                 let weights = self.blend.weights(noise, heights);
@@ -115,7 +119,7 @@ impl Ground {
                 // Cells that are long one way would turn fine heights into furrows.
                 let fade = (2.0 * self.step / cell).min(1.0);
                 self.heights.push(relief.height(p, cell) + detail * fade * fade);
-                if self.fine_index(i, j).is_some() {
+                if fine.is_some() {
                     self.fine.noise.push(noise);
                     self.fine.detail.push(detail);
                     self.fine.share.push(self.blend.clods(weights));
@@ -162,14 +166,22 @@ impl Ground {
         let around = blur(&heights, raster.width, (0.01 / self.step).ceil() as usize);
         let out: Vec<f32> = heights.iter().zip(&around).map(|(h, a)| h - a).collect();
         let sd = (out.iter().map(|x| x * x).sum::<f32>() / out.len() as f32).sqrt().max(1e-6);
-        for (k, out) in out.iter().enumerate() {
-            let p = raster.origin + vec2((k % raster.width) as f32, (k / raster.width) as f32) * raster.step;
-            let (x, y) = (f64::from(p.x), f64::from(p.y));
-            let patch = patches.fbm2(x * frequency + 0.5, y * frequency + 0.5, 4, 0.6) as f32 / FBM4_SD;
-            self.fine.moisture.push((mean + spread * patch - drying * (out / sd).clamp(-2.0, 2.0)).clamp(0.0, 1.0));
-            let tone = tones.fbm2(x / 0.03 + 0.5, y / 0.03 + 0.5, 4, 0.6) as f32 / FBM4_SD;
-            self.fine.tone.push(1.0 + 0.06 * tone.clamp(-2.5, 2.5));
-        }
+        let patches = slowly(raster, self.every(), |p| {
+            let (x, y) = (f64::from(p.x) * frequency, f64::from(p.y) * frequency);
+            patches.fbm2(x + 0.5, y + 0.5, 4, 0.6) as f32 / FBM4_SD
+        });
+        self.fine.tone = slowly(raster, self.every(), |p| {
+            let tone = tones.fbm2(f64::from(p.x) / 0.03 + 0.5, f64::from(p.y) / 0.03 + 0.5, 3, 0.6) as f32 / FBM4_SD;
+            1.0 + 0.06 * tone.clamp(-2.5, 2.5)
+        });
+        self.fine.moisture = (patches.iter().zip(&out))
+            .map(|(patch, out)| (mean + spread * patch - drying * (out / sd).clamp(-2.0, 2.0)).clamp(0.0, 1.0))
+            .collect();
+    }
+
+    /// Vertices between the samples of noises that change slowly: 4 mm.
+    fn every(&self) -> usize {
+        ((0.004 / self.step) as usize).max(1)
     }
 
     /// Central differences of the heights.
@@ -281,11 +293,20 @@ impl Ground {
     }
 
     pub(super) fn fine_cell(&self, p: Vec2) -> FineCell {
-        let q = (p - self.area().corners()[0]) / self.step;
+        let origin = vec2(self.grid.x.at[self.grid.x.first], self.grid.y.at[self.grid.y.first]);
+        let q = (p - origin) / self.step;
         let (nx, ny) = (self.grid.x.steps, self.grid.y.steps);
         let q = q.clamp(Vec2::ZERO, vec2(nx as f32, ny as f32));
         let (i, j) = ((q.x as usize).min(nx - 1), (q.y as usize).min(ny - 1));
         FineCell { k: j * (nx + 1) + i, n: nx + 1, t: q - vec2(i as f32, j as f32) }
+    }
+
+    /// Texel (i, j) when each step of the grid is split into `split` texels.
+    #[inline]
+    pub(super) fn texel_cell(&self, i: usize, j: usize, split: usize) -> FineCell {
+        let n = self.grid.x.steps + 1;
+        let t = |i: usize| ((i % split) as f32 + 0.5) / split as f32;
+        FineCell { k: j / split * n + i / split, n, t: vec2(t(i), t(j)) }
     }
 
     fn fine_columns(&self) -> usize {
@@ -356,6 +377,28 @@ fn check(desc: &SoilDesc, maps: usize, site: &Site) -> Result<()> {
         ));
     }
     Ok(())
+}
+
+/// `f` at every sample of a raster, taken at every `every`-th and mixed between.
+fn slowly(raster: Raster, every: usize, f: impl Fn(Vec2) -> f32) -> Vec<f32> {
+    let lines = |n: usize| (n - 1).div_ceil(every) + 1;
+    let (w, h) = (lines(raster.width), lines(raster.height));
+    // The last line may lie beyond the raster, so that all are evenly spaced.
+    let place = |i: usize, j: usize| raster.origin + vec2((i * every) as f32, (j * every) as f32) * raster.step;
+    let coarse: Vec<f32> = (0..w * h).map(|k| f(place(k % w, k / w))).collect();
+    let mut out = Vec::with_capacity(raster.width * raster.height);
+    for j in 0..raster.height {
+        for i in 0..raster.width {
+            let (a, b) = (i / every, j / every);
+            let t = vec2((i % every) as f32, (j % every) as f32) / every as f32;
+            // A sample on a line takes it alone: the next line may not be there.
+            let (east, north) = (usize::from(t.x > 0.0), w * usize::from(t.y > 0.0));
+            let k = b * w + a;
+            let south = coarse[k] + t.x * (coarse[k + east] - coarse[k]);
+            out.push(south + t.y * (coarse[k + north] + t.x * (coarse[k + north + east] - coarse[k + north]) - south));
+        }
+    }
+    out
 }
 
 /// Mean over a square of ±`reach` samples, its ends held.

@@ -20,6 +20,8 @@ mod pile;
 mod relief;
 mod skin;
 mod stone;
+#[cfg(test)]
+mod tests;
 
 pub use clod::clods;
 pub use desc::{

@@ -54,17 +54,18 @@ impl Pile {
         (sum / 7.0, slope / (3.0 * 0.6 * radius))
     }
 
-    /// Where a loose body of `radius` dropped at `p` comes to rest: it rolls down what is steeper than `hold`.
-    pub(super) fn settle(&self, mut p: Vec2, radius: f32, hold: f32) -> Vec2 {
-        for _ in 0..4 {
+    /// Where a loose body of `radius` dropped at `p` comes to rest: it rolls down what is steeper than `hold`. `None` if it
+    /// finds no rest nearby: it fell into a gap.
+    pub(super) fn settle(&self, mut p: Vec2, radius: f32, hold: f32) -> Option<Vec2> {
+        for _ in 0..5 {
             let (_, slope) = self.support(p, radius);
             let steep = slope.length();
             if steep <= hold {
-                break;
+                return Some(p);
             }
             p -= slope / steep * radius * 0.8;
         }
-        p
+        None
     }
 
     /// Raises the surface to a dome: half an ellipsoid of half-axes `a` (along `turn`) and `b`, from height `rim` to `top`.

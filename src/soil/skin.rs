@@ -44,19 +44,22 @@ impl Skin {
 }
 
 /// Depth of a pit between crumbs that hides half of the sky, metres.
-const HALF_SKY_M: f32 = 0.0009;
+const HALF_SKY_M: f32 = 0.0005;
 
 /// How much drier the loose crumbs are than what they lie on.
 const CRUMB_DRYING: f32 = 0.08;
+
+/// How much wetter such a pit is.
+const PIT_WETTING: f32 = 0.2;
 
 impl Ground {
     /// Bakes the texture with texels of at most `texel_m`; `maps` are those the ground was made with.
     pub fn skin<L: LayerMaps>(&self, maps: &[L], texel_m: f32) -> Skin {
         let area = self.area();
-        let texel = texel_m.clamp(2e-5, self.step);
-        // Texels of one size that fill the area evenly both ways: the area is whole steps, so split the step.
-        let texel = self.step / (self.step / texel - 1e-3).ceil();
-        let (width, height) = ((area.size().x / texel).round() as usize, (area.size().y / texel).round() as usize);
+        // Texels that split the grid's steps evenly: the area then holds whole texels, and each knows its cell.
+        let split = ((self.step / texel_m.max(2e-5) - 1e-3).ceil() as usize).max(1);
+        let texel = self.step / split as f32;
+        let (width, height) = (self.grid.x.steps * split, self.grid.y.steps * split);
         let raster = Raster { origin: area.corners()[0] + 0.5 * texel, step: texel, width, height };
         let n = width * height;
         let mut skin = Skin {
@@ -72,58 +75,58 @@ impl Ground {
         };
         let crumbs = self.crumbs(raster);
         let mut detail = crumbs.height;
-        for (k, detail) in detail.iter_mut().enumerate() {
-            let p = place(raster, k);
-            let cell = self.fine_cell(p);
-            let mut noise = [0.0; MAX_LAYERS];
-            for (i, n) in noise.iter_mut().enumerate().take(self.blend.layers()) {
-                *n = cell.mix(|v| self.fine.noise[v][i]);
+        for j in 0..height {
+            for i in 0..width {
+                let k = j * width + i;
+                let p = raster.origin + vec2(i as f32, j as f32) * texel;
+                let cell = self.texel_cell(i, j, split);
+                let mut noise = [0.0; MAX_LAYERS];
+                for (i, n) in noise.iter_mut().enumerate().take(self.blend.layers()) {
+                    *n = cell.mix(|v| self.fine.noise[v][i]);
+                }
+                let heights = self.blend.heights(maps, p);
+                let weights = self.blend.weights(noise, heights);
+                detail[k] += self.blend.displacement(weights, heights);
+                let tint = match crumbs.tint[k] {
+                    0 => 1.0,
+                    t => f32::from(t) / 128.0,
+                };
+                let tone = tint * cell.mix(|v| self.fine.tone[v]);
+                skin.albedo.push(Skin::encode(self.blend.albedo(maps, weights, p).map(|a| a * tone)));
+                skin.weights.push(weights.map(|w| (w * 255.0 + 0.5) as u8));
             }
-            let heights = self.blend.heights(maps, p);
-            let weights = self.blend.weights(noise, heights);
-            *detail += self.blend.displacement(weights, heights);
-            let (tint, drier) = match crumbs.tint[k] {
-                0 => (1.0, 0.0),
-                t => (f32::from(t) / 128.0, CRUMB_DRYING),
-            };
-            let tone = tint * cell.mix(|v| self.fine.tone[v]);
-            skin.albedo.push(Skin::encode(self.blend.albedo(maps, weights, p).map(|a| a * tone)));
-            skin.weights.push(weights.map(|w| (w * 255.0 + 0.5) as u8));
-            let wet = cell.mix(|v| self.fine.moisture[v]) - drier;
-            skin.moisture.push((wet.clamp(0.0, 1.0) * 255.0 + 0.5) as u8);
         }
-        self.bake_slopes(raster, &detail, &mut skin);
-        self.bake_openness(raster, detail, &mut skin);
+        self.bake_slopes(raster, split, &detail, &mut skin);
+        self.bake_pits(raster, split, detail, &crumbs.tint, &mut skin);
         skin
     }
 
     /// Slopes of the detail, less those that the mesh's normals already have.
-    fn bake_slopes(&self, raster: Raster, detail: &[f32], skin: &mut Skin) {
-        let vertices = self.raster();
-        let coarse = differences(&self.fine.detail, vertices);
+    fn bake_slopes(&self, raster: Raster, split: usize, detail: &[f32], skin: &mut Skin) {
+        let coarse = differences(&self.fine.detail, self.raster());
         for (k, fine) in differences(detail, raster).into_iter().enumerate() {
-            let cell = self.fine_cell(place(raster, k));
+            let cell = self.texel_cell(k % raster.width, k / raster.width, split);
             let mesh = vec2(cell.mix(|v| coarse[v].x), cell.mix(|v| coarse[v].y));
             let rest = (fine - mesh).clamp_length_max(2.0) * Skin::SLOPE_STEPS;
-            skin.slope.push([rest.x.round() as i8, rest.y.round() as i8]);
+            skin.slope.push([rest.x as i8, rest.y as i8]);
         }
     }
 
-    fn bake_openness(&self, raster: Raster, mut detail: Vec<f32>, skin: &mut Skin) {
+    /// What lies in pits of the detail sees less of the sky and dries later; crumbs dry first.
+    fn bake_pits(&self, raster: Raster, split: usize, mut detail: Vec<f32>, crumbs: &[u8], skin: &mut Skin) {
+        let cell = |k: usize| self.texel_cell(k % raster.width, k / raster.width, split);
         for (k, d) in detail.iter_mut().enumerate() {
-            let cell = self.fine_cell(place(raster, k));
-            *d -= cell.mix(|v| self.fine.detail[v]);
+            *d -= cell(k).mix(|v| self.fine.detail[v]);
         }
         let around = blur(&detail, raster.width, (0.0008 / raster.step).ceil() as usize);
-        skin.ao.extend(detail.iter().zip(&around).map(|(d, around)| {
-            let pit = (around - d).max(0.0);
-            (255.0 / (1.0 + pit / HALF_SKY_M) + 0.5) as u8
-        }));
+        for (k, (d, around)) in detail.iter().zip(&around).enumerate() {
+            let pit = (around - d).max(0.0) / HALF_SKY_M;
+            skin.ao.push((255.0 / (1.0 + pit) + 0.5) as u8);
+            let drier = if crumbs[k] > 0 { CRUMB_DRYING } else { 0.0 };
+            let wet = cell(k).mix(|v| self.fine.moisture[v]) - drier + PIT_WETTING * pit.min(1.0);
+            skin.moisture.push((wet.clamp(0.0, 1.0) * 255.0 + 0.5) as u8);
+        }
     }
-}
-
-fn place(raster: Raster, k: usize) -> Vec2 {
-    raster.origin + vec2((k % raster.width) as f32, (k / raster.width) as f32) * raster.step
 }
 
 fn differences(values: &[f32], raster: Raster) -> Vec<Vec2> {
