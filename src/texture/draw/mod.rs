@@ -5,21 +5,21 @@
 mod canvas;
 mod cells;
 mod leaf;
-mod page;
 mod shape;
 mod soil;
 mod veins;
 mod write;
 
 pub use leaf::{LeafRecipe, Look, Relief};
-pub use page::read;
 pub use shape::Margin;
 pub use soil::{Crumbs, Ground, Litter, SoilRecipe};
 pub use veins::Veins;
 pub use write::{encode, encode_height, write};
 
 use crate::error::Result;
+use crate::page::Page;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// What a recipe describes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -64,6 +64,11 @@ impl Grey {
         let code = |h: &f32| (((h / range_mm).clamp(0.0, 1.0) * 4095.0 + 0.5) as u16) * 16;
         Self { width, height, values: heights.iter().map(code).collect(), range_mm: range_mm * 65535.0 / 65520.0 }
     }
+}
+
+/// Reads a recipe.
+pub fn read(path: &Path) -> Result<Recipe> {
+    Page::read(path)?.parse()
 }
 
 /// Draws a recipe.
