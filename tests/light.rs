@@ -300,7 +300,7 @@ fn the_clear_dome_has_the_shape_of_hosek_and_wilkie() {
 #[test]
 fn nir_of_the_dome_follows_the_slope_from_blue_to_red() {
     let ratio = |turbidity: f32| {
-        let model = HosekWilkie::new(direction(0.5236, 0.0), turbidity);
+        let model = HosekWilkie::new(direction(30.0_f32.to_radians(), 0.0), turbidity);
         let e = furrow::light::Dome::bake(|d| model.radiance(d)).irradiance().to_array();
         e[3] / e[0]
     };

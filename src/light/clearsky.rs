@@ -165,11 +165,11 @@ mod tests {
                 let mass = |z: usize| air_mass(ZENITHS_DEG[z]);
                 let t = (mass(z) - mass(z - 1)) / (mass(z + 1) - mass(z - 1));
                 let s = (mass(z) / mass(z - 1)).ln() / (mass(z + 1) / mass(z - 1)).ln();
-                for band in 0..4 {
+                for (band, outside) in OUTSIDE.into_iter().enumerate() {
                     let blend = |f: &dyn Fn(usize) -> f64, t: f64| f(z - 1) * (1.0 - t) + f(z + 1) * t;
                     let beam = blend(&|z| row[z].0[band].ln(), t).exp();
-                    let share = blend(&|z| row[z].1[band] * mass(z) / (OUTSIDE[band] - row[z].0[band]), s);
-                    let sky = share * (OUTSIDE[band] - beam) / mass(z);
+                    let share = blend(&|z| row[z].1[band] * mass(z) / (outside - row[z].0[band]), s);
+                    let sky = share * (outside - beam) / mass(z);
                     assert!((beam / row[z].0[band] - 1.0).abs() < 0.05, "{z} {band} {beam} {}", row[z].0[band]);
                     assert!((sky / row[z].1[band] - 1.0).abs() < 0.05, "{z} {band} {sky} {}", row[z].1[band]);
                 }
@@ -180,13 +180,13 @@ mod tests {
     #[test]
     fn beyond_the_table_light_stays_positive_and_below_the_beam_outside() {
         for depth in [0.0, 0.02, 0.3, 0.6, 0.8] {
-            for zenith in [0.0, 10.0, 65.0, 84.0, 86.0, 88.0, 90.0] {
+            for zenith in [0.0_f64, 10.0, 65.0, 84.0, 86.0, 88.0, 90.0] {
                 let sky = clear_sky(zenith, depth);
-                let (direct, diffuse) = (sky.direct_normal.to_array(), sky.diffuse_horizontal.to_array());
-                for band in 0..4 {
-                    assert!(direct[band] >= 0.0 && diffuse[band] > 0.0, "{zenith} {depth}");
-                    let down = direct[band] as f64 / air_mass(zenith) + diffuse[band] as f64;
-                    assert!(down < OUTSIDE[band] / air_mass(zenith), "{zenith} {depth} {band}");
+                let bands = sky.direct_normal.to_array().into_iter().zip(sky.diffuse_horizontal.to_array());
+                for ((direct, diffuse), outside) in bands.zip(OUTSIDE) {
+                    assert!(direct >= 0.0 && diffuse > 0.0, "{zenith} {depth}");
+                    let down = f64::from(direct) / air_mass(zenith) + f64::from(diffuse);
+                    assert!(down < outside / air_mass(zenith), "{zenith} {depth}");
                 }
             }
         }

@@ -51,14 +51,7 @@ impl Distribution1D {
     /// A cell and a place in [0, 1) within it. A cell of weight zero is never drawn.
     #[inline]
     pub fn sample_cell(&self, u: f32) -> (usize, f32) {
-        // The last end at or below u; cells of no width are passed over. The end at 1 is left out, for u rounded up to 1.
-        let last = self.density.len();
-        let mut cell = self.cdf[1..last].partition_point(|&c| c <= u);
-        while self.density[cell] == 0.0 && cell > 0 {
-            cell -= 1;
-        }
-        let (lo, hi) = (self.cdf[cell], self.cdf[cell + 1]);
-        (cell, ((u - lo) / (hi - lo).max(f32::MIN_POSITIVE)).clamp(0.0, ONE_BELOW))
+        find(&self.cdf[1..], &self.density, u)
     }
 
     /// A number in [0, 1) and its density.
@@ -81,12 +74,15 @@ impl Distribution1D {
     }
 }
 
-/// A piecewise constant density on the unit square, rows along y.
+/// A piecewise constant density on the unit square, rows along y. One block of memory per table: a draw touches few cache lines.
 #[derive(Clone, Debug)]
 pub struct Distribution2D {
+    width: usize,
     rows: Distribution1D,
-    /// A row without weight has no table; it is never drawn.
-    cells: Vec<Option<Distribution1D>>,
+    /// Density of each cell per unit of area, row by row.
+    density: Vec<f32>,
+    /// Cumulated probability at the upper ends of the cells of each row.
+    cdf: Vec<f32>,
 }
 
 impl Distribution2D {
@@ -96,9 +92,22 @@ impl Distribution2D {
         if width == 0 || !weights.len().is_multiple_of(width) || !weights.iter().all(|w| w.is_finite() && *w >= 0.0) {
             return None;
         }
+        // A row without weight is never drawn; what stands in its tables does not matter.
         let cells: Vec<_> = weights.chunks_exact(width).map(Distribution1D::new).collect();
         let means: Vec<f32> = cells.iter().map(|c| c.as_ref().map_or(0.0, |c| c.integral() as f32)).collect();
-        Some(Self { rows: Distribution1D::new(&means)?, cells })
+        let rows = Distribution1D::new(&means)?;
+        let mut density = Vec::with_capacity(weights.len());
+        let mut cdf = Vec::with_capacity(weights.len());
+        for (row, cells) in cells.iter().enumerate() {
+            if let Some(cells) = cells {
+                density.extend(cells.density.iter().map(|d| d * rows.density[row]));
+                cdf.extend(&cells.cdf[1..]);
+            } else {
+                density.resize(density.len() + width, 0.0);
+                cdf.resize(cdf.len() + width, 1.0);
+            }
+        }
+        Some(Self { width, rows, density, cdf })
     }
 
     /// A point (x, y) and its density per unit of area.
@@ -106,19 +115,34 @@ impl Distribution2D {
     pub fn sample(&self, u: [f32; 2]) -> ([f32; 2], f32) {
         let (row, within) = self.rows.sample_cell(u[1]);
         let y = place(row, within, self.rows.len());
-        let (x, density) = self.cells[row].as_ref().map_or((u[0], 0.0), |cells| cells.sample(u[0]));
-        ([x, y], density * self.rows.density(row))
+        let start = row * self.width;
+        let (cdf, density) = (&self.cdf[start..start + self.width], &self.density[start..start + self.width]);
+        let (column, within) = find(cdf, density, u[0]);
+        ([place(column, within, self.width), y], density[column])
     }
 
     /// Density at (x, y) per unit of area; zero outside the unit square.
     #[inline]
     pub fn pdf(&self, p: [f32; 2]) -> f32 {
-        if !(0.0..1.0).contains(&p[1]) {
-            return 0.0;
+        if p.iter().all(|v| (0.0..1.0).contains(v)) {
+            self.density[cell_of(p[1], self.rows.len()) * self.width + cell_of(p[0], self.width)]
+        } else {
+            0.0
         }
-        let row = cell_of(p[1], self.rows.len());
-        self.cells[row].as_ref().map_or(0.0, |cells| cells.pdf(p[0]) * self.rows.density(row))
     }
+}
+
+/// The cell of positive density that holds `u`, given the cumulated probabilities at the cells' upper ends, and the place of u
+/// in it, [0, 1).
+#[inline]
+fn find(ends: &[f32], density: &[f32], u: f32) -> (usize, f32) {
+    // The first end above u; cells of no width are passed over. The last end, 1, is left out, for a u that rounding made 1.
+    let mut cell = ends[..ends.len() - 1].partition_point(|&end| end <= u);
+    while density[cell] == 0.0 && cell > 0 {
+        cell -= 1;
+    }
+    let lo = if cell == 0 { 0.0 } else { ends[cell - 1] };
+    (cell, ((u - lo) / (ends[cell] - lo).max(f32::MIN_POSITIVE)).clamp(0.0, ONE_BELOW))
 }
 
 /// One of several by weight: the index, its probability, and `u` made a fresh number in [0, 1).

@@ -4,7 +4,7 @@ use crate::sampling::rng::Stream;
 use crate::sampling::vary::{Bound, Positive, Vary};
 use serde::{Deserialize, Serialize};
 
-/// Between 0 and 100, the ends left out.
+/// Between 0 and 100.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Percent;
 

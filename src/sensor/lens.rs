@@ -56,7 +56,7 @@ impl Distortion {
         a * d - b * b
     }
 
-    /// The pinhole image point that the lens puts at `to`: Newton's method from `to` itself, to 10⁻¹⁴.
+    /// The pinhole image point that the lens puts at `to`: Newton's method from `to` itself, to about 10⁻¹⁵.
     pub fn undistort(&self, to: [f64; 2]) -> [f64; 2] {
         if self.is_none() {
             return to;
@@ -71,7 +71,8 @@ impl Distortion {
                 break;
             }
             at = [at[0] - (d * ex - b * ey) / det, at[1] - (a * ey - b * ex) / det];
-            if ex.abs() + ey.abs() < 1e-14 {
+            // The error of a Newton step is the square of the last one.
+            if ex.abs() + ey.abs() < 1e-8 {
                 break;
             }
         }

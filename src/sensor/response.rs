@@ -15,7 +15,7 @@ use crate::math::Spectrum;
 use crate::sampling::rng::{Purpose, Stream};
 use crate::sampling::vary::{Fraction, NonNegative, Num, Positive, Vary};
 use serde::{Deserialize, Serialize};
-use std::f32::consts::FRAC_1_PI;
+use std::f32::consts::{FRAC_1_PI, TAU};
 
 /// Electrons per radiance, relative to G.
 const RESPONSE: Spectrum = Spectrum::new(0.94, 1.0, 0.77, 0.93);
@@ -284,19 +284,26 @@ impl Sensor {
         };
         let mut stream = stream.child(Purpose::Sensor, u64::from(y) << 32 | u64::from(x));
         let white = full_well / CLIP;
-        let levels = level.to_array();
-        let counted = [read, read, read, read_nir].into_iter().zip(levels).map(|(read, level)| {
-            let electrons = (level * white).min(full_well);
+        let noise = normals(&mut stream);
+        let mut levels = level.to_array();
+        for ((level, read), noise) in levels.iter_mut().zip([read, read, read, read_nir]).zip(noise) {
+            let electrons = (*level * white).min(full_well);
             // A Poisson count of many electrons is a normal one.
-            let sd = (electrons + read * read).sqrt();
-            (electrons + sd * stream.normal() as f32).clamp(0.0, full_well) / white
-        });
-        let mut read = [0.0; Spectrum::BANDS];
-        for (to, from) in read.iter_mut().zip(counted) {
-            *to = from;
+            *level = (electrons + (electrons + read * read).sqrt() * noise).clamp(0.0, full_well) / white;
         }
-        Spectrum::from(read)
+        Spectrum::from(levels)
     }
+}
+
+/// Four standard normal numbers, two from each pair. Source: Box & Muller 1958.
+fn normals(stream: &mut Stream) -> [f32; 4] {
+    let mut pair = || {
+        let radius = (-2.0 * (1.0 - stream.uniform32()).ln()).sqrt();
+        let (sin, cos) = (TAU * stream.uniform32()).sin_cos();
+        [radius * sin, radius * cos]
+    };
+    let ([a, b], [c, d]) = (pair(), pair());
+    [a, b, c, d]
 }
 
 /// Gains on R, G, B under which a white card under this irradiance is neutral, G unchanged; 1 for a channel without light.
