@@ -78,9 +78,9 @@ impl AlphaMask {
                     continue;
                 }
                 if self.texel(x, y) {
-                    any_opaque = true
+                    any_opaque = true;
                 } else {
-                    any_transparent = true
+                    any_transparent = true;
                 }
                 if any_opaque && any_transparent {
                     return Coverage::Mixed;
