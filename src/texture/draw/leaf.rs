@@ -217,13 +217,14 @@ impl<'a> Painter<'a> {
         let base = r.pigments.chlorophyll.f32();
         let look = Surface::new(r, &self.stream);
         let mut rgba = vec![0u8; width * height * 4];
+        let opacity = self.opacity();
         for y in 0..height {
             for x in 0..width {
-                let alpha = self.coverage(x, y);
+                let i = y * width + x;
+                let alpha = opacity[i];
                 if alpha == 0 {
                     continue;
                 }
-                let i = y * width + x;
                 let p = self.place(x as f32 + 0.5, y as f32 + 0.5);
                 let veins = [self.veins[0].values[i], self.veins[1].values[i], self.veins[2].values[i]];
                 let tissue = look.at(p, veins, self.to_margin.values[i], &self.shape);
@@ -242,23 +243,29 @@ impl<'a> Painter<'a> {
         Drawn { width: width as u32, height: height as u32, rgba, opaque: false, relief }
     }
 
-    /// Opacity of a pixel, 0..255: the share of nine points that lie in the leaf. Where the margin is entire the mesh cuts
-    /// the shape, and the image reaches two pixels further, so that its alpha never nibbles at the mesh.
-    fn coverage(&self, x: usize, y: usize) -> u8 {
-        let entire = matches!(self.recipe.margin, Margin::Entire) && self.recipe.notch.is_none();
-        let grow = if entire { 2.2 / self.scale } else { 0.0 };
-        let centre = self.shape.inside(self.place(x as f32 + 0.5, y as f32 + 0.5)) + grow;
+    /// Opacity of each pixel, 0..255: the share of sixteen points that lie in the leaf. Where the margin is entire the mesh
+    /// cuts the shape, and the image reaches two pixels further, so that its alpha never nibbles at the mesh.
+    fn opacity(&self) -> Vec<u8> {
         let pixel = 1.0 / self.scale;
-        if centre.abs() > 4.0 * pixel {
-            return if centre > 0.0 { 255 } else { 0 };
+        let mut cover = Canvas::new(self.width, self.height, 0.0);
+        for (i, v) in cover.values.iter_mut().enumerate() {
+            let (x, y) = ((i % self.width) as f32, (i / self.width) as f32);
+            let centre = self.shape.inside(self.place(x + 0.5, y + 0.5));
+            *v = if centre.abs() > 6.0 * pixel {
+                f32::from(u8::from(centre > 0.0))
+            } else {
+                let at = |k: usize| (k as f32 + 0.5) / 4.0;
+                let inside = |k: usize| self.shape.inside(self.place(x + at(k % 4), y + at(k / 4))) > 0.0;
+                (0..16).filter(|k| inside(*k)).count() as f32 / 16.0
+            };
         }
-        let mut hits = 0;
-        for k in 0..16 {
-            let at = |i: usize| (i as f32 + 0.5) / 4.0;
-            let p = self.place(x as f32 + at(k % 4), y as f32 + at(k / 4));
-            hits += u32::from(self.shape.inside(p) + grow > 0.0);
+        if matches!(self.recipe.margin, Margin::Entire) && self.recipe.notch.is_none() {
+            let near = cover.distance_to(0.3);
+            for (v, d) in cover.values.iter_mut().zip(near.values) {
+                *v = v.max((2.7 - d).clamp(0.0, 1.0));
+            }
         }
-        (hits * 255 / 16) as u8
+        cover.values.iter().map(|v| (v * 255.0 + 0.5) as u8).collect()
     }
 
     /// Heights, half the image's size: relief is smoother than colour.
@@ -266,8 +273,8 @@ impl<'a> Painter<'a> {
         let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
         let mm = self.recipe.length_mm.f32() / self.scale;
         let mut ink = self.veins[0].clone();
-        for (v, (a, b)) in ink.values.iter_mut().zip(self.veins[1].values.iter().zip(&self.veins[2].values)) {
-            *v = v.max(*a).max(b * 0.9);
+        for (v, secondary) in ink.values.iter_mut().zip(&self.veins[1].values) {
+            *v = v.max(*secondary);
         }
         let to_vein = ink.distance_to(0.45);
         let widened = |order: usize, radius: usize| {
@@ -284,6 +291,7 @@ impl<'a> Painter<'a> {
             widened(2, (2.0 * unit).round() as usize),
         ];
         let noise = Tiling::new(self.stream.clone().seed32().into());
+        let cells = Cells::new(u64::from(self.stream.clone().seed32()) + 5, (8192, 8192), 0.8);
         let (furrow, blister) = (relief.furrow_mm.f32(), relief.blister_mm.f32());
         let mut heights = Vec::with_capacity(width * height);
         for y in 0..height {
@@ -291,10 +299,16 @@ impl<'a> Painter<'a> {
                 let i = (y * 2).min(self.height - 1) * self.width + (x * 2).min(self.width - 1);
                 let p = self.place(x as f32 * 2.0 + 0.5, y as f32 * 2.0 + 0.5);
                 let away = to_vein.values[i].min(1e4) * mm / self.recipe.length_mm.f32();
-                // Blisters rise from the veins and flatten a fortieth of a length away.
-                let dome = 1.0 - (-away * 45.0).exp();
-                let swell = 1.0 + 0.35 * noise.fbm(p.x * 14.0 + 100.0, p.y * 14.0 + 100.0, 4096, 3, 0.5);
-                let grain = 0.012 * noise.fbm(p.x * 160.0 + 900.0, p.y * 160.0 + 900.0, 4096, 2, 0.5);
+                // The blade rises from the veins and flattens a thirtieth of a length away; on it lie blisters, a dozen
+                // to the length.
+                let bend = vec2(
+                    noise.fbm(p.x * 10.0 + 40.0, p.y * 10.0 + 40.0, 4096, 2, 0.5),
+                    noise.fbm(p.x * 10.0 + 70.0, p.y * 10.0 + 40.0, 4096, 2, 0.5),
+                );
+                let blisters = smoothstep(0.0, 0.42, cells.at(p * 13.0 + bend * 0.4 + vec2(600.0, 600.0)).border);
+                let dome = (1.0 - (-away * 30.0).exp()) * lerp(0.45, 1.0, blisters);
+                let swell = 1.0 + 0.35 * noise.fbm(p.x * 8.0 + 100.0, p.y * 8.0 + 100.0, 4096, 3, 0.5);
+                let grain = 0.010 * noise.fbm(p.x * 160.0 + 900.0, p.y * 160.0 + 900.0, 4096, 2, 0.5);
                 let h = blister * (dome * swell + grain)
                     - furrow * (furrows[0][i] + 0.5 * furrows[1][i] + 0.2 * furrows[2][i]).min(1.0);
                 heights.push(h + furrow);
@@ -341,7 +355,7 @@ impl<'a> Surface<'a> {
                 .collect()
         };
         let blotches = marks(recipe.look.blotches.get(), 2.5, 9.0);
-        let spots = marks(recipe.look.spots.get(), 0.15, 0.5);
+        let spots = marks(recipe.look.spots.get(), 0.12, 0.4);
         let seed = s.seed32();
         Self {
             look: &recipe.look,
@@ -398,7 +412,7 @@ impl<'a> Surface<'a> {
         for (q, radius, depth) in &self.spots {
             let d = p.distance(*q) / (radius * (1.0 + 0.4 * noise((p - *q) * 200.0 + far * 11.0, 2))).max(1e-5);
             brown = brown.max(depth * (1.0 - smoothstep(0.6, 1.0, d)));
-            c *= 1.0 - 0.35 * (1.0 - smoothstep(0.8, 2.2, d));
+            c *= 1.0 - 0.25 * (1.0 - smoothstep(0.8, 1.8, d));
         }
         let rim = (-to_margin_mm / (0.010 * self.length_mm)).exp();
         let foot = veins[0] * (1.0 - smoothstep(0.0, 0.45, p.y));
@@ -419,12 +433,12 @@ impl<'a> Surface<'a> {
         if cover == 0.0 {
             return 0.0;
         }
-        let size = 0.32 / self.length_mm;
+        let size = 0.2 / self.length_mm;
         let across = (p.x.abs() / (0.5 * self.aspect)).min(1.0);
         let place = (1.25 - 1.05 * smoothstep(0.0, 0.8, p.y)) * (1.0 - 0.35 * across);
         let patch = (1.0 + 1.3 * self.noise.fbm(p.x * 9.0 + 31.0, p.y * 9.0 + 77.0, 8192, 4, 0.55)).max(0.0);
         let cell = self.areoles.at(p / size + vec2(501.0, 203.0));
-        let grain = smoothstep(0.05, 0.42, cell.border) * smoothstep(0.25, 0.95, cell.own);
-        (cover * place * patch * (0.35 + 1.5 * grain)).clamp(0.0, 0.85)
+        let grain = (1.0 - smoothstep(0.12, 0.5, cell.away)) * smoothstep(0.2, 0.9, cell.own);
+        (cover * place * patch * (0.3 + 2.4 * grain)).clamp(0.0, 0.85)
     }
 }

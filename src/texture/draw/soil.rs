@@ -343,7 +343,7 @@ impl Tile {
             let bright = (f64::from(self.spread) * s.normal()).exp() as f32 * 1.03;
             let warm = s.normal() as f32;
             let own = self.albedo * bright * vec3(1.0 + 0.022 * warm, 1.0, 1.0 - 0.04 * warm);
-            self.stamp(&stamp, |_, h, _| own * (0.97 + 0.06 * h), 0.10);
+            self.stamp(&stamp, |_, h, _| own * (0.97 + 0.06 * h), (0.05 * l).clamp(0.10, 0.18));
         }
     }
 
@@ -377,7 +377,7 @@ impl Tile {
         self.each(|t, x, y, i| {
             let sieve = smoothstep(-0.2, 0.5, t.noise(x, y, 26.0, 4, 6));
             // Where the crust is thin, beaten crumbs still show.
-            let shows = lerp(0.16, 0.55, sieve);
+            let shows = lerp(0.18, 0.8, sieve);
             let grain = t.noise(x, y, 1.6, 3, 7);
             let pore = smoothstep(0.42, 0.6, t.noise(x, y, 3.2, 2, 8));
             let h = 4.6 + 0.45 * (broad[i] - 2.6) + 0.5 * shows * (soft[i] - broad[i]) + 0.12 * grain - 0.5 * pore;
@@ -389,7 +389,7 @@ impl Tile {
 
     fn crack(&mut self, plate: f32, widest: f32, depth: f32) {
         let seed = u64::from(self.stream.child(Purpose::Texture, 3).seed32());
-        let layers = [(plate, 1.0, 0.0), (plate / 2.7, 0.38, 0.5)].map(|(mm, width, missing)| {
+        let layers = [(plate, 1.0, 0.0), (plate / 2.9, 0.3, 0.75)].map(|(mm, width, missing)| {
             let n = (self.period_mm / mm).round().max(1.0);
             (Cells::new(seed + mm as u64, (n as u32, n as u32), 0.9), n, width, missing)
         });
@@ -407,7 +407,8 @@ impl Tile {
                 if k == 0 {
                     own = cell.own;
                 }
-                if cell.shared < *missing {
+                // Only some plates broke again, and not along every line.
+                if k == 1 && (own < 0.35 || cell.shared < missing - 0.6 * own) {
                     continue;
                 }
                 let vary = lerp(0.35, 1.0, cell.shared) * (1.0 + 0.5 * t.noise(x, y, 18.0, 3, 30));
@@ -482,12 +483,12 @@ impl Tile {
     fn stones(&mut self, cover: f32, low: f32, high: f32) {
         // Grey limestone, ochre, reddish sandstone, slate, flint, quartz; with their shares.
         let kinds = [
-            (vec3(0.33, 0.30, 0.26), 0.32),
-            (vec3(0.34, 0.26, 0.17), 0.24),
-            (vec3(0.29, 0.19, 0.14), 0.14),
-            (vec3(0.20, 0.20, 0.20), 0.14),
+            (vec3(0.29, 0.25, 0.20), 0.32),
+            (vec3(0.29, 0.215, 0.135), 0.24),
+            (vec3(0.26, 0.165, 0.115), 0.14),
+            (vec3(0.19, 0.18, 0.165), 0.14),
             (vec3(0.11, 0.10, 0.095), 0.08),
-            (vec3(0.52, 0.49, 0.44), 0.08),
+            (vec3(0.42, 0.385, 0.33), 0.08),
         ];
         let mut s = self.stream.child(Purpose::Texture, 5);
         for l in self.sizes(cover, low, high, 2.2, &mut s) {
@@ -503,7 +504,7 @@ impl Tile {
             let rock = rock * (0.16 * s.normal()).exp() as f32;
             let axes = (vec2(0.5, 0.5 * s.range32(0.6, 0.92)) * l * self.scale).max(Vec2::splat(0.8));
             let dome = 0.5 * l * s.range32(0.6, 0.9);
-            let bottom = self.surface(centre).min(5.0) - dome * s.range32(0.35, 0.6);
+            let bottom = self.surface(centre).min(4.5) - dome * s.range32(0.2, 0.5);
             let sharp = if index >= 3 { s.range32(0.5, 0.9) } else { s.range32(0.0, 0.6) };
             let stamp = Stamp::new(centre, axes, bottom, dome, sharp, &mut s);
             let (noise, soil) = (self.noise, self.albedo);
