@@ -230,6 +230,7 @@ fn what_cannot_be_drawn_is_refused_with_a_reason() {
             "below the largest",
         ),
         ("Soil(seed: 1, size: 32, period_mm: 60, ground: Mud)", "Mud"),
+        ("Soil(seed: 1, size: 32, period_mm: 90000, ground: Dirt)", "crumbs on the tile"),
         (
             "Leaf(seed: 1, size: 64, length_mm: 9, aspect: 0.5, outline: Power(a: 0, b: 1), veins: Parallel(count: 3, midrib: 0.1), pigments: ())",
             "above 0",

@@ -8,6 +8,9 @@ mod leaf;
 mod page;
 mod shape;
 mod soil;
+mod stamp;
+mod tile;
+mod tissue;
 mod veins;
 mod write;
 
