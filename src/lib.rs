@@ -12,7 +12,7 @@
 //! | 5 | [`scene`] |
 //! | 4 | [`material`], [`scatter`] |
 //! | 3 | [`bsdf`], [`light`], [`sensor`], [`plant`], [`soil`], [`accel`] |
-//! | 2 | [`sampling`], [`geometry`], [`texture`], [`optics`], [`film`], [`cli`] |
+//! | 2 | [`sampling`], [`geometry`], [`texture`], [`optics`], [`film`], [`page`], [`cli`] |
 //! | 1 | [`math`], [`error`] |
 
 pub mod accel;
@@ -27,6 +27,7 @@ pub mod material;
 pub mod math;
 pub mod optics;
 pub mod output;
+pub mod page;
 pub mod plant;
 pub mod render;
 pub mod sampling;

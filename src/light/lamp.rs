@@ -128,8 +128,8 @@ impl Emitter for Lamp {
         (inside && pdf > 0.0 && pdf.is_finite()).then_some(LampHit { distance, radiance: self.radiance, pdf })
     }
 
-    /// Radiance × area × cosines / distance², with the receiver's cosine taken at the point of the lamp's sphere that is
-    /// highest above the plane, so that a lamp half behind the plane is not overlooked.
+    /// Radiance × area × cosines / distance². Seen from p, the points of the lamp spread over ± `spread` about its centre in the
+    /// receiver's cosine; the mean of the part above the plane is what counts, so that a lamp half behind it is not overlooked.
     #[inline]
     fn importance(&self, p: Vec3, n: Vec3, two_sided: bool) -> f32 {
         let to = self.centre - p;
@@ -138,18 +138,23 @@ impl Emitter for Lamp {
             return 0.0;
         }
         let distance = to.length();
-        let sin_reach = self.reach / distance;
+        let spread = (self.reach / distance).min(1.0);
         let cos = to.dot(n) / distance;
-        let cos = if two_sided { cos.abs() } else { cos };
-        // cos(angle − reach), one where the normal points into the sphere.
-        let cos_reach = (1.0 - sin_reach * sin_reach).max(0.0).sqrt();
-        let seen = if sin_reach >= 1.0 || cos >= cos_reach {
-            1.0
-        } else {
-            (cos * cos_reach + (1.0 - cos * cos).max(0.0).sqrt() * sin_reach).max(0.0)
+        let above = |cos: f32| {
+            if cos >= spread {
+                cos
+            } else if cos > -spread {
+                (cos + spread) * (cos + spread) / (4.0 * spread)
+            } else {
+                0.0
+            }
         };
-        let solid_angle = (self.area * height / (distance * distance * distance)).min(PI);
-        self.radiance.mean() * solid_angle * seen
+        let mut seen = above(cos) + if two_sided { above(-cos) } else { 0.0 };
+        if spread >= 1.0 {
+            // Within the lamp's sphere every direction may hold a part of it.
+            seen = seen.max(0.1);
+        }
+        self.radiance.mean() * (self.area * height / (distance * distance * distance)).min(PI) * seen
     }
 
     fn horizontal_irradiance(&self) -> Spectrum {

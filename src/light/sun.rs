@@ -1,7 +1,7 @@
 //! The sun: a disc 0.5332° across, darker towards its limb.
 //!
 //! Radiance at a distance r (0 to 1) from the disc's centre is L₀·(1 − u(1 − √(1 − r²))), the linear law of limb darkening,
-//! with u = 0.55, 0.64, 0.75, 0.40 in R, G, B, NIR (after the tables in Cox 2000, *Allen's Astrophysical Quantities*, §14.7).
+//! with u = 0.55, 0.64, 0.75, 0.40 in R, G, B, NIR: estimates read off published limb darkening curves.
 //! L₀ follows from the direct normal irradiance E: with r = sin γ / sin α, the projected solid angle of the disc is
 //! π sin²α and the mean of the law over it 1 − u/3, so L₀ = E / (π sin²α (1 − u/3)), exactly.
 

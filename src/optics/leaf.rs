@@ -37,8 +37,8 @@ pub struct LeafOptics {
 
 impl LeafOptics {
     /// Runs the model over chlorophyll 0..100 µg/cm² with everything else following `base`: carotenoids fall with the
-    /// chlorophyll but more slowly (pale tissue is yellowish), and tissue far paler than the leaf is vein: more layers (N up
-    /// by 0.4), half as much light let through. About 2 ms.
+    /// chlorophyll but never all the way (pale tissue is yellowish), and tissue far paler than the leaf is vein: more layers (N
+    /// up by 0.6), half as much light let through. About 2 ms.
     pub fn new(base: &Pigments) -> Self {
         let inputs = base.inputs();
         let nodes: Vec<Leaf> = (0..NODES).map(|i| node(&inputs, content(i))).collect();
@@ -92,9 +92,9 @@ fn node(base: &Inputs, chlorophyll: f64) -> Leaf {
     let paleness = ((0.7 - share) / 0.6).clamp(0.0, 1.0);
     let paleness = paleness * paleness * (3.0 - 2.0 * paleness);
     let bands = LeafBands::of(&Inputs {
-        n: (base.n + 0.4 * paleness).min(4.0),
+        n: (base.n + 0.6 * paleness).min(4.0),
         chlorophyll,
-        carotenoid: base.carotenoid * (0.2 + 0.8 * share).min(1.5),
+        carotenoid: base.carotenoid * (0.06 + 0.94 * share).min(1.5),
         ..*base
     });
     let transmittance = bands.transmittance * (1.0 - 0.5 * paleness as f32);

@@ -11,6 +11,9 @@ use std::f32::consts::FRAC_PI_2;
 /// How far everything that stands in the soil continues below it, metres.
 pub(super) const ROOT: f32 = 0.008;
 
+/// Height of a crown's dome over its radius.
+const CROWN: f32 = 0.5;
+
 /// How a form builds its axis.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Section {
@@ -18,6 +21,8 @@ pub(super) struct Section {
     pub(super) profile: Profile,
     /// Width of the stem's top over that of its base.
     pub(super) taper: f32,
+    /// How far each internode strays from the one below, one standard deviation of the direction.
+    pub(super) wander: f32,
     /// How far out leaves are seated: oldest and youngest layer, of the stem's radius.
     pub(super) seat: (f32, f32),
 }
@@ -28,6 +33,8 @@ pub(super) struct Axis {
     nodes: Vec<(Vec3, Vec3)>,
     radii: Vec<f32>,
     section: Section,
+    /// Height of the crown's dome over its radius; 0 where a stem goes on.
+    crown: f32,
 }
 
 impl Axis {
@@ -38,7 +45,10 @@ impl Axis {
         let out = direction(FRAC_PI_2, leaf.azimuth);
         let share = leaf.layer as f32 / last.max(1) as f32;
         let r = self.radii[leaf.layer.min(last)] * lerp(self.section.seat.0, self.section.seat.1, share);
-        Seat { point: point + (out - axis * out.dot(axis)) * r, axis }
+        // On a crown the younger leaves stand higher up the dome, just under its skin.
+        let whole = self.radii[0];
+        let lift = whole * (self.crown * (1.0 - (r / whole).powi(2)).max(0.0).sqrt() - 0.1 * self.crown);
+        Seat { point: point + (out - axis * out.dot(axis)) * r + axis * lift, axis }
     }
 }
 
@@ -59,8 +69,9 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
         nodes.push((point, direction_now));
         radii.push(radius * lerp(1.0, section.taper, share));
         // Each internode wanders a little and turns back to the light.
-        let wander = vec3(stream.normal() as f32, stream.normal() as f32, 0.0) * if *rise > below { 0.06 } else { 0.0 };
-        direction_now = (direction_now + wander + Vec3::Z * 0.08).normalize_or(Vec3::Z);
+        let wander = vec3(stream.normal() as f32, stream.normal() as f32, 0.0)
+            * if *rise > below { section.wander } else { 0.0 };
+        direction_now = (direction_now + wander + Vec3::Z * (0.8 * section.wander)).normalize_or(Vec3::Z);
         below = *rise;
     }
     if nodes.is_empty() {
@@ -73,9 +84,9 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
         .into_iter()
         .map(|h| ring(nodes[0].1 * h, nodes[0].1, radius, Profile::Channelled(1.0)))
         .collect();
-    let stemless = top_rise < 0.5 * radius;
+    let stemless = top_rise < radius;
     if stemless {
-        dome(&mut rings, nodes[0].1, radius);
+        dome(&mut rings, nodes[0].1, radius, CROWN);
     }
     let mesh = tube::rigid(&rings, 10);
     organs.push(Organ { kind: OrganKind::Hypocotyl, leaf: 0, skin: skin(&growth.desc.hypocotyl_skin), mesh });
@@ -91,12 +102,12 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
         }
         // The first ring sinks into the hypocotyl, so the joint shows no gap.
         if let (Some((_, d)), Some(r)) = (nodes.last(), radii.last()) {
-            dome(&mut rings, *d, *r);
+            dome(&mut rings, *d, *r, 1.0);
         }
         let mesh = tube::rigid(&rings, 12);
         organs.push(Organ { kind: OrganKind::Stem, leaf: 0, skin: skin(&growth.desc.stem_skin), mesh });
     }
-    Axis { nodes, radii, section }
+    Axis { nodes, radii, section, crown: if stemless { CROWN } else { 0.0 } }
 }
 
 fn ring(centre: Vec3, along: Vec3, radius: f32, profile: Profile) -> Ring {
@@ -105,11 +116,11 @@ fn ring(centre: Vec3, along: Vec3, radius: f32, profile: Profile) -> Ring {
     Ring { centre, right: frame.x, up: -frame.y, radii: (radius, radius), profile }
 }
 
-/// Closes the last ring by a half sphere.
-fn dome(rings: &mut Vec<Ring>, along: Vec3, radius: f32) {
+/// Closes the last ring by half an ellipsoid, its height over its radius given.
+fn dome(rings: &mut Vec<Ring>, along: Vec3, radius: f32, height: f32) {
     let Some(last) = rings.last().copied() else { return };
     for (rise, wide) in [(0.5, 0.87), (0.87, 0.5), (1.0, 0.02)] {
         let wide = radius * wide;
-        rings.push(Ring { centre: last.centre + along * (radius * rise), radii: (wide, wide), ..last });
+        rings.push(Ring { centre: last.centre + along * (radius * rise * height), radii: (wide, wide), ..last });
     }
 }

@@ -126,7 +126,8 @@ mod tests {
             let mesh = Mesh::smooth(s.rest.positions.clone(), s.rest.uvs.clone(), s.rest.triangles.clone());
             assert!(mesh.fault().is_none());
             assert!(mesh.normals.iter().all(|n| n.z > 0.999));
-            let inside = 0.5 * (0..4000).map(|i| 2.0 * outline.half_width((i as f32 + 0.5) / 4000.0)).sum::<f32>() / 4000.0;
+            let inside =
+                0.5 * (0..4000).map(|i| 2.0 * outline.half_width((i as f32 + 0.5) / 4000.0)).sum::<f32>() / 4000.0;
             let extra = mesh.area() / inside;
             assert!(extra > 1.0 && extra < 1.15, "{a} {b}: {extra}");
             // Rows are straight between corners: the chord at every t must still reach past the outline.

@@ -72,15 +72,16 @@ impl Ribbons<'_> {
         let ahead = along / length.max(1e-9);
         let right = ahead.cross(up);
         for k in 0..lobes {
-            let s = lerp(0.3, 0.82, (k as f32 + 0.5) / lobes as f32) + stream.range32(-0.05, 0.05);
+            let s = lerp(0.18, 0.88, (k as f32 + 0.5) / lobes as f32) + stream.range32(-0.05, 0.05);
             for side in [-1.0_f32, 1.0] {
-                let reach = length * stream.range32(0.28, 0.5) * (1.15 - s);
-                if reach < 1.2 * self.width {
+                let reach = length * stream.range32(0.42, 0.68) * (1.2 - s);
+                if reach < self.width {
                     continue;
                 }
                 let spread = stream.range32(0.55, 0.95);
                 let tilt = stream.range32(-0.35, 0.5);
-                let lobe = (ahead * spread.cos() + right * (side * spread.sin() * tilt.cos())
+                let lobe = (ahead * spread.cos()
+                    + right * (side * spread.sin() * tilt.cos())
                     + up * (spread.sin() * tilt.sin()))
                 .normalize_or(ahead);
                 let from = start + along * s + bow * (s * s);

@@ -7,7 +7,7 @@ use super::stage::Growth;
 use super::tube::Profile;
 
 /// Round, tapering.
-const SECTION: Section = Section { profile: Profile::Channelled(1.0), taper: 0.55, seat: (0.7, 0.5) };
+const SECTION: Section = Section { profile: Profile::Channelled(1.0), taper: 0.55, wander: 0.06, seat: (0.7, 0.5) };
 
 /// Grows an upright plant.
 pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {

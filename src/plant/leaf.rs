@@ -15,7 +15,9 @@ use std::f32::consts::FRAC_PI_2;
 
 /// Corners round a stalk.
 const SIDES: u32 = 9;
-/// A chain never comes nearer to the soil than this, metres: a leaf that would, lies on it.
+/// Shortest cell of a blade's mesh, metres: about what four pixels of a field camera see.
+const CELL: f32 = 0.9e-3;
+/// A chain never comes nearer to the soil than this, metres: a leaf that would, lies on it. A low crown halves it.
 const LYING: f32 = 0.003;
 
 /// Where a leaf stands on its axis.
@@ -48,7 +50,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
     let relief = relief(leaf, &mut stream);
     let rest = match &leaf.kind.shape {
         Shape::Sheet { outline } => {
-            let (rows, columns) = (leaf.kind.rows.get() as usize, leaf.kind.columns.get() as usize);
+            let (rows, columns) = cells(leaf);
             let mut sheet = blade::sheet(*outline, leaf.width, rows, columns, &skeleton);
             relief.apply(&mut sheet, leaf.blade);
             sheet.rest
@@ -72,6 +74,13 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
     organs.push(Organ { kind, leaf: leaf.number, skin: leaf.kind.stalk_skin.clone(), mesh });
 }
 
+/// Cells along and across the blade: those of the kind, but none shorter than [`CELL`], so that a bud costs little.
+fn cells(leaf: &LeafNow<'_>) -> (usize, usize) {
+    let (rows, columns) = (leaf.kind.rows.get(), leaf.kind.columns.get());
+    let fit = f64::from(leaf.blade / CELL).max(8.0).min(rows);
+    (fit.round() as usize, (columns * (fit / rows).sqrt()).round().max(4.0).min(columns) as usize)
+}
+
 fn measures(leaf: &LeafNow<'_>) -> Measures {
     let n = leaf.kind.joints.get() as usize;
     let veins: Vec<f32> = (1..=n).map(|k| k as f32 / (n as f32 + 1.0)).collect();
@@ -82,7 +91,13 @@ fn measures(leaf: &LeafNow<'_>) -> Measures {
         }
         _ => None,
     };
-    Measures { stalk: leaf.stalk, stalk_joints: if leaf.stalk > 0.0 { 4 } else { 1 }, length: leaf.blade, veins, secondaries }
+    Measures {
+        stalk: leaf.stalk,
+        stalk_joints: if leaf.stalk > 0.0 { 4 } else { 1 },
+        length: leaf.blade,
+        veins,
+        secondaries,
+    }
 }
 
 /// The frame of ST1 in plant coordinates: vein along the stalk, y out of the upper side, which faces the axis.
@@ -114,16 +129,14 @@ fn pose(skeleton: &mut Skeleton, leaf: &LeafNow<'_>, root: Pose, stream: &mut St
     let sag: Vec<f32> = (base..along.len() - 1)
         .map(|k| {
             let s = along[k] / leaf.blade;
-            let moment: f32 = (0..12)
-                .map(|i| (i as f32 + 0.5) / 12.0)
-                .filter(|t| *t > s)
-                .map(|t| shape(t) * (t - s))
-                .sum();
+            let moment: f32 =
+                (0..12).map(|i| (i as f32 + 0.5) / 12.0).filter(|t| *t > s).map(|t| shape(t) * (t - s)).sum();
             moment / (1.0 - 0.75 * s).powi(3)
         })
         .collect();
     let total: f32 = sag.iter().sum::<f32>().max(1e-6);
     let mut height = root.origin.z;
+    let lying = LYING.min(0.5 * height);
     let mut elevation = root.rotation.col(0).z.clamp(-1.0, 1.0).asin();
     for k in 0..along.len() - 1 {
         let (designed, load) = if k < base {
@@ -136,7 +149,7 @@ fn pose(skeleton: &mut Skeleton, leaf: &LeafNow<'_>, root: Pose, stream: &mut St
         // A young stalk's base is held by its neighbours.
         bend += wobble * stream.normal() as f32 * if k == 0 { 0.4 } else { 1.0 };
         let link = along[k + 1] - along[k];
-        let lowest = ((LYING - height) / link.max(1e-6)).clamp(-1.0, 0.9).asin();
+        let lowest = ((lying - height) / link.max(1e-6)).clamp(-1.0, 0.2).asin();
         if k > 0 || lowest < 0.0 {
             bend = bend.max(lowest - elevation);
         }
@@ -146,9 +159,7 @@ fn pose(skeleton: &mut Skeleton, leaf: &LeafNow<'_>, root: Pose, stream: &mut St
     }
     // The sides hang a little where the blade is level, and each is its own.
     let hang = 0.12 * leaf.bend * elevation.cos();
-    skeleton.bend_branches(|_, _| {
-        (wobble * stream.normal() as f32, 1.5 * wobble * stream.normal() as f32 - hang)
-    });
+    skeleton.bend_branches(|_, _| (wobble * stream.normal() as f32, 1.5 * wobble * stream.normal() as f32 - hang));
 }
 
 fn relief(leaf: &LeafNow<'_>, stream: &mut Stream) -> Relief {
@@ -195,6 +206,8 @@ fn stalk(leaf: &LeafNow<'_>, skeleton: &Skeleton, relief: &Relief, lower: Lower,
                     // The base widens over its first sixth to clasp the stem.
                     let flare = lerp(leaf.kind.stalk_base.f32(), 1.0, s.powf(0.7)) + 0.25 * smoothstep(0.2, 0.0, s);
                     let wide = tip_radius * flare;
+                    // The channel runs out into the midrib.
+                    let channel = channel * lerp(1.0, 0.5, smoothstep(0.75, 1.0, s));
                     rings.push(ring(y, (wide, wide * lerp(0.7, 0.85, s)), channel, 0.0));
                 }
                 Lower::Sheath(radius) => {
@@ -209,8 +222,9 @@ fn stalk(leaf: &LeafNow<'_>, skeleton: &Skeleton, relief: &Relief, lower: Lower,
     let reach = leaf.kind.rib.f32() * leaf.blade;
     if reach > 0.0 {
         let wide = if let Lower::Sheath(radius) = lower { 0.7 * radius } else { tip_radius };
-        for i in 1..=8 {
-            let s = i as f32 / 8.0;
+        // Without a stalk the rib begins at the stem.
+        for i in u8::from(leaf.stalk > 0.0)..=8 {
+            let s = f32::from(i) / 8.0;
             let r = wide * lerp(0.8, 0.06, s.sqrt());
             // Sunk so that the blade lies on its flat top.
             rings.push(ring(s * reach, (r, r), -0.3, 0.15 * r));
@@ -219,4 +233,3 @@ fn stalk(leaf: &LeafNow<'_>, skeleton: &Skeleton, relief: &Relief, lower: Lower,
     tube::sweep(&mut rest, &rings, SIDES, |p| skeleton.weights_on_chain(p.y));
     rest
 }
-

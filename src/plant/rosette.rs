@@ -7,7 +7,8 @@ use super::stage::Growth;
 use super::tube::Profile;
 
 /// A crown: older leaves on its flank, the youngest on top.
-pub(super) const SECTION: Section = Section { profile: Profile::Channelled(1.0), taper: 0.8, seat: (0.75, 0.2) };
+pub(super) const SECTION: Section =
+    Section { profile: Profile::Channelled(1.0), taper: 0.8, wander: 0.05, seat: (0.75, 0.2) };
 
 /// Grows a rosette.
 pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {

@@ -338,10 +338,10 @@ mod tests {
             let ((st, ct), (sa, ca)) = (theta.sin_cos(), alpha.sin_cos());
             let link = [[ct, -st, 0., a], [st * ca, ct * ca, -sa, 0.], [st * sa, ct * sa, ca, 0.], [0., 0., 0., 1.]];
             let m = product(joint.parent.map_or(root, |p| matrices[p]), link);
-            for r in 0..3 {
-                assert!((f64::from(pose.origin[r]) - m[r][3]).abs() < 1e-7, "{:?}", joint.name);
-                for c in 0..3 {
-                    assert!((f64::from(pose.rotation.col(c)[r]) - m[r][c]).abs() < 2e-6, "{:?}", joint.name);
+            for (r, row) in m.iter().enumerate().take(3) {
+                assert!((f64::from(pose.origin[r]) - row[3]).abs() < 1e-7, "{:?}", joint.name);
+                for (c, entry) in row.iter().enumerate().take(3) {
+                    assert!((f64::from(pose.rotation.col(c)[r]) - entry).abs() < 2e-6, "{:?}", joint.name);
                 }
             }
             matrices.push(m);
@@ -366,7 +366,8 @@ mod tests {
     #[test]
     fn a_positive_bend_raises_the_leaf_and_its_sides() {
         let mut skeleton = Skeleton::new(&beet());
-        skeleton.joints[skeleton.base()].bend = 0.2;
+        let base = skeleton.base();
+        skeleton.joints[base].bend = 0.2;
         skeleton.bend_branches(|_, _| (0.2, 0.0));
         let motions = skeleton.motions(Pose::leaf(-0.04));
         let side = motions[skeleton.branch(0, false, 2)].point(vec3(-0.02, 0.02, 0.0));

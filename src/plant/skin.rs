@@ -98,10 +98,12 @@ impl Relief {
         let ends = smoothstep(0.0, 0.12, t) * smoothstep(1.0, 0.8, t);
         let mut lift = 0.0;
         if self.wave != 0.0 {
-            let drift = noise.at2(f64::from(2.6 * t), f64::from(side) * 7.3 + 0.5) as f32;
-            let swell = 1.0 + 0.7 * noise.at2(f64::from(3.1 * t) + 31.7, f64::from(side) * 5.1 + 0.5) as f32;
-            let phase = TAU * (origin / self.period.max(0.02) + 0.7 * drift) + side;
-            lift += self.wave * swell * ends * across.powf(1.8) * phase.sin();
+            // Phase and height wander over about two periods; the two margins know nothing of each other.
+            let wander = f64::from(origin / (2.2 * self.period.max(0.02)));
+            let drift = noise.at2(wander, f64::from(side) * 7.3 + 0.5) as f32;
+            let swell = 1.0 + 1.3 * noise.at2(2.0 * wander + 31.7, f64::from(side) * 5.1 + 0.5) as f32;
+            let phase = TAU * (origin / self.period.max(0.02) + 0.8 * drift) + side;
+            lift += self.wave * swell.max(0.1) * ends * across.powf(1.8) * phase.sin();
         }
         if self.quilt != 0.0 {
             // One cell between neighbouring secondaries, high in its middle, tied down on the veins and the midrib.

@@ -25,7 +25,8 @@ pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {
         let mut stream = growth.stream.child(Purpose::Plant, 100 + k as u64);
         let size = stream.range32(TILLER.0, TILLER.1) * 0.93_f32.powi(k as i32);
         // A side shoot breaks out of the axil of an older leaf, across the ranks.
-        let towards = growth.leaves.first().map_or(0.0, |l| l.azimuth) + PI * (k % 2) as f32 + stream.range32(-0.7, 0.7);
+        let towards =
+            growth.leaves.first().map_or(0.0, |l| l.azimuth) + PI * (k % 2) as f32 + stream.range32(-0.7, 0.7);
         let axis = direction(stream.range32(0.35, 0.75), towards);
         let base = direction(FRAC_PI_2, towards) * (0.5 * growth.stem);
         let turn = FRAC_PI_2 + stream.range32(-0.5, 0.5);

@@ -7,7 +7,7 @@ use super::stage::Growth;
 use super::tube::Profile;
 
 /// Square, slender, leaves seated just below the skin.
-const SECTION: Section = Section { profile: Profile::Square, taper: 0.65, seat: (0.7, 0.7) };
+const SECTION: Section = Section { profile: Profile::Square, taper: 0.65, wander: 0.11, seat: (0.7, 0.7) };
 
 /// Grows whorls.
 pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {

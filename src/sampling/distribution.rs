@@ -65,7 +65,7 @@ impl Distribution1D {
     #[inline]
     pub fn sample(&self, u: f32) -> (f32, f32) {
         let (cell, within) = self.sample_cell(u);
-        (((cell as f32 + within) / self.density.len() as f32).min(ONE_BELOW), self.density[cell])
+        (place(cell, within, self.density.len()), self.density[cell])
     }
 
     /// Density in a cell.
@@ -105,7 +105,7 @@ impl Distribution2D {
     #[inline]
     pub fn sample(&self, u: [f32; 2]) -> ([f32; 2], f32) {
         let (row, within) = self.rows.sample_cell(u[1]);
-        let y = ((row as f32 + within) / self.rows.len() as f32).min(ONE_BELOW);
+        let y = place(row, within, self.rows.len());
         let (x, density) = self.cells[row].as_ref().map_or((u[0], 0.0), |cells| cells.sample(u[0]));
         ([x, y], density * self.rows.density(row))
     }
@@ -154,6 +154,20 @@ pub fn pick_by(count: usize, weight: impl Fn(usize) -> f32, u: f32) -> Option<(u
 
 /// The largest f32 below one.
 const ONE_BELOW: f32 = 1.0 - f32::EPSILON / 2.0;
+
+/// The number in [0, 1) at `within` of a cell of n, such that [`cell_of`] finds the same cell: rounding would now and then put
+/// it into the neighbour, whose density is another.
+#[inline]
+fn place(cell: usize, within: f32, n: usize) -> f32 {
+    let mut x = ((cell as f32 + within) / n as f32).min(ONE_BELOW);
+    while cell_of(x, n) > cell {
+        x = x.next_down();
+    }
+    while cell_of(x, n) < cell {
+        x = x.next_up();
+    }
+    x
+}
 
 #[inline]
 fn cell_of(x: f32, n: usize) -> usize {

@@ -2,7 +2,7 @@
 
 use super::desc::{FieldDesc, Growth, SpeciesDesc};
 use super::library::{Layer, Library, Species};
-use super::page::Page;
+use crate::page::Page;
 use super::tag::Tag;
 use super::{Part, PlantRecord, Scene};
 use crate::material::{Ground as GroundMaterial, GroundSkin, Material, Solid};

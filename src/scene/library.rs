@@ -1,7 +1,7 @@
 //! Everything that pages name, read once: species, pictures, soil layers.
 
 use super::desc::SpeciesDesc;
-use super::page::Page;
+use crate::page::Page;
 use crate::geometry::AlphaMask;
 use crate::material::{LeafMaterial, Picture};
 use crate::math::Vec2;

@@ -3,7 +3,6 @@
 pub mod build;
 pub mod desc;
 mod library;
-pub mod page;
 pub mod tag;
 
 use crate::accel::Surface;

@@ -8,6 +8,8 @@ mod exposure;
 mod lens;
 mod pose;
 mod response;
+#[cfg(test)]
+mod tests;
 mod tone;
 
 pub use desc::{ApertureDesc, CameraDesc, DistortionDesc, IntrinsicsDesc, PoseDesc};

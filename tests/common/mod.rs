@@ -1,4 +1,5 @@
-//! Shared by the system tests.
-#![allow(dead_code)]
+//! What several tests share.
+#![allow(dead_code, unreachable_pub, reason = "each test uses its part")]
 
+pub mod chi2;
 pub mod scenes;

@@ -40,7 +40,9 @@ impl Page {
     /// Reads the page as `T`.
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T> {
         use ron::extensions::Extensions;
-        let options = ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME);
+        // `notch: 0.05`, `Leaf(size: …)`: a page needs neither `Some` nor doubled brackets.
+        let options = ron::Options::default()
+            .with_default_extension(Extensions::IMPLICIT_SOME | Extensions::UNWRAP_VARIANT_NEWTYPES);
         options.from_str(&self.text).map_err(|e| self.fault(&locate(&self.text, &e)))
     }
 
