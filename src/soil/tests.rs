@@ -40,16 +40,17 @@ fn ground(desc: &SoilDesc, size: f32) -> Ground {
     Ground::new(desc, &MAPS, &site(size), &stream()).unwrap()
 }
 
+fn root(parent: &mut [usize], mut i: usize) -> usize {
+    while parent[i] != i {
+        parent[i] = parent[parent[i]];
+        i = parent[i];
+    }
+    i
+}
+
 /// The bodies of a mesh: vertices that triangles connect.
 fn bodies(mesh: &Mesh) -> Vec<Vec<Vec3>> {
     let mut parent: Vec<usize> = (0..mesh.positions.len()).collect();
-    fn root(parent: &mut [usize], mut i: usize) -> usize {
-        while parent[i] != i {
-            parent[i] = parent[parent[i]];
-            i = parent[i];
-        }
-        i
-    }
     for t in &mesh.triangles {
         let [a, b, c] = t.map(|i| root(&mut parent, i as usize));
         parent[b] = a;
