@@ -1,1 +1,141 @@
-//! To be furnished.
+//! Where samples become pixels: mean and variance of each band, and the first surface's channels.
+
+use crate::geometry::Window;
+use crate::math::{Spectrum, Vec2, Vec3};
+use glam::{DVec4, Vec4};
+
+/// What is known of one pixel after all its samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Pixel {
+    /// Mean radiance.
+    pub mean: Spectrum,
+    /// Variance of that mean: the sample variance over the number of samples.
+    pub variance: Spectrum,
+    /// Mean albedo of the first surface; zero where there was none.
+    pub albedo: Spectrum,
+    /// Mean shading normal of the first surface, not normalised.
+    pub normal: Vec3,
+    /// Mean distance to the first surface along the ray, metres; infinite where no sample met one.
+    pub depth: f32,
+}
+
+/// Adds up one pixel. One thread sums a pixel in sample order, so any number of threads makes the same bits.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Accumulator {
+    count: u32,
+    mean: DVec4,
+    m2: DVec4,
+    albedo: Vec4,
+    normal: Vec3,
+    depth: f64,
+    hits: u32,
+}
+
+impl Accumulator {
+    /// Adds one sample's radiance. Source: Welford 1962.
+    #[inline]
+    pub fn add(&mut self, radiance: Spectrum) {
+        self.count += 1;
+        let x = radiance.0.as_dvec4();
+        let delta = x - self.mean;
+        self.mean += delta / f64::from(self.count);
+        self.m2 += delta * (x - self.mean);
+    }
+
+    /// Adds what that sample saw first.
+    #[inline]
+    pub fn add_first(&mut self, albedo: Spectrum, normal: Vec3, depth: f32) {
+        self.hits += 1;
+        self.albedo += albedo.0;
+        self.normal += normal;
+        self.depth += f64::from(depth);
+    }
+
+    /// The pixel.
+    pub fn finish(&self) -> Pixel {
+        let n = f64::from(self.count.max(1));
+        let variance = if self.count > 1 { self.m2 / ((n - 1.0) * n) } else { DVec4::ZERO };
+        Pixel {
+            mean: Spectrum(self.mean.as_vec4()),
+            variance: Spectrum(variance.as_vec4()),
+            albedo: Spectrum(self.albedo / n as f32),
+            normal: self.normal / n as f32,
+            depth: if self.hits == 0 { f32::INFINITY } else { (self.depth / f64::from(self.hits)) as f32 },
+        }
+    }
+}
+
+/// How a pixel gathers light over its surroundings. Samples are drawn from the filter's shape, so pixels stay independent.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub enum Filter {
+    /// The pixel's own square, as a sensor with full fill factor and a perfect lens.
+    Box,
+    /// A normal blur of this standard deviation in pixels on top of the square: the lens's point spread.
+    Gaussian(f32),
+}
+
+impl Filter {
+    /// An offset from the pixel's centre, pixels, from four numbers in [0, 1).
+    #[inline]
+    pub fn sample(self, u: [f32; 2], v: [f32; 2]) -> Vec2 {
+        let square = Vec2::from(u) - 0.5;
+        match self {
+            Self::Box => square,
+            Self::Gaussian(sigma) => {
+                let r = sigma * (-2.0 * (1.0 - v[0]).ln()).sqrt();
+                let (sin, cos) = (std::f32::consts::TAU * v[1]).sin_cos();
+                square + Vec2::new(r * cos, r * sin)
+            }
+        }
+    }
+}
+
+/// A rendered image, row by row from the top.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Film {
+    /// Which part of the camera's image it shows.
+    pub window: Window,
+    /// Its pixels.
+    pub pixels: Vec<Pixel>,
+}
+
+impl Film {
+    /// The pixel at column x, row y of the window.
+    pub fn at(&self, x: u32, y: u32) -> &Pixel {
+        &self.pixels[(y * self.window.width() + x) as usize]
+    }
+
+    /// Median over pixels of the relative standard error of the radiance's luminance-like mean of the bands: one honest figure.
+    pub fn median_relative_error(&self) -> f32 {
+        let mut errors: Vec<f32> = self
+            .pixels
+            .iter()
+            .filter(|p| p.mean.mean() > 0.0)
+            .map(|p| p.variance.map(f32::sqrt).mean() / p.mean.mean())
+            .collect();
+        if errors.is_empty() {
+            return 0.0;
+        }
+        let middle = errors.len() / 2;
+        *errors.select_nth_unstable_by(middle, f32::total_cmp).1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mean_and_variance_are_those_of_the_samples() {
+        let mut a = Accumulator::default();
+        let samples = [1.0_f32, 4.0, 2.0, 9.0, 0.5];
+        for s in samples {
+            a.add(Spectrum::splat(s));
+        }
+        let mean = samples.iter().sum::<f32>() / 5.0;
+        let var = samples.iter().map(|s| (s - mean).powi(2)).sum::<f32>() / 4.0 / 5.0;
+        let p = a.finish();
+        assert!((p.mean.to_array()[2] - mean).abs() < 1e-6);
+        assert!((p.variance.to_array()[3] - var).abs() < 1e-5);
+    }
+}

@@ -1,1 +1,100 @@
-//! To be furnished.
+//! How a point of a surface scatters light, in its local frame. Pure functions: no geometry, no textures.
+
+mod diffuse;
+pub mod fresnel;
+mod leaf;
+pub mod microfacet;
+mod sample;
+mod wet;
+
+use crate::math::{Spectrum, Vec3};
+
+pub use diffuse::OrenNayar;
+pub use leaf::{Leaf, Side};
+pub use sample::{BsdfSample, Scatter};
+pub use wet::Wet;
+
+/// The scattering of one point. `Copy`: it lives on the stack for one bounce.
+#[derive(Clone, Copy, Debug)]
+pub enum Bsdf {
+    /// Rough and dry: soil, stone, wood.
+    OrenNayar(OrenNayar),
+    /// The same under a film of water.
+    Wet(Wet),
+    /// A thin sheet that reflects and transmits under a coat.
+    Leaf(Leaf),
+}
+
+macro_rules! each {
+    ($self:ident, $b:ident => $e:expr) => {
+        match $self {
+            Bsdf::OrenNayar($b) => $e,
+            Bsdf::Wet($b) => $e,
+            Bsdf::Leaf($b) => $e,
+        }
+    };
+}
+
+impl Bsdf {
+    /// See [`Scatter::eval`].
+    #[inline]
+    pub fn eval(&self, wo: Vec3, wi: Vec3) -> Spectrum {
+        each!(self, b => b.eval(wo, wi))
+    }
+
+    /// See [`Scatter::pdf`].
+    #[inline]
+    pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        each!(self, b => b.pdf(wo, wi))
+    }
+
+    /// See [`Scatter::sample`].
+    #[inline]
+    pub fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
+        each!(self, b => b.sample(wo, u))
+    }
+
+    /// Reflectance seen from the side of `cos_o`, about: what denoisers and people take for the surface's colour.
+    pub fn reflectance(&self, cos_o: f32) -> Spectrum {
+        match self {
+            Self::OrenNayar(b) => b.albedo(),
+            Self::Wet(b) => b.albedo(),
+            Self::Leaf(b) => b.reflectance(cos_o),
+        }
+    }
+
+    /// Whether light may pass through.
+    pub fn transmits(&self) -> bool {
+        matches!(self, Self::Leaf(_))
+    }
+
+    /// One of each kind over its range, by name: the tests run over all of them.
+    pub fn examples() -> Vec<(&'static str, Self)> {
+        let soil = Spectrum::new(0.22, 0.14, 0.09, 0.27);
+        let leaf = |front: f32, back: f32| {
+            let side = |roughness: f32, r: Spectrum| Side::new(1.45, [roughness; 2], r);
+            Leaf::new(
+                side(front, Spectrum::new(0.07, 0.11, 0.05, 0.44)),
+                side(back, Spectrum::new(0.1, 0.15, 0.08, 0.44)),
+                Spectrum::new(0.07, 0.12, 0.02, 0.5),
+            )
+        };
+        let grass = Leaf::new(
+            Side::new(1.45, [0.5, 0.2], Spectrum::splat(0.3)),
+            Side::new(1.45, [0.5, 0.2], Spectrum::splat(0.3)),
+            Spectrum::splat(0.4),
+        );
+        vec![
+            ("lambert", Self::OrenNayar(OrenNayar::new(Spectrum::splat(0.5), 0.0))),
+            ("dry soil", Self::OrenNayar(OrenNayar::new(soil, 0.35))),
+            ("rough soil", Self::OrenNayar(OrenNayar::new(soil, 0.7))),
+            ("moist soil", Self::Wet(Wet::new(soil, 0.35, 0.4, 0.3))),
+            ("wet soil", Self::Wet(Wet::new(soil, 0.35, 1.0, 0.15))),
+            ("glossy leaf", Self::Leaf(leaf(0.15, 0.5))),
+            ("beet leaf", Self::Leaf(leaf(0.3, 0.5))),
+            ("dull leaf", Self::Leaf(leaf(0.6, 0.6))),
+            ("grass", Self::Leaf(grass)),
+            ("leaf without a coat", Self::Leaf(Leaf::bare(Spectrum::splat(0.45), Spectrum::splat(0.55)))),
+        ]
+    }
+}

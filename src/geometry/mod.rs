@@ -1,10 +1,14 @@
 //! Shapes without optics: meshes, alpha masks, rays and what they hit.
 
 pub mod alpha;
+mod interaction;
 pub mod mesh;
 pub mod outline;
 mod ray;
+mod window;
 
 pub use alpha::AlphaMask;
+pub use interaction::Interaction;
 pub use mesh::Mesh;
 pub use ray::{Hit, Intersect, Ray};
+pub use window::Window;

@@ -1,1 +1,217 @@
-//! To be furnished.
+//! Light: sun, sky, constant environment, lamps; how a page writes them and how a path tracer draws from them.
+//!
+//! `sample.rs` holds the promise, each variant keeps it in a file of its own, the enum here only chooses. Radiance is
+//! W·m⁻²·sr⁻¹·nm⁻¹ and irradiance W·m⁻²·nm⁻¹, both in the four bands R, G, B, NIR.
+
+pub mod clearsky;
+mod daylight;
+mod environment;
+pub mod hosek;
+mod lamp;
+mod position;
+mod sample;
+mod sky;
+mod sun;
+
+pub use daylight::{AboveHorizon, Latitude, Longitude, SunDesc, Turbidity, daylight, overcast_irradiance};
+pub use environment::Environment;
+pub use lamp::{GlowDesc, Lamp, Outline, PointDesc, ShapeDesc};
+pub use position::{SunPosition, Utc, sun_position};
+pub use sample::{Emitter, LampHit, LightSample};
+pub use sky::{Dome, Sky};
+pub use sun::{HALF_ANGLE_DEG, Sun};
+
+use crate::Result;
+use crate::math::{Frame, Spectrum, Vec2, Vec3, vec3};
+use crate::sampling::rng::Stream;
+use crate::sampling::vary::{Fraction, NonNegative, Positive, Vary};
+use serde::{Deserialize, Serialize};
+
+/// A light.
+#[derive(Clone, Debug)]
+pub enum Light {
+    /// The sun's disc.
+    Sun(Sun),
+    /// The sky's dome.
+    Sky(Box<Sky>),
+    /// The same radiance from everywhere.
+    Environment(Environment),
+    /// A rectangle or disc that shines on one side.
+    Lamp(Lamp),
+}
+
+macro_rules! of {
+    ($light:expr, $inner:ident => $call:expr) => {
+        match $light {
+            Light::Sun($inner) => $call,
+            Light::Sky($inner) => $call,
+            Light::Environment($inner) => $call,
+            Light::Lamp($inner) => $call,
+        }
+    };
+}
+
+impl Light {
+    /// Draws a direction from `p` (metres, world) to the light with two numbers in [0, 1); `None` where the point sees nothing
+    /// of it. Visibility is not tested.
+    #[inline]
+    pub fn sample_li(&self, p: Vec3, u: [f32; 2]) -> Option<LightSample> {
+        of!(self, light => light.sample_li(p, u))
+    }
+
+    /// Density per solid angle with which [`Self::sample_li`] draws the unit direction `wi` at `p`.
+    #[inline]
+    pub fn pdf_li(&self, p: Vec3, wi: Vec3) -> f32 {
+        of!(self, light => light.pdf_li(p, wi))
+    }
+
+    /// Radiance along a ray that left the scene in the unit direction `dir`: sun, sky, environment. Zero for lamps.
+    #[inline]
+    pub fn le(&self, dir: Vec3) -> Spectrum {
+        of!(self, light => light.le(dir))
+    }
+
+    /// The lamp as met by a ray; `None` for lights infinitely far away.
+    #[inline]
+    pub fn hit(&self, origin: Vec3, dir: Vec3) -> Option<LampHit> {
+        of!(self, light => light.hit(origin, dir))
+    }
+
+    /// A cheap estimate of the irradiance (mean of the bands) at `p` on a surface of unit normal `n`, on both sides together
+    /// with `two_sided`; above zero wherever the light can contribute.
+    #[inline]
+    pub fn importance(&self, p: Vec3, n: Vec3, two_sided: bool) -> f32 {
+        of!(self, light => light.importance(p, n, two_sided))
+    }
+
+    /// Irradiance of a horizontal plane at the world's origin, unoccluded, W·m⁻²·nm⁻¹ per band.
+    pub fn horizontal_irradiance(&self) -> Spectrum {
+        of!(self, light => light.horizontal_irradiance())
+    }
+
+    /// Whether rays that leave the scene see it.
+    pub fn is_infinite(&self) -> bool {
+        !matches!(self, Self::Lamp(_))
+    }
+
+    /// One of each kind and corner, for tests that run over all lights.
+    pub fn examples() -> Vec<(&'static str, Self)> {
+        let mut of = Vec::new();
+        for (sun_name, sky_name, elevation, azimuth, turbidity, cloud) in [
+            ("high sun", "clear sky", 60.0, 170.0, 3.0, 0.0),
+            ("low sun", "hazy sky at a low sun", 6.0, 265.0, 6.0, 0.0),
+            ("veiled sun", "half clouded sky", 35.0, 95.0, 2.0, 0.5),
+        ] {
+            let (sun, sky) = daylight(elevation, azimuth, turbidity, cloud);
+            of.extend(sun.map(|sun| (sun_name, Self::Sun(sun))));
+            of.extend(sky.map(|sky| (sky_name, Self::Sky(Box::new(sky)))));
+        }
+        let overcast = Sky::new(Dome::overcast(overcast_irradiance(20.0)));
+        of.extend(overcast.map(|sky| ("overcast sky", Self::Sky(Box::new(sky)))));
+        of.push(("uniform sun", Self::Sun(Sun::uniform(vec3(0.6, 0.0, 0.8), Spectrum::ONE))));
+        of.push(("constant environment", Self::Environment(Environment::new(Spectrum::new(0.5, 1.0, 2.0, 4.0)))));
+        let radiance = Spectrum::new(2.0, 3.0, 1.0, 0.5);
+        let lamp = |outline, centre: Vec3, axis: Vec3| {
+            Self::Lamp(Lamp::new(outline, centre, Frame::about(axis.normalize()), radiance))
+        };
+        of.push(("rectangle above", lamp(Outline::Rectangle(Vec2::new(0.3, 0.1)), vec3(0.1, 0.2, 0.9), -Vec3::Z)));
+        of.push(("disc aside", lamp(Outline::Disc(0.15), vec3(0.5, -0.3, 0.6), vec3(-0.5, 0.3, -0.6))));
+        of.push((
+            "large near rectangle",
+            lamp(Outline::Rectangle(Vec2::ONE), vec3(0.0, 0.0, 0.4), vec3(0.2, 0.1, -1.0)),
+        ));
+        of
+    }
+}
+
+/// A light, as it is written.
+///
+/// ```
+/// use furrow::light::LightDesc;
+/// use furrow::sampling::{Purpose, Stream};
+/// let mut stream = Stream::of(1, 0, Purpose::Page, 0);
+/// for (page, count) in [
+///     (r#"Daylight(sun: At(latitude_deg: 50.6, longitude_deg: 7, utc: "2016-05-27T11:30:00Z"), turbidity: 3)"#, 2),
+///     ("Daylight(sun: Angles(elevation_deg: Uniform(20, 65), azimuth_deg: Uniform(0, 360)), cloud: 0.4)", 2),
+///     ("Overcast(illuminance_klx: Uniform(5, 25))", 1),
+///     ("Constant(radiance: (1, 1, 1, Uniform(0.5, 1)))", 1),
+///     (
+///         "Lamp(
+///             shape: Rectangle(width_m: 0.3, height_m: 0.1),
+///             position_m: (0.4, 0, 0.8),
+///             look_at_m: (0, 0, 0),
+///             glow: WhiteLed(irradiance: Uniform(0.8, 1.2), at_m: 0.9),
+///         )",
+///         1,
+///     ),
+///     ("Lamp(shape: Disc(radius_m: 0.05), position_m: (0, 0.3, 0.8), glow: Radiance(1, 1, 1, 0.5))", 1),
+/// ] {
+///     let desc: LightDesc = ron::from_str(page)?;
+///     assert_eq!(desc.build(&mut stream)?.len(), count);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(clippy::large_enum_variant, reason = "a page has a handful of lights")]
+pub enum LightDesc {
+    /// Sun and sky of one moment.
+    Daylight {
+        /// Where the sun stands.
+        sun: SunDesc,
+        /// Haze, 1.7 to 10; default 3.
+        #[serde(default = "daylight::clear_air")]
+        turbidity: Vary<Turbidity>,
+        /// Cloud cover, 0 clear to 1 overcast; default 0.
+        #[serde(default = "daylight::zero")]
+        cloud: Vary<Fraction>,
+    },
+    /// A sky of even cloud.
+    Overcast {
+        /// Illuminance of the ground, kilolux: 5 to 25 under heavy cloud, 20 to 50 under bright cloud; default 20.
+        #[serde(default = "daylight::bright_cloud")]
+        illuminance_klx: Vary<Positive>,
+    },
+    /// The same radiance from everywhere.
+    Constant {
+        /// Radiance in R, G, B, NIR, W·m⁻²·sr⁻¹·nm⁻¹.
+        radiance: (Vary<NonNegative>, Vary<NonNegative>, Vary<NonNegative>, Vary<NonNegative>),
+    },
+    /// An area that shines on one side.
+    Lamp {
+        /// The area.
+        shape: ShapeDesc,
+        /// Its centre, metres.
+        position_m: PointDesc,
+        /// The point it shines at, metres; default the origin.
+        #[serde(default = "lamp::origin")]
+        look_at_m: PointDesc,
+        /// Brightness and colour.
+        glow: GlowDesc,
+    },
+}
+
+impl LightDesc {
+    /// Draws the lights: two for a day with sun and sky, one for the others, none for one that is black.
+    pub fn build(&self, stream: &mut Stream) -> Result<Vec<Light>> {
+        let sky = |sky: Option<Sky>| sky.map(|sky| Light::Sky(Box::new(sky)));
+        Ok(match self {
+            Self::Daylight { sun, turbidity, cloud } => {
+                let at = sun.draw(stream)?;
+                let (turbidity, cloud) = (turbidity.draw(stream), cloud.draw32(stream));
+                let (sun, dome) = daylight(at.elevation_deg, at.azimuth_deg, turbidity, cloud);
+                sun.map(Light::Sun).into_iter().chain(sky(dome)).collect()
+            }
+            Self::Overcast { illuminance_klx } => {
+                sky(Sky::new(Dome::overcast(overcast_irradiance(illuminance_klx.draw32(stream))))).into_iter().collect()
+            }
+            Self::Constant { radiance: (r, g, b, nir) } => {
+                let radiance = Spectrum::from([r, g, b, nir].map(|band| band.draw32(stream)));
+                if radiance.is_black() { Vec::new() } else { vec![Light::Environment(Environment::new(radiance))] }
+            }
+            Self::Lamp { shape, position_m, look_at_m, glow } => {
+                vec![Light::Lamp(Lamp::draw(shape, position_m, look_at_m, glow, stream)?)]
+            }
+        })
+    }
+}

@@ -1,1 +1,41 @@
-//! To be furnished.
+//! What parts are made of: textures and optics at a point → its scattering and the frame it scatters in.
+
+pub mod ground;
+pub mod leaf;
+mod shading;
+mod solid;
+
+use crate::bsdf::Bsdf;
+use crate::geometry::Interaction;
+use crate::math::{Frame, Vec3};
+
+pub use ground::{Ground, GroundSkin};
+pub use leaf::{LeafDesc, LeafMaterial, Picture};
+pub use solid::Solid;
+
+/// What a part is made of.
+#[derive(Clone, Debug)]
+pub enum Material {
+    /// A blade, a petiole, a stem.
+    Leaf(LeafMaterial),
+    /// The ground and its clods.
+    Ground(Ground),
+    /// Stone, wood, straw: one colour, rough.
+    Solid(Solid),
+    /// The same scattering everywhere: for tests and teaching.
+    Plain(Bsdf),
+}
+
+impl Material {
+    /// The scattering at a point seen from `wo` (world, unit), and the frame of its directions. The frame's z axis is the
+    /// shading normal on the upper side of the surface; it always sees `wo` from the side that the triangle does.
+    #[inline]
+    pub fn scatter(&self, at: &Interaction, wo: Vec3) -> (Bsdf, Frame) {
+        match self {
+            Self::Leaf(m) => m.scatter(at, wo),
+            Self::Ground(m) => m.scatter(at, wo),
+            Self::Solid(m) => m.scatter(at, wo),
+            Self::Plain(bsdf) => (*bsdf, shading::frame(at, at.ns, wo)),
+        }
+    }
+}

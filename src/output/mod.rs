@@ -1,1 +1,104 @@
-//! To be furnished.
+//! Files: pictures for people, radiance for programs, labels for both. Each appears whole or not at all, and holds neither
+//! clock times nor paths, so equal runs write equal bytes.
+
+mod exr;
+mod overlay;
+mod png;
+
+use crate::film::Film;
+use crate::render::LabelMap;
+use crate::scene::tag::Class;
+use crate::sensor::Photograph;
+use crate::{Error, Result};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+pub use self::png::{Picture, read_gray16, read_indexed, write_png};
+
+/// Where an image came from: what its files say about themselves.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Provenance {
+    /// SHA-256 of the page and every page, texture and table that it names, in hex.
+    pub scene_hash: String,
+    /// Seed.
+    pub seed: u64,
+    /// Index of the field.
+    pub index: u64,
+    /// Samples a pixel.
+    pub spp: u32,
+    /// What was drawn: the integrator's name.
+    pub integrator: String,
+    /// The ray tracing kernels.
+    pub kernels: String,
+}
+
+impl Provenance {
+    /// One `key: value` a line.
+    pub fn text(&self) -> String {
+        format!(
+            "program: furrow {}\nscene: sha256 {}\nseed: {}\nindex: {}\nspp: {}\nintegrator: {}\nkernels: {}",
+            env!("CARGO_PKG_VERSION"),
+            self.scene_hash,
+            self.seed,
+            self.index,
+            self.spp,
+            self.integrator,
+            self.kernels
+        )
+    }
+}
+
+/// Writes a file under a temporary name beside its target, flushes it, then renames: a reader never sees half a file.
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".furrow-");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // As any other new file: the umask takes its part.
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    let mut file = builder.tempfile_in(folder).map_err(Error::io(path))?;
+    file.write_all(bytes).map_err(Error::io(path))?;
+    file.as_file().sync_all().map_err(Error::io(path))?;
+    file.persist(path).map_err(|e| Error::Io { path: path.into(), source: e.error })?;
+    Ok(())
+}
+
+/// Writes every file of one image into `folder` and returns their paths: `rgb.png`, `nir.png`, `radiance.exr`,
+/// `semantics.png`, `plants.png`, `leaves.png`, `overlay.png`.
+pub fn write_image(
+    folder: &Path,
+    film: &Film,
+    labels: &LabelMap,
+    photograph: &Photograph,
+    provenance: &Provenance,
+) -> Result<Vec<PathBuf>> {
+    let (w, h) = (film.window.width(), film.window.height());
+    let text = provenance.text();
+    let classes: Vec<u8> = labels.tags.iter().map(|t| t.class as u8).collect();
+    let palette: Vec<[u8; 3]> = Class::ALL.iter().map(|c| c.color()).collect();
+    let plants: Vec<u16> = labels.tags.iter().map(|t| t.plant).collect();
+    let leaves: Vec<u16> = labels.tags.iter().map(|t| t.leaf).collect();
+    let rgb = photograph.rgb.as_chunks::<3>().0;
+    let overlay = overlay::draw(rgb, labels);
+    let files: [(&str, Vec<u8>); 7] = [
+        ("rgb.png", png::encode(w, h, &Picture::Rgb(rgb), &text)?),
+        ("nir.png", png::encode(w, h, &Picture::Gray(&photograph.nir), &text)?),
+        ("radiance.exr", exr::encode(film, labels, &text)?),
+        ("semantics.png", png::encode(w, h, &Picture::Indexed(&classes, &palette), &text)?),
+        ("plants.png", png::encode(w, h, &Picture::Gray16(&plants), &text)?),
+        ("leaves.png", png::encode(w, h, &Picture::Gray16(&leaves), &text)?),
+        ("overlay.png", png::encode(w, h, &Picture::Rgb(&overlay), &text)?),
+    ];
+    files
+        .into_iter()
+        .map(|(name, bytes)| {
+            let path = folder.join(name);
+            write_atomically(&path, &bytes)?;
+            Ok(path)
+        })
+        .collect()
+}

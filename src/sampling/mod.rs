@@ -1,10 +1,11 @@
 //! Random numbers: addressed streams, what a page may draw, low-discrepancy samples, warps and tables with their densities.
 
 pub mod distribution;
+pub mod fault;
 pub mod rng;
 pub mod sampler;
 pub mod vary;
 pub mod warp;
 
 pub use rng::{Purpose, Stream};
-pub use sampler::Sampler;
+pub use sampler::{Sampler, sets};

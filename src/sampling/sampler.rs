@@ -5,6 +5,24 @@
 
 use super::rng::mix;
 
+/// What each set of four dimensions is for.
+pub mod sets {
+    /// Place in the pixel, place on the lens.
+    pub const CAMERA: u32 = 0;
+    /// The filter's blur.
+    pub const BLUR: u32 = 1;
+
+    /// Which light, where on it, roulette: at the surface number `depth`.
+    pub const fn light(depth: u32) -> u32 {
+        2 + 2 * depth
+    }
+
+    /// Which lobe, which direction.
+    pub const fn scatter(depth: u32) -> u32 {
+        3 + 2 * depth
+    }
+}
+
 /// Where one sample of one pixel draws its numbers.
 #[derive(Clone, Copy, Debug)]
 pub struct Sampler {
@@ -22,8 +40,11 @@ impl Sampler {
     }
 
     /// The four numbers in [0, 1) of dimension set `set`; each set is stratified by itself over the samples of a pixel.
+    /// The direction numbers of far sets are used again under another scramble and another order of the samples.
     #[inline]
     pub fn get4(&self, set: u32) -> [f32; 4] {
-        sobol_burley::sample_4d(self.index, set, self.seed)
+        const SETS: u32 = sobol_burley::NUM_DIMENSION_SETS_4D;
+        let seed = if set < SETS { self.seed } else { mix(u64::from(self.seed) << 32 | u64::from(set / SETS)) as u32 };
+        sobol_burley::sample_4d(self.index, set % SETS, seed)
     }
 }

@@ -7,10 +7,9 @@
 //! assert!(ron::from_str::<Vary<Positive>>("Uniform(-3, 2)").is_err());
 //! ```
 //!
-//! The bound is part of the type, so an impossible value is an error at its place in the file. RON tells neither where a
-//! custom error lies nor whether a number or a name comes next; both are read off the raw text of the value here, and
-//! [`Fault`] carries the place outward through serde's string-only errors.
+//! The bound is part of the type, so an impossible value is an error at its place in the file.
 
+pub use super::fault::{from_raw, parse_in, whole};
 use super::rng::Stream;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de, ser};
 use std::fmt;
@@ -62,67 +61,6 @@ bounds! {
     PositiveCount { const MIN: f64 = 1.0; const MAX: f64 = 1e6; const WHOLE: bool = true; const WORDS: &'static str = "a whole number from 1 to 1000000"; }
     /// Degrees of elevation above the horizon.
     Elevation { const MIN: f64 = -90.0; const MAX: f64 = 90.0; const WORDS: &'static str = "between -90 and 90 degrees"; }
-}
-
-/// A problem inside one value: the byte range within the value's raw text, and words. Travels through serde as a string.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Fault {
-    /// Bytes of the raw value.
-    pub raw_len: usize,
-    /// Where the fault begins, in bytes from the value's start.
-    pub start: usize,
-    /// Where it ends.
-    pub end: usize,
-    /// What is wrong.
-    pub message: String,
-}
-
-const MARK: char = '\u{1}';
-
-impl fmt::Display for Fault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{MARK}{}:{}:{}{MARK}{}", self.raw_len, self.start, self.end, self.message)
-    }
-}
-
-impl Fault {
-    /// Reads back what `Display` wrote; `None` for any other message.
-    pub fn parse(text: &str) -> Option<Self> {
-        let (head, message) = text.strip_prefix(MARK)?.split_once(MARK)?;
-        let mut numbers = head.split(':').map(str::parse);
-        let mut next = || numbers.next()?.ok();
-        Some(Self { raw_len: next()?, start: next()?, end: next()?, message: message.to_owned() })
-    }
-}
-
-/// Reads one value by its raw text; what `read` refuses becomes an error at that text.
-pub fn from_raw<'de, D: Deserializer<'de>, T>(
-    deserializer: D,
-    read: impl FnOnce(&str) -> Result<T, Fault>,
-) -> Result<T, D::Error> {
-    let raw = <&ron::value::RawValue>::deserialize(deserializer)?.get_ron();
-    read(raw).map_err(de::Error::custom)
-}
-
-/// Parses RON inside a value, keeping the place of an error.
-pub fn parse_in<T: de::DeserializeOwned>(raw: &str) -> Result<T, Fault> {
-    ron::from_str(raw).map_err(|e| {
-        let at = |p: ron::error::Position| offset_of(raw, p.line, p.col);
-        let (start, end) = (at(e.span.start), at(e.span.end));
-        Fault { raw_len: raw.len(), start, end: end.max(start), message: e.code.to_string() }
-    })
-}
-
-/// The byte offset of a line and column (both from 1, columns in characters); the text's end when it lies beyond.
-pub fn offset_of(text: &str, line: usize, column: usize) -> usize {
-    let start = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum::<usize>();
-    let rest = &text[start.min(text.len())..];
-    start + rest.char_indices().nth(column.saturating_sub(1)).map_or(rest.len(), |(i, _)| i)
-}
-
-/// A fault that covers the whole value.
-pub fn whole(raw: &str, message: impl Into<String>) -> Fault {
-    Fault { raw_len: raw.len(), start: 0, end: raw.trim_end().len(), message: message.into() }
 }
 
 fn starts_with_name(raw: &str) -> bool {

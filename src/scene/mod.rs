@@ -1,1 +1,90 @@
-//! To be furnished.
+//! What is out there: parts, materials, lights, a camera.
+
+pub mod build;
+pub mod desc;
+mod library;
+pub mod page;
+pub mod tag;
+
+use crate::accel::Surface;
+use crate::film::Filter;
+use crate::geometry::{AlphaMask, Mesh};
+use crate::light::Light;
+use crate::material::Material;
+use crate::math::Vec3;
+use crate::sensor::Camera;
+use std::sync::Arc;
+use tag::{Class, Tag};
+
+pub use build::Field;
+
+/// One organ of one plant, one stone, the ground: a mesh with a material and a name.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// Its triangles, in the world.
+    pub mesh: Mesh,
+    /// Where they are there at all; `None` for everywhere.
+    pub mask: Option<Arc<AlphaMask>>,
+    /// Index into [`Scene::materials`].
+    pub material: u32,
+    /// Who it is.
+    pub tag: Tag,
+}
+
+/// What is known of one plant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlantRecord {
+    /// Its number in the labels, from 1.
+    pub number: u16,
+    /// Scientific name.
+    pub species: String,
+    /// EPPO code.
+    pub eppo: String,
+    /// Crop or weed.
+    pub class: Class,
+    /// Where its stem meets the ground, metres.
+    pub position: Vec3,
+    /// Its growth axis, unit.
+    pub axis: Vec3,
+    /// Where its first leaf points, radians clockwise from north.
+    pub heading: f32,
+    /// Growth stage, BBCH.
+    pub bbch: u32,
+    /// Days after emergence.
+    pub age_days: f32,
+    /// Its height, metres.
+    pub height: f32,
+    /// Number of its leaves, seed leaves included.
+    pub leaves: u16,
+}
+
+/// One field.
+pub struct Scene {
+    /// Everything that rays can hit.
+    pub parts: Vec<Part>,
+    /// What the parts are made of.
+    pub materials: Vec<Material>,
+    /// What shines.
+    pub lights: Vec<Light>,
+    /// Who looks.
+    pub camera: Camera,
+    /// How its pixels gather light.
+    pub filter: Filter,
+}
+
+impl Scene {
+    /// The parts as the accelerators see them.
+    pub fn surfaces(&self) -> Vec<Surface<'_>> {
+        self.parts.iter().map(|p| Surface { mesh: &p.mesh, mask: p.mask.as_ref() }).collect()
+    }
+
+    /// One tag a part.
+    pub fn tags(&self) -> Vec<Tag> {
+        self.parts.iter().map(|p| p.tag).collect()
+    }
+
+    /// Number of triangles.
+    pub fn triangles(&self) -> usize {
+        self.parts.iter().map(|p| p.mesh.triangles.len()).sum()
+    }
+}

@@ -1,1 +1,185 @@
-//! To be furnished.
+//! The ground: soil layers blended by noise, relief, moisture, and the clods, stones and litter that lie on it.
+//!
+//! [`SoilDesc`] is what a page says. [`Ground`] is one piece of ground: a displaced grid ([`Ground::mesh`]) that goes on
+//! beyond the view with growing cells, and a texture of its own ([`Ground::skin`]) with all that is finer than the grid.
+//! The same blend weights drive both. Bodies are then laid on a [`Pile`], which remembers what lies there already, largest
+//! first: [`stones()`], [`clods()`], [`litter()`].
+//!
+//! Every random number is addressed: noise by its field, a body by the cell of the world it fell into. A larger area holds
+//! the same ground.
+
+pub mod blend;
+mod body;
+mod clod;
+mod crumb;
+mod desc;
+mod grid;
+mod ground;
+mod litter;
+mod pile;
+mod relief;
+mod skin;
+mod stone;
+#[cfg(test)]
+mod tests;
+
+pub use clod::clods;
+pub use desc::{
+    BlendDesc, ClodsDesc, CrumbsDesc, LayerDesc, LitterDesc, MoistureDesc, ReliefDesc, RowReliefDesc, SoilDesc,
+    StonesDesc,
+};
+pub use ground::{Ground, SeedRows, Site};
+pub use litter::litter;
+pub use pile::Pile;
+pub use skin::Skin;
+pub use stone::stones;
+
+use crate::geometry::Mesh;
+use crate::math::{Spectrum, Vec2, Vec3, vec2};
+use crate::sampling::{Purpose, Stream};
+
+/// The most layers that a ground blends.
+pub const MAX_LAYERS: usize = 4;
+
+/// The textures of one layer, read at tile coordinates: one tile is 0..1, and both repeat beyond.
+pub trait LayerMaps {
+    /// Height, 0 (black) to 1 (white).
+    fn height(&self, uv: Vec2) -> f32;
+    /// Linear reflectance R, G, B of the dry soil.
+    fn albedo(&self, uv: Vec2) -> [f32; 3];
+}
+
+impl<T: LayerMaps + ?Sized> LayerMaps for &T {
+    fn height(&self, uv: Vec2) -> f32 {
+        (**self).height(uv)
+    }
+    fn albedo(&self, uv: Vec2) -> [f32; 3] {
+        (**self).albedo(uv)
+    }
+}
+
+impl<T: LayerMaps + ?Sized> LayerMaps for Box<T> {
+    fn height(&self, uv: Vec2) -> f32 {
+        (**self).height(uv)
+    }
+    fn albedo(&self, uv: Vec2) -> [f32; 3] {
+        (**self).albedo(uv)
+    }
+}
+
+impl<T: LayerMaps + ?Sized> LayerMaps for std::sync::Arc<T> {
+    fn height(&self, uv: Vec2) -> f32 {
+        (**self).height(uv)
+    }
+    fn albedo(&self, uv: Vec2) -> [f32; 3] {
+        (**self).albedo(uv)
+    }
+}
+
+/// A layer without textures: one colour, one height.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plain {
+    /// Linear reflectance.
+    pub albedo: [f32; 3],
+    /// Height, 0 to 1.
+    pub height: f32,
+}
+
+impl LayerMaps for Plain {
+    fn height(&self, _: Vec2) -> f32 {
+        self.height
+    }
+    fn albedo(&self, _: Vec2) -> [f32; 3] {
+        self.albedo
+    }
+}
+
+/// A rectangle on the ground, metres, sides along x and y.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rect {
+    /// West side.
+    pub x0: f32,
+    /// South side.
+    pub y0: f32,
+    /// East side.
+    pub x1: f32,
+    /// North side.
+    pub y1: f32,
+}
+
+impl Rect {
+    /// The rectangle between two corners given as numbers.
+    pub const fn new(x0: f32, y0: f32, x1: f32, y1: f32) -> Self {
+        Self { x0, y0, x1, y1 }
+    }
+
+    /// Lower left and upper right corner.
+    pub fn corners(self) -> [Vec2; 2] {
+        [vec2(self.x0, self.y0), vec2(self.x1, self.y1)]
+    }
+
+    /// Size in x and y.
+    pub fn size(self) -> Vec2 {
+        vec2(self.x1 - self.x0, self.y1 - self.y0)
+    }
+
+    /// Square metres.
+    pub fn area(self) -> f32 {
+        self.size().x * self.size().y
+    }
+
+    /// Whether `p` lies inside; the south and west sides belong to it.
+    pub fn contains(self, p: Vec2) -> bool {
+        p.x >= self.x0 && p.x < self.x1 && p.y >= self.y0 && p.y < self.y1
+    }
+
+    /// Larger by `by` on every side.
+    #[must_use]
+    pub fn grown(self, by: f32) -> Self {
+        Self { x0: self.x0 - by, y0: self.y0 - by, x1: self.x1 + by, y1: self.y1 + by }
+    }
+}
+
+/// What lies on the ground.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DebrisKind {
+    /// A stone.
+    Stone,
+    /// A twig.
+    Stick,
+    /// A piece of a cereal's stalk.
+    Straw,
+    /// A bit of a dead leaf or root.
+    Bit,
+}
+
+/// One thing that lies on the ground, in world metres.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Debris {
+    /// What it is.
+    pub kind: DebrisKind,
+    /// Its shape; uv runs along its own surface, 0..1.
+    pub mesh: Mesh,
+    /// Mean reflectance of its kind.
+    pub albedo: Spectrum,
+    /// Brightness of this one beside its kind; 1 is the mean.
+    pub tint: f32,
+    /// A number of its own in 0..1, to vary its hue or pick its texture by.
+    pub hue: f32,
+    /// Centre.
+    pub centre: Vec3,
+    /// Radius of the disc that holds it, seen from above.
+    pub radius: f32,
+}
+
+/// The stream of cell (i, j) of population `index`: the same wherever the area begins.
+fn cell_stream(stream: &Stream, i: i32, j: i32) -> Stream {
+    stream.child(Purpose::Debris, (u64::from(i as u32) << 32) | u64::from(j as u32))
+}
+
+/// The cells of side `cell` that touch a rectangle.
+fn cells(area: Rect, cell: f32) -> impl Iterator<Item = (i32, i32)> {
+    let range = |lo: f32, hi: f32| (lo / cell).floor() as i32..(hi / cell).ceil() as i32;
+    let columns = range(area.x0, area.x1);
+    range(area.y0, area.y1).flat_map(move |j| columns.clone().map(move |i| (i, j)))
+}

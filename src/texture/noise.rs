@@ -50,3 +50,65 @@ impl Perlin {
         if total > 0.0 { sum / total } else { 0.0 }
     }
 }
+
+/// Gradient noise that repeats: value and slope at 0 and at its period agree, so an image of it tiles. In about −1..1.
+/// Perlin's lattice with its indices taken modulo the period; the `noise` crate has none that repeats.
+#[derive(Clone, Copy, Debug)]
+pub struct Tiling(u64);
+
+impl Tiling {
+    /// The noise of a seed.
+    pub fn new(seed: u64) -> Self {
+        Self(crate::sampling::rng::mix(seed))
+    }
+
+    /// Value at (x, y), both repeating after `period` (≥ 1).
+    pub fn at(&self, x: f32, y: f32, period: u32) -> f32 {
+        let (x0, y0) = (x.floor(), y.floor());
+        let (fx, fy) = (x - x0, y - y0);
+        let fade = |t: f32| t * t * t * (t * (t * 6.0 - 15.0) + 10.0);
+        let corner = |dx: i32, dy: i32| {
+            let wrap = |i: i32| i.rem_euclid(period as i32) as u64;
+            let h = crate::sampling::rng::mix(self.0 ^ (wrap(x0 as i32 + dx) << 32 | wrap(y0 as i32 + dy)));
+            let (gx, gy) = DIRECTIONS[(h >> 60) as usize];
+            gx * (fx - dx as f32) + gy * (fy - dy as f32)
+        };
+        let (u, v) = (fade(fx), fade(fy));
+        let top = corner(0, 0) * (1.0 - u) + corner(1, 0) * u;
+        let bottom = corner(0, 1) * (1.0 - u) + corner(1, 1) * u;
+        (top * (1.0 - v) + bottom * v) * 1.5
+    }
+
+    /// Fractional Brownian motion, as [`Perlin::fbm2`]; the first octave repeats after `period`.
+    pub fn fbm(&self, x: f32, y: f32, period: u32, octaves: u32, gain: f32) -> f32 {
+        let (mut sum, mut amplitude, mut total, mut scale) = (0.0, 1.0, 0.0, 1u32);
+        for octave in 0..octaves {
+            let layer = Self(self.0.wrapping_add(u64::from(octave)));
+            sum += amplitude * layer.at(x * scale as f32, y * scale as f32, period * scale);
+            total += amplitude;
+            amplitude *= gain;
+            scale *= 2;
+        }
+        if total > 0.0 { sum / total } else { 0.0 }
+    }
+}
+
+/// Sixteen unit vectors, 22.5° apart.
+const DIRECTIONS: [(f32, f32); 16] = [
+    (1.0, 0.0),
+    (0.92387953, 0.38268343),
+    (0.70710678, 0.70710678),
+    (0.38268343, 0.92387953),
+    (0.0, 1.0),
+    (-0.38268343, 0.92387953),
+    (-0.70710678, 0.70710678),
+    (-0.92387953, 0.38268343),
+    (-1.0, 0.0),
+    (-0.92387953, -0.38268343),
+    (-0.70710678, -0.70710678),
+    (-0.38268343, -0.92387953),
+    (0.0, -1.0),
+    (0.38268343, -0.92387953),
+    (0.70710678, -0.70710678),
+    (0.92387953, -0.38268343),
+];

@@ -1,0 +1,68 @@
+//! Rough, opaque, dry: soil, stone, wood.
+
+use super::sample::{BsdfSample, Scatter, cosine, facing};
+use crate::math::{Spectrum, Vec3};
+use std::f32::consts::FRAC_1_PI;
+
+/// Oren & Nayar 1994, the qualitative model: `f = ρ/π (A + B max(0, cos Δφ) sin α tan β)`.
+/// Never returns more than a Lambert surface of the same albedo, which it is for σ = 0.
+#[derive(Clone, Copy, Debug)]
+pub struct OrenNayar {
+    albedo: Spectrum,
+    a: f32,
+    b: f32,
+}
+
+impl OrenNayar {
+    /// `albedo` 0–1 per band; `sigma`: standard deviation of the facets' slope angle, radians, 0–1.
+    pub fn new(albedo: Spectrum, sigma: f32) -> Self {
+        let s = sigma * sigma;
+        Self { albedo, a: 1.0 - 0.5 * s / (s + 0.33), b: 0.45 * s / (s + 0.09) }
+    }
+
+    /// The albedo it was made with.
+    pub fn albedo(&self) -> Spectrum {
+        self.albedo
+    }
+
+    /// f · cos θi for directions that both lie above.
+    #[inline]
+    pub(super) fn upper(&self, wo: Vec3, wi: Vec3) -> Spectrum {
+        let mut shape = self.a;
+        if self.b > 0.0 {
+            // sin α tan β cos Δφ without trigonometry: (wo·wi − cos θo cos θi) / max(cos θo, cos θi).
+            let s = wo.dot(wi) - wo.z * wi.z;
+            if s > 0.0 {
+                shape += self.b * s / wo.z.max(wi.z);
+            }
+        }
+        self.albedo * (shape * FRAC_1_PI * wi.z)
+    }
+}
+
+impl Scatter for OrenNayar {
+    #[inline]
+    fn eval(&self, wo: Vec3, wi: Vec3) -> Spectrum {
+        if wo.z * wi.z <= 0.0 {
+            return Spectrum::ZERO;
+        }
+        let side = wo.z.signum();
+        self.upper(facing(wo, side), facing(wi, side))
+    }
+
+    #[inline]
+    fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        if wo.z * wi.z <= 0.0 { 0.0 } else { wi.z.abs() * FRAC_1_PI }
+    }
+
+    #[inline]
+    fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
+        let side = wo.z.signum();
+        let wi = cosine(u[1], u[2]);
+        let pdf = wi.z * FRAC_1_PI;
+        if pdf <= 0.0 || wo.z == 0.0 {
+            return None;
+        }
+        Some(BsdfSample { wi: facing(wi, side), weight: self.upper(facing(wo, side), wi) / pdf, pdf })
+    }
+}

@@ -1,0 +1,159 @@
+//! A leaf: a rough dielectric coat over diffuse reflection and transmission, each side its own.
+//!
+//! `f_r = F·D·G / (4 cos θi cos θo) + c(θi) c(θo) (R − E) / π`, `f_t = c(θi) c'(θo) T / π`, where R and T are the measured
+//! directional-hemispherical reflectance and transmittance near normal incidence (as PROSPECT gives them, coat included),
+//! E is the coat's own albedo there, and `c(θ) = (1 − F(θ)) / √((1 − F₀)(1 − F̄))` is what the coat lets through.
+//! Reciprocal, returns R and T at normal incidence, and nowhere more than R + T + 0.001 for roughness 0.1–0.6.
+//! Transmission of broad leaves is Lambertian in the visible and near infrared: Walter-Shea & Norman 1991.
+
+use super::fresnel;
+use super::microfacet::Ggx;
+use super::sample::{BsdfSample, Scatter, cosine, facing};
+use crate::math::{Spectrum, Vec3};
+use std::f32::consts::FRAC_1_PI;
+
+/// One side of a leaf.
+#[derive(Clone, Copy, Debug)]
+pub struct Side {
+    coat: Option<Ggx>,
+    /// 1 / √((1 − F₀)(1 − F̄)).
+    norm: f32,
+    /// E, the coat's albedo at normal incidence.
+    albedo: f32,
+    diffuse: Spectrum,
+}
+
+impl Side {
+    /// From the index of refraction, roughness α (across and along the blade) and total reflectance at normal incidence.
+    /// Slow: integrates the coat. Make one per material, then [`Side::with`] per point.
+    pub fn new(ior: f32, alpha: [f32; 2], reflectance: Spectrum) -> Self {
+        let coat = Ggx { alpha, ior };
+        let norm = 1.0 / ((1.0 - fresnel::dielectric(1.0, ior)) * (1.0 - fresnel::hemispherical(ior))).sqrt();
+        Self { coat: Some(coat), norm, albedo: coat.albedo(1.0), diffuse: Spectrum::ZERO }.with(reflectance)
+    }
+
+    /// A side without a coat.
+    pub fn bare(reflectance: Spectrum) -> Self {
+        Self { coat: None, norm: 1.0, albedo: 0.0, diffuse: reflectance }
+    }
+
+    /// The same coat over another total reflectance. Where a dark leaf reflects less than its coat the rest is black.
+    #[inline]
+    #[must_use]
+    pub fn with(mut self, reflectance: Spectrum) -> Self {
+        self.diffuse = (reflectance - Spectrum::splat(self.albedo)).clamp(0.0, 1.0);
+        self
+    }
+
+    /// c(θ).
+    #[inline]
+    fn through(&self, cos: f32) -> f32 {
+        self.coat.map_or(1.0, |coat| (1.0 - fresnel::dielectric(cos, coat.ior)) * self.norm)
+    }
+}
+
+/// A thin sheet.
+#[derive(Clone, Copy, Debug)]
+pub struct Leaf {
+    upper: Side,
+    lower: Side,
+    transmittance: Spectrum,
+}
+
+/// How likely each lobe is sampled; they sum to one.
+struct Chances {
+    coat: f32,
+    reflect: f32,
+    transmit: f32,
+}
+
+impl Leaf {
+    /// `transmittance` at normal incidence, the same from both sides.
+    pub fn new(upper: Side, lower: Side, transmittance: Spectrum) -> Self {
+        Self { upper, lower, transmittance }
+    }
+
+    /// A leaf without coats: for tests, and for ablations.
+    pub fn bare(reflectance: Spectrum, transmittance: Spectrum) -> Self {
+        Self::new(Side::bare(reflectance), Side::bare(reflectance), transmittance)
+    }
+
+    /// Reflectance at normal incidence of the side that a direction with this cosine sees.
+    pub fn reflectance(&self, cos: f32) -> Spectrum {
+        let side = if cos > 0.0 { &self.upper } else { &self.lower };
+        side.diffuse + Spectrum::splat(side.albedo)
+    }
+
+    /// The side that faces `w`, and the other.
+    #[inline]
+    fn sides(&self, w: Vec3) -> (&Side, &Side) {
+        if w.z > 0.0 { (&self.upper, &self.lower) } else { (&self.lower, &self.upper) }
+    }
+
+    #[inline]
+    fn chances(&self, side: &Side, cos_o: f32) -> Chances {
+        let coat = side.coat.map_or(0.0, |c| fresnel::dielectric(cos_o, c.ior).max(side.albedo));
+        // Red, green and near infrared matter alike; the mean of the bands stands for them.
+        let reflect = side.diffuse.mean();
+        let transmit = self.transmittance.mean();
+        let total = (coat + reflect + transmit).max(1e-6);
+        Chances { coat: coat / total, reflect: reflect / total, transmit: transmit / total }
+    }
+
+    #[inline]
+    fn density(&self, chances: &Chances, side: &Side, wo: Vec3, wi: Vec3) -> f32 {
+        if wo.z * wi.z < 0.0 {
+            return chances.transmit * wi.z.abs() * FRAC_1_PI;
+        }
+        let s = wo.z.signum();
+        let coat = side.coat.map_or(0.0, |c| c.pdf(facing(wo, s), facing(wi, s)));
+        chances.coat * coat + chances.reflect * wi.z.abs() * FRAC_1_PI
+    }
+}
+
+impl Scatter for Leaf {
+    #[inline]
+    fn eval(&self, wo: Vec3, wi: Vec3) -> Spectrum {
+        if wo.z == 0.0 || wi.z == 0.0 {
+            return Spectrum::ZERO;
+        }
+        let (near, far) = self.sides(wo);
+        let through = near.through(wo.z.abs()) * wi.z.abs() * FRAC_1_PI;
+        if wo.z * wi.z < 0.0 {
+            return self.transmittance * (through * far.through(wi.z.abs()));
+        }
+        let s = wo.z.signum();
+        let coat = near.coat.map_or(0.0, |c| c.eval(facing(wo, s), facing(wi, s)));
+        near.diffuse * (through * near.through(wi.z.abs())) + Spectrum::splat(coat)
+    }
+
+    #[inline]
+    fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        if wo.z == 0.0 || wi.z == 0.0 {
+            return 0.0;
+        }
+        let (near, _) = self.sides(wo);
+        self.density(&self.chances(near, wo.z.abs()), near, wo, wi)
+    }
+
+    #[inline]
+    fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
+        if wo.z == 0.0 {
+            return None;
+        }
+        let s = wo.z.signum();
+        let (near, _) = self.sides(wo);
+        let chances = self.chances(near, wo.z.abs());
+        let wi = match near.coat {
+            Some(coat) if u[0] < chances.coat => facing(coat.sample(facing(wo, s), u[1], u[2]), s),
+            _ if u[0] < chances.coat + chances.reflect => facing(cosine(u[1], u[2]), s),
+            _ => facing(cosine(u[1], u[2]), -s),
+        };
+        // A microfacet may send light below its own surface: absorbed, as single scattering has it.
+        if u[0] < chances.coat && wi.z * s <= 0.0 {
+            return None;
+        }
+        let pdf = self.density(&chances, near, wo, wi);
+        (pdf > 0.0 && wi.z != 0.0).then(|| BsdfSample { wi, weight: self.eval(wo, wi) / pdf, pdf })
+    }
+}

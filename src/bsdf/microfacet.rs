@@ -1,0 +1,110 @@
+//! GGX microfacets: the rough coat of a leaf, the film of wet soil.
+//!
+//! Distribution: Walter et al. 2007, stretched for anisotropy; masking and shadowing: Smith, height-correlated, Heitz 2014;
+//! sampling of visible normals: Dupuy & Benyoub 2023, "Sampling Visible GGX Normals with Spherical Caps".
+
+use super::fresnel;
+use crate::math::Vec3;
+
+/// A rough dielectric interface seen from outside; single scattering.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ggx {
+    /// Roughness α along local x and y, 0.02–1.
+    pub alpha: [f32; 2],
+    /// Relative index of refraction, above 1.
+    pub ior: f32,
+}
+
+impl Ggx {
+    /// Density of microfacet normals about `m` (z > 0), per solid angle times cos.
+    #[inline]
+    fn d(&self, m: Vec3) -> f32 {
+        let [ax, ay] = self.alpha;
+        let (x, y) = (m.x / ax, m.y / ay);
+        let s = x * x + y * y + m.z * m.z;
+        1.0 / (std::f32::consts::PI * ax * ay * s * s)
+    }
+
+    /// Smith's Λ.
+    #[inline]
+    fn lambda(&self, w: Vec3) -> f32 {
+        let [ax, ay] = self.alpha;
+        let (x, y) = (ax * w.x, ay * w.y);
+        0.5 * ((1.0 + (x * x + y * y) / (w.z * w.z)).sqrt() - 1.0)
+    }
+
+    /// F·D·G₂ / (4 cos θo), which is f · cos θi; both directions above.
+    #[inline]
+    pub fn eval(&self, wo: Vec3, wi: Vec3) -> f32 {
+        let m = (wo + wi).normalize_or_zero();
+        if wo.z <= 0.0 || wi.z <= 0.0 || m.z <= 0.0 {
+            return 0.0;
+        }
+        let g = 1.0 / (1.0 + self.lambda(wo) + self.lambda(wi));
+        fresnel::dielectric(wo.dot(m), self.ior) * self.d(m) * g / (4.0 * wo.z)
+    }
+
+    /// Density of [`Ggx::sample`], per solid angle.
+    #[inline]
+    pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        let m = (wo + wi).normalize_or_zero();
+        if wo.z <= 0.0 || wi.z <= 0.0 || m.z <= 0.0 {
+            return 0.0;
+        }
+        // D_visible / (4 wo·m) with D_visible = G₁ D (wo·m) / cos θo.
+        self.d(m) / ((1.0 + self.lambda(wo)) * 4.0 * wo.z)
+    }
+
+    /// Reflects `wo` (above) about a visible microfacet normal; the result may lie below, where [`Ggx::pdf`] is zero.
+    #[inline]
+    pub fn sample(&self, wo: Vec3, u: f32, v: f32) -> Vec3 {
+        let [ax, ay] = self.alpha;
+        let stretched = Vec3::new(wo.x * ax, wo.y * ay, wo.z).normalize();
+        let (sin_phi, cos_phi) = (std::f32::consts::TAU * u).sin_cos();
+        let z = (1.0 - v) * (1.0 + stretched.z) - stretched.z;
+        let r = (1.0 - z * z).clamp(0.0, 1.0).sqrt();
+        let half = Vec3::new(r * cos_phi, r * sin_phi, z) + stretched;
+        let m = Vec3::new(half.x * ax, half.y * ay, half.z).normalize_or(Vec3::Z);
+        2.0 * wo.dot(m) * m - wo
+    }
+
+    /// Directional albedo at `cos_o`: the share of light that one bounce off the interface returns, by quadrature.
+    pub fn albedo(&self, cos_o: f32) -> f32 {
+        const N: u32 = 64;
+        let wo = Vec3::new((1.0 - cos_o * cos_o).max(0.0).sqrt(), 0.0, cos_o);
+        let mut sum = 0.0_f64;
+        for i in 0..N {
+            for j in 0..N {
+                let wi = self.sample(wo, (i as f32 + 0.5) / N as f32, (j as f32 + 0.5) / N as f32);
+                let pdf = self.pdf(wo, wi);
+                if pdf > 0.0 {
+                    sum += f64::from(self.eval(wo, wi) / pdf);
+                }
+            }
+        }
+        (sum / f64::from(N * N)) as f32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Expected: single-scatter albedos at 0°, 60° and 80° computed independently by numerical integration, three digits.
+    #[test]
+    fn albedos_match_independent_integration() {
+        for (ior, alpha, expected) in [
+            (1.45, 0.2, [0.0322, 0.0663, 0.160]),
+            (1.45, 0.3, [0.0301, 0.0547, 0.117]),
+            (1.45, 0.5, [0.0238, 0.0388, 0.077]),
+            (1.40, 0.3, [0.0248, 0.0482, 0.110]),
+            (1.50, 0.5, [0.0282, 0.0439, 0.083]),
+        ] {
+            let ggx = Ggx { alpha: [alpha; 2], ior };
+            for (degrees, e) in [0.0_f32, 60.0, 80.0].into_iter().zip(expected) {
+                let got = ggx.albedo(degrees.to_radians().cos());
+                assert!((got - e).abs() < 0.03 * e + 2e-4, "n {ior} α {alpha} at {degrees}°: {got} for {e}");
+            }
+        }
+    }
+}

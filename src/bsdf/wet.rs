@@ -1,0 +1,93 @@
+//! Rough soil, part of it under a film of water.
+//!
+//! The film is a smooth-ish dielectric coat on a fraction of the surface; the reflectance given already holds the darkening by
+//! water (Lekner & Dorf 1988) and the film's own reflection, so the coat's albedo is taken off the base, as for a leaf.
+
+use super::diffuse::OrenNayar;
+use super::fresnel;
+use super::microfacet::Ggx;
+use super::sample::{BsdfSample, Scatter, cosine, facing};
+use crate::math::{Spectrum, Vec3};
+use std::f32::consts::FRAC_1_PI;
+
+/// Index of refraction of water.
+const WATER: f32 = 1.33;
+/// √((1 − F₀)(1 − F̄)) of water.
+const NORM: f32 = 0.956_727;
+/// F₀ of water: the film's albedo at normal incidence, nearly whatever its roughness.
+const F0: f32 = 0.020_06;
+
+/// Wet soil.
+#[derive(Clone, Copy, Debug)]
+pub struct Wet {
+    base: OrenNayar,
+    coat: Ggx,
+    film: f32,
+}
+
+impl Wet {
+    /// `reflectance` of the wet soil at normal incidence; `sigma` of its facets, radians; `film`: covered fraction 0–1;
+    /// `alpha`: the film's roughness.
+    pub fn new(reflectance: Spectrum, sigma: f32, film: f32, alpha: f32) -> Self {
+        let base = (reflectance - Spectrum::splat(film * F0)).clamp(0.0, 1.0);
+        Self { base: OrenNayar::new(base, sigma), coat: Ggx { alpha: [alpha; 2], ior: WATER }, film }
+    }
+
+    /// Reflectance at normal incidence.
+    pub fn albedo(&self) -> Spectrum {
+        self.base.albedo() + Spectrum::splat(self.film * F0)
+    }
+
+    /// What the film lets through, mixed with the bare part.
+    #[inline]
+    fn through(&self, cos: f32) -> f32 {
+        1.0 + self.film * ((1.0 - fresnel::dielectric(cos, WATER)) / NORM - 1.0)
+    }
+
+    #[inline]
+    fn chance(&self, cos_o: f32) -> f32 {
+        // The base reflects ten times as much as the film at normal incidence; at grazing angles they meet.
+        let coat = self.film * fresnel::dielectric(cos_o, WATER);
+        coat / (coat + 0.15)
+    }
+}
+
+impl Scatter for Wet {
+    #[inline]
+    fn eval(&self, wo: Vec3, wi: Vec3) -> Spectrum {
+        if wo.z * wi.z <= 0.0 {
+            return Spectrum::ZERO;
+        }
+        let s = wo.z.signum();
+        let (wo, wi) = (facing(wo, s), facing(wi, s));
+        let base = self.base.upper(wo, wi) * (self.through(wo.z) * self.through(wi.z));
+        base + Spectrum::splat(self.film * self.coat.eval(wo, wi))
+    }
+
+    #[inline]
+    fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        if wo.z * wi.z <= 0.0 {
+            return 0.0;
+        }
+        let s = wo.z.signum();
+        let (wo, wi) = (facing(wo, s), facing(wi, s));
+        let p = self.chance(wo.z);
+        p * self.coat.pdf(wo, wi) + (1.0 - p) * wi.z * FRAC_1_PI
+    }
+
+    #[inline]
+    fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
+        let s = wo.z.signum();
+        let up = facing(wo, s);
+        if up.z == 0.0 {
+            return None;
+        }
+        let wi = if u[0] < self.chance(up.z) { self.coat.sample(up, u[1], u[2]) } else { cosine(u[1], u[2]) };
+        if wi.z <= 0.0 {
+            return None;
+        }
+        let wi = facing(wi, s);
+        let pdf = self.pdf(wo, wi);
+        (pdf > 0.0).then(|| BsdfSample { wi, weight: self.eval(wo, wi) / pdf, pdf })
+    }
+}

@@ -1,0 +1,45 @@
+//! Pictures for finding faults: what the first surface is, in false colours.
+
+use super::{FirstHit, Integrator, Sighting, World};
+use crate::geometry::Ray;
+use crate::math::{Spectrum, Vec3};
+use crate::sampling::Sampler;
+use crate::sampling::rng::mix;
+
+/// What is shown of the first surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FalseColor {
+    /// The shading normal, (n + 1) / 2 in red, green, blue.
+    Normals,
+    /// A colour for each part.
+    Ids,
+    /// Texture coordinates in red and green.
+    Uv,
+    /// Reflectance.
+    Albedo,
+    /// Distance, 1 / (1 + metres).
+    Depth,
+}
+
+impl Integrator for FalseColor {
+    fn li(&self, world: &World<'_>, ray: &Ray, spread: f32, _sampler: &Sampler) -> Sighting {
+        let Some((hit, at)) = world.interact(ray, 0.0, spread) else { return Sighting::default() };
+        let wo = -ray.direction;
+        let part = &world.scene.parts[hit.part as usize];
+        let (bsdf, frame) = world.scene.materials[part.material as usize].scatter(&at, wo);
+        let normal = if frame.z.dot(wo) < 0.0 { -frame.z } else { frame.z };
+        let albedo = bsdf.reflectance(frame.to_local(wo).z);
+        let rgb = |v: Vec3| Spectrum::new(v.x, v.y, v.z, v.element_sum() / 3.0);
+        let radiance = match self {
+            Self::Normals => rgb(normal * 0.5 + 0.5),
+            Self::Ids => {
+                let h = mix(u64::from(hit.part));
+                rgb(Vec3::new((h & 255) as f32, (h >> 8 & 255) as f32, (h >> 16 & 255) as f32) / 255.0)
+            }
+            Self::Uv => rgb(at.uv.extend(0.0)),
+            Self::Albedo => albedo,
+            Self::Depth => Spectrum::splat(1.0 / (1.0 + hit.t)),
+        };
+        Sighting { radiance, first: Some(FirstHit { distance: hit.t, normal, albedo }) }
+    }
+}

@@ -1,0 +1,55 @@
+//! The same radiance from everywhere: the white furnace of the tests, and the flattest of studios.
+
+use super::sample::{Emitter, LampHit, LightSample};
+use crate::math::{Spectrum, Vec3};
+use crate::sampling::warp;
+use std::f32::consts::PI;
+
+/// Constant radiance from all directions, below the horizon too.
+#[derive(Clone, Copy, Debug)]
+pub struct Environment {
+    radiance: Spectrum,
+}
+
+impl Environment {
+    /// From the radiance, W·m⁻²·sr⁻¹·nm⁻¹ per band.
+    pub fn new(radiance: Spectrum) -> Self {
+        Self { radiance }
+    }
+}
+
+impl Emitter for Environment {
+    #[inline]
+    fn sample_li(&self, _p: Vec3, u: [f32; 2]) -> Option<LightSample> {
+        Some(LightSample {
+            wi: warp::uniform_sphere(u),
+            distance: f32::INFINITY,
+            radiance: self.radiance,
+            pdf: warp::UNIFORM_SPHERE_PDF,
+        })
+    }
+
+    #[inline]
+    fn pdf_li(&self, _p: Vec3, _wi: Vec3) -> f32 {
+        warp::UNIFORM_SPHERE_PDF
+    }
+
+    #[inline]
+    fn le(&self, _dir: Vec3) -> Spectrum {
+        self.radiance
+    }
+
+    #[inline]
+    fn hit(&self, _origin: Vec3, _dir: Vec3) -> Option<LampHit> {
+        None
+    }
+
+    #[inline]
+    fn importance(&self, _p: Vec3, _n: Vec3, two_sided: bool) -> f32 {
+        self.radiance.mean() * if two_sided { 2.0 * PI } else { PI }
+    }
+
+    fn horizontal_irradiance(&self) -> Spectrum {
+        self.radiance * PI
+    }
+}

@@ -1,0 +1,261 @@
+//! Lamps: rectangles and discs that shine on one side with the same radiance everywhere and in all directions.
+//!
+//! Points are drawn uniformly on the area A; seen from a point at distance d under the angle θ of the lamp's axis, the density
+//! per solid angle is d² / (A cos θ). Lamps are not geometry: a ray meets them through [`Emitter::hit`], they cast no shadow.
+//!
+//! Colours are band irradiances relative to G. They come from the signal of a white reflector in the JAI AD-130's channels
+//! under each lamp, divided by the signal under ASTM G173 global sun and multiplied by that sun's band irradiances; for the
+//! halogen lamp Planck's law at 3000 K gives the same within 1 %.
+
+use super::sample::{Emitter, LampHit, LightSample};
+use crate::math::{Frame, Spectrum, Vec2, Vec3, vec3};
+use crate::sampling::rng::Stream;
+use crate::sampling::vary::{Finite, NonNegative, Positive, Vary};
+use crate::sampling::warp;
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::f32::consts::PI;
+
+/// Halogen, 3000 K.
+const HALOGEN: Spectrum = Spectrum::new(1.59, 1.0, 0.556, 2.64);
+
+/// White light-emitting diode: next to nothing in NIR.
+const WHITE_LED: Spectrum = Spectrum::new(0.951, 1.0, 0.426, 0.0022);
+
+/// Infrared diode, 810 to 850 nm, relative to NIR.
+const NIR_LED: Spectrum = Spectrum::new(0.0, 0.0, 0.0, 1.0);
+
+/// The outline of a lamp.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Outline {
+    /// Half of the width and height, metres.
+    Rectangle(Vec2),
+    /// Radius, metres.
+    Disc(f32),
+}
+
+/// A flat area that shines to the side of its frame's z.
+#[derive(Clone, Copy, Debug)]
+pub struct Lamp {
+    outline: Outline,
+    centre: Vec3,
+    frame: Frame,
+    radiance: Spectrum,
+    area: f32,
+    /// Radius of the sphere around it.
+    reach: f32,
+}
+
+impl Lamp {
+    /// A lamp around `centre` (metres) that shines along `frame.z`; a rectangle's width lies along `frame.x`.
+    pub fn new(outline: Outline, centre: Vec3, frame: Frame, radiance: Spectrum) -> Self {
+        let (area, reach) = match outline {
+            Outline::Rectangle(half) => (4.0 * half.x * half.y, half.length()),
+            Outline::Disc(radius) => (PI * radius * radius, radius),
+        };
+        Self { outline, centre, frame, radiance, area, reach }
+    }
+
+    /// A point of the area.
+    #[inline]
+    fn point(&self, u: [f32; 2]) -> Vec3 {
+        let local = match self.outline {
+            Outline::Rectangle(half) => Vec2::new(2.0 * u[0] - 1.0, 2.0 * u[1] - 1.0) * half,
+            Outline::Disc(radius) => warp::disc(u) * radius,
+        };
+        self.centre + self.frame.x * local.x + self.frame.y * local.y
+    }
+
+    /// Irradiance per radiance at `p` on a plane of unit normal `n`, by the midpoint rule over the area.
+    fn form_factor(&self, p: Vec3, n: Vec3) -> f32 {
+        const SIDE: usize = 64;
+        let mut sum = 0.0_f64;
+        for k in 0..SIDE * SIDE {
+            let at = |i: usize| (i as f32 + 0.5) / SIDE as f32;
+            let to = self.point([at(k % SIDE), at(k / SIDE)]) - p;
+            let d2 = to.length_squared();
+            let cosines = to.dot(n).max(0.0) * (-to.dot(self.frame.z)).max(0.0);
+            if d2 > 0.0 {
+                sum += f64::from(cosines / (d2 * d2));
+            }
+        }
+        (sum * f64::from(self.area) / (SIDE * SIDE) as f64) as f32
+    }
+}
+
+impl Emitter for Lamp {
+    #[inline]
+    fn sample_li(&self, p: Vec3, u: [f32; 2]) -> Option<LightSample> {
+        let to = self.point(u) - p;
+        let d2 = to.length_squared();
+        let distance = d2.sqrt();
+        let wi = to / distance;
+        let cos = -wi.dot(self.frame.z);
+        let pdf = d2 / (self.area * cos);
+        (cos > 0.0 && pdf > 0.0 && pdf.is_finite()).then_some(LightSample {
+            wi,
+            distance,
+            radiance: self.radiance,
+            pdf,
+        })
+    }
+
+    #[inline]
+    fn pdf_li(&self, p: Vec3, wi: Vec3) -> f32 {
+        self.hit(p, wi).map_or(0.0, |hit| hit.pdf)
+    }
+
+    #[inline]
+    fn le(&self, _dir: Vec3) -> Spectrum {
+        Spectrum::ZERO
+    }
+
+    #[inline]
+    fn hit(&self, origin: Vec3, dir: Vec3) -> Option<LampHit> {
+        let cos = -dir.dot(self.frame.z);
+        let height = (origin - self.centre).dot(self.frame.z);
+        if cos <= 0.0 || height <= 0.0 {
+            return None;
+        }
+        let distance = height / cos;
+        let at = origin + dir * distance - self.centre;
+        let local = Vec2::new(at.dot(self.frame.x), at.dot(self.frame.y));
+        let inside = match self.outline {
+            Outline::Rectangle(half) => local.abs().cmple(half).all(),
+            Outline::Disc(radius) => local.length_squared() <= radius * radius,
+        };
+        let pdf = distance * distance / (self.area * cos);
+        (inside && pdf > 0.0 && pdf.is_finite()).then_some(LampHit { distance, radiance: self.radiance, pdf })
+    }
+
+    /// Radiance × area × cosines / distance². Seen from p, the points of the lamp spread over ± `spread` about its centre in the
+    /// receiver's cosine; the mean of the part above the plane is what counts, so that a lamp half behind it is not overlooked.
+    #[inline]
+    fn importance(&self, p: Vec3, n: Vec3, two_sided: bool) -> f32 {
+        let to = self.centre - p;
+        let height = -to.dot(self.frame.z);
+        if height <= 0.0 {
+            return 0.0;
+        }
+        let distance = to.length();
+        let spread = (self.reach / distance).min(1.0);
+        let cos = to.dot(n) / distance;
+        let above = |cos: f32| {
+            if cos >= spread {
+                cos
+            } else if cos > -spread {
+                (cos + spread) * (cos + spread) / (4.0 * spread)
+            } else {
+                0.0
+            }
+        };
+        let mut seen = above(cos) + if two_sided { above(-cos) } else { 0.0 };
+        if spread >= 1.0 {
+            // Within the lamp's sphere every direction may hold a part of it.
+            seen = seen.max(0.1);
+        }
+        self.radiance.mean() * (self.area * height / (distance * distance * distance)).min(PI) * seen
+    }
+
+    fn horizontal_irradiance(&self) -> Spectrum {
+        self.radiance * self.form_factor(Vec3::ZERO, Vec3::Z)
+    }
+}
+
+/// The outline of a lamp, as it is written.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum ShapeDesc {
+    /// A rectangle; its width is horizontal.
+    Rectangle {
+        /// Horizontal side, metres.
+        width_m: Vary<Positive>,
+        /// Other side, metres.
+        height_m: Vary<Positive>,
+    },
+    /// A disc.
+    Disc {
+        /// Radius, metres.
+        radius_m: Vary<Positive>,
+    },
+}
+
+/// How bright a lamp is and of what colour, as it is written.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum GlowDesc {
+    /// Radiance in R, G, B, NIR, W·m⁻²·sr⁻¹·nm⁻¹.
+    Radiance(Vary<NonNegative>, Vary<NonNegative>, Vary<NonNegative>, Vary<NonNegative>),
+    /// Halogen, 3000 K: G irradiance of a plane facing the lamp at a distance on its axis.
+    Halogen {
+        /// Irradiance in G, W·m⁻²·nm⁻¹; the noon sun gives 1.4.
+        irradiance: Vary<NonNegative>,
+        /// Distance at which it is given, metres.
+        at_m: Vary<Positive>,
+    },
+    /// White diode: G irradiance of a plane facing the lamp at a distance on its axis.
+    WhiteLed {
+        /// Irradiance in G, W·m⁻²·nm⁻¹.
+        irradiance: Vary<NonNegative>,
+        /// Distance at which it is given, metres.
+        at_m: Vary<Positive>,
+    },
+    /// Infrared diode, 810 to 850 nm: NIR irradiance of a plane facing the lamp at a distance on its axis.
+    NirLed {
+        /// Irradiance in NIR, W·m⁻²·nm⁻¹.
+        irradiance: Vary<NonNegative>,
+        /// Distance at which it is given, metres.
+        at_m: Vary<Positive>,
+    },
+}
+
+/// A point, as it is written, metres.
+pub type PointDesc = (Vary<Finite>, Vary<Finite>, Vary<Finite>);
+
+pub(super) fn origin() -> PointDesc {
+    (Vary::fixed(0.0), Vary::fixed(0.0), Vary::fixed(0.0))
+}
+
+impl Lamp {
+    /// Draws a lamp around `position_m` that shines at `look_at_m`. An [`Error::Scene`] where the two are the same.
+    pub fn draw(
+        shape: &ShapeDesc,
+        position_m: &PointDesc,
+        look_at_m: &PointDesc,
+        glow: &GlowDesc,
+        stream: &mut Stream,
+    ) -> Result<Self> {
+        let outline = match shape {
+            ShapeDesc::Rectangle { width_m, height_m } => {
+                Outline::Rectangle(Vec2::new(width_m.draw32(stream), height_m.draw32(stream)) * 0.5)
+            }
+            ShapeDesc::Disc { radius_m } => Outline::Disc(radius_m.draw32(stream)),
+        };
+        let mut point = |at: &PointDesc| vec3(at.0.draw32(stream), at.1.draw32(stream), at.2.draw32(stream));
+        let centre = point(position_m);
+        let axis = (point(look_at_m) - centre).try_normalize().ok_or_else(|| {
+            Error::Scene(
+                "a lamp looks at its own position and shines nowhere\n help: give look_at_m another point".into(),
+            )
+        })?;
+        let level = Vec3::Z.cross(axis);
+        let frame = Frame::with_tangent(axis, if level.length() > 1e-6 { level } else { Vec3::X });
+        let lamp = Lamp::new(outline, centre, frame, Spectrum::ONE);
+        let per_irradiance = |at: f32| 1.0 / lamp.form_factor(centre + axis * at, -axis).max(f32::MIN_POSITIVE);
+        let radiance = match glow {
+            GlowDesc::Radiance(r, g, b, nir) => {
+                Spectrum::new(r.draw32(stream), g.draw32(stream), b.draw32(stream), nir.draw32(stream))
+            }
+            GlowDesc::Halogen { irradiance, at_m } => {
+                HALOGEN * (irradiance.draw32(stream) * per_irradiance(at_m.draw32(stream)))
+            }
+            GlowDesc::WhiteLed { irradiance, at_m } => {
+                WHITE_LED * (irradiance.draw32(stream) * per_irradiance(at_m.draw32(stream)))
+            }
+            GlowDesc::NirLed { irradiance, at_m } => {
+                NIR_LED * (irradiance.draw32(stream) * per_irradiance(at_m.draw32(stream)))
+            }
+        };
+        Ok(Self { radiance, ..lamp })
+    }
+}

@@ -1,0 +1,197 @@
+//! The sky's dome: a table of radiances over the upper hemisphere that *is* the light.
+//!
+//! The dome is unfolded onto a square by the octahedral map: with p = d / (|x| + |y| + z), the square's coordinates are
+//! s = (p.x + p.y + 1)/2, t = (p.x − p.y + 1)/2. Looking up costs one division and no trigonometry; the solid angle of an
+//! element is dω = 2 (|x| + |y| + z)³ ds dt. Source: Cigolle et al. 2014, "A Survey of Efficient Representations for
+//! Independent Unit Vectors", JCGT 3(2).
+//!
+//! Radiance is constant within a cell (about 1°), so a density proportional to radiance × solid angle of the cell is an exact
+//! table, and the irradiance that the table gives is known and can be set. Zero below the horizon.
+
+use super::sample::{Emitter, LampHit, LightSample};
+use crate::math::{Spectrum, Vec3, vec3};
+use crate::sampling::distribution::Distribution2D;
+
+/// Cells along a side of the square.
+const SIDE: usize = 128;
+
+/// Points along a side of a cell over which a radiance is averaged.
+const SUB: usize = 3;
+
+/// A table of radiances over the upper hemisphere.
+#[derive(Clone, Debug)]
+pub struct Dome {
+    cells: Vec<Spectrum>,
+}
+
+impl Dome {
+    /// Tabulates `radiance` of unit directions of the upper hemisphere.
+    pub fn bake(mut radiance: impl FnMut(Vec3) -> Spectrum) -> Self {
+        let cells = (0..SIDE * SIDE)
+            .map(|cell| {
+                let mut sum = Spectrum::ZERO;
+                let mut weight = 0.0;
+                for (dir, solid_angle) in points(cell) {
+                    sum += radiance(dir) * solid_angle;
+                    weight += solid_angle;
+                }
+                sum / weight
+            })
+            .collect();
+        Self { cells }
+    }
+
+    /// The CIE overcast sky, giving a horizontal plane the irradiance `horizontal`: L = Lz (1 + 2 cos θ)/3, E = 7π/9 Lz.
+    /// Source: Moon & Spencer 1942; CIE S 011.
+    pub fn overcast(horizontal: Spectrum) -> Self {
+        Self::bake(|d| Spectrum::splat(1.0 + 2.0 * d.z)).with_irradiance(horizontal)
+    }
+
+    /// The same table with each band scaled so that a horizontal plane receives `horizontal` (W·m⁻²·nm⁻¹); a band without
+    /// any light stays dark.
+    #[must_use]
+    pub fn with_irradiance(mut self, horizontal: Spectrum) -> Self {
+        let now = self.irradiance().to_array();
+        let wanted = horizontal.to_array();
+        let scale = Spectrum::from([0, 1, 2, 3].map(|b| if now[b] > 0.0 { wanted[b] / now[b] } else { 0.0 }));
+        for cell in &mut self.cells {
+            *cell *= scale;
+        }
+        self
+    }
+
+    /// Cell by cell sum.
+    #[must_use]
+    pub fn plus(mut self, other: &Self) -> Self {
+        for (cell, more) in self.cells.iter_mut().zip(&other.cells) {
+            *cell += *more;
+        }
+        self
+    }
+
+    /// Irradiance of a horizontal plane, W·m⁻²·nm⁻¹ per band.
+    pub fn irradiance(&self) -> Spectrum {
+        let mut sum = [0.0_f64; Spectrum::BANDS];
+        for (cell, radiance) in self.cells.iter().enumerate() {
+            let cosine: f32 = points(cell).map(|(dir, solid_angle)| dir.z * solid_angle).sum();
+            for (sum, l) in sum.iter_mut().zip(radiance.to_array()) {
+                *sum += f64::from(l) * f64::from(cosine);
+            }
+        }
+        Spectrum::from(sum.map(|x| x as f32))
+    }
+}
+
+/// The sky as a light.
+#[derive(Clone, Debug)]
+pub struct Sky {
+    dome: Dome,
+    distribution: Distribution2D,
+    irradiance: Spectrum,
+    /// Mean irradiance of planes that face east, west, north, south, up.
+    faces: [f32; 5],
+}
+
+impl Sky {
+    /// The light of a dome; `None` where the dome is black.
+    pub fn new(dome: Dome) -> Option<Self> {
+        let mut faces = [0.0_f32; 5];
+        let mut weights = Vec::with_capacity(SIDE * SIDE);
+        for (cell, radiance) in dome.cells.iter().enumerate() {
+            let mean = radiance.mean();
+            let mut solid = 0.0;
+            for (d, solid_angle) in points(cell) {
+                solid += solid_angle;
+                for (face, cos) in faces.iter_mut().zip([d.x, -d.x, d.y, -d.y, d.z]) {
+                    *face += mean * cos.max(0.0) * solid_angle;
+                }
+            }
+            weights.push(mean * solid);
+        }
+        let distribution = Distribution2D::new(&weights, SIDE)?;
+        Some(Self { irradiance: dome.irradiance(), dome, distribution, faces })
+    }
+}
+
+impl Emitter for Sky {
+    #[inline]
+    fn sample_li(&self, _p: Vec3, u: [f32; 2]) -> Option<LightSample> {
+        let (st, density) = self.distribution.sample(u);
+        let wi = to_direction(st);
+        let pdf = density * inverse_stretch(wi);
+        (pdf > 0.0).then(|| LightSample { wi, distance: f32::INFINITY, radiance: self.dome.cells[cell_of(st)], pdf })
+    }
+
+    #[inline]
+    fn pdf_li(&self, _p: Vec3, wi: Vec3) -> f32 {
+        if wi.z < 0.0 { 0.0 } else { self.distribution.pdf(to_square(wi)) * inverse_stretch(wi) }
+    }
+
+    #[inline]
+    fn le(&self, dir: Vec3) -> Spectrum {
+        if dir.z < 0.0 { Spectrum::ZERO } else { self.dome.cells[cell_of(to_square(dir))] }
+    }
+
+    #[inline]
+    fn hit(&self, _origin: Vec3, _dir: Vec3) -> Option<LampHit> {
+        None
+    }
+
+    /// Irradiances of the six axis directions blended by the squared components of the normal; nothing comes from below.
+    /// Source: McTaggart 2004, "Half-Life 2 / Valve Source Shading" (the ambient cube).
+    #[inline]
+    fn importance(&self, _p: Vec3, n: Vec3, two_sided: bool) -> f32 {
+        let [east, west, north, south, up] = self.faces;
+        let sq = n * n;
+        if two_sided {
+            return sq.x * (east + west) + sq.y * (north + south) + sq.z * up;
+        }
+        let x = if n.x > 0.0 { east } else { west };
+        let y = if n.y > 0.0 { north } else { south };
+        sq.x * x + sq.y * y + if n.z > 0.0 { sq.z * up } else { 0.0 }
+    }
+
+    fn horizontal_irradiance(&self) -> Spectrum {
+        self.irradiance
+    }
+}
+
+/// Square to upper hemisphere.
+#[inline]
+fn to_direction([s, t]: [f32; 2]) -> Vec3 {
+    let (x, y) = (s + t - 1.0, s - t);
+    // On the square's edge rounding may bring z a hair below the horizon.
+    vec3(x, y, (1.0 - x.abs() - y.abs()).max(0.0)).normalize()
+}
+
+/// Upper hemisphere to square, within [0, 1).
+#[inline]
+fn to_square(d: Vec3) -> [f32; 2] {
+    let scale = 0.5 / (d.x.abs() + d.y.abs() + d.z.abs());
+    let below_one = 1.0 - f32::EPSILON / 2.0;
+    [(d.x + d.y) * scale + 0.5, (d.x - d.y) * scale + 0.5].map(|v| v.clamp(0.0, below_one))
+}
+
+/// ds dt / dω at a unit direction.
+#[inline]
+fn inverse_stretch(d: Vec3) -> f32 {
+    let l1 = d.x.abs() + d.y.abs() + d.z.abs();
+    0.5 / (l1 * l1 * l1)
+}
+
+#[inline]
+fn cell_of([s, t]: [f32; 2]) -> usize {
+    let index = |v: f32| ((v * SIDE as f32) as usize).min(SIDE - 1);
+    index(t) * SIDE + index(s)
+}
+
+/// The points over which a cell is averaged, with their solid angles.
+fn points(cell: usize) -> impl Iterator<Item = (Vec3, f32)> {
+    let n = (SIDE * SUB) as f32;
+    let (row, column) = (cell / SIDE * SUB, cell % SIDE * SUB);
+    (0..SUB * SUB).map(move |k| {
+        let st = [((column + k % SUB) as f32 + 0.5) / n, ((row + k / SUB) as f32 + 0.5) / n];
+        let d = to_direction(st);
+        (d, 1.0 / (inverse_stretch(d) * n * n))
+    })
+}

@@ -1,0 +1,120 @@
+//! The ground and its clods: the baked skin of the soil, made moist, in four bands.
+
+use super::shading::frame;
+use crate::bsdf::{Bsdf, OrenNayar, Wet};
+use crate::geometry::Interaction;
+use crate::math::{Frame, Spectrum, Vec2, Vec3, vec2};
+use crate::optics::soil::{LOESS, at as four_bands, wet};
+use crate::soil::Skin;
+use std::sync::Arc;
+
+/// Slope angle of the facets below a millimetre, radians. With explicit relief down to 1 mm Irons et al. 1992 leave 0.26–0.52.
+const SIGMA: f32 = 0.35;
+/// Roughness α of a water film that lies over grains; an estimate between a puddle (0.1) and damp grains (0.4).
+const FILM_ROUGHNESS: f32 = 0.3;
+/// Below this share of film the gloss is not worth its cost: it would add less than 0.1 % of reflectance.
+const DRY: f32 = 0.04;
+
+/// One texel, ready to shade.
+#[derive(Clone, Copy, Debug, Default)]
+struct Texel {
+    /// 255 · √reflectance of the moist soil, R, G, B, NIR.
+    reflectance: [u8; 4],
+    /// Slope as the skin stores it.
+    slope: [i8; 2],
+    /// 255 · share under a film of water.
+    film: u8,
+}
+
+/// The skin of one ground, baked once: shading reads one texel and no noise.
+#[derive(Debug)]
+pub struct GroundSkin {
+    width: usize,
+    height: usize,
+    texels: Vec<Texel>,
+    /// Square of i / 255.
+    decode: [f32; 256],
+}
+
+impl GroundSkin {
+    /// From the soil's skin: wetness darkens, NIR follows from red, pits that the mesh is too coarse for are darkened.
+    pub fn bake(skin: &Skin) -> Self {
+        let texel = |i: usize| {
+            let open = f32::from(skin.ao[i]) / 255.0;
+            let dry = four_bands(Skin::decode(skin.albedo[i]), LOESS) * open;
+            let (moist, film) = wet(dry, f32::from(skin.moisture[i]) / 255.0);
+            Texel {
+                reflectance: moist.to_array().map(|r| (r.max(0.0).sqrt() * 255.0 + 0.5) as u8),
+                slope: skin.slope[i],
+                film: (film * 255.0 + 0.5) as u8,
+            }
+        };
+        Self {
+            width: skin.width,
+            height: skin.height,
+            texels: (0..skin.width * skin.height).map(texel).collect(),
+            decode: std::array::from_fn(|i| (i as f32 / 255.0).powi(2)),
+        }
+    }
+
+    /// Reflectance, slope (∂z/∂x, ∂z/∂y), film; bilinear.
+    #[inline]
+    fn sample(&self, uv: Vec2) -> (Spectrum, Vec2, f32) {
+        let place = uv.clamp(Vec2::ZERO, Vec2::ONE) * vec2(self.width as f32, self.height as f32) - 0.5;
+        let floor = place.floor();
+        let part = place - floor;
+        let column = |i: i32| i.clamp(0, self.width as i32 - 1) as usize;
+        let row = |j: i32| j.clamp(0, self.height as i32 - 1) as usize * self.width;
+        let (x0, x1) = (column(floor.x as i32), column(floor.x as i32 + 1));
+        let (y0, y1) = (row(floor.y as i32), row(floor.y as i32 + 1));
+        let weights = [(1.0 - part.x) * (1.0 - part.y), part.x * (1.0 - part.y), (1.0 - part.x) * part.y, part.x * part.y];
+        let mut reflectance = Spectrum::ZERO;
+        let (mut slope, mut film) = (Vec2::ZERO, 0.0);
+        for (index, w) in [y0 + x0, y0 + x1, y1 + x0, y1 + x1].into_iter().zip(weights) {
+            let t = &self.texels[index];
+            reflectance += Spectrum::from(t.reflectance.map(|r| self.decode[r as usize])) * w;
+            slope += vec2(f32::from(t.slope[0]), f32::from(t.slope[1])) * w;
+            film += f32::from(t.film) * w;
+        }
+        (reflectance, slope / Skin::SLOPE_STEPS, film / 255.0)
+    }
+}
+
+/// The ground itself, or clods of it.
+#[derive(Clone, Debug)]
+pub struct Ground {
+    skin: Arc<GroundSkin>,
+    tint: f32,
+    relief: bool,
+}
+
+impl Ground {
+    /// The ground: its fine relief tilts the shading normal.
+    pub fn new(skin: Arc<GroundSkin>) -> Self {
+        Self { skin, tint: 1.0, relief: true }
+    }
+
+    /// Clods of it, brighter by `tint`: they have relief of their own.
+    pub fn clods(skin: Arc<GroundSkin>, tint: f32) -> Self {
+        Self { skin, tint, relief: false }
+    }
+
+    #[inline]
+    pub(super) fn scatter(&self, at: &Interaction, wo: Vec3) -> (Bsdf, Frame) {
+        let (reflectance, slope, film) = self.skin.sample(at.uv);
+        let reflectance = (reflectance * self.tint).clamp(0.0, 0.95);
+        let normal = if self.relief {
+            // Slopes of heights over the plane add up; the mesh's normal is (−∂z/∂x, −∂z/∂y, 1) to scale.
+            let n = at.ns / at.ns.z.max(0.05);
+            Vec3::new(n.x - slope.x, n.y - slope.y, n.z).normalize_or(at.ns)
+        } else {
+            at.ns
+        };
+        let bsdf = if film < DRY {
+            Bsdf::OrenNayar(OrenNayar::new(reflectance, SIGMA))
+        } else {
+            Bsdf::Wet(Wet::new(reflectance, SIGMA, film, FILM_ROUGHNESS))
+        };
+        (bsdf, frame(at, normal, wo))
+    }
+}

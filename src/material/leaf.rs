@@ -1,0 +1,139 @@
+//! Blades, petioles, stems: pigments and a picture → coat, reflection of either side, transmission.
+
+use super::shading::{bump, frame};
+use crate::bsdf::{self, Bsdf, Side};
+use crate::geometry::Interaction;
+use crate::math::{Frame, Spectrum, Vec3};
+use crate::optics::{LeafOptics, Pigments};
+use crate::sampling::vary::{Bound, Fraction, NonNegative, Num, Pick};
+use crate::texture::{Maps, Texture};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// A refractive index that a leaf's wax can have.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Index;
+
+impl Bound for Index {
+    const MIN: f64 = 1.2;
+    const MAX: f64 = 2.0;
+    const WORDS: &'static str = "between 1.2 and 2";
+}
+
+/// A leaf as a species page writes it.
+///
+/// ```
+/// use furrow::material::LeafDesc;
+/// let leaf: LeafDesc = ron::from_str(r#"(texture: "leaf.png", roughness: 0.3, pigments: (chlorophyll: 38))"#).unwrap();
+/// assert!(ron::from_str::<LeafDesc>("(roughnes: 0.3)").is_err());
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default, rename = "Leaf")]
+pub struct LeafDesc {
+    /// RGBA picture, sRGB; its alpha cuts the blade's shape. Without one the pigments alone give the colour.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub texture: Option<Pick<String>>,
+    /// GGX roughness α of the upper side's coat: 0.22–0.38 on a glossy beet leaf, 0.45 dull, 0.6 mealy.
+    pub roughness: Num<Fraction>,
+    /// Of the lower side's.
+    pub roughness_back: Num<Fraction>,
+    /// Roughness along the blade where it differs from that across, as on grasses.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub roughness_along: Option<Num<Fraction>>,
+    /// Index of refraction of the coat.
+    pub ior: Num<Index>,
+    /// How much more visible light the lower side reflects: 1.3–1.8 on most dicots.
+    pub back_paleness: Num<NonNegative>,
+    /// Strength of the relief read from the picture; 1 is a vein relief of 0.2 mm on a leaf of 100 mm.
+    pub relief: Num<NonNegative>,
+    /// What the leaf is made of.
+    pub pigments: Pigments,
+}
+
+impl Default for LeafDesc {
+    fn default() -> Self {
+        Self {
+            texture: None,
+            roughness: Num::new(0.35),
+            roughness_back: Num::new(0.5),
+            roughness_along: None,
+            ior: Num::new(1.45),
+            back_paleness: Num::new(1.4),
+            relief: Num::new(1.0),
+            pigments: Pigments::default(),
+        }
+    }
+}
+
+/// A picture with the maps derived from it; decoded once, shared by every specimen.
+#[derive(Debug)]
+pub struct Picture {
+    /// Colour and opacity.
+    pub color: Texture,
+    /// Normal, height and occlusion.
+    pub maps: Maps,
+}
+
+/// A leaf ready to shade. Cloning shares the picture and the tables.
+#[derive(Clone, Debug)]
+pub struct LeafMaterial {
+    picture: Option<Arc<Picture>>,
+    optics: Arc<LeafOptics>,
+    upper: Side,
+    lower: Side,
+    back_paleness: f32,
+    relief: f32,
+    /// Colour of this specimen over the picture's, per visible band.
+    tint: Vec3,
+}
+
+impl LeafMaterial {
+    /// From its written form and its picture.
+    pub fn new(desc: &LeafDesc, picture: Option<Arc<Picture>>) -> Self {
+        let across = desc.roughness.f32().max(0.02);
+        let along = desc.roughness_along.map_or(across, |r| r.f32().max(0.02));
+        let back = desc.roughness_back.f32().max(0.02);
+        let ior = desc.ior.f32();
+        Self {
+            picture,
+            optics: Arc::new(LeafOptics::new(&desc.pigments)),
+            upper: Side::new(ior, [across, along], Spectrum::ZERO),
+            lower: Side::new(ior, [back, along.max(back)], Spectrum::ZERO),
+            back_paleness: desc.back_paleness.f32(),
+            relief: desc.relief.f32(),
+            tint: Vec3::ONE,
+        }
+    }
+
+    /// The same leaf with another chlorophyll content, as a factor on the page's: how one specimen differs from the next.
+    #[must_use]
+    pub fn with_chlorophyll(&self, base: f32, factor: f32) -> Self {
+        let rgb = |c: f32| self.optics.with_chlorophyll(c).reflectance.0.truncate().max(Vec3::splat(1e-3));
+        Self { tint: rgb(base * factor) / rgb(base), ..self.clone() }
+    }
+
+    pub(super) fn scatter(&self, at: &Interaction, wo: Vec3) -> (Bsdf, Frame) {
+        let (leaf, normal) = match &self.picture {
+            None => {
+                let [r, g, b, _] = self.optics.plain().reflectance.to_array();
+                (self.optics.at((Vec3::new(r, g, b) * self.tint).to_array()), at.ns)
+            }
+            Some(picture) => {
+                // The footprint as an extent of the image, by the larger side of a texel on the surface.
+                let metres = at.dp_dv.length().max(1e-6);
+                let lod = picture.color.lod(at.footprint / metres);
+                let [r, g, b, _] = picture.color.sample(at.uv, lod);
+                let slope = picture.maps.normal.sample(at.uv, lod) * self.relief;
+                (self.optics.at((Vec3::new(r, g, b) * self.tint).to_array()), bump(at, slope))
+            }
+        };
+        let upper = leaf.reflectance;
+        // The lower side scatters more visible light back, never more than the sheet has left.
+        let room = Spectrum::splat(0.99) - leaf.transmittance;
+        let [r, g, b, nir] = upper.to_array();
+        let paler = Spectrum::new(r * self.back_paleness, g * self.back_paleness, b * self.back_paleness, nir);
+        let lower = Spectrum(paler.0.min(room.0));
+        let bsdf = bsdf::Leaf::new(self.upper.with(upper), self.lower.with(lower), leaf.transmittance);
+        (Bsdf::Leaf(bsdf), frame(at, normal, wo))
+    }
+}

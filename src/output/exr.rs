@@ -1,0 +1,59 @@
+//! Radiance and everything beside it as one OpenEXR file, through the `exr` crate.
+//!
+//! Channels: `R G B NIR` (radiance, W·m⁻²·sr⁻¹·nm⁻¹, f32), `variance.*` (of that mean, f32), `albedo.*` and `normal.{X,Y,Z}`
+//! (f16), `depth.Z` (metres along the ray, f32, infinite where nothing was met), `id.class`, `id.plant`, `id.leaf`,
+//! `id.part` (u32, from the label pass; part + 1, 0 for none). The header's comment holds the provenance.
+
+use crate::film::Film;
+use crate::math::Spectrum;
+use crate::render::{LabelMap, label::NONE};
+use crate::{Error, Result};
+use exr::prelude::*;
+
+fn channel(name: String, samples: FlatSamples) -> AnyChannel<FlatSamples> {
+    AnyChannel { name: name.as_str().into(), sample_data: samples, quantize_linearly: false, sampling: Vec2(1, 1) }
+}
+
+/// Encodes a film and its labels, which must share a window.
+pub(super) fn encode(film: &Film, labels: &LabelMap, text: &str) -> Result<Vec<u8>> {
+    let mut channels = SmallVec::new();
+    let pixels = &film.pixels;
+    for (band, name) in Spectrum::NAMES.iter().enumerate() {
+        let of = |f: fn(&crate::film::Pixel) -> Spectrum| pixels.iter().map(move |p| f(p).to_array()[band]);
+        channels.push(channel((*name).into(), FlatSamples::F32(of(|p| p.mean).collect())));
+        channels.push(channel(format!("variance.{name}"), FlatSamples::F32(of(|p| p.variance).collect())));
+        channels
+            .push(channel(format!("albedo.{name}"), FlatSamples::F16(of(|p| p.albedo).map(f16::from_f32).collect())));
+    }
+    for (axis, name) in ["X", "Y", "Z"].iter().enumerate() {
+        let samples = pixels.iter().map(|p| f16::from_f32(p.normal.to_array()[axis])).collect();
+        channels.push(channel(format!("normal.{name}"), FlatSamples::F16(samples)));
+    }
+    channels.push(channel("depth.Z".into(), FlatSamples::F32(pixels.iter().map(|p| p.depth).collect())));
+    let ids = [
+        ("class", labels.tags.iter().map(|t| t.class as u32).collect()),
+        ("plant", labels.tags.iter().map(|t| u32::from(t.plant)).collect()),
+        ("leaf", labels.tags.iter().map(|t| u32::from(t.leaf)).collect()),
+        ("part", labels.parts.iter().map(|p| if *p == NONE { 0 } else { p + 1 }).collect::<Vec<u32>>()),
+    ];
+    for (name, samples) in ids {
+        channels.push(channel(format!("id.{name}"), FlatSamples::U32(samples)));
+    }
+    let w = film.window;
+    let attributes = LayerAttributes {
+        layer_position: Vec2(w.x0 as i32, w.y0 as i32),
+        comments: Text::new_or_none(text),
+        ..LayerAttributes::default()
+    };
+    // Rows in increasing order, whichever thread compressed them first: equal runs write equal bytes.
+    let encoding = Encoding {
+        compression: Compression::ZIP16,
+        blocks: Blocks::ScanLines,
+        line_order: exr::prelude::attribute::LineOrder::Increasing,
+    };
+    let size = Vec2(w.width() as usize, w.height() as usize);
+    let image = Image::from_layer(Layer::new(size, attributes, encoding, AnyChannels::sort(channels)));
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    image.write().to_unbuffered(&mut bytes).map_err(|e| Error::Scene(format!("cannot encode an EXR: {e}")))?;
+    Ok(bytes.into_inner())
+}

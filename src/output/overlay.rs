@@ -1,0 +1,33 @@
+//! Labels over the picture, for people: classes tinted, plants and leaves outlined.
+
+use crate::render::LabelMap;
+use crate::scene::tag::{Class, Tag};
+
+/// Share of the class colour over the picture.
+const TINT: f32 = 0.35;
+
+/// The picture under its labels.
+pub(super) fn draw(rgb: &[[u8; 3]], labels: &LabelMap) -> Vec<[u8; 3]> {
+    let (w, h) = (labels.window.width() as usize, labels.window.height() as usize);
+    let tag = |x: usize, y: usize| labels.tags[y * w + x];
+    let mut out = rgb.to_vec();
+    for y in 0..h {
+        for x in 0..w {
+            let here = tag(x, y);
+            // An outline pixel lies inside the region whose right or lower neighbour is another.
+            let other = |f: fn(Tag) -> u16| {
+                (x + 1 < w && f(tag(x + 1, y)) != f(here)) || (y + 1 < h && f(tag(x, y + 1)) != f(here))
+            };
+            let pixel = &mut out[y * w + x];
+            if other(|t| t.plant) {
+                *pixel = [255, 255, 0];
+            } else if here.class != Class::Soil {
+                let (color, tint) = if other(|t| t.leaf) { ([255; 3], 0.6) } else { (here.class.color(), TINT) };
+                *pixel = std::array::from_fn(|i| {
+                    (f32::from(pixel[i]) * (1.0 - tint) + f32::from(color[i]) * tint).round() as u8
+                });
+            }
+        }
+    }
+    out
+}

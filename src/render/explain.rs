@@ -1,0 +1,69 @@
+//! One pixel in words: what `--pixel x,y` prints.
+
+use super::{Settings, label, pixel};
+use crate::geometry::{Ray, Window};
+use crate::integrator::{Integrator, World};
+use crate::math::Spectrum;
+use crate::scene::PlantRecord;
+use std::fmt::Write;
+
+/// Describes a pixel: its label, the surface at its centre, the light of its samples.
+pub fn explain(
+    world: &World<'_>,
+    plants: &[PlantRecord],
+    integrator: &dyn Integrator,
+    settings: &Settings,
+    x: u32,
+    y: u32,
+) -> String {
+    let scene = world.scene;
+    let window = Window { x0: x, y0: y, x1: x + 1, y1: y + 1 };
+    let tag = label(world.geometry, &scene.tags(), &scene.camera, window).tags[0];
+    let mut text = format!("pixel {x},{y}\n  label: {} plant {} leaf {}", tag.class.name(), tag.plant, tag.leaf);
+    if let Some(plant) = plants.iter().find(|p| p.number == tag.plant) {
+        let _ = write!(
+            text,
+            "\n  plant: {} ({}), BBCH {}, {:.0} days",
+            plant.species, plant.eppo, plant.bbch, plant.age_days
+        );
+        let p = plant.position;
+        let _ = write!(text, ", {} leaves, stands at {:.3}, {:.3}, {:.3} m", plant.leaves, p.x, p.y, p.z);
+    }
+    let (origin, direction) = scene.camera.centre_ray(x, y);
+    match world.interact(&Ray::new(origin, direction), 0.0, scene.camera.pixel_angle()) {
+        None => text.push_str("\n  surface: none"),
+        Some((hit, at)) => {
+            let part = &scene.parts[hit.part as usize];
+            let (bsdf, frame) = scene.materials[part.material as usize].scatter(&at, -direction);
+            let cos = frame.to_local(-direction).z;
+            let _ = write!(
+                text,
+                "\n  surface: part {} triangle {} at {:.4}, {:.4}, {:.4} m, {:.3} m away\n  texture: u {:.4} v {:.4}, {} side\n  reflectance: {}",
+                hit.part,
+                hit.triangle,
+                at.p.x,
+                at.p.y,
+                at.p.z,
+                hit.t,
+                at.uv.x,
+                at.uv.y,
+                if at.ng.dot(-direction) >= 0.0 { "upper" } else { "lower" },
+                bands(bsdf.reflectance(cos))
+            );
+        }
+    }
+    let seen = pixel(world, integrator, settings, x, y);
+    let _ = write!(
+        text,
+        "\n  radiance: {}\n  ± error:  {}  ({} samples)",
+        bands(seen.mean),
+        bands(seen.variance.map(f32::sqrt)),
+        settings.spp
+    );
+    text
+}
+
+fn bands(s: Spectrum) -> String {
+    let all: Vec<String> = Spectrum::NAMES.iter().zip(s.to_array()).map(|(n, v)| format!("{n} {v:.4}")).collect();
+    all.join("  ")
+}

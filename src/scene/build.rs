@@ -1,0 +1,413 @@
+//! Page + seed + index → one field.
+
+use super::desc::{FieldDesc, Growth, SpeciesDesc};
+use super::library::{Layer, Library, Species};
+use super::page::Page;
+use super::tag::Tag;
+use super::{Part, PlantRecord, Scene};
+use crate::material::{Ground as GroundMaterial, GroundSkin, Material, Solid};
+use crate::film::Film;
+use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3, vec2};
+use crate::plant::{self, OrganKind, Stage};
+use crate::sampling::rng::mix;
+use crate::sampling::{Purpose, Stream};
+use crate::scatter::{self, Disc, Rows, Spot};
+use crate::sensor::Linear;
+use crate::sensor::{Photograph, SensorDesc};
+use crate::soil::{self, Debris, Ground, Pile, Rect, SeedRows, Site, SoilDesc};
+use crate::{Error, Result};
+use rayon::prelude::*;
+use std::path::Path;
+use std::sync::Arc;
+
+impl Field {
+    /// Seed of the samples: a field of its own noise for every image.
+    pub fn sample_seed(&self) -> u64 {
+        mix(mix(self.seed) ^ self.index)
+    }
+
+    /// Takes the photograph of a film of this field.
+    pub fn photograph(&self, film: &Film) -> Photograph {
+        let stream = |k| Stream::of(self.seed, self.index, Purpose::Sensor, k);
+        let illuminant = self.scene.lights.iter().fold(Spectrum::ZERO, |sum, l| sum + l.horizontal_irradiance());
+        let pixels: Vec<Spectrum> = film.pixels.iter().map(|p| p.mean).collect();
+        let window = film.window;
+        let linear = Linear { pixels: &pixels, width: window.width(), left: window.x0, top: window.y0 };
+        self.sensor.build(&mut stream(0)).expose(linear, &self.scene.camera, illuminant, &stream(1))
+    }
+}
+
+/// What the command line adds to a page.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Options {
+    /// Instead of the page's seed.
+    pub seed: Option<u64>,
+    /// Which field.
+    pub index: u64,
+    /// Image width; the field of view stays.
+    pub width: Option<u32>,
+    /// Image height.
+    pub height: Option<u32>,
+}
+
+/// One field, ready to be rendered, and what is known of it.
+pub struct Field {
+    /// What is out there.
+    pub scene: Scene,
+    /// Its plants, by number − 1.
+    pub plants: Vec<PlantRecord>,
+    /// How its film becomes a picture.
+    pub sensor: SensorDesc,
+    /// SHA-256 of everything that was read, hex.
+    pub hash: String,
+    /// Seed.
+    pub seed: u64,
+    /// Which field of the distribution.
+    pub index: u64,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// Room around the view in which plants are grown: they lean in and throw shadows.
+const PLANT_MARGIN: f32 = 0.35;
+/// Room around the view with fine ground.
+const GROUND_MARGIN: f32 = 0.04;
+/// How far the coarse ground goes on.
+const GROUND_REACH: f32 = 2.5;
+/// Radius around a stem that clods leave free, metres.
+const STEM_ROOM: f32 = 0.004;
+/// Most plants that a field can number.
+const MOST_PLANTS: usize = u16::MAX as usize;
+
+/// Builds field `options.index` of the page at `path`.
+pub fn field(path: &Path, options: &Options) -> Result<Field> {
+    let mut library = Library::default();
+    let page = library.page(path)?;
+    let desc: FieldDesc = page.parse()?;
+    Builder::new(&page, &desc, options, library)?.build()
+}
+
+/// Builds a field from a page's text; paths are relative to the working directory.
+pub fn field_of(text: &str, options: &Options) -> Result<Field> {
+    let page = Page::of(text);
+    let desc: FieldDesc = page.parse()?;
+    Builder::new(&page, &desc, options, Library::default())?.build()
+}
+
+/// A plant to be grown: where, which, how old.
+struct Seedling {
+    species: Arc<Species>,
+    growth: Growth,
+    position: Vec2,
+    heading: Option<f64>,
+    only_leaf: Option<u16>,
+    stream: Stream,
+}
+
+/// The ground while it is being covered.
+struct Earth {
+    ground: Ground,
+    skin: Arc<GroundSkin>,
+    pile: Pile,
+    stones: Vec<Debris>,
+}
+
+struct Builder<'a> {
+    page: &'a Page,
+    desc: &'a FieldDesc,
+    library: Library,
+    seed: u64,
+    index: u64,
+    scene: Scene,
+    warnings: Vec<String>,
+}
+
+impl<'a> Builder<'a> {
+    fn new(page: &'a Page, desc: &'a FieldDesc, options: &Options, library: Library) -> Result<Self> {
+        let (seed, index) = (options.seed.unwrap_or(desc.seed), options.index);
+        let mut stream = Stream::of(seed, index, Purpose::Page, 0);
+        let camera = desc.camera.build(&mut stream)?;
+        let camera = match (options.width, options.height) {
+            (None, None) => camera,
+            (w, h) => {
+                let (w0, h0) = (camera.width(), camera.height());
+                let aspect = f64::from(h0) / f64::from(w0);
+                let width = w.unwrap_or_else(|| h.map_or(w0, |h| (f64::from(h) / aspect).round().max(1.0) as u32));
+                let height = h.unwrap_or_else(|| (f64::from(width) * aspect).round().max(1.0) as u32);
+                camera.with_size(width, height)
+            }
+        };
+        let mut lights = Vec::new();
+        for (i, light) in desc.lights.iter().enumerate() {
+            lights.extend(light.build(&mut Stream::of(seed, index, Purpose::Page, 1 + i as u64))?);
+        }
+        let mut warnings = Vec::new();
+        if lights.is_empty() {
+            warnings.push("no light in the scene: the image will be black".into());
+        }
+        let scene = Scene { parts: Vec::new(), materials: Vec::new(), lights, camera, filter: desc.filter };
+        Ok(Self { page, desc, library, seed, index, scene, warnings })
+    }
+
+    fn stream(&self, purpose: Purpose, index: u64) -> Stream {
+        Stream::of(self.seed, self.index, purpose, index)
+    }
+
+    /// The rectangle of the ground plane that the camera sees.
+    fn view(&self) -> Result<Rect> {
+        let camera = &self.scene.camera;
+        let (w, h) = (camera.width(), camera.height());
+        let mut corners = Vec::new();
+        // The corners and the middles of the sides: a barrel distortion bulges between corners.
+        for (x, y) in [(0, 0), (1, 0), (2, 0), (0, 1), (2, 1), (0, 2), (1, 2), (2, 2)] {
+            let at = vec2(w as f32 * x as f32 / 2.0, h as f32 * y as f32 / 2.0);
+            let (origin, direction) = camera.ray(at, [0.5; 2]);
+            if direction.z < -0.05 && origin.z > 0.0 {
+                corners.push((origin + direction * (origin.z / -direction.z)).truncate());
+            }
+        }
+        let (Some(lo), Some(hi)) = (corners.iter().copied().reduce(Vec2::min), corners.iter().copied().reduce(Vec2::max))
+        else {
+            return Err(Error::Scene(format!("{}: the camera does not look at the ground", self.page.path.display())));
+        };
+        // A camera that looks along the ground sees to the horizon; only what is near can be made of crumbs.
+        let below = camera.pose().position.truncate();
+        let reach = Vec2::splat(MOST_VIEW);
+        let (lo, hi) = (lo.max(below - reach), hi.min(below + reach));
+        Ok(Rect::new(lo.x, lo.y, hi.x, hi.y))
+    }
+
+    /// Side of a pixel on the ground in the image's middle, metres; 1 mm where the camera does not look down.
+    fn ground_pixel(&self) -> f32 {
+        let camera = &self.scene.camera;
+        let (origin, direction) = camera.centre_ray(camera.width() / 2, camera.height() / 2);
+        if direction.z < -0.05 { origin.z / -direction.z * camera.pixel_angle() } else { 1e-3 }
+    }
+
+    fn material(&mut self, material: Material) -> u32 {
+        self.scene.materials.push(material);
+        self.scene.materials.len() as u32 - 1
+    }
+
+    fn part(&mut self, mesh: crate::geometry::Mesh, material: u32) {
+        self.scene.parts.push(Part { mesh, mask: None, material, tag: Tag::default() });
+    }
+
+    fn build(mut self) -> Result<Field> {
+        let wanted = self.desc.soil.is_some() || !self.desc.crops.is_empty() || !self.desc.weeds.is_empty();
+        let view = if wanted { self.view()? } else { Rect::new(-0.5, -0.5, 0.5, 0.5) };
+        let mut earth = match &self.desc.soil {
+            Some(soil) => Some(self.break_ground(soil, view)?),
+            None => None,
+        };
+        let stones: Vec<Disc> = earth.iter().flat_map(|e| &e.stones).map(|s| (s.centre.truncate(), s.radius)).collect();
+        let seedlings = self.seedlings(view.grown(PLANT_MARGIN), &stones)?;
+        if let (Some(earth), Some(soil)) = (&mut earth, &self.desc.soil) {
+            self.cover(soil, earth, &seedlings);
+        }
+        let plants = self.plant(&seedlings, earth.as_ref().map(|e| &e.ground))?;
+        Ok(Field {
+            scene: self.scene,
+            plants,
+            sensor: self.desc.sensor.clone(),
+            hash: self.library.hash(),
+            seed: self.seed,
+            index: self.index,
+            warnings: self.warnings,
+        })
+    }
+
+    /// The ground and the stones in it: what must be known before plants can be placed.
+    fn break_ground(&mut self, desc: &SoilDesc, view: Rect) -> Result<Earth> {
+        let mut maps: Vec<Layer> = Vec::new();
+        for layer in &desc.layers {
+            maps.push(self.library.layer(self.page, layer)?);
+        }
+        let pixel = self.ground_pixel();
+        let rows = self.desc.crops.first().map(|c| {
+            let rows = Rows::draw(&c.rows, &self.stream(Purpose::Scatter, 0));
+            SeedRows { spacing_m: rows.spacing_m, azimuth: rows.azimuth, offset_m: rows.offset_m }
+        });
+        let site = Site {
+            area: view.grown(GROUND_MARGIN),
+            grid_m: (2.5 * pixel).clamp(8e-4, 4e-3),
+            margin_m: GROUND_REACH,
+            rows,
+        };
+        let ground = Ground::new(desc, &maps, &site, &self.stream(Purpose::Soil, 0))?;
+        let skin = Arc::new(GroundSkin::bake(&ground.skin(&maps, (0.9 * pixel).clamp(2e-4, 2e-3))));
+        let mut pile = Pile::new(&ground);
+        let stones = soil::stones(&desc.stones, &ground, &mut pile, &self.stream(Purpose::Debris, 0));
+        Ok(Earth { ground, skin, pile, stones })
+    }
+
+    /// Clods and litter around the stems, and everything of the ground becomes parts.
+    fn cover(&mut self, desc: &SoilDesc, earth: &mut Earth, seedlings: &[Seedling]) {
+        let stems: Vec<(Vec2, f32)> = seedlings.iter().map(|s| (s.position, STEM_ROOM)).collect();
+        let clods = soil::clods(&earth.ground, &mut earth.pile, &stems);
+        let litter = soil::litter(&desc.litter, &earth.ground, &mut earth.pile, &self.stream(Purpose::Debris, 1));
+        let material = self.material(Material::Ground(GroundMaterial::new(earth.skin.clone())));
+        self.part(earth.ground.mesh(), material);
+        for (tint, mesh) in clods {
+            let material = self.material(Material::Ground(GroundMaterial::clods(earth.skin.clone(), tint)));
+            self.part(mesh, material);
+        }
+        for (i, thing) in std::mem::take(&mut earth.stones).into_iter().chain(litter).enumerate() {
+            let solid = Solid::new(thing.albedo * thing.tint, DEBRIS_SIGMA);
+            let solid = solid.with_grain(mix(i as u64) as u32, thing.radius.max(1e-3) * 0.5, 0.35);
+            let material = self.material(Material::Solid(solid));
+            self.part(thing.mesh, material);
+        }
+    }
+
+    /// Where plants stand, in an order that adding a species at the end does not change.
+    fn seedlings(&mut self, area: Rect, stones: &[Disc]) -> Result<Vec<Seedling>> {
+        let mut all = Vec::new();
+        let area = area.corners();
+        let (desc, page) = (self.desc, self.page);
+        for (k, crop) in desc.crops.iter().enumerate() {
+            let species = self.library.species(page, &crop.species)?;
+            for spot in scatter::rows(&crop.rows, area, stones, &self.stream(Purpose::Scatter, k as u64)) {
+                all.push(self.seedling(&species, &crop.growth, spot, 1 + k as u64));
+            }
+        }
+        for (k, weed) in desc.weeds.iter().enumerate() {
+            let species = self.library.species(page, &weed.species)?;
+            for spot in scatter::weeds(&weed.spread, area, stones, &self.stream(Purpose::Scatter, 1000 + k as u64)) {
+                all.push(self.seedling(&species, &weed.growth, spot, 1001 + k as u64));
+            }
+        }
+        for (k, placed) in desc.plants.iter().enumerate() {
+            let species = self.library.species(page, &placed.species)?;
+            let mut stream = self.stream(Purpose::Scatter, 2000 + k as u64);
+            let position = vec2(placed.position_m.0.draw32(&mut stream), placed.position_m.1.draw32(&mut stream));
+            all.push(Seedling {
+                species,
+                growth: placed.growth.clone(),
+                position,
+                heading: Some(placed.heading_deg.draw(&mut stream)),
+                only_leaf: placed.only_leaf.map(|l| l.get() as u16),
+                stream: stream.child(Purpose::Plant, 0),
+            });
+        }
+        if all.len() > MOST_PLANTS {
+            return Err(Error::Scene(format!("{} plants: labels can number {MOST_PLANTS}; lower the density", all.len())));
+        }
+        Ok(all)
+    }
+
+    fn seedling(&self, species: &Arc<Species>, growth: &Growth, spot: Spot, population: u64) -> Seedling {
+        Seedling {
+            species: species.clone(),
+            growth: growth.clone(),
+            position: spot.at,
+            heading: None,
+            only_leaf: None,
+            stream: self.stream(Purpose::Plant, population).child(Purpose::Plant, spot.key),
+        }
+    }
+
+    /// Grows every plant and stands it on the ground.
+    fn plant(&mut self, seedlings: &[Seedling], ground: Option<&Ground>) -> Result<Vec<PlantRecord>> {
+        let grown: Vec<(PlantRecord, Vec<Grown>)> =
+            seedlings.par_iter().enumerate().map(|(i, s)| grow(s, i as u16 + 1, ground)).collect();
+        let mut records = Vec::with_capacity(grown.len());
+        for (record, organs) in grown {
+            // One material a plant and skin: plants differ in their green.
+            let mut made: Vec<(String, usize, u32)> = Vec::new();
+            for organ in organs {
+                if let Some(fault) = organ.part.mesh.fault() {
+                    return Err(Error::Scene(format!("plant {} grew a broken mesh: {fault}", record.number)));
+                }
+                let known = made.iter().find(|(s, c, _)| *s == organ.skin && *c == organ.choice).map(|m| m.2);
+                let material = match known {
+                    Some(material) => material,
+                    None => {
+                        let material = self.material(Material::Leaf(organ.material));
+                        made.push((organ.skin, organ.choice, material));
+                        material
+                    }
+                };
+                self.scene.parts.push(Part { material, ..organ.part });
+            }
+            records.push(record);
+        }
+        Ok(records)
+    }
+}
+
+/// Most that a view may measure from the point below the camera, metres.
+const MOST_VIEW: f32 = 1.5;
+/// Slope angle of the facets of stones, straw and wood, radians.
+const DEBRIS_SIGMA: f32 = 0.3;
+
+/// An organ that stands in the field.
+struct Grown {
+    part: Part,
+    skin: String,
+    choice: usize,
+    material: crate::material::LeafMaterial,
+}
+
+/// Grows one plant, in its own stream, and stands it on the ground.
+fn grow(s: &Seedling, number: u16, ground: Option<&Ground>) -> (PlantRecord, Vec<Grown>) {
+    let desc: &SpeciesDesc = &s.species.desc;
+    let mut stream = s.stream.clone();
+    let stage = match &s.growth {
+        Growth::AgeDays(days) => Stage::Age(days.draw32(&mut stream)),
+        Growth::Bbch(code) => Stage::Bbch(code.draw(&mut stream) as u32),
+    };
+    let any = stream.range(0.0, 360.0);
+    let heading = s.heading.unwrap_or(any).to_radians() as f32;
+    let green = (1.0 + desc.chlorophyll_sd.get() * stream.normal()).clamp(0.6, 1.5) as f32;
+    let (x, y) = (s.position.x, s.position.y);
+    let (z, normal) = ground.map_or((0.0, Vec3::Z), |g| (g.height(x, y), g.trend(x, y, STANCE)));
+    let axis = scatter::axis(normal, AXIS_NOISE_DEG, &mut stream);
+    let plant = plant::grow(&desc.plant, stage, &stream);
+    let foot = Vec3::new(x, y, z);
+    // Plant coordinates: y to the heading, z along the axis.
+    let ahead = Vec3::new(heading.sin(), heading.cos(), 0.0);
+    let frame = Frame::with_tangent(axis, ahead.cross(axis));
+    let rotation = Mat3::from_cols(frame.x, frame.y, frame.z);
+    let class = desc.role.class();
+    let organs = plant.organs.into_iter().filter(|o| s.only_leaf.is_none_or(|l| o.leaf == l)).map(|organ| {
+        let mut mesh = organ.mesh;
+        mesh.transform(rotation, foot);
+        let choices = &s.species.skins[&organ.skin];
+        let choice = stream.child(Purpose::Leaf, 1 << 20 | u64::from(organ.leaf)).index(choices.len());
+        let (material, mask) = &choices[choice];
+        let base = desc.skins[&organ.skin].pigments.chlorophyll.f32();
+        let cut = matches!(organ.kind, OrganKind::Blade | OrganKind::Cotyledon);
+        Grown {
+            part: Part {
+                mesh,
+                mask: if cut { mask.clone() } else { None },
+                material: 0,
+                tag: Tag { class, plant: number, leaf: organ.leaf },
+            },
+            skin: organ.skin,
+            choice,
+            material: material.with_chlorophyll(base, green),
+        }
+    });
+    let organs: Vec<Grown> = organs.collect();
+    let record = PlantRecord {
+        number,
+        species: desc.name.clone(),
+        eppo: desc.eppo.clone(),
+        class,
+        position: foot,
+        axis,
+        heading,
+        bbch: plant.bbch,
+        age_days: plant.age_days,
+        height: plant.height,
+        leaves: organs.iter().map(|o| o.part.tag.leaf).max().unwrap_or(0),
+    };
+    (record, organs)
+}
+
+/// Radius over which the ground's slope decides how a plant stands, metres.
+const STANCE: f32 = 0.02;
+/// White noise on the growth axis, degrees.
+const AXIS_NOISE_DEG: f32 = 4.0;

@@ -1,0 +1,177 @@
+//! What a page says: the field and the species, composed of what each room can read.
+
+use crate::film::Filter;
+use crate::light::LightDesc;
+use crate::material::LeafDesc;
+use crate::plant::PlantDesc;
+use crate::sampling::vary::{Finite, Fraction, NonNegative, Num, Pick, PositiveCount, Vary};
+use crate::scatter::{RowsDesc, WeedsDesc};
+use crate::scene::tag::Class;
+use crate::sensor::{CameraDesc, SensorDesc};
+use crate::soil::SoilDesc;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// A distribution over fields. Every number may be fixed or drawn; paths are relative to the page.
+///
+/// ```
+/// let page = r#"Field(
+///     seed: 7,
+///     camera: JaiAd130(height_m: 0.85),
+///     lights: [Daylight(sun: Angles(elevation_deg: Uniform(30, 60), azimuth_deg: 140))],
+///     plants: [(species: "species/sugar_beet.ron", growth: Bbch(14))],
+/// )"#;
+/// let field: furrow::scene::desc::FieldDesc = ron::from_str(page).unwrap();
+/// assert_eq!(field.plants.len(), 1);
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename = "Field")]
+pub struct FieldDesc {
+    /// Seed of everything that is drawn; `--seed` overrides it.
+    #[serde(default)]
+    pub seed: u64,
+    /// Who looks.
+    pub camera: CameraDesc,
+    /// How the film becomes a picture.
+    #[serde(default)]
+    pub sensor: SensorDesc,
+    /// How a pixel gathers light.
+    #[serde(default = "point_spread")]
+    pub filter: Filter,
+    /// What shines.
+    #[serde(default)]
+    pub lights: Vec<LightDesc>,
+    /// What the plants stand in; nothing unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub soil: Option<SoilDesc>,
+    /// Sown in rows.
+    #[serde(default)]
+    pub crops: Vec<CropDesc>,
+    /// What came by itself.
+    #[serde(default)]
+    pub weeds: Vec<WeedDesc>,
+    /// Single plants in their places.
+    #[serde(default)]
+    pub plants: Vec<PlacedDesc>,
+}
+
+/// A good lens on small pixels: about half a pixel of blur.
+fn point_spread() -> Filter {
+    Filter::Gaussian(0.4)
+}
+
+/// How far a plant has grown.
+///
+/// ```
+/// use furrow::scene::desc::Growth;
+/// let g: Growth = ron::from_str("AgeDays(Normal(mean: 24, sd: 2))").unwrap();
+/// let g: Growth = ron::from_str("Bbch(Choice([12, 14]))").unwrap();
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Growth {
+    /// Days after emergence.
+    AgeDays(Vary<NonNegative>),
+    /// Growth stage, BBCH scale (Meier 2001).
+    Bbch(Vary<PositiveCount>),
+}
+
+/// A crop in rows.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename = "Crop")]
+pub struct CropDesc {
+    /// Species page.
+    pub species: String,
+    /// How far each plant has grown.
+    pub growth: Growth,
+    /// Where they stand.
+    pub rows: RowsDesc,
+}
+
+/// A weed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename = "Weed")]
+pub struct WeedDesc {
+    /// Species page.
+    pub species: String,
+    /// How far each plant has grown.
+    pub growth: Growth,
+    /// How many and how they gather.
+    #[serde(default)]
+    pub spread: WeedsDesc,
+}
+
+/// One plant in its place.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename = "Plant")]
+pub struct PlacedDesc {
+    /// Species page.
+    pub species: String,
+    /// How far it has grown.
+    pub growth: Growth,
+    /// Where its stem meets the ground, metres east and north.
+    #[serde(default = "origin")]
+    pub position_m: (Vary<Finite>, Vary<Finite>),
+    /// Which way its first leaf points, degrees clockwise from north.
+    #[serde(default = "any_heading")]
+    pub heading_deg: Vary<Finite>,
+    /// Only this leaf of it, counted from 1 with the seed leaves; the whole plant unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub only_leaf: Option<Num<PositiveCount>>,
+}
+
+fn origin() -> (Vary<Finite>, Vary<Finite>) {
+    (Vary::fixed(0.0), Vary::fixed(0.0))
+}
+
+fn any_heading() -> Vary<Finite> {
+    Vary::uniform(0.0, 360.0)
+}
+
+/// A species, as its page writes it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename = "Species")]
+pub struct SpeciesDesc {
+    /// Scientific name.
+    pub name: String,
+    /// EPPO code.
+    pub eppo: String,
+    /// Crop or weed.
+    pub role: Role,
+    /// What its organs look like, by the names that the plant uses.
+    pub skins: BTreeMap<String, LeafDesc>,
+    /// How it grows.
+    pub plant: PlantDesc,
+    /// Relative spread of the chlorophyll from plant to plant.
+    #[serde(default = "spread")]
+    pub chlorophyll_sd: Num<Fraction>,
+}
+
+const fn spread() -> Num<Fraction> {
+    Num::new(0.12)
+}
+
+/// What a plant is to the farmer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Role {
+    /// Sown.
+    Crop,
+    /// Not sown.
+    Weed,
+}
+
+impl Role {
+    /// The class of its pixels.
+    pub fn class(self) -> Class {
+        match self {
+            Self::Crop => Class::Crop,
+            Self::Weed => Class::Weed,
+        }
+    }
+}
+
+impl SpeciesDesc {
+    /// The textures that the page names.
+    pub fn textures(&self) -> impl Iterator<Item = &str> {
+        self.skins.values().flat_map(|leaf| leaf.texture.iter().flat_map(Pick::all)).map(String::as_str)
+    }
+}

@@ -1,0 +1,48 @@
+//! Who a part is: the table that turns a hit into a label.
+
+/// The classes of the label image, by their index in it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[repr(u8)]
+pub enum Class {
+    /// Ground, clods, stones, litter, and everything that is not a plant.
+    #[default]
+    Soil = 0,
+    /// The crop.
+    Crop = 1,
+    /// Any other plant.
+    Weed = 2,
+}
+
+impl Class {
+    /// All classes in the order of their indices.
+    pub const ALL: [Self; 3] = [Self::Soil, Self::Crop, Self::Weed];
+
+    /// Lower-case name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Soil => "soil",
+            Self::Crop => "crop",
+            Self::Weed => "weed",
+        }
+    }
+
+    /// sRGB colour in label images: Di Cicco et al. 2017 paint crop green, weed red and soil black.
+    pub fn color(self) -> [u8; 3] {
+        match self {
+            Self::Soil => [0, 0, 0],
+            Self::Crop => [0, 255, 0],
+            Self::Weed => [255, 0, 0],
+        }
+    }
+}
+
+/// Who a part is. Zero means none: soil has no plant, a stem has no leaf.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tag {
+    /// Its class.
+    pub class: Class,
+    /// Number of its plant in the field, from 1.
+    pub plant: u16,
+    /// Number of its leaf in the plant, from 1.
+    pub leaf: u16,
+}

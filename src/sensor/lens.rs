@@ -1,0 +1,80 @@
+//! Lens distortion after Brown & Conrady, in OpenCV's order and signs.
+//!
+//! With (x, y) the pinhole image at unit distance and r² = x² + y²,
+//! x′ = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + 2 p1 x y + p2 (r² + 2x²),
+//! y′ = y (1 + k1 r² + k2 r⁴ + k3 r⁶) + p1 (r² + 2y²) + 2 p2 x y.
+//! Source: Brown 1971, "Close-range camera calibration"; OpenCV, module calib3d.
+
+/// The five coefficients; all zero is a pinhole.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Distortion {
+    /// Radial, r².
+    pub k1: f64,
+    /// Radial, r⁴.
+    pub k2: f64,
+    /// Tangential, along y.
+    pub p1: f64,
+    /// Tangential, along x.
+    pub p2: f64,
+    /// Radial, r⁶.
+    pub k3: f64,
+}
+
+impl Distortion {
+    /// Whether there is none.
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Where the lens puts the pinhole image point.
+    pub fn distort(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let Self { k1, k2, p1, p2, k3 } = *self;
+        let r2 = x * x + y * y;
+        let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+        [
+            x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
+        ]
+    }
+
+    /// Derivatives of [`Self::distort`]: ∂x′/∂x, ∂x′/∂y = ∂y′/∂x, ∂y′/∂y.
+    fn jacobian(&self, [x, y]: [f64; 2]) -> [f64; 3] {
+        let Self { k1, k2, p1, p2, k3 } = *self;
+        let r2 = x * x + y * y;
+        let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+        let slope = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3));
+        [
+            radial + x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x,
+            x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y,
+            radial + y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x,
+        ]
+    }
+
+    /// Area of the distorted image per area of the pinhole image: above zero where the image does not fold over.
+    pub fn stretch(&self, at: [f64; 2]) -> f64 {
+        let [a, b, d] = self.jacobian(at);
+        a * d - b * b
+    }
+
+    /// The pinhole image point that the lens puts at `to`: Newton's method from `to` itself, to 10⁻¹⁴.
+    pub fn undistort(&self, to: [f64; 2]) -> [f64; 2] {
+        if self.is_none() {
+            return to;
+        }
+        let mut at = to;
+        for _ in 0..20 {
+            let [x, y] = self.distort(at);
+            let (ex, ey) = (x - to[0], y - to[1]);
+            let [a, b, d] = self.jacobian(at);
+            let det = a * d - b * b;
+            if det <= 0.0 {
+                break;
+            }
+            at = [at[0] - (d * ex - b * ey) / det, at[1] - (a * ey - b * ex) / det];
+            if ex.abs() + ey.abs() < 1e-14 {
+                break;
+            }
+        }
+        at
+    }
+}

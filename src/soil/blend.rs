@@ -1,0 +1,135 @@
+//! Which layer lies where.
+//!
+//! Layer i has a Perlin noise nᵢ of its own and the weight
+//! wᵢ ∝ shareᵢ · exp(sharpness · (nᵢ + height · (hᵢ − ½))), scaled so that the weights sum to one.
+//!
+//! Two layers then blend linearly by a Perlin mask, as terrains usually do; the term in the layer's own height hᵢ lets
+//! the tops of one layer stick out of the other at the border, which a plain mask would make see-through. The weights
+//! come from here for the vertices and for the texture alike.
+
+use super::{BlendDesc, LayerDesc, LayerMaps, MAX_LAYERS};
+use crate::math::{Vec2, vec2};
+use crate::sampling::{Purpose, Stream};
+use crate::texture::noise::Perlin;
+
+/// The weights of the layers at a place; unused ones are zero.
+pub type Weights = [f32; MAX_LAYERS];
+
+/// The blend of one ground.
+#[derive(Clone, Debug)]
+pub(super) struct Blend {
+    tiles: Vec<Tile>,
+    frequency: f64,
+    octaves: u32,
+    sharpness: f32,
+    height: f32,
+}
+
+#[derive(Clone, Debug)]
+struct Tile {
+    noise: Perlin,
+    log_share: f32,
+    // Each ground lays its tiles another way round, so that no two show the same clod.
+    rotation: Vec2,
+    offset: Vec2,
+    low: f32,
+    relief: f32,
+    clods: f32,
+}
+
+impl Blend {
+    pub(super) fn new(desc: &BlendDesc, layers: &[LayerDesc], stream: &Stream) -> Self {
+        let child = |k| stream.child(Purpose::Texture, k);
+        let tiles = layers
+            .iter()
+            .enumerate()
+            .map(|(i, layer)| {
+                let mut s = child(16 + i as u64);
+                let (low, high) = (layer.height_mm.0.f32() * 1e-3, layer.height_mm.1.f32() * 1e-3);
+                Tile {
+                    noise: Perlin::new(s.seed32()),
+                    rotation: Vec2::from_angle(s.range32(0.0, std::f32::consts::TAU)) / layer.size_m.f32(),
+                    offset: vec2(s.uniform32(), s.uniform32()),
+                    log_share: layer.share.draw32(&mut s).ln(),
+                    low,
+                    relief: high - low,
+                    clods: layer.clods.f32(),
+                }
+            })
+            .collect();
+        Self {
+            tiles,
+            frequency: 1.0 / desc.scale_m.draw(&mut child(0)),
+            octaves: desc.octaves.get() as u32,
+            sharpness: desc.sharpness.draw32(&mut child(1)),
+            height: desc.height.f32(),
+        }
+    }
+
+    /// The noise of layer `i`; slow to change over the ground, so it may be interpolated between vertices.
+    pub(super) fn noise(&self, i: usize, p: Vec2) -> f32 {
+        let (x, y) = (f64::from(p.x) * self.frequency, f64::from(p.y) * self.frequency);
+        // Shifted off the lattice, where all noises are zero together.
+        self.tiles[i].noise.fbm2(x + 0.37 + i as f64, y + 0.61, self.octaves, 0.5) as f32
+    }
+
+    /// Tile coordinates of layer `i`.
+    pub(super) fn uv(&self, i: usize, p: Vec2) -> Vec2 {
+        self.tiles[i].rotation.rotate(p) + self.tiles[i].offset
+    }
+
+    /// The weights from the layers' noises and their heights (0..1).
+    #[inline]
+    pub(super) fn weights(&self, noise: Weights, heights: Weights) -> Weights {
+        let mut w = [0.0; MAX_LAYERS];
+        let n = self.tiles.len();
+        if n == 1 {
+            w[0] = 1.0;
+            return w;
+        }
+        let score = |i: usize| self.sharpness * (noise[i] + self.height * (heights[i] - 0.5)) + self.tiles[i].log_share;
+        let top = (0..n).map(score).fold(f32::MIN, f32::max);
+        for (i, w) in w.iter_mut().enumerate().take(n) {
+            *w = (score(i) - top).exp();
+        }
+        let sum: f32 = w.iter().sum();
+        w.map(|x| x / sum)
+    }
+
+    /// Heights of all layers, 0..1.
+    pub(super) fn heights<L: LayerMaps>(&self, maps: &[L], p: Vec2) -> Weights {
+        let mut h = [0.0; MAX_LAYERS];
+        for (i, (h, map)) in h.iter_mut().zip(maps).enumerate() {
+            *h = map.height(self.uv(i, p));
+        }
+        h
+    }
+
+    /// Displacement in metres.
+    pub(super) fn displacement(&self, weights: Weights, heights: Weights) -> f32 {
+        self.tiles.iter().enumerate().map(|(i, t)| weights[i] * (t.low + heights[i] * t.relief)).sum()
+    }
+
+    /// Reflectance.
+    pub(super) fn albedo<L: LayerMaps>(&self, maps: &[L], weights: Weights, p: Vec2) -> [f32; 3] {
+        let mut sum = [0.0; 3];
+        for (i, map) in maps.iter().enumerate().take(self.tiles.len()) {
+            if weights[i] > 1e-3 {
+                let a = map.albedo(self.uv(i, p));
+                for (s, a) in sum.iter_mut().zip(a) {
+                    *s += weights[i] * a;
+                }
+            }
+        }
+        sum
+    }
+
+    /// Share of the clods that lie here.
+    pub(super) fn clods(&self, weights: Weights) -> f32 {
+        self.tiles.iter().zip(weights).map(|(t, w)| t.clods * w).sum()
+    }
+
+    pub(super) fn layers(&self) -> usize {
+        self.tiles.len()
+    }
+}

@@ -1,0 +1,266 @@
+//! How many aggregates of which size lie where, and those that are too small to be bodies.
+//!
+//! The number longer than L is N₅ · (5 mm / L)^D per m² (Aubertot et al. 1999). N₅ and D both vary over the ground: some
+//! patches hold more of everything, some are coarser, as the harrow's tines leave them.
+//!
+//! A crumb is part of the ground's surface: a half-sunk ellipsoid with two flat faces, drawn by its height and tint.
+
+use super::{ClodsDesc, Rect, cell_stream, cells};
+use crate::math::{Vec2, vec2};
+use crate::sampling::{Purpose, Stream};
+use crate::texture::noise::Perlin;
+
+/// Length at which the local exponents pivot.
+const PIVOT_MM: f32 = 5.0;
+
+/// Standard deviation of [`Perlin::fbm2`] with three octaves and gain 0.5.
+const FBM3_SD: f32 = 0.28;
+
+/// Side of the cells that the aggregates are addressed by.
+const CELL_M: f32 = 0.02;
+
+/// The law of the aggregates of one ground.
+#[derive(Clone, Debug)]
+pub(super) struct Law {
+    over_pivot: f32,
+    exponent: f32,
+    clustering: f32,
+    sorting: f32,
+    frequency: f64,
+    noise: Perlin,
+    /// Standard deviation of the logarithm of brightness.
+    pub(super) tint_sigma: f32,
+}
+
+/// Where the law holds: the local number over 5 mm, m⁻², and the local exponent.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Local {
+    over_pivot: f32,
+    exponent: f32,
+}
+
+impl Local {
+    /// Number between two lengths, m⁻².
+    pub(super) fn number(self, min_mm: f32, max_mm: f32) -> f32 {
+        let over = |mm: f32| self.over_pivot * (PIVOT_MM / mm).powf(self.exponent);
+        (over(min_mm) - over(max_mm)).max(0.0)
+    }
+
+    /// A length between two, from u in 0..1.
+    pub(super) fn length_mm(self, min_mm: f32, max_mm: f32, u: f32) -> f32 {
+        // Inverse of the truncated power law.
+        let (a, b) = (min_mm.powf(-self.exponent), max_mm.powf(-self.exponent));
+        (a + u * (b - a)).powf(-1.0 / self.exponent).clamp(min_mm, max_mm)
+    }
+}
+
+impl Law {
+    pub(super) fn new(desc: &ClodsDesc, stream: &Stream) -> Self {
+        let child = |k| stream.child(Purpose::Debris, k);
+        Self {
+            over_pivot: desc.over_5mm_per_m2.draw32(&mut child(0)),
+            exponent: desc.exponent.draw32(&mut child(1)),
+            clustering: desc.clustering.draw32(&mut child(2)),
+            frequency: 1.0 / desc.cluster_m.draw(&mut child(3)),
+            sorting: desc.sorting.f32(),
+            noise: Perlin::new(child(4).seed32()),
+            tint_sigma: desc.tint_sigma.f32(),
+        }
+    }
+
+    /// The law at `p`, where the layers hold `share` of the aggregates.
+    pub(super) fn at(&self, p: Vec2, share: f32) -> Local {
+        let (x, y) = (f64::from(p.x) * self.frequency, f64::from(p.y) * self.frequency);
+        let normal = |shift: f64| (self.noise.fbm2(x + shift, y - shift, 3, 0.5) as f32 / FBM3_SD).clamp(-2.0, 2.0);
+        let more = if self.clustering > 0.0 { normal(0.43) * self.clustering } else { 0.0 };
+        let coarser = if self.sorting > 0.0 { normal(57.91) * self.sorting } else { 0.0 };
+        Local {
+            over_pivot: share * self.over_pivot * (more - 0.5 * self.clustering * self.clustering).exp(),
+            exponent: self.exponent * (1.0 - coarser),
+        }
+    }
+
+    /// Every aggregate between two lengths whose centre lies in `area`: its place, its length in mm, and a stream of its
+    /// own. `share` tells how much of the aggregates the layers hold at a place.
+    pub(super) fn scatter(
+        &self,
+        area: Rect,
+        mm: (f32, f32),
+        stream: &Stream,
+        share: impl Fn(Vec2) -> f32,
+        mut each: impl FnMut(Vec2, f32, &mut Stream),
+    ) {
+        for (i, j) in cells(area, CELL_M) {
+            let corner = vec2(i as f32, j as f32) * CELL_M;
+            let mut s = cell_stream(stream, i, j);
+            // The law is taken at the cell's own centre, inside the area or not, so that the area changes nothing in it.
+            let local = self.at(corner + 0.5 * CELL_M, share(corner + 0.5 * CELL_M));
+            for _ in 0..s.poisson(f64::from(local.number(mm.0, mm.1) * CELL_M * CELL_M)) {
+                let p = corner + vec2(s.uniform32(), s.uniform32()) * CELL_M;
+                let length = local.length_mm(mm.0, mm.1, s.uniform32());
+                if area.contains(p) {
+                    each(p, length, &mut s);
+                } else {
+                    each(p, 0.0, &mut s);
+                }
+            }
+        }
+    }
+}
+
+/// A raster of heights above the bare ground, and of tints.
+#[derive(Clone, Debug)]
+pub(super) struct Crumbs {
+    /// Metres above the ground without crumbs.
+    pub(super) height: Vec<f32>,
+    /// Brightness times 128; 0 where no crumb lies.
+    pub(super) tint: Vec<u8>,
+}
+
+/// Where the raster's samples are.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Raster {
+    pub(super) origin: Vec2,
+    pub(super) step: f32,
+    pub(super) width: usize,
+    pub(super) height: usize,
+}
+
+impl Crumbs {
+    /// Draws all crumbs between two lengths onto a raster.
+    pub(super) fn draw(
+        raster: Raster,
+        law: &Law,
+        mm: (f32, f32),
+        amount: f32,
+        stream: &Stream,
+        share: impl Fn(Vec2) -> f32,
+    ) -> Self {
+        let n = raster.width * raster.height;
+        let mut crumbs = Self { height: vec![0.0; n], tint: vec![0; n] };
+        let far = raster.origin + vec2(raster.width as f32, raster.height as f32) * raster.step;
+        let area = Rect::new(raster.origin.x, raster.origin.y, far.x, far.y).grown(mm.1 * 1e-3);
+        if mm.0 < mm.1 && amount > 0.0 {
+            law.scatter(
+                area,
+                mm,
+                stream,
+                |p| amount * share(p),
+                |p, length, s| {
+                    crumbs.add(raster, p, length, law.tint_sigma, s);
+                },
+            );
+        }
+        crumbs
+    }
+
+    fn add(&mut self, raster: Raster, p: Vec2, length_mm: f32, sigma: f32, s: &mut Stream) {
+        // Ten numbers whatever happens, so that a crumb outside the area leaves its neighbours as they are.
+        let mut u = [0.0; 10];
+        u.fill_with(|| s.uniform32());
+        let a = 0.5e-3 * length_mm;
+        let b = a * (0.67 + 0.25 * u[0]);
+        let turn = Vec2::from_angle(u[1] * std::f32::consts::TAU);
+        let top = a * 0.55 * (0.8 + 0.4 * u[2]);
+        // Sunk by 20–50 % of its height.
+        let centre = top * (0.6 - 0.6 * u[3]);
+        let face = |v: f32, w: f32| Vec2::from_angle(v * std::f32::consts::TAU) * (0.4 + 0.9 * w);
+        let (f, g) = (face(u[4], u[5]), face(u[6], u[7]));
+        // The sum of two uniforms less one has standard deviation 0.408.
+        let tint = ((u[8] + u[9] - 1.0) / 0.408 * 1.5 * sigma).exp();
+        let tint = (tint * 128.0).clamp(1.0, 255.0) as u8;
+
+        let q = (p - raster.origin) / raster.step;
+        let reach = a / raster.step;
+        let lo = (q - reach).ceil().max(Vec2::ZERO);
+        let hi = (q + reach).floor().min(vec2(raster.width as f32 - 1.0, raster.height as f32 - 1.0));
+        let scale = vec2(raster.step / a.max(1e-9), raster.step / b.max(1e-9));
+        for y in lo.y as i32..=hi.y as i32 {
+            for x in lo.x as i32..=hi.x as i32 {
+                let d = turn.rotate(vec2(x as f32, y as f32) - q) * scale;
+                let inside = 1.0 - d.length_squared();
+                if inside <= 0.0 {
+                    continue;
+                }
+                // Steeper at the rim and flatter on top than an ellipsoid.
+                let dome = inside.sqrt() * (1.35 - 0.35 * inside);
+                let z = centre + top * dome.min(0.75 + f.dot(d)).min(0.85 + g.dot(d));
+                let k = y as usize * raster.width + x as usize;
+                if z > self.height[k] {
+                    self.height[k] = z;
+                    self.tint[k] = tint;
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::vary::{Num, Vary};
+
+    fn law(clustering: f64) -> Law {
+        let desc = ClodsDesc {
+            over_5mm_per_m2: Vary::fixed(9400.0),
+            exponent: Vary::fixed(3.8),
+            clustering: Vary::fixed(clustering),
+            sorting: Num::new(0.0),
+            ..ClodsDesc::default()
+        };
+        Law::new(&desc, &Stream::of(5, 0, Purpose::Test, 0))
+    }
+
+    fn lengths(law: &Law, area: Rect) -> Vec<(Vec2, f32)> {
+        let mut all = Vec::new();
+        law.scatter(
+            area,
+            (2.5, 60.0),
+            &Stream::of(6, 0, Purpose::Test, 0),
+            |_| 1.0,
+            |p, mm, _| {
+                if mm > 0.0 {
+                    all.push((p, mm));
+                }
+            },
+        );
+        all
+    }
+
+    #[test]
+    fn sizes_follow_the_power_law_that_was_asked_for() {
+        let all = lengths(&law(0.0), Rect::new(-1.0, -0.5, 1.0, 0.5));
+        // Maximum likelihood exponent of a Pareto law (Hill 1975); its standard error is D/√n.
+        let n = all.len() as f32;
+        let d = n / all.iter().map(|(_, mm)| (mm / 2.5).ln()).sum::<f32>();
+        assert!((d - 3.8).abs() < 4.0 * 3.8 / n.sqrt(), "{d} from {n}");
+        let over5 = all.iter().filter(|(_, mm)| *mm > 5.0).count() as f32;
+        assert!((over5 / 2.0 - 9400.0).abs() < 4.0 * (9400f32 / 2.0).sqrt(), "{over5}");
+    }
+
+    #[test]
+    fn clusters_change_the_pattern_but_not_the_mean() {
+        let area = Rect::new(0.0, 0.0, 2.0, 2.0);
+        let count = |clustering| {
+            let mut quadrats = vec![0.0f32; 400];
+            for (p, _) in lengths(&law(clustering), area) {
+                quadrats[(p.y * 10.0) as usize * 20 + (p.x * 10.0) as usize] += 1.0;
+            }
+            let mean = quadrats.iter().sum::<f32>() / 400.0;
+            (mean, quadrats.iter().map(|q| (q - mean).powi(2)).sum::<f32>() / 400.0 / mean)
+        };
+        let (even, clustered) = (count(0.0), count(0.45));
+        assert!((clustered.0 / even.0 - 1.0).abs() < 0.15, "{even:?} {clustered:?}");
+        assert!(clustered.1 > 5.0 * even.1 && (even.1 - 1.0).abs() < 0.3, "{even:?} {clustered:?}");
+    }
+
+    #[test]
+    fn a_larger_area_holds_the_same_aggregates() {
+        let small = Rect::new(0.1, 0.1, 0.33, 0.27);
+        let few = lengths(&law(0.45), small);
+        let many: Vec<_> =
+            lengths(&law(0.45), small.grown(0.2)).into_iter().filter(|(p, _)| small.contains(*p)).collect();
+        assert!(few.len() > 1000);
+        assert_eq!(few, many);
+    }
+}

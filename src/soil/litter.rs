@@ -1,0 +1,241 @@
+//! Straw, sticks and bits of dead plants.
+//!
+//! All are swept: a closed cross-section drawn along a bent path. A straw is a split stalk, its section a thick arc; a stick
+//! a tapered round with stubs; a bit a flat lens that curls. The path is fitted to the pile: stiff things bridge hollows,
+//! and lie where they touch.
+
+use super::{Debris, DebrisKind, Ground, LitterDesc, Pile, Rect, cell_stream, cells};
+use crate::geometry::Mesh;
+use crate::math::{Spectrum, Vec2, Vec3, vec2};
+use crate::sampling::{Purpose, Stream};
+use std::f32::consts::{PI, TAU};
+
+/// Reflectance of straw and wood: measured wood shavings and bark; the bits are rotten leaves, redder and darker.
+const STRAW: Spectrum = Spectrum::new(0.42, 0.32, 0.19, 0.585);
+const WOOD: Spectrum = Spectrum::new(0.22, 0.16, 0.12, 0.38);
+const ROTTEN: Spectrum = Spectrum::new(0.20, 0.09, 0.05, 0.32);
+
+/// Side of the cells that litter is addressed by.
+const CELL_M: f32 = 0.1;
+
+/// The litter of a page, laid onto the pile.
+pub fn litter(desc: &LitterDesc, ground: &Ground, pile: &mut Pile, stream: &Stream) -> Vec<Debris> {
+    let mut all = Vec::new();
+    let child = |k: u64| stream.child(Purpose::Debris, 300 + k);
+    let sticks = desc.sticks_per_m2.draw32(&mut child(0));
+    // Straws differ in length and width; the mean of both gives the number that covers what was asked for.
+    let mut s = child(1);
+    let one = (0..256).map(|_| desc.straw_mm.draw32(&mut s) * desc.straw_width_mm.draw32(&mut s)).sum::<f32>() / 256e6;
+    let straws = -(1.0 - desc.straw_cover.draw32(&mut child(2)).min(0.95)).ln() / one;
+    let bits = desc.bits_per_m2.draw32(&mut child(3));
+    for (kind, per_m2, k) in
+        [(DebrisKind::Stick, sticks, 4), (DebrisKind::Straw, straws, 5), (DebrisKind::Bit, bits, 6)]
+    {
+        for (at, mut s) in places(ground.area(), per_m2, &child(k)) {
+            all.push(match kind {
+                DebrisKind::Stick => stick(desc, pile, at, &mut s),
+                DebrisKind::Straw => straw(desc, pile, at, &mut s),
+                _ => bit(desc, pile, at, &mut s),
+            });
+        }
+    }
+    all
+}
+
+fn places(area: Rect, per_m2: f32, stream: &Stream) -> Vec<(Vec2, Stream)> {
+    let mut all = Vec::new();
+    for (i, j) in cells(area, CELL_M) {
+        let mut cell = cell_stream(stream, i, j);
+        for k in 0..cell.poisson(f64::from(per_m2 * CELL_M * CELL_M)) {
+            let mut s = cell.child(Purpose::Debris, k);
+            let at = (vec2(i as f32, j as f32) + vec2(s.uniform32(), s.uniform32())) * CELL_M;
+            if area.contains(at) {
+                all.push((at, s));
+            }
+        }
+    }
+    all
+}
+
+/// A path of `n` points and length `length` through `at`, bent in the plane by about `bend` radians in all.
+fn path(at: Vec2, length: f32, bend: f32, n: usize, s: &mut Stream) -> Vec<Vec2> {
+    let mut heading = s.range32(0.0, TAU);
+    let turn = bend * s.normal() as f32 / n as f32;
+    let kink = (s.index(n), bend * s.normal() as f32);
+    let mut points = vec![Vec2::ZERO];
+    for i in 1..n {
+        heading += turn + if i == kink.0 { kink.1 } else { 0.0 };
+        points.push(points[i - 1] + Vec2::from_angle(heading) * (length / (n - 1) as f32));
+    }
+    let middle = points.iter().sum::<Vec2>() / n as f32;
+    points.iter().map(|p| *p - middle + at).collect()
+}
+
+/// Lays a path of half-thickness `half` on the pile. `stiff` is 1 for what lies on two points, 0 for what follows the ground.
+fn lay(points: &[Vec2], half: f32, stiff: f32, pile: &Pile) -> Vec<Vec3> {
+    let n = points.len() as f32;
+    let under: Vec<f32> = points.iter().map(|p| pile.at(*p)).collect();
+    // The straight line that fits what lies under it, lifted until a quarter of its points touch.
+    let mean = under.iter().sum::<f32>() / n;
+    let t = |i: usize| i as f32 - 0.5 * (n - 1.0);
+    let spread: f32 = (0..points.len()).map(|i| t(i).powi(2)).sum();
+    let slope = under.iter().enumerate().map(|(i, h)| t(i) * (h - mean)).sum::<f32>() / spread.max(1e-9);
+    let mut gaps: Vec<f32> = under.iter().enumerate().map(|(i, h)| h - mean - slope * t(i)).collect();
+    gaps.sort_by(f32::total_cmp);
+    let lift = gaps[(gaps.len() * 3 / 4).min(gaps.len() - 1)];
+    points
+        .iter()
+        .enumerate()
+        .map(|(i, p)| {
+            let line = mean + slope * t(i) + lift;
+            p.extend(under[i] + stiff * (line - under[i]) + 0.5 * half)
+        })
+        .collect()
+}
+
+/// Sweeps a closed cross-section (x to the side, y up, counter-clockwise seen along the path backwards) along a path.
+/// `size` scales it at t in 0..1; `twist` turns it. uv: u around, v along.
+fn sweep(path: &[Vec3], section: &[Vec2], size: impl Fn(f32) -> Vec2, twist: f32) -> Mesh {
+    let (n, m) = (path.len(), section.len());
+    let (mut positions, mut uvs, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
+    for i in 0..n {
+        let along = (path[(i + 1).min(n - 1)] - path[i.saturating_sub(1)]).normalize_or(Vec3::X);
+        let side = Vec3::Z.cross(along).normalize_or(Vec3::Y);
+        let up = along.cross(side);
+        let t = i as f32 / (n - 1) as f32;
+        let turn = Vec2::from_angle(twist * (t - 0.5));
+        for k in 0..=m {
+            let c = turn.rotate(section[k % m] * size(t));
+            positions.push(path[i] + side * c.x + up * c.y);
+            uvs.push(vec2(k as f32 / m as f32, t));
+        }
+    }
+    let (w, rows) = (m as u32 + 1, n as u32);
+    for i in 0..rows - 1 {
+        for k in 0..m as u32 {
+            let a = i * w + k;
+            triangles.push([a, a + 1, a + w + 1]);
+            triangles.push([a, a + w + 1, a + w]);
+        }
+    }
+    for (row, flip) in [(0, true), (rows - 1, false)] {
+        for k in 1..m as u32 - 1 {
+            let [a, b, c] = [row * w, row * w + k, row * w + k + 1];
+            triangles.push(if flip { [a, c, b] } else { [a, b, c] });
+        }
+    }
+    Mesh::smooth(positions, uvs, triangles)
+}
+
+/// A round section of radius 1.
+fn round(corners: u8) -> Vec<Vec2> {
+    (0..corners).map(|k| Vec2::from_angle(TAU * f32::from(k) / f32::from(corners))).collect()
+}
+
+/// The wall of a split stalk: an arc of `opening` radians in all, half-width 1, its middle up.
+fn arc(opening: f32, wall: f32) -> Vec<Vec2> {
+    let n = 6u8;
+    let radius = 1.0 / (0.5 * opening).min(0.5 * PI).sin();
+    let at = |k: u8, r: f32| {
+        let angle = 0.5 * PI + opening * (f32::from(k) / f32::from(n) - 0.5);
+        Vec2::from_angle(angle) * r - vec2(0.0, radius * (0.5 + 0.5 * (0.5 * opening).cos()))
+    };
+    (0..=n).map(|k| at(k, radius)).chain((0..=n).rev().map(|k| at(k, radius - wall))).collect()
+}
+
+fn debris(kind: DebrisKind, mesh: Mesh, albedo: Spectrum, path: &[Vec3], s: &mut Stream) -> Debris {
+    let centre = path[path.len() / 2];
+    let radius = mesh.positions.iter().map(|p| p.truncate().distance(centre.truncate())).fold(0.0, f32::max);
+    let tint = (0.22 * s.normal() as f32).exp();
+    Debris { kind, mesh, albedo, tint, hue: s.uniform32(), centre, radius }
+}
+
+fn straw(desc: &LitterDesc, pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
+    let length = desc.straw_mm.draw32(s) * 1e-3;
+    let width = desc.straw_width_mm.draw32(s) * 1e-3;
+    let n = ((length / 0.004) as usize).clamp(6, 24);
+    let opening = s.range32(0.9, 4.2);
+    let points = path(at, length, 0.25, n, s);
+    let path = lay(&points, 0.2 * width, 0.85, pile);
+    let frayed = s.range32(0.55, 1.0);
+    let side = if s.chance(0.35) { -1.0 } else { 1.0 };
+    let section: Vec<Vec2> = arc(opening, 0.22).iter().map(|c| *c * side).collect();
+    let mesh = sweep(
+        &path,
+        &section,
+        |t| Vec2::splat(0.5 * width * (1.0 - (1.0 - frayed) * t.powi(3))),
+        0.5 * s.normal() as f32,
+    );
+    raise(pile, &path, 0.5 * width);
+    debris(DebrisKind::Straw, mesh, STRAW, &path, s)
+}
+
+fn stick(desc: &LitterDesc, pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
+    let length = desc.stick_mm.draw32(s) * 1e-3;
+    let half = 0.5e-3 * desc.stick_width_mm.draw32(s);
+    let n = ((length / 0.005) as usize).clamp(8, 32);
+    let points = path(at, length, 0.5, n, s);
+    let path = lay(&points, half, 0.9, pile);
+    let knots = (s.range32(0.0, TAU), s.range32(20.0, 60.0));
+    let taper = s.range32(0.35, 0.75);
+    let size = |t: f32| Vec2::splat(half * (1.0 - (1.0 - taper) * t) * (1.0 + 0.08 * (knots.0 + knots.1 * t).sin()));
+    let mut mesh = sweep(&path, &round(8), size, 0.0);
+    for _ in 0..desc.stubs.draw(s) as u32 {
+        let i = 1 + s.index(n - 2);
+        let along = (path[i + 1] - path[i]).normalize_or(Vec3::X);
+        let side = along.cross(Vec3::Z).normalize_or(Vec3::Y) * if s.chance(0.5) { 1.0 } else { -1.0 };
+        let to = (along + side * s.range32(0.6, 1.4) + Vec3::Z * s.range32(-0.1, 0.5)).normalize_or(Vec3::X);
+        let long = half * s.range32(2.5, 9.0);
+        let stub: Vec<Vec3> = (0..4u8).map(|k| path[i] + to * (long * f32::from(k) / 3.0)).collect();
+        let thick = size(i as f32 / n as f32).x * s.range32(0.35, 0.65);
+        mesh.append(&sweep(&stub, &round(6), |t| Vec2::splat(thick * (1.0 - 0.5 * t)), 0.0));
+    }
+    raise(pile, &path, half);
+    debris(DebrisKind::Stick, mesh, WOOD, &path, s)
+}
+
+fn bit(desc: &LitterDesc, pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
+    let length = desc.bit_mm.draw32(s) * 1e-3;
+    let half = 0.5 * length * s.range32(0.12, 0.5);
+    let points = path(at, length, 0.5, 6, s);
+    let mut path = lay(&points, 1e-4, 0.6, pile);
+    // Dry leaves curl up at their ends.
+    let curl = length * s.range32(0.0, 0.25);
+    for (i, p) in path.iter_mut().enumerate() {
+        p.z += curl * (i as f32 / 2.5 - 1.0).powi(2);
+    }
+    let (from, to) = (s.range32(0.1, 0.6), s.range32(0.05, 0.4));
+    let wide = |t: f32| ((1.0 - t) * from + t * to) + (1.0 - 0.5 * (from + to)) * (PI * t).sin();
+    let thick = (0.06 * half).max(6e-5);
+    let section: Vec<Vec2> = arc(s.range32(0.3, 1.6), 0.12);
+    let mesh = sweep(&path, &section, |t| vec2(half * wide(t), (half * wide(t)).max(thick)), 0.8 * s.normal() as f32);
+    let pale = s.chance(0.3);
+    debris(DebrisKind::Bit, mesh, if pale { STRAW } else { ROTTEN }, &path, s)
+}
+
+fn raise(pile: &mut Pile, path: &[Vec3], half: f32) {
+    for p in path {
+        pile.heap(p.truncate(), Vec2::X, half, half, p.z, p.z + half);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn swept_bodies_are_closed_and_face_outward() {
+        let path: Vec<Vec3> = (0..9u8).map(|i| Vec3::new(f32::from(i) * 0.1, 0.0, 0.02 * f32::from(i))).collect();
+        for section in [round(8), arc(1.2, 0.2), arc(4.0, 0.2)] {
+            let mesh = sweep(&path, &section, |_| Vec2::splat(0.05), 0.3);
+            assert_eq!(mesh.fault(), None);
+            let volume: f32 = (0..mesh.triangles.len() as u32)
+                .map(|i| {
+                    let [a, b, c] = mesh.corners(i);
+                    a.cross(b).dot(c) / 6.0
+                })
+                .sum();
+            assert!(volume > 0.0, "{volume}");
+        }
+    }
+}

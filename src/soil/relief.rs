@@ -1,0 +1,136 @@
+//! The ground's large shape: tilt, the profile along seed rows, and fractional Brownian motion.
+//!
+//! Tilled soil is a single-scale surface with self-affine roughness on top (Davidson et al. 2000); octaves of Perlin noise
+//! from the longest wavelength down, each 2^−H as high as the one before, give both.
+
+use super::{ReliefDesc, SeedRows};
+use crate::math::{Vec2, smoothstep, vec2};
+use crate::sampling::{Purpose, Stream};
+use crate::texture::noise::Perlin;
+
+/// Standard deviation of one octave of [`Perlin::at2`] over the plane; a test holds it.
+const PERLIN_SD: f32 = 0.43;
+
+/// Wavelengths are counted down to this one, so that the height asked for means the same at every grid spacing.
+const SHORTEST_M: f32 = 0.001;
+
+/// One relief.
+#[derive(Clone, Debug)]
+pub(super) struct Relief {
+    noise: Perlin,
+    amplitude: f32,
+    gain: f32,
+    longest: f32,
+    tilt: Vec2,
+    rows: Option<Rows>,
+}
+
+#[derive(Clone, Debug)]
+struct Rows {
+    across: Vec2,
+    offset: f32,
+    spacing: f32,
+    depth: f32,
+    half_width: f32,
+    ridge: f32,
+}
+
+impl Relief {
+    pub(super) fn new(desc: &ReliefDesc, rows: Option<SeedRows>, stream: &Stream) -> Self {
+        let child = |k| stream.child(Purpose::Soil, k);
+        let gain = 2f32.powf(-desc.hurst.draw32(&mut child(1)));
+        let longest = desc.longest_m.draw32(&mut child(2));
+        let octaves = (longest / SHORTEST_M).log2().max(0.0) as i32 + 1;
+        let energy: f32 = (0..octaves).map(|k| gain.powi(2 * k)).sum();
+        let mut side = child(3);
+        let slope = desc.tilt_deg.draw32(&mut side).to_radians().tan();
+        let row = &desc.row;
+        Self {
+            noise: Perlin::new(child(0).seed32()),
+            amplitude: desc.rms_mm.draw32(&mut child(4)) * 1e-3 / (PERLIN_SD * energy.sqrt()),
+            gain,
+            longest,
+            tilt: Vec2::from_angle(side.range32(0.0, std::f32::consts::TAU)) * slope,
+            rows: rows.filter(|r| r.spacing_m > 0.0).map(|r| Rows {
+                across: vec2(r.azimuth.cos(), -r.azimuth.sin()),
+                offset: r.offset_m,
+                spacing: r.spacing_m,
+                depth: row.depth_mm.draw32(&mut child(5)) * 1e-3,
+                half_width: row.width_mm.draw32(&mut child(6)) * 0.5e-3,
+                ridge: row.ridge_mm.draw32(&mut child(7)) * 1e-3,
+            }),
+        }
+    }
+
+    /// Height at `p`, leaving out what is finer than two cells.
+    pub(super) fn height(&self, p: Vec2, cell: f32) -> f32 {
+        self.tilt.dot(p) + self.fbm(p, cell) + self.row(p)
+    }
+
+    fn fbm(&self, p: Vec2, cell: f32) -> f32 {
+        let shortest = (2.0 * cell).max(SHORTEST_M);
+        let (mut sum, mut amplitude, mut wavelength, mut shift) = (0.0, self.amplitude, self.longest, 0.31);
+        while wavelength >= shortest {
+            let at = |c: f32, by: f64| f64::from(c) / f64::from(wavelength) + by;
+            sum += amplitude * self.noise.at2(at(p.x, shift), at(p.y, -shift)) as f32;
+            amplitude *= self.gain;
+            wavelength *= 0.5;
+            shift += 17.31;
+        }
+        sum
+    }
+
+    fn row(&self, p: Vec2) -> f32 {
+        let Some(rows) = &self.rows else { return 0.0 };
+        let d = (p.dot(rows.across) - rows.offset) / rows.spacing;
+        let d = (d - d.round()).abs() * rows.spacing;
+        // The press wheel's print: a flat floor, soft shoulders, and a little soil pushed up beside it.
+        let print = 1.0 - smoothstep(0.35 * rows.half_width, rows.half_width, d);
+        let shoulder = (-((d - 1.25 * rows.half_width) / (0.35 * rows.half_width)).powi(2)).exp();
+        let ridge = 0.5 + 0.5 * (std::f32::consts::TAU * d / rows.spacing).cos();
+        rows.depth * (0.25 * shoulder - print) + rows.ridge * ridge
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::vary::Vary;
+    use crate::soil::RowReliefDesc;
+
+    fn desc(rms_mm: f64) -> ReliefDesc {
+        ReliefDesc {
+            rms_mm: Vary::fixed(rms_mm),
+            hurst: Vary::fixed(0.7),
+            tilt_deg: Vary::fixed(0.0),
+            row: RowReliefDesc { depth_mm: Vary::fixed(10.0), ..RowReliefDesc::default() },
+            ..ReliefDesc::default()
+        }
+    }
+
+    #[test]
+    fn rms_height_is_the_one_asked_for() {
+        for (seed, rms) in [(1, 4.0), (2, 9.0), (3, 30.0)] {
+            let relief = Relief::new(&desc(rms), None, &Stream::of(seed, 0, Purpose::Test, 0));
+            let heights: Vec<f32> = (0..40_000)
+                .map(|k| relief.height(vec2((k % 200) as f32 * 0.0437, (k / 200) as f32 * 0.0391), 0.0005))
+                .collect();
+            let mean = heights.iter().sum::<f32>() / heights.len() as f32;
+            let sd = (heights.iter().map(|h| (h - mean).powi(2)).sum::<f32>() / heights.len() as f32).sqrt();
+            assert!((sd * 1e3 / rms as f32 - 1.0).abs() < 0.06, "{} mm for {rms}", sd * 1e3);
+        }
+    }
+
+    #[test]
+    fn the_seed_row_lies_deeper_than_its_shoulders() {
+        let rows = SeedRows { spacing_m: 0.5, azimuth: 0.3, offset_m: 0.1 };
+        let relief = Relief::new(&desc(0.0), Some(rows), &Stream::of(1, 0, Purpose::Test, 0));
+        let across = vec2(rows.azimuth.cos(), -rows.azimuth.sin());
+        for row in -3..3 {
+            let centre = across * (rows.offset_m + row as f32 * rows.spacing_m);
+            assert!((relief.height(centre, 0.001) + 0.010).abs() < 1e-4);
+            assert!(relief.height(centre + across * 0.05, 0.001) > -0.001);
+            assert!(relief.height(centre + across * 0.25, 0.001).abs() < 1e-4);
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! The ground's own texture: colour, wetness and all relief that is finer than its grid.
+
+use super::crumb::Raster;
+use super::ground::blur;
+use super::{Ground, LayerMaps, MAX_LAYERS};
+use crate::math::{Vec2, vec2};
+
+/// A texture over [`Ground::area`], row 0 in the south, so that [`Ground::uv`] reads it with v growing down its rows.
+/// All vectors hold `width · height` texels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Skin {
+    /// Texels along x.
+    pub width: usize,
+    /// Texels along y.
+    pub height: usize,
+    /// South-west corner of the first texel, metres.
+    pub origin: Vec2,
+    /// Side of a texel, metres.
+    pub texel_m: f32,
+    /// Linear reflectance R, G, B of the dry soil, each stored as 255·√reflectance; see [`Skin::decode`].
+    pub albedo: Vec<[u8; 3]>,
+    /// Weight of each layer times 255.
+    pub weights: Vec<[u8; MAX_LAYERS]>,
+    /// 0 air-dry, 255 saturated.
+    pub moisture: Vec<u8>,
+    /// Slope ∂z/∂x, ∂z/∂y to be added to that of the mesh's shading normal, times [`Skin::SLOPE_STEPS`].
+    pub slope: Vec<[i8; 2]>,
+    /// Share of the sky that the relief finer than the mesh leaves open, times 255.
+    pub ao: Vec<u8>,
+}
+
+impl Skin {
+    /// Steps of [`Skin::slope`] to a slope of 1.
+    pub const SLOPE_STEPS: f32 = 60.0;
+
+    /// Reflectance from a stored albedo.
+    pub fn decode(albedo: [u8; 3]) -> [f32; 3] {
+        albedo.map(|a| (f32::from(a) / 255.0).powi(2))
+    }
+
+    fn encode(albedo: [f32; 3]) -> [u8; 3] {
+        albedo.map(|a| (a.max(0.0).sqrt() * 255.0 + 0.5).min(255.0) as u8)
+    }
+}
+
+/// Depth of a pit between crumbs that hides half of the sky, metres.
+const HALF_SKY_M: f32 = 0.0005;
+
+/// How much drier the loose crumbs are than what they lie on.
+const CRUMB_DRYING: f32 = 0.08;
+
+/// How much wetter such a pit is.
+const PIT_WETTING: f32 = 0.2;
+
+impl Ground {
+    /// Bakes the texture with texels of at most `texel_m`; `maps` are those the ground was made with.
+    pub fn skin<L: LayerMaps>(&self, maps: &[L], texel_m: f32) -> Skin {
+        let area = self.area();
+        // Texels that split the grid's steps evenly: the area then holds whole texels, and each knows its cell.
+        let split = ((self.step / texel_m.max(2e-5) - 1e-3).ceil() as usize).max(1);
+        let texel = self.step / split as f32;
+        let (width, height) = (self.grid.x.steps * split, self.grid.y.steps * split);
+        let raster = Raster { origin: area.corners()[0] + 0.5 * texel, step: texel, width, height };
+        let n = width * height;
+        let mut skin = Skin {
+            width,
+            height,
+            origin: area.corners()[0],
+            texel_m: texel,
+            albedo: Vec::with_capacity(n),
+            weights: Vec::with_capacity(n),
+            moisture: Vec::with_capacity(n),
+            slope: Vec::with_capacity(n),
+            ao: Vec::with_capacity(n),
+        };
+        let crumbs = self.crumbs(raster);
+        let mut detail = crumbs.height;
+        for j in 0..height {
+            for i in 0..width {
+                let k = j * width + i;
+                let p = raster.origin + vec2(i as f32, j as f32) * texel;
+                let cell = self.texel_cell(i, j, split);
+                let mut noise = [0.0; MAX_LAYERS];
+                for (i, n) in noise.iter_mut().enumerate().take(self.blend.layers()) {
+                    *n = cell.mix(|v| self.fine.noise[v][i]);
+                }
+                let heights = self.blend.heights(maps, p);
+                let weights = self.blend.weights(noise, heights);
+                detail[k] += self.blend.displacement(weights, heights);
+                let tint = match crumbs.tint[k] {
+                    0 => 1.0,
+                    t => f32::from(t) / 128.0,
+                };
+                let tone = tint * cell.mix(|v| self.fine.tone[v]);
+                skin.albedo.push(Skin::encode(self.blend.albedo(maps, weights, p).map(|a| a * tone)));
+                skin.weights.push(weights.map(|w| (w * 255.0 + 0.5) as u8));
+            }
+        }
+        self.bake_slopes(raster, split, &detail, &mut skin);
+        self.bake_pits(raster, split, detail, &crumbs.tint, &mut skin);
+        skin
+    }
+
+    /// Slopes of the detail, less those that the mesh's normals already have.
+    fn bake_slopes(&self, raster: Raster, split: usize, detail: &[f32], skin: &mut Skin) {
+        let coarse = differences(&self.fine.detail, self.raster());
+        for (k, fine) in differences(detail, raster).into_iter().enumerate() {
+            let cell = self.texel_cell(k % raster.width, k / raster.width, split);
+            let mesh = vec2(cell.mix(|v| coarse[v].x), cell.mix(|v| coarse[v].y));
+            let rest = (fine - mesh).clamp_length_max(2.0) * Skin::SLOPE_STEPS;
+            skin.slope.push([rest.x as i8, rest.y as i8]);
+        }
+    }
+
+    /// What lies in pits of the detail sees less of the sky and dries later; crumbs dry first.
+    fn bake_pits(&self, raster: Raster, split: usize, mut detail: Vec<f32>, crumbs: &[u8], skin: &mut Skin) {
+        let cell = |k: usize| self.texel_cell(k % raster.width, k / raster.width, split);
+        for (k, d) in detail.iter_mut().enumerate() {
+            *d -= cell(k).mix(|v| self.fine.detail[v]);
+        }
+        let around = blur(&detail, raster.width, (0.0008 / raster.step).ceil() as usize);
+        for (k, (d, around)) in detail.iter().zip(&around).enumerate() {
+            let pit = (around - d).max(0.0) / HALF_SKY_M;
+            skin.ao.push((255.0 / (1.0 + pit) + 0.5) as u8);
+            let drier = if crumbs[k] > 0 { CRUMB_DRYING } else { 0.0 };
+            let wet = cell(k).mix(|v| self.fine.moisture[v]) - drier + PIT_WETTING * pit.min(1.0);
+            skin.moisture.push((wet.clamp(0.0, 1.0) * 255.0 + 0.5) as u8);
+        }
+    }
+}
+
+fn differences(values: &[f32], raster: Raster) -> Vec<Vec2> {
+    let (w, h) = (raster.width, raster.height);
+    let mut out = Vec::with_capacity(values.len());
+    for j in 0..h {
+        let (south, north) = (j.saturating_sub(1), (j + 1).min(h - 1));
+        for i in 0..w {
+            let (west, east) = (i.saturating_sub(1), (i + 1).min(w - 1));
+            let v = |i: usize, j: usize| values[j * w + i];
+            let d = vec2(
+                (v(east, j) - v(west, j)) / (east - west).max(1) as f32,
+                (v(i, north) - v(i, south)) / (north - south).max(1) as f32,
+            );
+            out.push(d / raster.step);
+        }
+    }
+    out
+}

@@ -1,0 +1,127 @@
+//! Stones: worn bodies, laid before anything grows.
+
+use super::body::{self, Cut, Pose, Shape};
+use super::{Debris, DebrisKind, Ground, Pile, Rect, StonesDesc, cell_stream, cells};
+use crate::geometry::Mesh;
+use crate::math::{Vec2, vec2, vec3};
+use crate::sampling::{Purpose, Stream};
+
+/// How stones wear.
+const CUT: Cut = Cut { planes: (5, 9), distance: (0.7, 1.0), sharpness: (4.0, 9.0), lumps: 0.12, rough: 0.04 };
+
+/// The middle axis over the long one, and the short over the middle one: an estimate for field stones.
+const AXES: (f32, f32) = (0.75, 0.65);
+
+/// Side of the cells that stones are addressed by.
+const CELL_M: f32 = 0.1;
+
+/// All populations of stones of a page, laid onto the pile, largest first within each.
+pub fn stones(desc: &[StonesDesc], ground: &Ground, pile: &mut Pile, stream: &Stream) -> Vec<Debris> {
+    let mut all = Vec::new();
+    for (i, population) in desc.iter().enumerate() {
+        let stream = stream.child(Purpose::Debris, 200 + i as u64);
+        for (at, mm, mut s) in sizes(population, ground.area(), &stream) {
+            all.push(stone(population, ground, pile, at, mm, &mut s));
+        }
+    }
+    all
+}
+
+/// A length in mm: lognormal, cut.
+fn length(desc: &StonesDesc, stream: &mut Stream) -> f32 {
+    let (min, max) = (desc.min_mm.f32(), desc.max_mm.f32());
+    for _ in 0..50 {
+        let mm = desc.median_mm.f32() * (desc.sigma.f32() * stream.normal() as f32).exp();
+        if mm >= min && mm <= max {
+            return mm;
+        }
+    }
+    desc.median_mm.f32().clamp(min, max.max(min))
+}
+
+/// Places and lengths, largest first.
+fn sizes(desc: &StonesDesc, area: Rect, stream: &Stream) -> Vec<(Vec2, f32, Stream)> {
+    let cover = desc.cover.draw32(&mut stream.child(Purpose::Page, 0));
+    // The mean disc of the law, from 512 stones: the cover asked for divides by it.
+    let mut s = stream.child(Purpose::Page, 1);
+    let disc = (0..512).map(|_| disc_m2(length(desc, &mut s))).sum::<f32>() / 512.0;
+    // Discs fall independently: 1 − exp(−λ·disc) of the ground is covered.
+    let per_m2 = -(1.0 - cover.min(0.98)).ln() / disc;
+    let mut all = Vec::new();
+    for (i, j) in cells(area, CELL_M) {
+        let mut cell = cell_stream(stream, i, j);
+        for k in 0..cell.poisson(f64::from(per_m2 * CELL_M * CELL_M)) {
+            let mut s = cell.child(Purpose::Debris, k);
+            let at = (vec2(i as f32, j as f32) + vec2(s.uniform32(), s.uniform32())) * CELL_M;
+            let mm = length(desc, &mut s);
+            if area.contains(at) {
+                all.push((at, mm, s));
+            }
+        }
+    }
+    all.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.x.total_cmp(&b.0.x)));
+    all
+}
+
+/// Ground under a stone of a length.
+fn disc_m2(mm: f32) -> f32 {
+    std::f32::consts::FRAC_PI_4 * AXES.0 * (mm * 1e-3).powi(2)
+}
+
+fn stone(desc: &StonesDesc, ground: &Ground, pile: &mut Pile, at: Vec2, mm: f32, s: &mut Stream) -> Debris {
+    let level = match mm {
+        ..2.5 => 0,
+        2.5..6.0 => 1,
+        6.0..12.0 => 2,
+        _ => 3,
+    };
+    let shape = Shape::new(level, CUT, s);
+    let mut vary = |mean: f32| (mean * (1.0 + 0.12 * s.normal() as f32)).clamp(0.6 * mean, 1.0);
+    let middle = vary(AXES.0);
+    let axes = vec3(1.0, middle, middle * vary(AXES.1)) * (0.5e-3 * mm);
+    let pose = Pose::lying(&shape, axes, 0.2, s);
+    let sink = s.range32(0.2, 0.5);
+    let (support, _) = pile.support(at, 0.5 * (axes.x + axes.y));
+    let centre = at.extend(support - sink * (pose.high - pose.low) - pose.low);
+    let mut mesh = Mesh::default();
+    body::emit(
+        &mut mesh,
+        &shape,
+        &pose,
+        centre,
+        |corners, _| corners.iter().all(|c| c.z < ground.height(c.x, c.y) - 1e-3),
+        |p, _| {
+            let p = p.normalize_or(crate::math::Vec3::Z);
+            vec2(p.y.atan2(p.x) / std::f32::consts::TAU + 0.5, p.z.clamp(-1.0, 1.0).acos() / std::f32::consts::PI)
+        },
+    );
+    pile.heap(at, pose.turn, 0.95 * axes.x, 0.95 * axes.y, support, centre.z + pose.high);
+    Debris {
+        kind: DebrisKind::Stone,
+        mesh,
+        albedo: desc.albedo,
+        tint: (desc.tint_sigma.f32() * s.normal() as f32).exp(),
+        hue: s.uniform32(),
+        centre,
+        radius: axes.x,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::vary::Vary;
+
+    #[test]
+    fn stones_cover_what_they_were_asked_to() {
+        for cover in [0.01, 0.1] {
+            let desc = StonesDesc { cover: Vary::fixed(cover), ..StonesDesc::default() };
+            let area = Rect::new(0.0, 0.0, 5.0, 5.0);
+            let all = sizes(&desc, area, &Stream::of(3, 0, Purpose::Test, 0));
+            let sum: f32 = all.iter().map(|(_, mm, _)| disc_m2(*mm)).sum();
+            let covered = 1.0 - (-sum / area.area()).exp();
+            assert!((f64::from(covered) / cover - 1.0).abs() < 0.12, "{covered} for {cover}");
+            assert!(all.iter().all(|(_, mm, _)| (5.0..=60.0).contains(mm)));
+        }
+    }
+}

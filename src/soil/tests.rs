@@ -1,0 +1,266 @@
+//! The ground as a whole: what the pieces must keep together.
+
+use super::*;
+use crate::sampling::vary::{Num, Vary};
+use std::collections::BTreeMap;
+
+/// Waves and steps, so that layers differ in height and colour.
+struct Waves(f32, [f32; 3]);
+
+impl LayerMaps for Waves {
+    fn height(&self, uv: Vec2) -> f32 {
+        0.5 + 0.5 * (std::f32::consts::TAU * self.0 * uv.x).sin() * (std::f32::consts::TAU * self.0 * uv.y).cos()
+    }
+    fn albedo(&self, _: Vec2) -> [f32; 3] {
+        self.1
+    }
+}
+
+const MAPS: [Waves; 2] = [Waves(20.0, [1.0, 0.0, 0.0]), Waves(7.0, [0.0, 1.0, 0.0])];
+
+fn page() -> SoilDesc {
+    ron::from_str(
+        r#"(layers: [
+            (albedo: "a", height: "b", size_m: 0.3, height_mm: (-1, 1)),
+            (albedo: "c", height: "d", size_m: 0.4, height_mm: (4, 8)),
+        ], stones: [(cover: 0.03)], litter: (straw_cover: 0.02, sticks_per_m2: 20))"#,
+    )
+    .unwrap()
+}
+
+fn site(size: f32) -> Site {
+    Site { area: Rect::new(-size, -size, size, size), grid_m: 0.001, margin_m: 0.5, rows: None }
+}
+
+fn stream() -> Stream {
+    Stream::of(21, 4, Purpose::Soil, 0)
+}
+
+fn ground(desc: &SoilDesc, size: f32) -> Ground {
+    Ground::new(desc, &MAPS, &site(size), &stream()).unwrap()
+}
+
+/// The bodies of a mesh: vertices that triangles connect.
+fn bodies(mesh: &Mesh) -> Vec<Vec<Vec3>> {
+    let mut parent: Vec<usize> = (0..mesh.positions.len()).collect();
+    fn root(parent: &mut [usize], mut i: usize) -> usize {
+        while parent[i] != i {
+            parent[i] = parent[parent[i]];
+            i = parent[i];
+        }
+        i
+    }
+    for t in &mesh.triangles {
+        let [a, b, c] = t.map(|i| root(&mut parent, i as usize));
+        parent[b] = a;
+        parent[c] = a;
+    }
+    let mut all: BTreeMap<usize, Vec<Vec3>> = BTreeMap::new();
+    for i in 0..mesh.positions.len() {
+        let r = root(&mut parent, i);
+        all.entry(r).or_default().push(mesh.positions[i]);
+    }
+    all.into_values().collect()
+}
+
+#[test]
+fn heights_are_those_of_the_mesh_and_continuous_over_the_seam() {
+    let ground = ground(&page(), 0.06);
+    let mesh = ground.mesh();
+    assert_eq!(mesh.fault(), None);
+    for t in mesh.triangles.iter().step_by(97) {
+        let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
+        assert!((b - a).cross(c - a).z > 0.0);
+        let p = a * 0.2 + b * 0.5 + c * 0.3;
+        assert!((ground.height(p.x, p.y) - p.z).abs() < 2e-5, "{p} {}", ground.height(p.x, p.y));
+    }
+    // Every inner edge belongs to two triangles: no crack between the fine and the coarse ground.
+    let mut edges = BTreeMap::new();
+    for t in &mesh.triangles {
+        for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
+            *edges.entry((a.min(b), a.max(b))).or_insert(0) += 1;
+        }
+    }
+    let border = 2 * (ground.grid.columns() - 1 + ground.grid.rows() - 1);
+    assert_eq!(edges.values().filter(|n| **n == 1).count(), border);
+    assert!(edges.values().all(|n| *n <= 2));
+    for k in 0..200 {
+        let y = -0.07 + 0.0007 * k as f32;
+        for x in [-0.06, 0.06] {
+            assert!((ground.height(x - 1e-5, y) - ground.height(x + 1e-5, y)).abs() < 1e-4);
+        }
+    }
+    let (lo, hi) = mesh.bounds().unwrap();
+    assert!(lo.x < -0.55 && hi.y > 0.55);
+}
+
+#[test]
+fn one_blend_drives_colour_and_height_and_sums_to_one() {
+    let mut page = page();
+    page.relief.rms_mm = Vary::fixed(0.0);
+    page.relief.tilt_deg = Vary::fixed(0.0);
+    page.clods.over_5mm_per_m2 = Vary::fixed(0.0);
+    page.blend.scale_m = Vary::fixed(0.05);
+    let ground = ground(&page, 0.1);
+    let skin = ground.skin(&MAPS, 0.0005);
+    let (mut low, mut high) = (0, 0);
+    for j in (0..skin.height).step_by(7) {
+        for i in (0..skin.width).step_by(7) {
+            let k = j * skin.width + i;
+            let sum: u32 = skin.weights[k].iter().map(|w| u32::from(*w)).sum();
+            assert!((254..=256).contains(&sum), "{:?}", skin.weights[k]);
+            // The layers are pure red and green, so the colour is the weights, up to the tone of the place.
+            let [r, g, _] = Skin::decode(skin.albedo[k]);
+            let second = f32::from(skin.weights[k][1]) / 255.0;
+            assert!((g / (r + g) - second).abs() < 0.02);
+            let p = skin.origin + (vec2(i as f32, j as f32) + 0.5) * skin.texel_m;
+            let h = ground.height(p.x, p.y) * 1e3;
+            assert!(h > -1.1 * (1.0 - second) + 3.8 * second - 0.6 && h < 1.1 * (1.0 - second) + 8.2 * second + 0.6);
+            low += i32::from(second < 0.1);
+            high += i32::from(second > 0.9);
+        }
+    }
+    assert!(low > 50 && high > 50, "{low} {high}");
+}
+
+#[test]
+fn the_skin_and_the_mesh_together_have_the_slopes_of_the_whole_relief() {
+    let mut page = page();
+    page.layers.truncate(1);
+    page.layers[0].height_mm = (Num::new(-0.2), Num::new(0.2));
+    page.relief.rms_mm = Vary::fixed(0.0);
+    page.relief.tilt_deg = Vary::fixed(0.0);
+    page.clods.over_5mm_per_m2 = Vary::fixed(0.0);
+    let maps = [Waves(150.0, [0.2; 3])];
+    let site = Site { grid_m: 0.002, ..site(0.05) };
+    let ground = Ground::new(&page, &maps, &site, &stream()).unwrap();
+    let skin = ground.skin(&maps, 0.0001);
+    let height = |p: Vec2| ground.blend.displacement([1.0, 0.0, 0.0, 0.0], ground.blend.heights(&maps, p));
+    let mut off = 0.0;
+    let mut n = 0.0;
+    for k in (0..skin.slope.len()).step_by(1009) {
+        let (i, j) = (k % skin.width, k / skin.width);
+        let inner = |i: usize, n: usize| i > n / 8 && i < 7 * n / 8;
+        if !inner(i, skin.width) || !inner(j, skin.height) {
+            continue;
+        }
+        let p = skin.origin + (vec2(i as f32, j as f32) + 0.5) * skin.texel_m;
+        let d = 1e-4;
+        let exact = (height(p + vec2(d, 0.0)) - height(p - vec2(d, 0.0))) / (2.0 * d);
+        let normal = ground.normal(p.x, p.y);
+        let both = -normal.x / normal.z + f32::from(skin.slope[k][0]) / Skin::SLOPE_STEPS;
+        off += (both - exact).abs();
+        n += 1.0;
+    }
+    assert!(off / n < 0.02, "{}", off / n);
+}
+
+#[test]
+fn the_same_address_gives_the_same_ground_and_a_larger_area_holds_it() {
+    let page = page();
+    let (a, b) = (ground(&page, 0.05), ground(&page, 0.05));
+    assert_eq!(a.mesh(), b.mesh());
+    assert_eq!(a.skin(&MAPS, 0.0005), b.skin(&MAPS, 0.0005));
+    let large = ground(&page, 0.08);
+    for k in 0..400 {
+        let (x, y) = (-0.04 + 0.004 * (k % 20) as f32, -0.04 + 0.004 * (k / 20) as f32);
+        assert!((a.height(x, y) - large.height(x, y)).abs() < 2e-4);
+    }
+    let other = Ground::new(&page, &MAPS, &site(0.05), &Stream::of(21, 5, Purpose::Soil, 0)).unwrap();
+    assert_ne!(a.height(0.0, 0.0), other.height(0.0, 0.0));
+}
+
+#[test]
+fn nothing_floats_and_nothing_is_wholly_buried() {
+    let mut page = page();
+    // Sparse, so that all lie on the ground and not on each other.
+    page.clods.over_5mm_per_m2 = Vary::fixed(400.0);
+    page.clods.min_mm = Num::new(5.0);
+    page.crumbs.amount = Vary::fixed(0.0);
+    let ground = ground(&page, 0.3);
+    let mut pile = Pile::new(&ground);
+    let mut all: Vec<Vec<Vec3>> = Vec::new();
+    for (tint, mesh) in clods(&ground, &mut pile, &[]) {
+        assert_eq!(mesh.fault(), None);
+        assert!(tint > 0.5 && tint < 2.0);
+        // Scraps of a few corners are the rim of a body whose buried side was left out.
+        all.extend(bodies(&mesh).into_iter().filter(|b| b.len() > 6));
+    }
+    let clods = all.len();
+    assert!(clods > 60, "{clods}");
+    for body in &all {
+        let above = |p: &Vec3| p.z - ground.height(p.x, p.y);
+        let (lo, hi) = body.iter().map(above).fold((f32::MAX, f32::MIN), |(l, h), z| (l.min(z), h.max(z)));
+        assert!(hi > 0.0, "buried by {hi}");
+        assert!(lo < 0.5e-3, "floats by {lo} of {hi}");
+    }
+    let mut pile = Pile::new(&ground);
+    for thing in stones(&page.stones, &ground, &mut pile, &stream()).into_iter().chain(litter(
+        &page.litter,
+        &ground,
+        &mut Pile::new(&ground),
+        &stream(),
+    )) {
+        assert_eq!(thing.mesh.fault(), None);
+        let above = |p: &Vec3| p.z - ground.height(p.x, p.y);
+        let (lo, hi) =
+            thing.mesh.positions.iter().map(above).fold((f32::MAX, f32::MIN), |(l, h), z| (l.min(z), h.max(z)));
+        // A stone may lie on another.
+        let slack = if thing.kind == DebrisKind::Stone { 0.02 } else { 0.2e-3 };
+        assert!(lo < slack && hi > 0.0, "{:?} {lo} {hi}", thing.kind);
+        assert!(thing.mesh.positions.iter().all(|p| p.distance(thing.centre) < 1.8 * thing.radius + 0.01));
+    }
+}
+
+#[test]
+fn a_seedbed_stays_within_its_budget_and_keeps_stems_clear() {
+    let mut page = page();
+    page.layers.truncate(1);
+    page.clods.over_5mm_per_m2 = Vary::fixed(12000.0);
+    page.clods.exponent = Vary::fixed(3.3);
+    let maps = [Plain { albedo: [0.2, 0.15, 0.1], height: 0.5 }];
+    let site = Site { area: Rect::new(0.0, 0.0, 0.3, 0.2), grid_m: 0.001, margin_m: 0.1, rows: None };
+    let ground = Ground::new(&page, &maps, &site, &stream()).unwrap();
+    let stem = (vec2(0.15, 0.1), 0.01);
+    let groups = clods(&ground, &mut Pile::new(&ground), &[stem]);
+    let triangles: usize = groups.iter().map(|(_, m)| m.triangles.len()).sum();
+    let per_view = triangles as f32 / 0.06 * 0.325;
+    assert!(per_view > 3e5 && per_view < 1.5e6, "{per_view}");
+    assert!(groups.len() >= 5);
+    for (_, mesh) in &groups {
+        assert!(mesh.positions.iter().all(|p| p.truncate().distance(stem.0) > 0.003));
+        assert!(mesh.uvs.iter().all(|t| t.cmpge(Vec2::ZERO).all() && t.cmple(Vec2::ONE).all()));
+    }
+    assert_eq!(groups, clods(&ground, &mut Pile::new(&ground), &[stem]));
+}
+
+#[test]
+fn the_trend_is_the_slope_of_a_plane() {
+    let mut page = page();
+    page.layers.truncate(1);
+    page.relief.rms_mm = Vary::fixed(0.0);
+    page.relief.tilt_deg = Vary::fixed(9.0);
+    page.clods.over_5mm_per_m2 = Vary::fixed(0.0);
+    let maps = [Plain { albedo: [0.2, 0.15, 0.1], height: 0.5 }];
+    let ground = Ground::new(&page, &maps, &site(0.05), &stream()).unwrap();
+    for normal in [ground.trend(0.0, 0.01, 0.02), ground.normal(0.01, 0.0)] {
+        assert!((normal.z.acos().to_degrees() - 9.0).abs() < 0.05, "{normal}");
+    }
+}
+
+#[test]
+fn impossible_pages_are_refused_in_words() {
+    let try_page =
+        |page: &SoilDesc| Ground::new(page, &MAPS, &site(0.02), &stream()).map(|_| ()).unwrap_err().to_string();
+    let mut one = page();
+    one.layers.truncate(1);
+    assert!(try_page(&one).contains("1 layers but 2 were loaded"));
+    let mut swapped = page();
+    swapped.layers[0].height_mm = (Num::new(2.0), Num::new(-2.0));
+    assert!(try_page(&swapped).contains("swap its ends"));
+    let mut clods = page();
+    clods.clods.max_mm = Num::new(1.0);
+    assert!(try_page(&clods).contains("min_mm"));
+    let thin = Site { grid_m: 1e-7, ..site(1.0) };
+    assert!(Ground::new(&page(), &MAPS, &thin, &stream()).is_err());
+}

@@ -1,0 +1,74 @@
+//! Cellular noise that repeats: areoles of a leaf, plates of a crust. Source: Worley 1996; exact borders as of the Voronoi
+//! cells of the jittered points.
+
+use crate::math::{Vec2, vec2};
+use crate::sampling::rng::mix;
+
+/// One jittered point in each unit square, repeating after a whole number of squares.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cells {
+    seed: u64,
+    period: (i32, i32),
+    jitter: f32,
+}
+
+/// What a place of the pattern knows.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cell {
+    /// Distance to the border between the nearest and the next cell.
+    pub(super) border: f32,
+    /// A number of this cell, uniform in 0..1.
+    pub(super) own: f32,
+    /// A number of the pair of cells that share the nearest border, uniform in 0..1.
+    pub(super) shared: f32,
+}
+
+pub(super) fn unit(hash: u64) -> f32 {
+    (hash >> 40) as f32 / (1u64 << 24) as f32
+}
+
+impl Cells {
+    pub(super) fn new(seed: u64, period: (u32, u32), jitter: f32) -> Self {
+        Self { seed: mix(seed), period: (period.0.max(1) as i32, period.1.max(1) as i32), jitter }
+    }
+
+    fn hash(&self, x: i32, y: i32) -> u64 {
+        let (x, y) = (x.rem_euclid(self.period.0) as u64, y.rem_euclid(self.period.1) as u64);
+        mix(self.seed ^ (x << 32 | y))
+    }
+
+    fn point(&self, x: i32, y: i32) -> (Vec2, u64) {
+        let h = self.hash(x, y);
+        let away = vec2(unit(h), unit(h << 24)) - 0.5;
+        (vec2(x as f32 + 0.5, y as f32 + 0.5) + away * self.jitter, h)
+    }
+
+    /// The pattern at `p`, in squares.
+    pub(super) fn at(&self, p: Vec2) -> Cell {
+        let (cx, cy) = (p.x.floor() as i32, p.y.floor() as i32);
+        let (mut best, mut centre, mut own, mut square) = (f32::MAX, Vec2::ZERO, 0, (cx, cy));
+        for y in cy - 1..=cy + 1 {
+            for x in cx - 1..=cx + 1 {
+                let (q, h) = self.point(x, y);
+                let d = q.distance_squared(p);
+                if d < best {
+                    (best, centre, own, square) = (d, q, h, (x, y));
+                }
+            }
+        }
+        let (mut border, mut other) = (f32::MAX, 0);
+        for y in square.1 - 2..=square.1 + 2 {
+            for x in square.0 - 2..=square.0 + 2 {
+                if (x, y) == square {
+                    continue;
+                }
+                let (q, h) = self.point(x, y);
+                let d = ((centre + q) * 0.5 - p).dot((q - centre).normalize_or_zero());
+                if d < border {
+                    (border, other) = (d, h);
+                }
+            }
+        }
+        Cell { border: border.max(0.0), own: unit(mix(own)), shared: unit(mix(own ^ other)) }
+    }
+}

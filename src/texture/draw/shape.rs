@@ -1,0 +1,205 @@
+//! A leaf's silhouette: the outline shared with the mesh, cut by teeth, lobes or a notch.
+//!
+//! Coordinates are in lengths of the leaf: Y along the midrib, 0 at the base and 1 at the tip, X to the right.
+
+use super::cells::unit;
+use crate::geometry::outline::Outline;
+use crate::math::{Vec2, lerp, smoothstep, vec2};
+use crate::sampling::rng::mix;
+use crate::sampling::vary::{Count, Fraction, Num, Positive, PositiveCount};
+use serde::{Deserialize, Serialize};
+
+/// How the margin departs from the outline; always inward, so that the mesh's outline bounds the leaf.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum Margin {
+    /// The outline itself.
+    #[default]
+    Entire,
+    /// Irregular blunt teeth that point to the tip.
+    Toothed {
+        /// Teeth on each side.
+        count: Num<PositiveCount>,
+        /// Depth of the sinuses, of the half-width.
+        depth: Num<Fraction>,
+    },
+    /// Cut nearly to the midrib into lobes that lean to the tip, the last one larger (pinnatifid). The outline is then the
+    /// envelope of the lobes' tips.
+    Lobed {
+        /// Pairs of lobes below the last.
+        pairs: Num<PositiveCount>,
+        /// Width of the strip along the midrib, of the leaf's width.
+        rachis: Num<Fraction>,
+        /// Length of the last lobe, of the leaf's length.
+        terminal: Num<Fraction>,
+        /// How far the lobes lean to the tip, degrees.
+        lean_deg: Num<Count>,
+    },
+}
+
+/// The silhouette.
+pub(super) struct Shape {
+    outline: Outline,
+    aspect: f32,
+    margin: Margin,
+    notch: f32,
+    lobes: Vec<Lobe>,
+    teeth: [Vec<(f32, f32)>; 2],
+}
+
+/// One lobe: its foot on the midrib, axis, length and half-width.
+struct Lobe {
+    foot: Vec2,
+    axis: Vec2,
+    length: f32,
+    half_width: f32,
+    /// Exponents of its own outline.
+    power: (f32, f32),
+}
+
+impl Shape {
+    /// `aspect` is width over length; `notch` the depth of a notch in the tip, in lengths.
+    pub(super) fn new(outline: Outline, aspect: Num<Positive>, margin: Margin, notch: f32, seed: u64) -> Self {
+        let aspect = aspect.f32();
+        let mut shape = Self { outline, aspect, margin, notch, lobes: Vec::new(), teeth: [Vec::new(), Vec::new()] };
+        let random = |i: usize, k: u64| unit(mix(mix(seed ^ (k << 40)) ^ i as u64)) - 0.5;
+        match margin {
+            Margin::Entire => {}
+            Margin::Toothed { count, .. } => {
+                let n = count.get() as usize;
+                for side in 0..2 {
+                    // Ends of the teeth along the midrib, from the base; the widest stand low.
+                    shape.teeth[side] = (0..=n)
+                        .map(|i| {
+                            let even = i as f32 / n as f32;
+                            let inner = i > 0 && i < n;
+                            let shift = if inner { random(i, side as u64) * 0.55 / n as f32 } else { 0.0 };
+                            (lerp(0.16, 0.93, even.powf(0.9)) + shift, 0.65 + 0.7 * (random(i, 7 + side as u64) + 0.5))
+                        })
+                        .collect();
+                }
+            }
+            Margin::Lobed { pairs, terminal, lean_deg, .. } => {
+                let n = pairs.get() as usize;
+                let start = 1.0 - terminal.f32();
+                for i in 0..n {
+                    let even = (i as f32 + 0.5) / n as f32;
+                    for (k, side) in [-1.0f32, 1.0].into_iter().enumerate() {
+                        let k = k as u64;
+                        let pitch = start * 0.86 / n as f32;
+                        let y = 0.14 * start + even * start * 0.86 - 0.3 * pitch + random(i, k) * 0.3 * pitch;
+                        let lean = (lean_deg.f32() * (1.0 + 0.5 * random(i, 2 + k))).to_radians();
+                        let axis = vec2(side * lean.cos(), lean.sin());
+                        // Lobes grow toward the tip and stay within the outline's half-width where they end.
+                        let tip = y + 0.5 * aspect * lean.tan();
+                        let room = aspect * outline.half_width(tip.min(0.97)).min(0.5) / lean.cos();
+                        let length = room * lerp(0.84, 0.98, random(i, 4 + k) + 0.5) * lerp(0.5, 1.0, even.powf(0.7));
+                        let half_width = pitch * lerp(0.36, 0.48, random(i, 6 + k) + 0.5);
+                        shape.lobes.push(Lobe { foot: vec2(0.0, y), axis, length, half_width, power: (0.16, 0.55) });
+                    }
+                }
+                let length = terminal.f32() * 1.12;
+                shape.lobes.push(Lobe {
+                    foot: vec2(0.0, 1.0 - length),
+                    axis: vec2(0.0, 1.0),
+                    length,
+                    half_width: 0.44 * aspect,
+                    power: (0.75, 0.55),
+                });
+            }
+        }
+        shape
+    }
+
+    /// Half-width of the uncut outline at Y, in lengths.
+    pub(super) fn half_width(&self, y: f32) -> f32 {
+        self.aspect * self.outline.half_width(y)
+    }
+
+    /// The axes of the lobes: where their veins run.
+    pub(super) fn lobe_axes(&self) -> impl Iterator<Item = (Vec2, Vec2)> + '_ {
+        self.lobes.iter().map(|l| (l.foot, l.foot + l.axis * l.length * 0.92))
+    }
+
+    /// About the distance to the margin, positive inside.
+    pub(super) fn inside(&self, p: Vec2) -> f32 {
+        let cut = if self.notch > 0.0 {
+            let width = 0.16 * self.aspect;
+            self.notch * (-(p.x / width).powi(2)).exp() * smoothstep(0.6, 1.0, p.y)
+        } else {
+            0.0
+        };
+        match self.margin {
+            Margin::Entire => self.within(p.x, p.y + cut, 1.0),
+            Margin::Toothed { depth, .. } => {
+                let side = usize::from(p.x > 0.0);
+                // Sheared coordinates make the teeth point to the tip.
+                let s = p.y - 0.35 * p.x.abs();
+                self.within(p.x, p.y, 1.0 - depth.f32() * self.sinus(side, s))
+            }
+            Margin::Lobed { rachis, .. } => {
+                let strip = rachis.f32() * self.aspect * 0.5 * lerp(0.55, 1.0, p.y.clamp(0.0, 1.0));
+                let within_ends = p.y.min(0.94 - p.y);
+                let mut d = (strip - p.x.abs()).min(within_ends);
+                for lobe in &self.lobes {
+                    d = smooth_max(d, lobe.inside(p), 0.012);
+                }
+                // The outline bounds everything, as it bounds the mesh.
+                d.min(self.within(p.x, p.y, 1.0))
+            }
+        }
+    }
+
+    fn within(&self, x: f32, y: f32, scale: f32) -> f32 {
+        if !(0.0..=1.0).contains(&y) {
+            return -(y - y.clamp(0.0, 1.0)).hypot(x);
+        }
+        let half = self.half_width(y) * scale;
+        let step = 1e-3;
+        let slope =
+            (self.half_width((y + step).min(1.0)) - self.half_width((y - step).max(0.0))) / (2.0 * step) * scale;
+        (half - x.abs()) / (1.0 + slope * slope).sqrt()
+    }
+
+    /// 0 at the tips of teeth, up to 1 in the sinuses, at `s` along a side.
+    fn sinus(&self, side: usize, s: f32) -> f32 {
+        let teeth = &self.teeth[side];
+        let i = teeth.partition_point(|(end, _)| *end < s);
+        if i == 0 || i == teeth.len() {
+            return 0.0;
+        }
+        let ((start, a), (end, b)) = (teeth[i - 1], teeth[i]);
+        let t = (s - start) / (end - start);
+        // A tooth: rises slowly from the lower sinus, is blunt at its tip, falls steeply into the next.
+        let tip = 0.68;
+        let fall = if t < tip { 1.0 - t / tip } else { (t - tip) / (1.0 - tip) };
+        let fall = fall * fall * (1.4 - 0.4 * fall);
+        let fade = smoothstep(0.10, 0.22, s) * (1.0 - smoothstep(0.72, 0.97, s));
+        fall * if t < tip { a } else { b } * fade
+    }
+}
+
+impl Lobe {
+    fn inside(&self, p: Vec2) -> f32 {
+        let q = p - self.foot;
+        let (s, n) = (q.dot(self.axis) / self.length, q.perp_dot(self.axis));
+        if !(0.0..=1.0).contains(&s) {
+            return -((s - s.clamp(0.0, 1.0)) * self.length).hypot(n);
+        }
+        let (a, b) = self.power;
+        let half = |s: f32| Outline::Power { a, b }.half_width(s.clamp(0.0, 1.0)) * 2.0 * self.half_width;
+        let room = half(s) - n.abs();
+        if room < 0.0 {
+            // Farther than it is: the union then never grows spurs where two lobes' outsides meet.
+            return room;
+        }
+        let slope = (half(s + 0.01) - half(s - 0.01)) / (0.02 * self.length);
+        room / (1.0 + slope * slope).sqrt()
+    }
+}
+
+/// A union without a crease: the larger, rounded over `k`.
+fn smooth_max(a: f32, b: f32, k: f32) -> f32 {
+    let h = (k - (a - b).abs()).max(0.0) / k;
+    a.max(b) + h * h * k * 0.25
+}

@@ -1,0 +1,118 @@
+//! Writes drawn textures, with their provenance inside.
+
+use super::{Drawn, Grey, Recipe, draw, read};
+use crate::error::{Error, Result};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Who may use a drawn texture, and how.
+const LICENCE: &str = "CC0-1.0 OR MIT OR Apache-2.0";
+
+/// Draws the recipe in a page and writes, beside it, `NAME.png`, `NAME.height.png` where it has relief, and
+/// `NAME.source.md` unless a `SOURCE.md` in its folder or the one above names it. Returns what was written.
+pub fn write(recipe_path: &Path) -> Result<Vec<PathBuf>> {
+    let recipe = read(recipe_path)?;
+    let drawn = draw(&recipe)?;
+    let name = recipe_path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let source = source(&recipe, &name);
+    let mut written = Vec::new();
+    let path = recipe_path.with_extension("png");
+    put(&path, &encode(&drawn, &source))?;
+    written.push(path);
+    if let Some(relief) = &drawn.relief {
+        let path = recipe_path.with_extension("height.png");
+        put(&path, &encode_height(relief, &source))?;
+        written.push(path);
+    }
+    if !named_above(recipe_path, &name) {
+        let path = recipe_path.with_extension("source.md");
+        put(&path, format!("`{name}.png`: {source}. Licence: {LICENCE}.\n").as_bytes())?;
+        written.push(path);
+    }
+    Ok(written)
+}
+
+/// Where a texture comes from, in words.
+pub(super) fn source(recipe: &Recipe, name: &str) -> String {
+    let kind = match recipe {
+        Recipe::Leaf(_) => "leaf",
+        Recipe::Soil(_) => "soil",
+    };
+    format!("drawn by furrow from the {kind} recipe {name}.ron; no photograph went into it")
+}
+
+/// The PNG file of a drawn texture's colour: sRGB, with opacity unless it is opaque. `source` goes into the file.
+pub fn encode(drawn: &Drawn, source: &str) -> Vec<u8> {
+    let (color, bytes) = if drawn.opaque {
+        let rgb = drawn.rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+        (png::ColorType::Rgb, rgb)
+    } else {
+        (png::ColorType::Rgba, drawn.rgba.clone())
+    };
+    png_file(drawn.width, drawn.height, color, png::BitDepth::Eight, &bytes, |info| {
+        info.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+        text(info, "Source", source);
+    })
+}
+
+/// The PNG file of a relief: 16-bit grey, linear; its range stands inside as `HeightRange`.
+pub fn encode_height(relief: &Grey, source: &str) -> Vec<u8> {
+    let bytes: Vec<u8> = relief.values.iter().flat_map(|v| v.to_be_bytes()).collect();
+    png_file(relief.width, relief.height, png::ColorType::Grayscale, png::BitDepth::Sixteen, &bytes, |info| {
+        text(info, "Source", source);
+        text(info, "HeightRange", &format!("{} mm", relief.range_mm));
+    })
+}
+
+/// PNG texts are Latin-1; a file's name may hold more.
+fn text(encoder: &mut png::Encoder<'_, &mut Vec<u8>>, keyword: &str, words: &str) {
+    let latin = words.chars().map(|c| if u32::from(c) < 256 { c } else { '?' }).collect();
+    encoder.add_text_chunk(keyword.to_owned(), latin).expect("keywords are short");
+}
+
+fn png_file(
+    width: u32,
+    height: u32,
+    color: png::ColorType,
+    depth: png::BitDepth,
+    bytes: &[u8],
+    inform: impl FnOnce(&mut png::Encoder<'_, &mut Vec<u8>>),
+) -> Vec<u8> {
+    let mut file = Vec::new();
+    let mut encoder = png::Encoder::new(&mut file, width, height);
+    encoder.set_color(color);
+    encoder.set_depth(depth);
+    encoder.set_compression(png::Compression::High);
+    encoder.set_filter(png::Filter::Adaptive);
+    inform(&mut encoder);
+    text(&mut encoder, "License", LICENCE);
+    let mut writer = encoder.write_header().expect("a drawn image has a size, and memory takes it");
+    writer.write_image_data(bytes).expect("as many bytes as pixels");
+    writer.finish().expect("memory takes the end");
+    file
+}
+
+/// A file that is whole or not there: written under another name, flushed, renamed.
+fn put(path: &Path, bytes: &[u8]) -> Result<()> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    // Temporary files are private by default; a texture is as public as any file its user makes.
+    #[cfg(unix)]
+    let public = std::os::unix::fs::PermissionsExt::from_mode(0o666);
+    #[cfg(unix)]
+    builder.permissions(public);
+    let mut file = builder.prefix(".furrow-").tempfile_in(folder).map_err(Error::io(path))?;
+    file.write_all(bytes).and_then(|()| file.as_file().sync_all()).map_err(Error::io(path))?;
+    file.persist(path).map_err(|e| Error::io(path)(e.error))?;
+    Ok(())
+}
+
+fn named_above(recipe_path: &Path, name: &str) -> bool {
+    let needle = format!("`{name}`");
+    recipe_path
+        .ancestors()
+        .skip(1)
+        .take(2)
+        .filter_map(|folder| std::fs::read_to_string(folder.join("SOURCE.md")).ok())
+        .any(|text| text.contains(&needle))
+}

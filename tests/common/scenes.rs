@@ -1,0 +1,78 @@
+//! Small scenes built in code.
+
+use furrow::accel::EmbreeAccel;
+use furrow::bsdf::Bsdf;
+use furrow::film::{Film, Filter};
+use furrow::geometry::{Mesh, Window};
+use furrow::integrator::{Integrator, World};
+use furrow::light::Light;
+use furrow::material::Material;
+use furrow::math::{Vec2, Vec3, vec2, vec3};
+use furrow::render::{self, Settings, Watch};
+use furrow::scene::tag::Tag;
+use furrow::scene::{Part, Scene};
+use furrow::sensor::{Camera, Distortion, Pose};
+use std::sync::atomic::AtomicBool;
+
+/// A square of side `side` about `centre`, facing up.
+pub fn square(centre: Vec3, side: f32) -> Mesh {
+    let h = side / 2.0;
+    let at = |x: f32, y: f32| centre + vec3(x * h, y * h, 0.0);
+    Mesh::smooth(
+        vec![at(-1.0, -1.0), at(1.0, -1.0), at(1.0, 1.0), at(-1.0, 1.0)],
+        vec![vec2(0.0, 1.0), vec2(1.0, 1.0), vec2(1.0, 0.0), vec2(0.0, 0.0)],
+        vec![[0, 1, 2], [0, 2, 3]],
+    )
+}
+
+/// A sphere with true normals, `n` bands.
+pub fn sphere(centre: Vec3, radius: f32, n: u32) -> Mesh {
+    let mut mesh = Mesh::default();
+    for i in 0..=n {
+        for j in 0..=2 * n {
+            let (theta, phi) = (std::f32::consts::PI * i as f32 / n as f32, std::f32::consts::PI * j as f32 / n as f32);
+            let d = vec3(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
+            mesh.positions.push(centre + d * radius);
+            mesh.normals.push(d);
+            mesh.uvs.push(vec2(j as f32 / (2 * n) as f32, i as f32 / n as f32));
+            if i < n && j < 2 * n {
+                let (a, b) = (i * (2 * n + 1) + j, (i + 1) * (2 * n + 1) + j);
+                mesh.triangles.extend([[a, b, a + 1], [a + 1, b, b + 1]]);
+            }
+        }
+    }
+    mesh
+}
+
+/// A camera of `size` pixels at `position` that looks at `target` with a horizontal field of view in degrees.
+pub fn camera(size: (u32, u32), position: Vec3, target: Vec3, fov_deg: f64) -> Camera {
+    let focal = f64::from(size.0) / 2.0 / (fov_deg.to_radians() / 2.0).tan();
+    let centre = [f64::from(size.0) / 2.0, f64::from(size.1) / 2.0];
+    let pose = Pose::look_at(position, target).expect("a direction");
+    Camera::new(size, [focal; 2], centre, Distortion::default(), pose).expect("a camera")
+}
+
+/// A scene of unmasked meshes, each with one scattering.
+pub fn scene(parts: Vec<(Mesh, Bsdf)>, lights: Vec<Light>, camera: Camera) -> Scene {
+    let materials = parts.iter().map(|(_, b)| Material::Plain(*b)).collect();
+    let part = |(i, (mesh, _)): (usize, (Mesh, Bsdf))| Part { mesh, mask: None, material: i as u32, tag: Tag::default() };
+    let parts = parts.into_iter().enumerate().map(part).collect();
+    Scene { parts, materials, lights, camera, filter: Filter::Box }
+}
+
+/// Renders all of a scene on two threads.
+pub fn shoot(scene: &Scene, integrator: &dyn Integrator, spp: u32, seed: u64) -> Film {
+    let accel = EmbreeAccel::build(&scene.surfaces(), 1).expect("an accelerator");
+    let world = World { scene, geometry: &accel };
+    let window = Window::full(scene.camera.width(), scene.camera.height());
+    let settings = Settings { spp, seed, window, filter: scene.filter };
+    let stop = AtomicBool::new(false);
+    let watch = Watch { done: &|_| (), stop: &stop };
+    let pool = render::pool(2).expect("a pool");
+    pool.install(|| render::render(&world, integrator, &settings, &watch)).expect("a film")
+}
+
+/// The pixel's centre.
+pub fn middle(film: &Film) -> Vec2 {
+    vec2(film.window.width() as f32 / 2.0, film.window.height() as f32 / 2.0)
+}
