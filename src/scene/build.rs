@@ -2,12 +2,12 @@
 
 use super::desc::{FieldDesc, Growth, SpeciesDesc};
 use super::library::{Layer, Library, Species};
-use crate::page::Page;
 use super::tag::Tag;
 use super::{Part, PlantRecord, Scene};
-use crate::material::{Ground as GroundMaterial, GroundSkin, Material, Solid};
 use crate::film::Film;
+use crate::material::{Ground as GroundMaterial, GroundSkin, Material, Solid};
 use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3, vec2};
+use crate::page::Page;
 use crate::plant::{self, OrganKind, Stage};
 use crate::sampling::rng::mix;
 use crate::sampling::{Purpose, Stream};
@@ -166,7 +166,8 @@ impl<'a> Builder<'a> {
                 corners.push((origin + direction * (origin.z / -direction.z)).truncate());
             }
         }
-        let (Some(lo), Some(hi)) = (corners.iter().copied().reduce(Vec2::min), corners.iter().copied().reduce(Vec2::max))
+        let (Some(lo), Some(hi)) =
+            (corners.iter().copied().reduce(Vec2::min), corners.iter().copied().reduce(Vec2::max))
         else {
             return Err(Error::Scene(format!("{}: the camera does not look at the ground", self.page.path.display())));
         };
@@ -291,7 +292,10 @@ impl<'a> Builder<'a> {
             });
         }
         if all.len() > MOST_PLANTS {
-            return Err(Error::Scene(format!("{} plants: labels can number {MOST_PLANTS}; lower the density", all.len())));
+            return Err(Error::Scene(format!(
+                "{} plants: labels can number {MOST_PLANTS}; lower the density",
+                all.len()
+            )));
         }
         Ok(all)
     }
@@ -320,14 +324,11 @@ impl<'a> Builder<'a> {
                     return Err(Error::Scene(format!("plant {} grew a broken mesh: {fault}", record.number)));
                 }
                 let known = made.iter().find(|(s, c, _)| *s == organ.skin && *c == organ.choice).map(|m| m.2);
-                let material = match known {
-                    Some(material) => material,
-                    None => {
-                        let material = self.material(Material::Leaf(organ.material));
-                        made.push((organ.skin, organ.choice, material));
-                        material
-                    }
-                };
+                let material = known.unwrap_or_else(|| {
+                    let material = self.material(Material::Leaf(organ.material));
+                    made.push((organ.skin, organ.choice, material));
+                    material
+                });
                 self.scene.parts.push(Part { material, ..organ.part });
             }
             records.push(record);
