@@ -61,7 +61,11 @@ pub fn render(world: &World<'_>, integrator: &dyn Integrator, settings: &Setting
                 return Vec::new();
             }
             let tile = tile(w, i % columns, i / columns);
-            let pixels = rows(tile).map(|(x, y)| pixel(world, integrator, settings, x, y)).collect::<Vec<_>>();
+            // Asked at every pixel: with thousands of samples a tile takes minutes. What is left out then is never shown.
+            let pixels: Vec<Pixel> = rows(tile)
+                .take_while(|_| !watch.stop.load(Ordering::Relaxed))
+                .map(|(x, y)| pixel(world, integrator, settings, x, y))
+                .collect();
             (watch.done)(u64::from(settings.spp) * pixels.len() as u64);
             pixels
         })
