@@ -1,0 +1,103 @@
+//! Rays a second in the main scene's canopy: from the camera, scattered, and to the light; with the leaves' masks and with the same
+//! blades opaque. `cargo bench --bench intersect`; the last lines say what masks cost.
+
+use criterion::{BenchmarkId, Criterion, Throughput};
+use furrow::accel::{EmbreeAccel, Surface, prepare_thread};
+use furrow::geometry::{Interaction, Intersect, Ray};
+use furrow::math::{Frame, Vec3};
+use furrow::sampling::{Purpose, Stream, warp};
+use furrow::scene::{Field, build};
+use std::hint::black_box;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+const WIDTH: u32 = 324;
+/// Where the light stands: 45° up in the south.
+const LIGHT: Vec3 = Vec3::new(0.0, -std::f32::consts::FRAC_1_SQRT_2, std::f32::consts::FRAC_1_SQRT_2);
+
+fn field() -> Field {
+    let options = build::Options { width: Some(WIDTH), ..build::Options::default() };
+    build::field(Path::new("scenes/field.ron"), &options).expect("the main scene")
+}
+
+/// What a path asks of the geometry.
+struct Rays {
+    primary: Vec<Ray>,
+    bounce: Vec<Ray>,
+    shadow: Vec<Ray>,
+}
+
+fn rays(field: &Field, geometry: &EmbreeAccel) -> Rays {
+    let (scene, camera) = (&field.scene, &field.scene.camera);
+    let mut stream = Stream::of(1, 0, Purpose::Test, 0);
+    let mut rays = Rays { primary: Vec::new(), bounce: Vec::new(), shadow: Vec::new() };
+    for i in 0..camera.width() * camera.height() {
+        let (origin, direction) = camera.centre_ray(i % camera.width(), i / camera.width());
+        let ray = Ray::new(origin, direction);
+        rays.primary.push(ray);
+        let Some(hit) = geometry.closest(&ray) else { continue };
+        let at = Interaction::new(&scene.parts[hit.part as usize].mesh, &hit, 0.0);
+        let up = if at.ng.dot(direction) > 0.0 { -at.ng } else { at.ng };
+        let scattered = warp::cosine_hemisphere([stream.uniform32(), stream.uniform32()]);
+        rays.bounce.push(at.ray(Frame::about(up).to_world(scattered), f32::INFINITY));
+        rays.shadow.push(at.ray(LIGHT, f32::INFINITY));
+    }
+    rays
+}
+
+fn closest(geometry: &EmbreeAccel, rays: &[Ray]) -> usize {
+    rays.iter().filter(|r| geometry.closest(black_box(r)).is_some()).count()
+}
+
+fn occluded(geometry: &EmbreeAccel, rays: &[Ray]) -> usize {
+    rays.iter().filter(|r| geometry.occluded(black_box(r))).count()
+}
+
+/// The best of five, as the machine's other work only slows it.
+fn best(mut run: impl FnMut() -> usize) -> f64 {
+    let once = |run: &mut dyn FnMut() -> usize| {
+        let begin = Instant::now();
+        black_box(run());
+        begin.elapsed().as_secs_f64()
+    };
+    (0..5).map(|_| once(&mut run)).fold(f64::INFINITY, f64::min)
+}
+
+type Query = fn(&EmbreeAccel, &[Ray]) -> usize;
+
+fn main() {
+    prepare_thread();
+    let field = field();
+    let masked = EmbreeAccel::build(&field.scene.surfaces(), 0).expect("an accelerator");
+    let bare: Vec<Surface<'_>> = field.scene.parts.iter().map(|p| Surface { mesh: &p.mesh, mask: None }).collect();
+    let opaque = EmbreeAccel::build(&bare, 0).expect("an accelerator");
+    let rays = rays(&field, &masked);
+    let kinds: [(&str, &[Ray], Query); 3] =
+        [("primary", &rays.primary, closest), ("bounce", &rays.bounce, closest), ("shadow", &rays.shadow, occluded)];
+
+    let mut criterion = Criterion::default()
+        .sample_size(10)
+        .warm_up_time(Duration::from_millis(300))
+        .measurement_time(Duration::from_secs(2))
+        .configure_from_args();
+    let mut group = criterion.benchmark_group("intersect");
+    for (kind, rays, query) in kinds {
+        group.throughput(Throughput::Elements(rays.len() as u64));
+        for (leaves, geometry) in [("masked", &masked), ("opaque", &opaque)] {
+            group.bench_function(BenchmarkId::new(kind, leaves), |b| b.iter(|| query(geometry, rays)));
+        }
+    }
+    group.finish();
+    criterion.final_summary();
+
+    for (kind, rays, query) in kinds {
+        let (with, without) = (best(|| query(&masked, rays)), best(|| query(&opaque, rays)));
+        let rate = |seconds: f64| rays.len() as f64 / seconds / 1e6;
+        eprintln!(
+            "{kind}: {:.2} Mray/s masked, {:.2} opaque, ratio {:.2} on one thread",
+            rate(with),
+            rate(without),
+            without / with
+        );
+    }
+}
