@@ -81,11 +81,15 @@ pub fn shoot(field: &Field, spp: u32, threads: usize) -> (Film, LabelMap) {
 /// SHA-256 of numbers, hex.
 pub fn hash(numbers: impl IntoIterator<Item = u32>) -> String {
     use sha2::{Digest, Sha256};
+    use std::fmt::Write;
     let mut sha = Sha256::new();
     for n in numbers {
         sha.update(n.to_le_bytes());
     }
-    sha.finalize().iter().map(|b| format!("{b:02x}")).collect()
+    sha.finalize().iter().fold(String::new(), |mut hex, byte| {
+        let _ = write!(hex, "{byte:02x}");
+        hex
+    })
 }
 
 /// Every bit of a film, as numbers.
