@@ -51,7 +51,11 @@ fn expect(name: &str, scene: &Scene, by_chance: bool, spp: u32, expected: Spectr
         for band in 0..4 {
             let (g, e, x) = (got.to_array()[band], error.to_array()[band], expected.to_array()[band]);
             // Rounding of a long sum in single precision: 1e-4 of the value.
-            assert!((g - x).abs() <= 4.0 * e + 2e-4 * x + 1e-7, "{name}, {:?}, band {band}: {g} ± {e}, not {x}", path.technique);
+            assert!(
+                (g - x).abs() <= 4.0 * e + 2e-4 * x + 1e-7,
+                "{name}, {:?}, band {band}: {g} ± {e}, not {x}",
+                path.technique
+            );
             assert!(e <= 0.02 * x.max(1e-3), "{name}, {:?}: error {e} of {x} says nothing", path.technique);
         }
     }
@@ -107,7 +111,8 @@ fn a_white_leaf_vanishes_in_a_furnace() {
     let mut crossed = square(vec3(0.2, 0.0, 0.1), 1.0);
     crossed.transform(furrow::math::Mat3::from_rotation_x(1.1), Vec3::ZERO);
     let s = scene(vec![(square(Vec3::ZERO, 1.5), leaf), (crossed, leaf)], vec![sky(1.0)], eye);
-    let path = Path { max_depth: 200, technique: Technique { roulette: false, ..Technique::default() }, ..Path::default() };
+    let path =
+        Path { max_depth: 200, technique: Technique { roulette: false, ..Technique::default() }, ..Path::default() };
     let film = shoot(&s, &path, 64, 3);
     for p in &film.pixels {
         let [r, g, b, n] = p.mean.to_array();

@@ -1,30 +1,273 @@
 //! The textures that ship with the program.
 //!
-//! After a change of the drawing code: `cargo test --test textures -- --ignored redraw` draws them all again.
+//! After a change of the drawing code: `cargo test --test textures -- --ignored redraw` draws them all again; `ONLY=beet` before
+//! it draws those whose path holds the word.
 
-use furrow::texture::draw;
+use furrow::geometry::outline::Outline;
+use furrow::math::vec2;
+use furrow::texture::draw::{self, Drawn, Margin, Recipe};
+use furrow::texture::{ColorSpace, Height, Texture, Wrap};
 use std::path::{Path, PathBuf};
 
-fn recipes() -> Vec<PathBuf> {
-    let mut found: Vec<PathBuf> = ["textures/leaf", "textures/soil"]
-        .iter()
-        .flat_map(|folder| std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join(folder)).unwrap())
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn recipes(kind: &str) -> Vec<PathBuf> {
+    let mut found: Vec<PathBuf> = std::fs::read_dir(root().join("textures").join(kind))
+        .unwrap()
         .map(|entry| entry.unwrap().path())
         .filter(|path| path.extension().is_some_and(|e| e == "ron"))
         .collect();
     found.sort();
+    assert!(!found.is_empty());
     found
+}
+
+fn all() -> Vec<PathBuf> {
+    [recipes("leaf"), recipes("soil")].concat()
+}
+
+fn text_of(png_file: &Path) -> String {
+    String::from_utf8_lossy(&std::fs::read(png_file).unwrap()[..600]).into_owned()
 }
 
 #[test]
 #[ignore = "writes into the working tree; run it after changing the drawing code"]
 fn redraw() {
     let only = std::env::var("ONLY").unwrap_or_default();
-    for recipe in recipes() {
+    for recipe in all() {
         if recipe.to_string_lossy().contains(&only) {
-            let start = std::time::Instant::now();
             draw::write(&recipe).unwrap();
-            eprintln!("{} {:?}", recipe.display(), start.elapsed());
+        }
+    }
+}
+
+/// Rationale: a recipe that no longer draws its image is a false statement of where the image comes from.
+/// Expected: the same bytes, relief included, from a copy of the recipe elsewhere.
+#[test]
+fn every_image_is_what_its_recipe_draws() {
+    let check = |recipe: &Path| {
+        let folder = tempfile::tempdir().unwrap();
+        let copy = folder.path().join(recipe.file_name().unwrap());
+        std::fs::copy(recipe, &copy).unwrap();
+        for drawn in draw::write(&copy).unwrap() {
+            let committed = recipe.with_file_name(drawn.file_name().unwrap());
+            if drawn.extension().is_some_and(|e| e == "png") {
+                let same = std::fs::read(&drawn).unwrap() == std::fs::read(&committed).unwrap_or_default();
+                assert!(same, "{} is not what its recipe draws; see this file's head", committed.display());
+            }
+        }
+    };
+    let recipes = all();
+    std::thread::scope(|scope| {
+        let halves = [0, 1].map(|k| {
+            let recipes = &recipes;
+            scope.spawn(move || recipes.iter().skip(k).step_by(2).for_each(|r| check(r)))
+        });
+        for half in halves {
+            half.join().unwrap();
+        }
+    });
+}
+
+#[test]
+fn every_texture_says_where_it_comes_from() {
+    let source = std::fs::read_to_string(root().join("textures/SOURCE.md")).unwrap();
+    let mut bytes = 0;
+    for folder in ["leaf", "soil"] {
+        for entry in std::fs::read_dir(root().join("textures").join(folder)).unwrap() {
+            let path = entry.unwrap().path();
+            if path.extension().is_some_and(|e| e == "ron") {
+                continue;
+            }
+            let file = path.file_name().unwrap().to_string_lossy().into_owned();
+            let name = file.split('.').next().unwrap().to_owned();
+            assert!(source.contains(&format!("`{name}`")), "{file} is not in SOURCE.md");
+            let text = text_of(&path);
+            assert!(text.contains("Source") && text.contains("License"), "{file} does not say it inside");
+            let size = std::fs::metadata(&path).unwrap().len();
+            assert!(size < 2_900_000, "{file}: {size} bytes");
+            bytes += size;
+        }
+    }
+    assert!(bytes < 12_000_000, "{bytes} bytes of textures");
+}
+
+#[test]
+fn a_texture_drawn_elsewhere_gets_its_source_beside_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let recipe = folder.path().join("näh 茎.ron");
+    std::fs::write(&recipe, "Soil(seed: 1, size: 32, period_mm: 60, ground: Dirt)").unwrap();
+    let written = draw::write(&recipe).unwrap();
+    assert_eq!(written.len(), 3);
+    assert!(written.iter().all(|p| p.exists()));
+    assert!(std::fs::read_to_string(&written[2]).unwrap().contains("CC0"));
+}
+
+fn leaf(path: &Path) -> (draw::LeafRecipe, Texture) {
+    match draw::read(path).unwrap() {
+        Recipe::Leaf(recipe) => (recipe, Texture::load(&path.with_extension("png"), ColorSpace::Srgb).unwrap()),
+        Recipe::Soil(_) => panic!("{} is no leaf", path.display()),
+    }
+}
+
+/// Rationale: the renderer takes a texel for a reflectance. Expected: the mean of every leaf lies where measured leaves lie, and
+/// green is the strongest band. Source: LOPEX93 band means of soybean, maize, lettuce: R 0.06–0.11, G 0.09–0.14, B 0.05–0.08
+/// of the camera, whose blue is wider than the eye's.
+#[test]
+fn leaves_reflect_what_leaves_reflect() {
+    for path in recipes("leaf") {
+        let (_, texture) = leaf(&path);
+        let (mut sum, mut weight, mut largest) = ([0.0f64; 3], 0.0, 0.0f32);
+        for y in 0..texture.height() {
+            for x in 0..texture.width() {
+                let c = texture.texel(x, y);
+                for k in 0..3 {
+                    sum[k] += f64::from(c[k] * c[3]);
+                }
+                largest = if c[3] > 0.0 { largest.max(c[1]) } else { largest };
+                weight += f64::from(c[3]);
+            }
+        }
+        let [r, g, b] = sum.map(|s| s / weight);
+        let ok = (0.04..0.16).contains(&r) && (0.08..0.20).contains(&g) && (0.02..0.10).contains(&b) && g > 1.15 * r;
+        assert!(ok && largest < 0.6, "{}: {r:.3} {g:.3} {b:.3}, at most {largest}", path.display());
+    }
+}
+
+/// Rationale: the mesh of an entire leaf is the outline; alpha must not cut into it. Expected: the opaque area is the outline's,
+/// or two pixels more all around; teeth and lobes only take away.
+#[test]
+fn opacity_follows_the_outline() {
+    for path in recipes("leaf") {
+        let (recipe, texture) = leaf(&path);
+        let mask = texture.alpha_mask().unwrap();
+        let (w, h) = mask.size();
+        let area =
+            (0..h as i32).flat_map(|y| (0..w as i32).map(move |x| (x, y))).filter(|(x, y)| mask.texel(*x, *y)).count();
+        let share = area as f32 / (w * h) as f32 * 1.08 * 1.08;
+        let n = 2000;
+        let outline =
+            (0..n).map(|i| 2.0 * recipe.outline.half_width((i as f32 + 0.5) / n as f32)).sum::<f32>() / n as f32;
+        let rim = 2.0 * 2.8 * (1.0 / w as f32 + 1.0 / h as f32);
+        let name = path.display();
+        match recipe.margin {
+            Margin::Entire if recipe.notch.is_none() => {
+                assert!(share > outline && share < outline + rim, "{name}: {share} for {outline}");
+            }
+            Margin::Entire | Margin::Toothed { .. } => {
+                assert!(share < outline * 1.01 && share > 0.75 * outline, "{name}: {share} for {outline}");
+            }
+            Margin::Lobed { .. } => assert!((0.25..0.75).contains(&share), "{name}: {share}"),
+        }
+        // Every point of an entire leaf's mesh is opaque.
+        if let (Outline::Power { .. }, Margin::Entire, None) = (recipe.outline, recipe.margin, recipe.notch) {
+            for i in 1..200 {
+                let t = i as f32 / 200.0;
+                for side in [-1.0, 1.0] {
+                    let uv = furrow::geometry::outline::uv(side * recipe.outline.half_width(t), t);
+                    assert!(mask.opaque_at(uv), "{name}: the margin at {t}");
+                }
+            }
+        }
+    }
+}
+
+fn soil(path: &Path) -> (draw::SoilRecipe, Texture, Height) {
+    let Recipe::Soil(recipe) = draw::read(path).unwrap() else { panic!("{} is no soil", path.display()) };
+    let colour = Texture::load(&path.with_extension("png"), ColorSpace::Srgb).unwrap().wrapped(Wrap::Repeat);
+    let height = Height::load(&path.with_extension("height.png"), recipe.range_mm.f32()).unwrap();
+    (recipe, colour, height.wrapped(Wrap::Repeat))
+}
+
+/// Expected: across the edge colour and height step no more than within.
+#[test]
+fn ground_tiles() {
+    for path in recipes("soil") {
+        let (_, colour, height) = soil(&path);
+        let n = colour.width();
+        let values = height.values();
+        let at = |x: u32, y: u32| values[(y % n * n + x % n) as usize];
+        let green = |x: u32, y: u32| colour.texel(x % n, y % n)[1];
+        let step =
+            |f: &dyn Fn(u32, u32) -> f32, x: u32| (0..n).map(|y| (f(x, y) - f(x + 1, y)).abs()).sum::<f32>() / n as f32;
+        let fall =
+            |f: &dyn Fn(u32, u32) -> f32, y: u32| (0..n).map(|x| (f(x, y) - f(x, y + 1)).abs()).sum::<f32>() / n as f32;
+        for f in [&at as &dyn Fn(u32, u32) -> f32, &green] {
+            let inside = |g: &dyn Fn(u32) -> f32| (0..32).map(|k| g(k * 31 + 7)).fold(0.0, f32::max);
+            let (across, down) = (step(f, n - 1), fall(f, n - 1));
+            assert!(across < 1.25 * inside(&|x| step(f, x)), "{}: {across}", path.display());
+            assert!(down < 1.25 * inside(&|y| fall(f, y)), "{}: {down}", path.display());
+        }
+    }
+}
+
+#[test]
+fn ground_has_the_colour_that_its_recipe_states() {
+    for path in recipes("soil") {
+        let (recipe, colour, height) = soil(&path);
+        // The coarsest level of the pyramid is the mean.
+        let mean = colour.sample(vec2(0.5, 0.5), 20.0);
+        for k in 0..3 {
+            let stated = recipe.albedo[k].f32();
+            assert!((mean[k] / stated - 1.0).abs() < 0.12, "{}: {mean:?}", path.display());
+        }
+        let top = height.values().iter().copied().fold(0.0, f32::max);
+        assert!(top < recipe.range_mm.f32() * 0.999, "{}: the relief is cut off", path.display());
+        assert!(colour.alpha_mask().is_none());
+    }
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused_with_a_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.ron");
+    for (page, words) in [
+        ("Soil(seed: 1, size: 9000, period_mm: 60, ground: Dirt)", "at most 4096"),
+        (
+            "Soil(seed: 1, size: 32, period_mm: 60, crumbs: (smallest_mm: 9, largest_mm: 2), ground: Dirt)",
+            "below the largest",
+        ),
+        ("Soil(seed: 1, size: 32, period_mm: 60, ground: Mud)", "Mud"),
+        ("Soil(seed: 1, size: 32, period_mm: 90000, ground: Dirt)", "crumbs on the tile"),
+        (
+            "Leaf(seed: 1, size: 64, length_mm: 9, aspect: 0.5, outline: Power(a: 0, b: 1), veins: Parallel(count: 3, midrib: 0.1), pigments: ())",
+            "above 0",
+        ),
+        (
+            "Leaf(seed: 1, size: 64, length_mm: 9, aspect: 500, outline: Full, veins: Parallel(count: 3, midrib: 0.1), pigments: ())",
+            "at most 4096",
+        ),
+    ] {
+        std::fs::write(&path, page).unwrap();
+        let message = draw::write(&path).unwrap_err().to_string();
+        assert!(message.contains(words), "{message}");
+    }
+}
+
+/// Rationale: odd recipes must end, not hang or panic.
+#[test]
+fn odd_leaves_are_drawn_too() {
+    for aspect in ["0.01", "0.5", "3"] {
+        for (outline, rest) in [
+            ("Power(a: 0.1, b: 5)", "veins: Pinnate(pairs: 9, angle_deg: 170, midrib: 0.3, fine: 40)"),
+            (
+                "Full",
+                "margin: Lobed(pairs: 12, rachis: 0, terminal: 0.01, lean_deg: 89), veins: Pinnate(pairs: 0, angle_deg: 0, midrib: 0, fine: 30)",
+            ),
+            (
+                "Power(a: 1, b: 1)",
+                "margin: Toothed(count: 60, depth: 1), notch: Some(1), veins: Parallel(count: 40, midrib: 1)",
+            ),
+        ] {
+            let page = format!(
+                "(seed: 1, size: 48, length_mm: 9, aspect: {aspect}, outline: {outline}, {rest}, pigments: (chlorophyll: 0),
+                  relief: Some((range_mm: 1, furrow_mm: 9, blister_mm: 9)))"
+            );
+            let recipe = Recipe::Leaf(ron::from_str(&page).unwrap_or_else(|e| panic!("{page}: {e}")));
+            let drawn: Drawn = draw::draw(&recipe).unwrap();
+            assert_eq!(drawn.rgba.len(), drawn.width as usize * drawn.height as usize * 4);
         }
     }
 }

@@ -50,16 +50,16 @@ pub fn prepare_thread() {
 /// Version and instruction set, for headers and manifests.
 pub fn version() -> Result<String> {
     let device = device(1)?;
-    let number = device.get_property(rtc::DeviceProperty::VERSION).map_err(|e| refused(&e))?;
+    let number = device.get_property(rtc::DeviceProperty::VERSION).map_err(refused)?;
     Ok(format!("Embree {}.{}.{} {ISA}", number / 10000, number / 100 % 100, number % 100))
 }
 
 fn device(threads: u32) -> Result<rtc::Device> {
     let config = rtc::Config { threads, isa: Some(ISA), max_isa: ISA, ..rtc::Config::default() };
-    rtc::Device::with_config(config).map_err(|e| refused(&e))
+    rtc::Device::with_config(config).map_err(refused)
 }
 
-fn refused(error: &rtc::Error) -> Error {
+fn refused(error: rtc::Error) -> Error {
     Error::Embree(format!("{error:?}"))
 }
 
@@ -67,7 +67,7 @@ impl EmbreeAccel {
     /// Builds the hierarchy over all surfaces with `threads` threads (0: all there are).
     pub fn build(surfaces: &[Surface<'_>], threads: u32) -> Result<Self> {
         let device = device(threads)?;
-        let mut scene = device.create_scene().map_err(|e| refused(&e))?;
+        let mut scene = device.create_scene().map_err(refused)?;
         scene.set_flags(rtc::SceneFlags::ROBUST);
         scene.set_build_quality(rtc::BuildQuality::MEDIUM);
         let mut slots = Vec::with_capacity(surfaces.len());
@@ -105,13 +105,13 @@ fn attach(
     cut: Option<Cut>,
 ) -> Result<()> {
     let mesh = surface.mesh;
-    let mut geometry = device.create_geometry(rtc::GeometryKind::TRIANGLE).map_err(|e| refused(&e))?;
+    let mut geometry = device.create_geometry(rtc::GeometryKind::TRIANGLE).map_err(refused)?;
     let count = only.map_or(mesh.triangles.len(), <[u32]>::len);
     {
         let corners = mesh.positions.len().max(1);
         let mut to = geometry
             .set_new_buffer::<[f32; 3]>(rtc::BufferUsage::VERTEX, 0, rtc::Format::FLOAT3, 12, corners)
-            .map_err(|e| refused(&e))?;
+            .map_err(refused)?;
         to[0] = [0.0; 3];
         for (to, p) in to.iter_mut().zip(&mesh.positions) {
             *to = p.to_array();
@@ -120,7 +120,7 @@ fn attach(
     {
         let mut to = geometry
             .set_new_buffer::<[u32; 3]>(rtc::BufferUsage::INDEX, 0, rtc::Format::UINT3, 12, count.max(1))
-            .map_err(|e| refused(&e))?;
+            .map_err(refused)?;
         to[0] = [0; 3];
         match only {
             None => to.iter_mut().zip(&mesh.triangles).for_each(|(to, t)| *to = *t),

@@ -165,8 +165,7 @@ fn render(args: &RenderArgs) -> Result<Vec<PathBuf>> {
         }
     };
     let page = args.scene.as_deref().unwrap_or(Path::new(""));
-    let options =
-        build::Options { seed: args.seed, index: args.index, width: args.width, height: args.height };
+    let options = build::Options { seed: args.seed, index: args.index, width: args.width, height: args.height };
     let pool = render::pool(args.threads)?;
     let field: Field = pool.install(|| build::field(page, &options))?;
     for warning in &field.warnings {

@@ -101,7 +101,7 @@ impl Leaf {
     }
 
     #[inline]
-    fn density(&self, chances: &Chances, side: &Side, wo: Vec3, wi: Vec3) -> f32 {
+    fn density(chances: &Chances, side: &Side, wo: Vec3, wi: Vec3) -> f32 {
         if wo.z * wi.z < 0.0 {
             return chances.transmit * wi.z.abs() * FRAC_1_PI;
         }
@@ -133,7 +133,7 @@ impl Scatter for Leaf {
             return 0.0;
         }
         let (near, _) = self.sides(wo);
-        self.density(&self.chances(near, wo.z.abs()), near, wo, wi)
+        Self::density(&self.chances(near, wo.z.abs()), near, wo, wi)
     }
 
     #[inline]
@@ -153,7 +153,7 @@ impl Scatter for Leaf {
         if u[0] < chances.coat && wi.z * s <= 0.0 {
             return None;
         }
-        let pdf = self.density(&chances, near, wo, wi);
+        let pdf = Self::density(&chances, near, wo, wi);
         (pdf > 0.0 && wi.z != 0.0).then(|| BsdfSample { wi, weight: self.eval(wo, wi) / pdf, pdf })
     }
 }

@@ -64,6 +64,16 @@ impl AlphaMask {
         self.texel((uv.x * self.width as f32).floor() as i32, (uv.y * self.height as f32).floor() as i32)
     }
 
+    /// The bits of tile (x, y), row by row; all transparent outside.
+    #[inline]
+    fn tile(&self, x: i32, y: i32) -> u64 {
+        let tiles_y = self.tiles.len() as u32 / self.tiles_x.max(1);
+        if x < 0 || y < 0 || x >= self.tiles_x as i32 || y >= tiles_y as i32 {
+            return 0;
+        }
+        self.tiles[(y as u32 * self.tiles_x + x as u32) as usize]
+    }
+
     /// What the mask says about the uv triangle. Conservative: `Mixed` where in doubt.
     pub fn coverage(&self, uv: [Vec2; 3]) -> Coverage {
         let scale = vec2(self.width as f32, self.height as f32);
@@ -71,16 +81,27 @@ impl AlphaMask {
         // A margin of a hundredth of a texel covers the rounding of interpolated uvs.
         let lo = (t[0].min(t[1]).min(t[2]) - 0.01).floor();
         let hi = (t[0].max(t[1]).max(t[2]) + 0.01).floor();
+        let (lo, hi) = ([lo.x as i32, lo.y as i32], [hi.x as i32, hi.y as i32]);
         let (mut any_opaque, mut any_transparent) = (false, false);
-        for y in lo.y as i32..=hi.y as i32 {
-            for x in lo.x as i32..=hi.x as i32 {
-                if !touches(&t, vec2(x as f32, y as f32)) {
+        for tile_y in lo[1].div_euclid(8)..=hi[1].div_euclid(8) {
+            for tile_x in lo[0].div_euclid(8)..=hi[0].div_euclid(8) {
+                let corner = vec2(tile_x as f32, tile_y as f32) * 8.0;
+                if !touches(&t, corner, 8.0) {
                     continue;
                 }
-                if self.texel(x, y) {
-                    any_opaque = true
-                } else {
-                    any_transparent = true
+                match self.tile(tile_x, tile_y) {
+                    0 => any_transparent = true,
+                    u64::MAX => any_opaque = true,
+                    bits => {
+                        for bit in 0..64u32 {
+                            let (x, y) = (tile_x * 8 + (bit & 7) as i32, tile_y * 8 + (bit >> 3) as i32);
+                            let inside = x >= lo[0] && x <= hi[0] && y >= lo[1] && y <= hi[1];
+                            if inside && touches(&t, vec2(x as f32, y as f32), 1.0) {
+                                any_opaque |= bits >> bit & 1 == 1;
+                                any_transparent |= bits >> bit & 1 == 0;
+                            }
+                        }
+                    }
                 }
                 if any_opaque && any_transparent {
                     return Coverage::Mixed;
@@ -91,9 +112,10 @@ impl AlphaMask {
     }
 }
 
-/// Whether the triangle may touch the texel at `corner` (unit square, widened by a hundredth): separating axes of the edges.
-fn touches(t: &[Vec2; 3], corner: Vec2) -> bool {
-    let centre = corner + 0.5;
+/// Whether the triangle may touch the square at `corner`, widened by a hundredth of a texel: separating axes of the edges.
+fn touches(t: &[Vec2; 3], corner: Vec2, side: f32) -> bool {
+    let half = 0.5 * side;
+    let centre = corner + half;
     let orientation = (t[1] - t[0]).perp_dot(t[2] - t[0]);
     if orientation == 0.0 {
         return true;
@@ -102,7 +124,7 @@ fn touches(t: &[Vec2; 3], corner: Vec2) -> bool {
         let (a, b) = (t[i], t[(i + 1) % 3]);
         let edge = (b - a) * orientation.signum();
         let inward = vec2(-edge.y, edge.x);
-        let reach = 0.51 * (inward.x.abs() + inward.y.abs());
+        let reach = (half + 0.01) * (inward.x.abs() + inward.y.abs());
         inward.dot(centre - a) >= -reach
     })
 }

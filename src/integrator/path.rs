@@ -117,7 +117,8 @@ struct Local {
     bsdf: crate::bsdf::Bsdf,
     frame: crate::math::Frame,
     wo: Vec3,
-    wo_local: Vec3,
+    /// `wo` in the frame.
+    seen: Vec3,
 }
 
 impl Local {
@@ -125,18 +126,18 @@ impl Local {
     /// plane. Where the two disagree a normal map would leak light; nothing scatters there.
     #[inline]
     fn consistent(&self, at: &Interaction, wi: Vec3, wi_local_z: f32) -> bool {
-        (at.ng.dot(self.wo) * at.ng.dot(wi) > 0.0) == (self.wo_local.z * wi_local_z > 0.0)
+        (at.ng.dot(self.wo) * at.ng.dot(wi) > 0.0) == (self.seen.z * wi_local_z > 0.0)
     }
 
     #[inline]
     fn eval(&self, at: &Interaction, wi: Vec3) -> Spectrum {
         let local = self.frame.to_local(wi);
-        if self.consistent(at, wi, local.z) { self.bsdf.eval(self.wo_local, local) } else { Spectrum::ZERO }
+        if self.consistent(at, wi, local.z) { self.bsdf.eval(self.seen, local) } else { Spectrum::ZERO }
     }
 
     #[inline]
     fn pdf(&self, wi: Vec3) -> f32 {
-        self.bsdf.pdf(self.wo_local, self.frame.to_local(wi))
+        self.bsdf.pdf(self.seen, self.frame.to_local(wi))
     }
 }
 
@@ -178,17 +179,17 @@ impl Integrator for Path {
             let wo = -ray.direction;
             let part = &world.scene.parts[hit.part as usize];
             let (bsdf, frame) = world.scene.materials[part.material as usize].scatter(&at, wo);
-            let local = Local { bsdf, frame, wo, wo_local: frame.to_local(wo) };
+            let local = Local { bsdf, frame, wo, seen: frame.to_local(wo) };
             if depth == 0 {
                 let normal = if frame.z.dot(wo) < 0.0 { -frame.z } else { frame.z };
-                sighting.first = Some(FirstHit { distance: hit.t, normal, albedo: bsdf.reflectance(local.wo_local.z) });
+                sighting.first = Some(FirstHit { distance: hit.t, normal, albedo: bsdf.reflectance(local.seen.z) });
             }
             let lights = sampler.get4(sets::light(depth));
             let scattering = sampler.get4(sets::scatter(depth));
             if self.technique.light_sampling {
                 radiance += throughput * self.direct(world, &at, &local, lights);
             }
-            let Some(s) = bsdf.sample(local.wo_local, [scattering[0], scattering[1], scattering[2]]) else { break };
+            let Some(s) = bsdf.sample(local.seen, [scattering[0], scattering[1], scattering[2]]) else { break };
             let wi = frame.to_world(s.wi);
             if !local.consistent(&at, wi, s.wi.z) {
                 break;

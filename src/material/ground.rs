@@ -67,7 +67,8 @@ impl GroundSkin {
         let row = |j: i32| j.clamp(0, self.height as i32 - 1) as usize * self.width;
         let (x0, x1) = (column(floor.x as i32), column(floor.x as i32 + 1));
         let (y0, y1) = (row(floor.y as i32), row(floor.y as i32 + 1));
-        let weights = [(1.0 - part.x) * (1.0 - part.y), part.x * (1.0 - part.y), (1.0 - part.x) * part.y, part.x * part.y];
+        let weights =
+            [(1.0 - part.x) * (1.0 - part.y), part.x * (1.0 - part.y), (1.0 - part.x) * part.y, part.x * part.y];
         let mut reflectance = Spectrum::ZERO;
         let (mut slope, mut film) = (Vec2::ZERO, 0.0);
         for (index, w) in [y0 + x0, y0 + x1, y1 + x0, y1 + x1].into_iter().zip(weights) {

@@ -72,17 +72,20 @@ impl Spectrum {
 
     /// Each band held within `lo..=hi`.
     #[inline]
+    #[must_use]
     pub fn clamp(self, lo: f32, hi: f32) -> Self {
         Self(self.0.clamp(Vec4::splat(lo), Vec4::splat(hi)))
     }
 
     /// Linear blend, `self` at 0 and `other` at 1.
     #[inline]
+    #[must_use]
     pub fn lerp(self, other: Self, t: f32) -> Self {
         Self(self.0.lerp(other.0, t))
     }
 
     /// `f` of each band.
+    #[must_use]
     pub fn map(self, f: impl Fn(f32) -> f32) -> Self {
         Self(Vec4::from_array(self.to_array().map(f)))
     }

@@ -10,8 +10,8 @@ use crate::render::{LabelMap, label::NONE};
 use crate::{Error, Result};
 use exr::prelude::*;
 
-fn channel(name: String, samples: FlatSamples) -> AnyChannel<FlatSamples> {
-    AnyChannel { name: name.as_str().into(), sample_data: samples, quantize_linearly: false, sampling: Vec2(1, 1) }
+fn channel(name: &str, samples: FlatSamples) -> AnyChannel<FlatSamples> {
+    AnyChannel { name: name.into(), sample_data: samples, quantize_linearly: false, sampling: Vec2(1, 1) }
 }
 
 /// Encodes a film and its labels, which must share a window.
@@ -20,16 +20,16 @@ pub(super) fn encode(film: &Film, labels: &LabelMap, text: &str) -> Result<Vec<u
     let pixels = &film.pixels;
     for (band, name) in Spectrum::NAMES.iter().enumerate() {
         let of = |f: fn(&crate::film::Pixel) -> Spectrum| pixels.iter().map(move |p| f(p).to_array()[band]);
-        channels.push(channel((*name).into(), FlatSamples::F32(of(|p| p.mean).collect())));
-        channels.push(channel(format!("variance.{name}"), FlatSamples::F32(of(|p| p.variance).collect())));
+        channels.push(channel(name, FlatSamples::F32(of(|p| p.mean).collect())));
+        channels.push(channel(&format!("variance.{name}"), FlatSamples::F32(of(|p| p.variance).collect())));
         channels
-            .push(channel(format!("albedo.{name}"), FlatSamples::F16(of(|p| p.albedo).map(f16::from_f32).collect())));
+            .push(channel(&format!("albedo.{name}"), FlatSamples::F16(of(|p| p.albedo).map(f16::from_f32).collect())));
     }
     for (axis, name) in ["X", "Y", "Z"].iter().enumerate() {
         let samples = pixels.iter().map(|p| f16::from_f32(p.normal.to_array()[axis])).collect();
-        channels.push(channel(format!("normal.{name}"), FlatSamples::F16(samples)));
+        channels.push(channel(&format!("normal.{name}"), FlatSamples::F16(samples)));
     }
-    channels.push(channel("depth.Z".into(), FlatSamples::F32(pixels.iter().map(|p| p.depth).collect())));
+    channels.push(channel("depth.Z", FlatSamples::F32(pixels.iter().map(|p| p.depth).collect())));
     let ids = [
         ("class", labels.tags.iter().map(|t| t.class as u32).collect()),
         ("plant", labels.tags.iter().map(|t| u32::from(t.plant)).collect()),
@@ -37,7 +37,7 @@ pub(super) fn encode(film: &Film, labels: &LabelMap, text: &str) -> Result<Vec<u
         ("part", labels.parts.iter().map(|p| if *p == NONE { 0 } else { p + 1 }).collect::<Vec<u32>>()),
     ];
     for (name, samples) in ids {
-        channels.push(channel(format!("id.{name}"), FlatSamples::U32(samples)));
+        channels.push(channel(&format!("id.{name}"), FlatSamples::U32(samples)));
     }
     let w = film.window;
     let attributes = LayerAttributes {

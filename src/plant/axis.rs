@@ -63,7 +63,11 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
     let top_rise = growth.rise.last().copied().unwrap_or(0.0);
     let (mut nodes, mut radii) = (Vec::new(), Vec::new());
     let (mut point, mut below) = (base, 0.0);
+    // A crown's short internodes make its dome higher; its leaves are seated on the dome.
+    let stemless = top_rise < radius;
+    let crown = if stemless { CROWN + top_rise / radius } else { 0.0 };
     for rise in &growth.rise {
+        let rise = &if stemless { 0.0 } else { *rise };
         point += direction_now * (rise - below);
         let share = if top_rise > 0.0 { rise / top_rise } else { 0.0 };
         nodes.push((point, direction_now));
@@ -84,9 +88,8 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
         .into_iter()
         .map(|h| ring(nodes[0].1 * h, nodes[0].1, radius, Profile::Channelled(1.0)))
         .collect();
-    let stemless = top_rise < radius;
     if stemless {
-        dome(&mut rings, nodes[0].1, radius, CROWN);
+        dome(&mut rings, nodes[0].1, radius, crown);
     }
     let mesh = tube::rigid(&rings, 10);
     organs.push(Organ { kind: OrganKind::Hypocotyl, leaf: 0, skin: skin(&growth.desc.hypocotyl_skin), mesh });
@@ -107,7 +110,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
         let mesh = tube::rigid(&rings, 12);
         organs.push(Organ { kind: OrganKind::Stem, leaf: 0, skin: skin(&growth.desc.stem_skin), mesh });
     }
-    Axis { nodes, radii, section, crown: if stemless { CROWN } else { 0.0 } }
+    Axis { nodes, radii, section, crown }
 }
 
 fn ring(centre: Vec3, along: Vec3, radius: f32, profile: Profile) -> Ring {

@@ -207,7 +207,7 @@ fn stalk(leaf: &LeafNow<'_>, skeleton: &Skeleton, relief: &Relief, lower: Lower,
                     let flare = lerp(leaf.kind.stalk_base.f32(), 1.0, s.powf(0.7)) + 0.25 * smoothstep(0.2, 0.0, s);
                     let wide = tip_radius * flare;
                     // The channel runs out into the midrib.
-                    let channel = channel * lerp(1.0, 0.5, smoothstep(0.75, 1.0, s));
+                    let channel = channel * lerp(1.0, 0.3, smoothstep(0.7, 1.0, s));
                     rings.push(ring(y, (wide, wide * lerp(0.7, 0.85, s)), channel, 0.0));
                 }
                 Lower::Sheath(radius) => {
@@ -227,7 +227,7 @@ fn stalk(leaf: &LeafNow<'_>, skeleton: &Skeleton, relief: &Relief, lower: Lower,
             let s = f32::from(i) / 8.0;
             let r = wide * lerp(0.8, 0.06, s.sqrt());
             // Sunk so that the blade lies on its flat top.
-            rings.push(ring(s * reach, (r, r), -0.3, 0.15 * r));
+            rings.push(ring(s * reach, (r, r), -0.2, 0.1 * r));
         }
     }
     tube::sweep(&mut rest, &rings, SIDES, |p| skeleton.weights_on_chain(p.y));

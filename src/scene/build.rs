@@ -347,14 +347,11 @@ impl<'a> Builder<'a> {
                     )));
                 }
                 let known = made.iter().find(|(s, c, _)| *s == organ.skin && *c == organ.choice).map(|m| m.2);
-                let material = match known {
-                    Some(material) => material,
-                    None => {
-                        let material = self.material(Material::Leaf(organ.material));
-                        made.push((organ.skin, organ.choice, material));
-                        material
-                    }
-                };
+                let material = known.unwrap_or_else(|| {
+                    let material = self.material(Material::Leaf(organ.material));
+                    made.push((organ.skin, organ.choice, material));
+                    material
+                });
                 self.scene.parts.push(Part { material, ..organ.part });
             }
             records.push(record);

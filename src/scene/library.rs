@@ -12,17 +12,21 @@ use crate::texture::{ColorSpace, Height, Maps, Relief, Texture, Wrap};
 use crate::{Error, Result};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// A picture with the mask that it cuts.
 pub(super) type Cut = (Arc<Picture>, Option<Arc<AlphaMask>>);
 
+/// A skin's choices, each with its mask.
+pub(super) type Choices = Vec<(LeafMaterial, Option<Arc<AlphaMask>>)>;
+
 /// A species with its materials ready.
 pub(super) struct Species {
     pub(super) desc: SpeciesDesc,
-    /// By skin: the choices that the page gives, each with its mask.
-    pub(super) skins: BTreeMap<String, Vec<(LeafMaterial, Option<Arc<AlphaMask>>)>>,
+    /// By the skin's name.
+    pub(super) skins: BTreeMap<String, Choices>,
 }
 
 /// What was read so far. Every file's bytes go into the hash in the order of their paths.
@@ -47,7 +51,11 @@ impl Library {
         for digest in self.files.values() {
             all.update(digest);
         }
-        all.finalize().iter().map(|b| format!("{b:02x}")).collect()
+        let mut hex = String::new();
+        for byte in all.finalize() {
+            let _ = write!(hex, "{byte:02x}");
+        }
+        hex
     }
 
     /// The species page that `page` names.

@@ -143,7 +143,7 @@ pub struct RowReliefDesc {
 
 impl Default for RowReliefDesc {
     fn default() -> Self {
-        Self { depth_mm: Vary::uniform(5.0, 12.0), width_mm: Vary::uniform(40.0, 80.0), ridge_mm: Vary::fixed(0.0) }
+        Self { depth_mm: Vary::uniform(4.0, 11.0), width_mm: Vary::uniform(45.0, 80.0), ridge_mm: Vary::fixed(0.0) }
     }
 }
 

@@ -172,7 +172,7 @@ pub struct Debris {
     pub radius: f32,
 }
 
-/// The stream of cell (i, j) of population `index`: the same wherever the area begins.
+/// The stream of cell (i, j): the same wherever the area begins.
 fn cell_stream(stream: &Stream, i: i32, j: i32) -> Stream {
     stream.child(Purpose::Debris, (u64::from(i as u32) << 32) | u64::from(j as u32))
 }

@@ -33,6 +33,8 @@ struct Rows {
     depth: f32,
     half_width: f32,
     ridge: f32,
+    /// 1, or 0 to test the profile.
+    wander: f32,
 }
 
 impl Relief {
@@ -57,6 +59,7 @@ impl Relief {
                 spacing: r.spacing_m,
                 depth: row.depth_mm.draw32(&mut child(5)) * 1e-3,
                 half_width: row.width_mm.draw32(&mut child(6)) * 0.5e-3,
+                wander: 1.0,
                 ridge: row.ridge_mm.draw32(&mut child(7)) * 1e-3,
             }),
         }
@@ -82,13 +85,20 @@ impl Relief {
 
     fn row(&self, p: Vec2) -> f32 {
         let Some(rows) = &self.rows else { return 0.0 };
-        let d = (p.dot(rows.across) - rows.offset) / rows.spacing;
+        // The edges wander by a few millimetres and the print is not equally deep all along.
+        let wander = |wavelength: f32, shift: f64| {
+            let at = |c: f32, by: f64| f64::from(c / wavelength) + by;
+            self.noise.at2(at(p.x, shift), at(p.y, -shift)) as f32
+        };
+        let d = (p.dot(rows.across) - rows.offset
+            + rows.wander * (0.012 * wander(0.07, 201.7) + 0.006 * wander(0.025, 307.1)))
+            / rows.spacing;
         let d = (d - d.round()).abs() * rows.spacing;
         // The press wheel's print: a flat floor, soft shoulders, and a little soil pushed up beside it.
-        let print = 1.0 - smoothstep(0.35 * rows.half_width, rows.half_width, d);
-        let shoulder = (-((d - 1.25 * rows.half_width) / (0.35 * rows.half_width)).powi(2)).exp();
+        let print = 1.0 - smoothstep(0.1 * rows.half_width, 1.1 * rows.half_width, d);
+        let shoulder = (-((d - 1.3 * rows.half_width) / (0.4 * rows.half_width)).powi(2)).exp();
         let ridge = 0.5 + 0.5 * (std::f32::consts::TAU * d / rows.spacing).cos();
-        rows.depth * (0.25 * shoulder - print) + rows.ridge * ridge
+        rows.depth * (1.0 + 0.5 * rows.wander * wander(0.15, 401.3)) * (0.2 * shoulder - print) + rows.ridge * ridge
     }
 }
 
@@ -124,12 +134,13 @@ mod tests {
     #[test]
     fn the_seed_row_lies_deeper_than_its_shoulders() {
         let rows = SeedRows { spacing_m: 0.5, azimuth: 0.3, offset_m: 0.1 };
-        let relief = Relief::new(&desc(0.0), Some(rows), &Stream::of(1, 0, Purpose::Test, 0));
+        let mut relief = Relief::new(&desc(0.0), Some(rows), &Stream::of(1, 0, Purpose::Test, 0));
+        relief.rows.iter_mut().for_each(|r| r.wander = 0.0);
         let across = vec2(rows.azimuth.cos(), -rows.azimuth.sin());
         for row in -3..3 {
             let centre = across * (rows.offset_m + row as f32 * rows.spacing_m);
             assert!((relief.height(centre, 0.001) + 0.010).abs() < 1e-4);
-            assert!(relief.height(centre + across * 0.05, 0.001) > -0.001);
+            assert!(relief.height(centre + across * 0.06, 0.001) > -0.001);
             assert!(relief.height(centre + across * 0.25, 0.001).abs() < 1e-4);
         }
     }

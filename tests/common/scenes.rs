@@ -55,7 +55,8 @@ pub fn camera(size: (u32, u32), position: Vec3, target: Vec3, fov_deg: f64) -> C
 /// A scene of unmasked meshes, each with one scattering.
 pub fn scene(parts: Vec<(Mesh, Bsdf)>, lights: Vec<Light>, camera: Camera) -> Scene {
     let materials = parts.iter().map(|(_, b)| Material::Plain(*b)).collect();
-    let part = |(i, (mesh, _)): (usize, (Mesh, Bsdf))| Part { mesh, mask: None, material: i as u32, tag: Tag::default() };
+    let part =
+        |(i, (mesh, _)): (usize, (Mesh, Bsdf))| Part { mesh, mask: None, material: i as u32, tag: Tag::default() };
     let parts = parts.into_iter().enumerate().map(part).collect();
     Scene { parts, materials, lights, camera, filter: Filter::Box }
 }

@@ -51,8 +51,8 @@ impl Canvas {
         }
         let mut column = vec![0.0; self.height];
         for x in 0..self.width {
-            for y in 0..self.height {
-                column[y] = out.values[y * self.width + x];
+            for (c, row) in column.iter_mut().zip(out.values.chunks_exact(self.width)) {
+                *c = row[x];
             }
             for (y, d) in lower_envelope(&column).into_iter().enumerate() {
                 out.values[y * self.width + x] = d;

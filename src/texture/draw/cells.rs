@@ -15,6 +15,8 @@ pub(super) struct Cells {
 /// What a place of the pattern knows.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cell {
+    /// Distance to the nearest point.
+    pub(super) away: f32,
     /// Distance to the border between the nearest and the next cell.
     pub(super) border: f32,
     /// A number of this cell, uniform in 0..1.
@@ -33,7 +35,9 @@ impl Cells {
     }
 
     fn hash(&self, x: i32, y: i32) -> u64 {
-        let (x, y) = (x.rem_euclid(self.period.0) as u64, y.rem_euclid(self.period.1) as u64);
+        // A division only where a square lies beyond the period.
+        let wrap = |i: i32, n: i32| if (0..n).contains(&i) { i } else { i.rem_euclid(n) } as u64;
+        let (x, y) = (wrap(x, self.period.0), wrap(y, self.period.1));
         mix(self.seed ^ (x << 32 | y))
     }
 
@@ -69,6 +73,6 @@ impl Cells {
                 }
             }
         }
-        Cell { border: border.max(0.0), own: unit(mix(own)), shared: unit(mix(own ^ other)) }
+        Cell { away: best.sqrt(), border: border.max(0.0), own: unit(mix(own)), shared: unit(mix(own ^ other)) }
     }
 }

@@ -3,15 +3,16 @@
 //! Relief is written apart, as height: no shading is painted in.
 
 use super::canvas::Canvas;
-use super::cells::{Cells, unit};
+use super::cells::Cells;
 use super::shape::{Margin, Shape};
+use super::tissue::Surface;
 use super::veins::{self, Segment, Veins};
 use super::{Drawn, Grey};
 use crate::error::{Error, Result};
 use crate::geometry::outline::{MARGIN, Outline};
 use crate::math::{Vec2, Vec3, lerp, smoothstep, vec2};
 use crate::optics::{LeafOptics, Pigments};
-use crate::sampling::rng::{Purpose, Stream, mix};
+use crate::sampling::rng::{Purpose, Stream};
 use crate::sampling::vary::{Count, Fraction, NonNegative, Num, Positive, PositiveCount};
 use crate::texture::noise::Tiling;
 use crate::texture::srgb::ColorSpace;
@@ -127,6 +128,26 @@ pub(super) fn draw(recipe: &LeafRecipe) -> Result<Drawn> {
     if height.max(width) > 4096 {
         return Err(Error::Scene(format!("a leaf of {width} × {height} pixels: at most 4096 can be drawn")));
     }
+    let (pairs, fine) = match recipe.veins {
+        Veins::Pinnate { pairs, fine, .. } => (pairs.get(), fine.get()),
+        Veins::Parallel { count, .. } => (count.get(), 0.0),
+    };
+    let cuts = match recipe.margin {
+        Margin::Entire => 0.0,
+        Margin::Toothed { count, .. } => count.get(),
+        Margin::Lobed { pairs, .. } => pairs.get(),
+    };
+    let marks = recipe.look.blotches.get().max(recipe.look.spots.get());
+    for (what, asked, most) in [
+        ("veins on a side", pairs, 200.0),
+        ("points for fine veins", fine, 20_000.0),
+        ("teeth or lobes on a side", cuts, 200.0),
+        ("blotches or spots", marks, 2000.0),
+    ] {
+        if asked > most {
+            return Err(Error::Scene(format!("{asked} {what}: at most {most} can be drawn")));
+        }
+    }
     Ok(Painter::new(recipe, width, height).paint())
 }
 
@@ -217,13 +238,14 @@ impl<'a> Painter<'a> {
         let base = r.pigments.chlorophyll.f32();
         let look = Surface::new(r, &self.stream);
         let mut rgba = vec![0u8; width * height * 4];
+        let opacity = self.opacity();
         for y in 0..height {
             for x in 0..width {
-                let alpha = self.coverage(x, y);
+                let i = y * width + x;
+                let alpha = opacity[i];
                 if alpha == 0 {
                     continue;
                 }
-                let i = y * width + x;
                 let p = self.place(x as f32 + 0.5, y as f32 + 0.5);
                 let veins = [self.veins[0].values[i], self.veins[1].values[i], self.veins[2].values[i]];
                 let tissue = look.at(p, veins, self.to_margin.values[i], &self.shape);
@@ -242,23 +264,29 @@ impl<'a> Painter<'a> {
         Drawn { width: width as u32, height: height as u32, rgba, opaque: false, relief }
     }
 
-    /// Opacity of a pixel, 0..255: the share of nine points that lie in the leaf. Where the margin is entire the mesh cuts
-    /// the shape, and the image reaches two pixels further, so that its alpha never nibbles at the mesh.
-    fn coverage(&self, x: usize, y: usize) -> u8 {
-        let entire = matches!(self.recipe.margin, Margin::Entire) && self.recipe.notch.is_none();
-        let grow = if entire { 2.2 / self.scale } else { 0.0 };
-        let centre = self.shape.inside(self.place(x as f32 + 0.5, y as f32 + 0.5)) + grow;
+    /// Opacity of each pixel, 0..255: the share of sixteen points that lie in the leaf. Where the margin is entire the mesh
+    /// cuts the shape, and the image reaches two pixels further, so that its alpha never nibbles at the mesh.
+    fn opacity(&self) -> Vec<u8> {
         let pixel = 1.0 / self.scale;
-        if centre.abs() > 4.0 * pixel {
-            return if centre > 0.0 { 255 } else { 0 };
+        let mut cover = Canvas::new(self.width, self.height, 0.0);
+        for (i, v) in cover.values.iter_mut().enumerate() {
+            let (x, y) = ((i % self.width) as f32, (i / self.width) as f32);
+            let centre = self.shape.inside(self.place(x + 0.5, y + 0.5));
+            *v = if centre.abs() > 6.0 * pixel {
+                f32::from(u8::from(centre > 0.0))
+            } else {
+                let at = |k: usize| (k as f32 + 0.5) / 4.0;
+                let inside = |k: usize| self.shape.inside(self.place(x + at(k % 4), y + at(k / 4))) > 0.0;
+                (0..16).filter(|k| inside(*k)).count() as f32 / 16.0
+            };
         }
-        let mut hits = 0;
-        for k in 0..16 {
-            let at = |i: usize| (i as f32 + 0.5) / 4.0;
-            let p = self.place(x as f32 + at(k % 4), y as f32 + at(k / 4));
-            hits += u32::from(self.shape.inside(p) + grow > 0.0);
+        if matches!(self.recipe.margin, Margin::Entire) && self.recipe.notch.is_none() {
+            let near = cover.distance_to(0.3);
+            for (v, d) in cover.values.iter_mut().zip(near.values) {
+                *v = v.max((2.7 - d).clamp(0.0, 1.0));
+            }
         }
-        (hits * 255 / 16) as u8
+        cover.values.iter().map(|v| (v * 255.0 + 0.5) as u8).collect()
     }
 
     /// Heights, half the image's size: relief is smoother than colour.
@@ -266,8 +294,8 @@ impl<'a> Painter<'a> {
         let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
         let mm = self.recipe.length_mm.f32() / self.scale;
         let mut ink = self.veins[0].clone();
-        for (v, (a, b)) in ink.values.iter_mut().zip(self.veins[1].values.iter().zip(&self.veins[2].values)) {
-            *v = v.max(*a).max(b * 0.9);
+        for (v, secondary) in ink.values.iter_mut().zip(&self.veins[1].values) {
+            *v = v.max(*secondary);
         }
         let to_vein = ink.distance_to(0.45);
         let widened = |order: usize, radius: usize| {
@@ -284,6 +312,7 @@ impl<'a> Painter<'a> {
             widened(2, (2.0 * unit).round() as usize),
         ];
         let noise = Tiling::new(self.stream.clone().seed32().into());
+        let cells = Cells::new(u64::from(self.stream.clone().seed32()) + 5, (8192, 8192), 0.8);
         let (furrow, blister) = (relief.furrow_mm.f32(), relief.blister_mm.f32());
         let mut heights = Vec::with_capacity(width * height);
         for y in 0..height {
@@ -291,140 +320,21 @@ impl<'a> Painter<'a> {
                 let i = (y * 2).min(self.height - 1) * self.width + (x * 2).min(self.width - 1);
                 let p = self.place(x as f32 * 2.0 + 0.5, y as f32 * 2.0 + 0.5);
                 let away = to_vein.values[i].min(1e4) * mm / self.recipe.length_mm.f32();
-                // Blisters rise from the veins and flatten a fortieth of a length away.
-                let dome = 1.0 - (-away * 45.0).exp();
-                let swell = 1.0 + 0.35 * noise.fbm(p.x * 14.0 + 100.0, p.y * 14.0 + 100.0, 4096, 3, 0.5);
-                let grain = 0.012 * noise.fbm(p.x * 160.0 + 900.0, p.y * 160.0 + 900.0, 4096, 2, 0.5);
+                // The blade rises from the veins and flattens a thirtieth of a length away; on it lie blisters, a dozen
+                // to the length.
+                let bend = vec2(
+                    noise.fbm(p.x * 10.0 + 40.0, p.y * 10.0 + 40.0, 4096, 2, 0.5),
+                    noise.fbm(p.x * 10.0 + 70.0, p.y * 10.0 + 40.0, 4096, 2, 0.5),
+                );
+                let blisters = smoothstep(0.0, 0.42, cells.at(p * 13.0 + bend * 0.4 + vec2(600.0, 600.0)).border);
+                let dome = (1.0 - (-away * 30.0).exp()) * lerp(0.45, 1.0, blisters);
+                let swell = 1.0 + 0.35 * noise.fbm(p.x * 8.0 + 100.0, p.y * 8.0 + 100.0, 4096, 3, 0.5);
+                let grain = 0.010 * noise.fbm(p.x * 160.0 + 900.0, p.y * 160.0 + 900.0, 4096, 2, 0.5);
                 let h = blister * (dome * swell + grain)
                     - furrow * (furrows[0][i] + 0.5 * furrows[1][i] + 0.2 * furrows[2][i]).min(1.0);
                 heights.push(h + furrow);
             }
         }
         Grey::from_mm(width as u32, height as u32, &heights, relief.range_mm.f32())
-    }
-}
-
-/// What a place of the blade is made of.
-struct Tissue {
-    /// Share of the blade's chlorophyll.
-    chlorophyll: f32,
-    red: f32,
-    brown: f32,
-    meal: f32,
-    /// A factor on the colour: the epidermis' fine grain.
-    shade: f32,
-}
-
-struct Surface<'a> {
-    look: &'a Look,
-    length_mm: f32,
-    aspect: f32,
-    noise: Tiling,
-    areoles: Cells,
-    areole: f32,
-    blotches: Vec<(Vec2, f32, f32)>,
-    spots: Vec<(Vec2, f32, f32)>,
-    seed: u64,
-}
-
-impl<'a> Surface<'a> {
-    fn new(recipe: &'a LeafRecipe, stream: &Stream) -> Self {
-        let length_mm = recipe.length_mm.f32();
-        let aspect = recipe.aspect.f32();
-        let mut s = stream.child(Purpose::Texture, 3);
-        let mut marks = |mean: f64, lo: f32, hi: f32| -> Vec<(Vec2, f32, f32)> {
-            (0..s.poisson(mean))
-                .map(|_| {
-                    let p = vec2(s.range32(-0.5, 0.5) * aspect, s.range32(0.05, 0.97));
-                    (p, s.range32(lo, hi) / length_mm, s.range32(0.35, 1.0))
-                })
-                .collect()
-        };
-        let blotches = marks(recipe.look.blotches.get(), 2.5, 9.0);
-        let spots = marks(recipe.look.spots.get(), 0.15, 0.5);
-        let seed = s.seed32();
-        Self {
-            look: &recipe.look,
-            length_mm,
-            aspect,
-            noise: Tiling::new(seed.into()),
-            areoles: Cells::new(u64::from(seed) + 1, (8192, 8192), 0.85),
-            areole: recipe.look.areoles.0.f32() / length_mm,
-            blotches,
-            spots,
-            seed: u64::from(seed),
-        }
-    }
-
-    fn at(&self, p: Vec2, veins: [f32; 3], to_margin_mm: f32, shape: &Shape) -> Tissue {
-        let look = self.look;
-        let far = vec2(64.0, 64.0);
-        let noise = |q: Vec2, octaves: u32| self.noise.fbm(q.x, q.y, 8192, octaves, 0.55);
-        let across = (p.x.abs() / shape.half_width(p.y).max(1e-4)).min(1.0);
-
-        let mottle = look.mottle.f32();
-        let mut c = 1.0 + mottle * 1.4 * noise(p * 5.0 + far, 5) + mottle * 0.55 * noise(p * 55.0 + far * 2.0, 3);
-        c *= 1.0 - look.pale_base.f32() * (1.0 - smoothstep(0.0, 0.55, p.y));
-        c *= 1.0 - look.pale_margin.f32() * (-to_margin_mm / (0.016 * self.length_mm)).exp();
-
-        // Three generations of areoles, their borders bent by noise: the inner ones are paler lines still.
-        let bend = vec2(noise(p * 40.0 + far * 3.0, 2), noise(p * 40.0 + far * 5.0, 2));
-        let mut net = 0.0f32;
-        for (k, (size, weight)) in [(4.2, 1.35), (1.8, 1.0), (0.75, 0.55)].into_iter().enumerate() {
-            let cell = self.areoles.at(p / (self.areole * size) + bend * 0.35 + far * (k + 7) as f32);
-            let line = 1.0 - smoothstep(0.02, 0.02 + 0.15 / (size * 0.55_f32).max(1.0), cell.border);
-            net = net.max(line * weight);
-            c *= 1.0 + mottle * 0.8 * (cell.own - 0.5);
-        }
-        let fades = 1.0 - 0.35 * across;
-        c *= 1.0 - look.areoles.1.f32() * net * fades;
-        let mut kept = 1.0f32;
-        let keeps = [look.veins.0.f32(), look.veins.1.f32(), look.veins.2.f32()];
-        for (order, keep) in keeps.into_iter().enumerate().rev() {
-            // The midrib greens toward the tip, where it is thin and the blade lies over it.
-            let keep = if order == 0 {
-                lerp(keep, 0.62, smoothstep(0.2, 1.0, p.y))
-            } else {
-                lerp(keep, 0.85, 0.4 * across * across)
-            };
-            kept = kept.min(1.0 - (1.0 - keep) * veins[order]);
-        }
-        c *= kept;
-        for (q, radius, depth) in &self.blotches {
-            let ragged = radius * (1.0 + 0.5 * noise((p - *q) * 30.0 + far * 9.0, 3));
-            c *= 1.0 - 0.5 * depth * (1.0 - smoothstep(0.2, 1.0, p.distance(*q) / ragged.max(1e-5)));
-        }
-        let mut brown = 0.0f32;
-        for (q, radius, depth) in &self.spots {
-            let d = p.distance(*q) / (radius * (1.0 + 0.4 * noise((p - *q) * 200.0 + far * 11.0, 2))).max(1e-5);
-            brown = brown.max(depth * (1.0 - smoothstep(0.6, 1.0, d)));
-            c *= 1.0 - 0.35 * (1.0 - smoothstep(0.8, 2.2, d));
-        }
-        let rim = (-to_margin_mm / (0.010 * self.length_mm)).exp();
-        let foot = veins[0] * (1.0 - smoothstep(0.0, 0.45, p.y));
-        let red =
-            look.red.f32() * (rim + foot).min(1.0) * (0.7 + 0.6 * noise(p * 16.0 + far * 13.0, 3)).clamp(0.0, 1.0);
-
-        let meal = self.meal(p);
-        let hash = unit(mix(
-            self.seed ^ (u64::from((p.x * 6000.0 + 9e5) as u32) << 32 | u64::from((p.y * 6000.0 + 9e5) as u32))
-        ));
-        let shade = 1.0 + look.speckle.f32() * (noise(p * 230.0 + far * 17.0, 2) + 0.8 * (hash - 0.5));
-        Tissue { chlorophyll: c.max(0.02), red, brown, meal, shade }
-    }
-
-    /// Grains of meal: small round bladders, crowded at the base and along the middle.
-    fn meal(&self, p: Vec2) -> f32 {
-        let cover = self.look.meal.f32();
-        if cover == 0.0 {
-            return 0.0;
-        }
-        let size = 0.32 / self.length_mm;
-        let across = (p.x.abs() / (0.5 * self.aspect)).min(1.0);
-        let place = (1.25 - 1.05 * smoothstep(0.0, 0.8, p.y)) * (1.0 - 0.35 * across);
-        let patch = (1.0 + 1.3 * self.noise.fbm(p.x * 9.0 + 31.0, p.y * 9.0 + 77.0, 8192, 4, 0.55)).max(0.0);
-        let cell = self.areoles.at(p / size + vec2(501.0, 203.0));
-        let grain = smoothstep(0.05, 0.42, cell.border) * smoothstep(0.25, 0.95, cell.own);
-        (cover * place * patch * (0.35 + 1.5 * grain)).clamp(0.0, 0.85)
     }
 }

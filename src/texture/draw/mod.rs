@@ -7,6 +7,9 @@ mod cells;
 mod leaf;
 mod shape;
 mod soil;
+mod stamp;
+mod tile;
+mod tissue;
 mod veins;
 mod write;
 

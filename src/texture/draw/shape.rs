@@ -87,7 +87,8 @@ impl Shape {
                     for (k, side) in [-1.0f32, 1.0].into_iter().enumerate() {
                         let k = k as u64;
                         let pitch = start * 0.86 / n as f32;
-                        let y = 0.14 * start + even * start * 0.86 - 0.3 * pitch + random(i, k) * 0.3 * pitch;
+                        let y = 0.14 * start + even * start * 0.86 - 0.3 * pitch
+                            + (0.12 * side + 0.35 * random(i, k)) * pitch;
                         let lean = (lean_deg.f32() * (1.0 + 0.5 * random(i, 2 + k))).to_radians();
                         let axis = vec2(side * lean.cos(), lean.sin());
                         // Lobes grow toward the tip and stay within the outline's half-width where they end.

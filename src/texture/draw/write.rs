@@ -82,7 +82,7 @@ fn png_file(
     let mut encoder = png::Encoder::new(&mut file, width, height);
     encoder.set_color(color);
     encoder.set_depth(depth);
-    encoder.set_compression(png::Compression::High);
+    encoder.set_compression(png::Compression::Balanced);
     encoder.set_filter(png::Filter::Adaptive);
     inform(&mut encoder);
     text(&mut encoder, "License", LICENCE);

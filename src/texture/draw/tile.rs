@@ -1,0 +1,356 @@
+//! The steps by which ground is drawn; each changes heights and colours all over the tile. See [`super::soil`].
+
+use super::cells::Cells;
+use super::soil::{Litter, SoilRecipe};
+use super::stamp::Stamp;
+use super::{Drawn, Grey};
+use crate::math::{Vec2, Vec3, lerp, smoothstep, vec2, vec3};
+use crate::sampling::rng::{Purpose, Stream};
+use crate::sampling::vary::Num;
+use crate::texture::noise::Tiling;
+use crate::texture::srgb::ColorSpace;
+
+/// Ground while it is drawn.
+pub(super) struct Tile {
+    size: usize,
+    /// Pixels in a millimetre.
+    scale: f32,
+    period_mm: f32,
+    stream: Stream,
+    noise: Tiling,
+    spread: f32,
+    /// Heights, mm.
+    height: Vec<f32>,
+    colour: Vec<Vec3>,
+    albedo: Vec3,
+}
+
+impl Tile {
+    pub(super) fn new(recipe: &SoilRecipe, size: usize) -> Self {
+        let stream = Stream::of(recipe.seed.get() as u64, 0, Purpose::Texture, 1);
+        let period_mm = recipe.period_mm.f32();
+        let albedo = Vec3::from(recipe.albedo.map(Num::f32));
+        Self {
+            size,
+            scale: size as f32 / period_mm,
+            period_mm,
+            noise: Tiling::new(stream.child(Purpose::Texture, 1).seed32().into()),
+            stream,
+            spread: recipe.spread.f32(),
+            height: vec![0.0; size * size],
+            colour: vec![albedo; size * size],
+            albedo,
+        }
+    }
+
+    /// Noise over the tile whose first octave has features of `mm`.
+    fn noise(&self, x: f32, y: f32, mm: f32, octaves: u32, layer: u64) -> f32 {
+        let period = (self.period_mm / mm).round().max(1.0);
+        let k = period / self.size as f32;
+        let noise = Tiling::new(layer * 7919 + u64::from(self.noise.at(0.5, 0.5, 4).to_bits()));
+        noise.fbm(x * k, y * k, period as u32, octaves, 0.55)
+    }
+
+    fn each(&mut self, mut f: impl FnMut(&Self, f32, f32, usize) -> (f32, Vec3)) {
+        let (mut height, mut colour) = (vec![0.0; self.height.len()], vec![Vec3::ZERO; self.colour.len()]);
+        for y in 0..self.size {
+            for x in 0..self.size {
+                let i = y * self.size + x;
+                (height[i], colour[i]) = f(self, x as f32, y as f32, i);
+            }
+        }
+        (self.height, self.colour) = (height, colour);
+    }
+
+    /// The fine earth between crumbs.
+    pub(super) fn matrix(&mut self) {
+        let albedo = self.albedo;
+        self.each(|t, x, y, _| {
+            let swell = t.noise(x, y, t.period_mm / 5.0, 5, 1);
+            let grain = t.noise(x, y, 2.4, 3, 2);
+            let stain = t.noise(x, y, t.period_mm / 6.0, 5, 3);
+            let warm = t.noise(x, y, t.period_mm / 9.0, 4, 4);
+            let shade = 0.9 * (1.0 + 0.10 * stain + 0.16 * grain);
+            (2.6 + 2.4 * swell + 0.5 * grain, albedo * shade * vec3(1.0 + 0.03 * warm, 1.0, 1.0 - 0.05 * warm))
+        });
+    }
+
+    /// Places a stamp; what lies higher stays.
+    fn stamp(&mut self, stamp: &Stamp, paint: impl Fn(Vec2, f32, Vec3) -> Vec3, rough: f32) {
+        let reach = stamp.axes.max_element().ceil() as i32 + 1;
+        let (cx, cy) = (stamp.centre.x.floor() as i32, stamp.centre.y.floor() as i32);
+        let n = self.size as i32;
+        for y in cy - reach..=cy + reach {
+            for x in cx - reach..=cx + reach {
+                let offset = vec2(x as f32 + 0.5, y as f32 + 0.5) - stamp.centre;
+                let Some(h) = stamp.at(offset) else { continue };
+                let i = y.rem_euclid(n) as usize * self.size + x.rem_euclid(n) as usize;
+                let bump = if rough > 0.0 {
+                    1.0 + rough * self.noise.at(x as f32 * 0.37 + 7.0, y as f32 * 0.37, 65536)
+                } else {
+                    1.0
+                };
+                let top = stamp.bottom + stamp.dome * h * bump;
+                if top > self.height[i] {
+                    self.height[i] = top;
+                    self.colour[i] = paint(offset, h, self.colour[i]);
+                }
+            }
+        }
+    }
+
+    fn surface(&self, p: Vec2) -> f32 {
+        let n = self.size;
+        self.height[(p.y as usize).min(n - 1) * n + (p.x as usize).min(n - 1)]
+    }
+
+    fn somewhere(&self, s: &mut Stream) -> Vec2 {
+        vec2(s.range32(0.0, self.size as f32), s.range32(0.0, self.size as f32))
+    }
+
+    /// Sizes of things by the power law, large first, until their areas cover a share of the ground.
+    fn sizes(&self, cover: f32, low: f32, high: f32, power: f32, s: &mut Stream) -> Vec<f32> {
+        let mut left = cover * self.period_mm * self.period_mm;
+        let cut = (low / high).powf(power);
+        let mut sizes = Vec::new();
+        while left > 0.0 {
+            let l = low * (1.0 - s.uniform32() * (1.0 - cut)).powf(-1.0 / power);
+            left -= std::f32::consts::FRAC_PI_4 * 0.77 * l * l;
+            sizes.push(l);
+        }
+        sizes.sort_by(|a, b| b.total_cmp(a));
+        sizes
+    }
+
+    pub(super) fn crumbs(&mut self, recipe: &SoilRecipe) {
+        let c = &recipe.crumbs;
+        let mut s = self.stream.child(Purpose::Texture, 2);
+        let ground = self.height.clone();
+        let n = self.size;
+        for l in self.sizes(c.cover.f32().min(4.0), c.smallest_mm.f32(), c.largest_mm.f32(), c.power.f32(), &mut s) {
+            let centre = self.somewhere(&mut s);
+            let dome = 0.55 * l * s.range32(0.75, 1.05);
+            let sunk = dome * s.range32(0.25, 0.5);
+            let earth = ground[(centre.y as usize).min(n - 1) * n + (centre.x as usize).min(n - 1)];
+            // Small crumbs lie in the gaps more than on top of large ones.
+            let bottom = lerp(earth, self.surface(centre), s.range32(0.1, 0.45)) - sunk;
+            let axes = vec2(0.5, 0.5 * s.range32(0.66, 0.9)) * l * self.scale;
+            let axes = axes.max(Vec2::splat(0.6));
+            let stamp = Stamp::new(centre, axes, bottom, dome, s.range32(0.2, 0.9), &mut s);
+            // Coarse crumbs broke from deeper, moister soil at random; fine ones mix and so differ less.
+            let bright = (f64::from(self.spread) * s.normal()).exp() as f32 * 1.03;
+            let warm = s.normal() as f32;
+            let own = self.albedo * bright * vec3(1.0 + 0.022 * warm, 1.0, 1.0 - 0.04 * warm);
+            self.stamp(&stamp, |_, h, _| own * (0.97 + 0.06 * h), (0.05 * l).clamp(0.10, 0.18));
+        }
+    }
+
+    /// Dry dust makes what stands out paler, moisture darkens the gaps.
+    pub(super) fn dust(&mut self) {
+        let mean = self.height.iter().sum::<f32>() / self.height.len() as f32;
+        let soft = crate::texture::maps::blur(
+            &self.height,
+            (self.size, self.size),
+            (4.0 * self.scale) as usize,
+            crate::texture::Wrap::Repeat,
+        );
+        self.each(|t, x, y, i| {
+            let stands = ((t.height[i] - soft[i]) * 0.5).clamp(-1.0, 1.0);
+            let high = ((t.height[i] - mean) * 0.15).clamp(-1.0, 1.0);
+            let fine = t.noise(x, y, 1.4, 2, 5);
+            (t.height[i], t.colour[i] * (1.0 + 0.10 * stands + 0.06 * high + 0.06 * fine))
+        });
+    }
+
+    /// Rain beats the crumbs down to a smooth, paler crust.
+    pub(super) fn slake(&mut self) {
+        let size = (self.size, self.size);
+        let wrap = crate::texture::Wrap::Repeat;
+        let soften = |t: &Self, mm: f32| {
+            let radius = (mm * t.scale).round().max(1.0) as usize;
+            crate::texture::maps::blur(&crate::texture::maps::blur(&t.height, size, radius, wrap), size, radius, wrap)
+        };
+        let (soft, broad) = (soften(self, 1.0), soften(self, 9.0));
+        let albedo = self.albedo;
+        self.each(|t, x, y, i| {
+            let sieve = smoothstep(-0.2, 0.5, t.noise(x, y, 26.0, 4, 6));
+            // Where the crust is thin, beaten crumbs still show.
+            let shows = lerp(0.18, 0.8, sieve);
+            let grain = t.noise(x, y, 1.6, 3, 7);
+            let pore = smoothstep(0.42, 0.6, t.noise(x, y, 3.2, 2, 8));
+            let h = 4.6 + 0.45 * (broad[i] - 2.6) + 0.5 * shows * (soft[i] - broad[i]) + 0.12 * grain - 0.5 * pore;
+            let veil = albedo * (1.0 + 0.10 * t.noise(x, y, 60.0, 5, 9));
+            let colour = veil.lerp(t.colour[i], 0.25 + 0.4 * shows) * (1.0 + 0.05 * grain - 0.10 * pore);
+            (h, colour)
+        });
+    }
+
+    pub(super) fn crack(&mut self, plate: f32, widest: f32, depth: f32) {
+        let seed = u64::from(self.stream.child(Purpose::Texture, 3).seed32());
+        let layers = [(plate, 1.0, 0.0), (plate / 2.9, 0.3, 0.75)].map(|(mm, width, missing)| {
+            let n = (self.period_mm / mm).round().max(1.0);
+            (Cells::new(seed + mm as u64, (n as u32, n as u32), 0.9), n, width, missing)
+        });
+        self.each(|t, x, y, i| {
+            let bend = |mm: f32, layer: u64| vec2(t.noise(x, y, mm, 5, layer), t.noise(x, y, mm, 5, layer + 1));
+            let warp = bend(plate * 0.5, 20) * plate * 0.16;
+            let ragged = bend(5.0, 24) * 0.9;
+            let mut open = 0.0f32;
+            let (mut curl, mut own) = (0.0f32, 0.5);
+            for (k, (cells, n, width, missing)) in layers.iter().enumerate() {
+                let unit = t.period_mm / n;
+                let p = (vec2(x + 0.5, y + 0.5) / t.scale + warp + ragged) / unit;
+                let cell = cells.at(p);
+                let away = cell.border * unit;
+                if k == 0 {
+                    own = cell.own;
+                }
+                // Only some plates broke again, and not along every line.
+                if k == 1 && (own < 0.35 || cell.shared < missing - 0.6 * own) {
+                    continue;
+                }
+                let vary = lerp(0.35, 1.0, cell.shared) * (1.0 + 0.5 * t.noise(x, y, 18.0, 3, 30));
+                let half = 0.5 * widest * width * vary.max(0.15);
+                let pixel = 0.5 / t.scale;
+                open = open.max(1.0 - smoothstep(half - pixel, half + pixel + 0.3 * half, away));
+                curl = curl.max(width * (-away / (0.09 * plate)).exp());
+            }
+            let wall = open * depth * (0.75 + 0.25 * t.noise(x, y, 4.0, 2, 31));
+            let h = t.height[i] + 0.9 * curl - wall;
+            let tone = 1.0 + 0.12 * (own - 0.5) + 0.05 * curl;
+            // Inside a crack the earth is moister, hence darker; its shadow is the renderer's.
+            (h, t.colour[i] * tone * (1.0 - 0.32 * open))
+        });
+        let lowest = self.height.iter().copied().fold(f32::MAX, f32::min);
+        let lift = (0.2 - lowest).max(0.0);
+        self.height.iter_mut().for_each(|h| *h += lift);
+    }
+
+    pub(super) fn litter(&mut self, litter: &Litter) {
+        let mut s = self.stream.child(Purpose::Texture, 4);
+        let area = f64::from(self.period_mm * self.period_mm) * 1e-6;
+        for _ in 0..s.poisson(litter.grains.get() * area) {
+            let pale = vec3(0.42, 0.38, 0.32) * s.range32(0.75, 1.35);
+            self.bit(s.range32(0.5, 1.5), 0.9, pale, &mut s);
+        }
+        for _ in 0..s.poisson(litter.humus.get() * area) {
+            let dark = vec3(0.075, 0.048, 0.030).lerp(vec3(0.20, 0.085, 0.040), s.uniform32().powi(2));
+            let length = 0.8 * (1.0 - s.uniform32()).powf(-0.55);
+            self.bit(length.min(7.0), s.range32(0.25, 0.6), dark * s.range32(0.8, 1.3), &mut s);
+        }
+        for _ in 0..s.poisson(litter.fibres.get() * area) {
+            let straw = vec3(0.38, 0.30, 0.17).lerp(vec3(0.22, 0.15, 0.09), s.uniform32()) * s.range32(0.8, 1.25);
+            self.fibre(s.range32(3.0, 16.0), s.range32(0.35, 0.8), straw, &mut s);
+        }
+    }
+
+    fn bit(&mut self, length: f32, slim: f32, colour: Vec3, s: &mut Stream) {
+        let centre = self.somewhere(s);
+        let axes = (vec2(0.5, 0.5 * slim) * length * self.scale).max(Vec2::splat(0.75));
+        let dome = 0.35 * length * slim;
+        let stamp = Stamp::new(centre, axes, self.surface(centre) - 0.2 * dome, dome + 0.15, 0.8, s);
+        self.stamp(&stamp, |_, h, under| under.lerp(colour, smoothstep(0.0, 0.35, h)), 0.0);
+    }
+
+    /// A thin, slightly bent fibre that lies on the ground.
+    fn fibre(&mut self, length: f32, width: f32, colour: Vec3, s: &mut Stream) {
+        let mut p = self.somewhere(s);
+        let (mut heading, bend) = (s.range32(0.0, std::f32::consts::TAU), s.range32(-0.06, 0.06));
+        let steps = (length * self.scale / 0.5) as usize;
+        let n = self.size as f32;
+        for k in 0..steps {
+            let ends =
+                smoothstep(0.0, 0.15, k as f32 / steps as f32) * (1.0 - smoothstep(0.85, 1.0, k as f32 / steps as f32));
+            let radius = (0.5 * width * self.scale * lerp(0.5, 1.0, ends)).max(0.62);
+            let q = vec2(p.x.rem_euclid(n), p.y.rem_euclid(n));
+            let stamp = Stamp {
+                centre: q,
+                axes: Vec2::splat(radius),
+                turn: vec2(1.0, 0.0),
+                bottom: self.surface(q) - 0.02,
+                dome: 0.12,
+                facets: [(Vec2::ZERO, 0.0, 9.0); 6],
+                sharp: 0.0,
+            };
+            self.stamp(&stamp, |_, h, under| under.lerp(colour, smoothstep(0.0, 0.6, h)), 0.0);
+            heading += bend * 0.25 + s.range32(-0.05, 0.05);
+            p += vec2(heading.cos(), heading.sin()) * 0.5;
+        }
+    }
+
+    pub(super) fn stones(&mut self, cover: f32, low: f32, high: f32) {
+        // Grey limestone, ochre, reddish sandstone, slate, flint, quartz; with their shares.
+        let kinds = [
+            (vec3(0.29, 0.25, 0.20), 0.32),
+            (vec3(0.29, 0.215, 0.135), 0.24),
+            (vec3(0.26, 0.165, 0.115), 0.14),
+            (vec3(0.19, 0.18, 0.165), 0.14),
+            (vec3(0.11, 0.10, 0.095), 0.08),
+            (vec3(0.42, 0.385, 0.33), 0.08),
+        ];
+        let mut s = self.stream.child(Purpose::Texture, 5);
+        for l in self.sizes(cover, low, high, 2.2, &mut s) {
+            let centre = self.somewhere(&mut s);
+            let mut pick = s.uniform32();
+            let (mut rock, mut index) = (kinds[0].0, 0);
+            for (k, (colour, share)) in kinds.into_iter().enumerate() {
+                if pick >= 0.0 {
+                    (rock, index) = (colour, k);
+                }
+                pick -= share;
+            }
+            let rock = rock * (0.16 * s.normal()).exp() as f32;
+            let axes = (vec2(0.5, 0.5 * s.range32(0.6, 0.92)) * l * self.scale).max(Vec2::splat(0.8));
+            let dome = 0.5 * l * s.range32(0.6, 0.9);
+            let bottom = self.surface(centre).min(4.5) - dome * s.range32(0.2, 0.5);
+            let sharp = if index >= 3 { s.range32(0.5, 0.9) } else { s.range32(0.0, 0.6) };
+            let stamp = Stamp::new(centre, axes, bottom, dome, sharp, &mut s);
+            let (noise, soil) = (self.noise, self.albedo);
+            let (vein, shift) = (s.range32(0.0, 1.0), s.range32(0.0, 900.0));
+            let turn = stamp.turn;
+            let scale = self.scale;
+            let paint = move |offset: Vec2, h: f32, _: Vec3| {
+                let q = offset / scale + shift;
+                let fleck = noise.fbm(q.x * 1.1, q.y * 1.1, 65536, 3, 0.6);
+                // Some stones are banded.
+                let band = if vein > 0.7 {
+                    (offset.dot(turn) / scale * 1.3 + 2.0 * noise.at(q.x * 0.3, q.y * 0.3, 65536)).sin()
+                } else {
+                    0.0
+                };
+                let cloud = noise.fbm(q.x * 0.25, q.y * 0.25, 65536, 3, 0.5);
+                let bare = rock * (1.0 + 0.16 * fleck + 0.08 * band + 0.12 * cloud);
+                // Earth clings to the foot, and dust to hollows.
+                let dust = (1.0 - smoothstep(0.05, 0.5, h)).max(0.5 * smoothstep(0.1, 0.5, cloud));
+                bare.lerp(soil, 0.65 * dust)
+            };
+            self.stamp(&stamp, paint, 0.02);
+        }
+    }
+
+    /// Scales colours so that their mean is the soil's.
+    pub(super) fn balance(&mut self, albedo: Vec3) {
+        let sum = self
+            .colour
+            .iter()
+            .fold([0.0f64; 3], |s, c| [s[0] + f64::from(c.x), s[1] + f64::from(c.y), s[2] + f64::from(c.z)]);
+        let n = self.colour.len() as f64;
+        let mean = Vec3::from(sum.map(|s| (s / n) as f32));
+        let factor = albedo / mean.max(Vec3::splat(1e-4));
+        self.colour.iter_mut().for_each(|c| *c *= factor);
+    }
+
+    pub(super) fn finish(self, range_mm: f32) -> Drawn {
+        let n = self.size as u32;
+        let rgba = self
+            .colour
+            .iter()
+            .flat_map(|c| {
+                let code = |v: f32| ColorSpace::Srgb.encode(v.clamp(0.0, 0.9));
+                [code(c.x), code(c.y), code(c.z), 255]
+            })
+            .collect();
+        let relief = Some(Grey::from_mm(n, n, &self.height, range_mm));
+        Drawn { width: n, height: n, rgba, opaque: true, relief }
+    }
+}
