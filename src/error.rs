@@ -75,15 +75,34 @@ pub struct PageError {
     pub help: String,
 }
 
+/// Most characters of a page's line that an error shows.
+const WINDOW: usize = 140;
+
+/// A character as an error may show it: one column wide.
+fn visible(c: char) -> char {
+    match c {
+        '\t' => ' ',
+        c if c.is_control() => '·',
+        c => c,
+    }
+}
+
 impl std::fmt::Display for PageError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { path, line, column, width, text, message, help } = self;
         let margin = line.to_string().len().max(4);
-        writeln!(f, "{}:{line}:{column}: {message}", path.display())?;
-        writeln!(f, "{line:>margin$} | {}", text.replace('\t', " "))?;
-        write!(f, "{:margin$} | {:indent$}{}", "", "", "^".repeat(*width), indent = column - 1)?;
+        // Of a long line only the part around the fault; nothing that a terminal would obey.
+        let hidden = if *column > WINDOW - 20 { column - WINDOW / 2 } else { 0 };
+        let shown: String = text.chars().skip(hidden).take(WINDOW).map(visible).collect();
+        let (before, after) =
+            (if hidden > 0 { "… " } else { "" }, if text.chars().count() > hidden + WINDOW { " …" } else { "" });
+        let indent = column - 1 - hidden + before.chars().count();
+        let width = (*width).min(WINDOW + 1 - (column - hidden)).max(1);
+        writeln!(f, "{}:{line}:{column}: {}", path.display(), message.replace(char::is_control, "·"))?;
+        writeln!(f, "{line:>margin$} | {before}{shown}{after}")?;
+        write!(f, "{:margin$} | {:indent$}{}", "", "", "^".repeat(width))?;
         if !help.is_empty() {
-            write!(f, "\n help: {help}")?;
+            write!(f, "\n help: {}", help.replace(char::is_control, "·"))?;
         }
         Ok(())
     }

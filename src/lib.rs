@@ -6,14 +6,18 @@
 //!
 //! | floor | rooms |
 //! |---|---|
-//! | 8 | [`output`] |
-//! | 7 | [`render`] |
-//! | 6 | [`integrator`] |
-//! | 5 | [`scene`] |
-//! | 4 | [`material`], [`scatter`] |
-//! | 3 | [`bsdf`], [`light`], [`sensor`], [`plant`], [`soil`], [`accel`] |
-//! | 2 | [`sampling`], [`geometry`], [`texture`], [`optics`], [`film`], [`page`], [`cli`] |
+//! | 10 | [`output`] |
+//! | 9 | [`render`] |
+//! | 8 | [`integrator`] |
+//! | 7 | [`scene`] |
+//! | 6 | [`material`], [`scatter`] |
+//! | 5 | [`bsdf`], [`light`], [`sensor`], [`plant`], [`soil`], [`accel`] |
+//! | 4 | [`texture`] |
+//! | 3 | [`optics`], [`film`], [`page`], [`cli`] |
+//! | 2 | [`sampling`], [`geometry`] |
 //! | 1 | [`math`], [`error`] |
+//!
+//! `tests/architecture.rs` reads this table and holds the rooms to it.
 
 pub mod accel;
 pub mod bsdf;

@@ -1,13 +1,18 @@
 //! Pages: RON files, read with errors that show their place.
 
 use crate::error::PageError;
-use crate::sampling::fault::{Fault, locate, offset_of};
+use crate::sampling::fault::{Fault, locate, nearest, offset_of};
+use crate::sampling::place::{Step, place};
 use crate::{Error, Result};
+use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
 /// Largest page that is read, bytes: a page is written by hand.
 const LARGEST: u64 = 4 << 20;
+
+/// Bytes of a value that are underlined as a whole.
+const MOST_UNDERLINED: usize = 48;
 
 /// A page's text and where it lies.
 #[derive(Clone, Debug)]
@@ -21,15 +26,32 @@ pub struct Page {
 impl Page {
     /// Reads a file.
     pub fn read(path: &Path) -> Result<Self> {
-        let size = std::fs::metadata(path).map_err(Error::io(path))?.len();
-        if size > LARGEST {
-            return Err(Error::Scene(format!("{}: {size} bytes is too large for a page", path.display())));
+        let refuse = |what: &str| Err(Error::Scene(format!("{}: {what}", path.display())));
+        let about = std::fs::metadata(path).map_err(Error::io(path))?;
+        if about.is_dir() {
+            return refuse("this is a folder\n help: name a page in it, a file that ends in .ron");
+        }
+        if about.len() > LARGEST {
+            return refuse(
+                "this file is too large for a page\n help: a page is text of at most 4 MiB that ends in .ron",
+            );
         }
         let bytes = std::fs::read(path).map_err(Error::io(path))?;
-        let text = String::from_utf8(bytes).map_err(|_| {
-            Error::Scene(format!("{}: it is not text (UTF-8), so it is not a RON page", path.display()))
-        })?;
-        Ok(Self { path: path.into(), text })
+        // Some editors begin a file with a byte order mark.
+        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
+        if bytes.contains(&0) {
+            return refuse("this is not a text file\n help: a page is text that ends in .ron");
+        }
+        match std::str::from_utf8(bytes) {
+            Ok(text) => Ok(Self { path: path.into(), text: text.to_owned() }),
+            Err(e) => {
+                let at = e.valid_up_to();
+                let page = Self { path: path.into(), text: String::from_utf8_lossy(bytes).into_owned() };
+                let message = format!("byte {:#04x} is not UTF-8 text", bytes[at]);
+                let help = "save the page as UTF-8".to_owned();
+                Err(page.fault(&Fault { raw_len: page.text.len(), start: at, end: at + 1, message, help }))
+            }
+        }
     }
 
     /// A page that lies nowhere, for tests and tools; its paths are relative to the working directory.
@@ -39,11 +61,29 @@ impl Page {
 
     /// Reads the page as `T`.
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T> {
-        use ron::extensions::Extensions;
-        // `notch: 0.05`, `Leaf(size: …)`: a page needs neither `Some` nor doubled brackets.
-        let options = ron::Options::default()
-            .with_default_extension(Extensions::IMPLICIT_SOME | Extensions::UNWRAP_VARIANT_NEWTYPES);
-        options.from_str(&self.text).map_err(|e| self.fault(&locate(&self.text, &e)))
+        if self.text.trim().is_empty() {
+            let help = "a page begins with a name and a bracket, as scenes/field.ron with `Field(`".to_owned();
+            return Err(self.fault(&Fault {
+                raw_len: 0,
+                start: 0,
+                end: 0,
+                message: "this page is empty".to_owned(),
+                help,
+            }));
+        }
+        options().from_str(&self.text).map_err(|e| {
+            let fault = locate(&self.text, &e);
+            let help = decimal_comma(&self.text, &fault).unwrap_or(fault.help.clone());
+            self.fault(&Fault { help, ..fault })
+        })
+    }
+
+    /// The text of a page that reads as `value`.
+    pub fn print<T: Serialize>(value: &T) -> Result<String> {
+        let pretty = ron::ser::PrettyConfig::new().struct_names(true).compact_arrays(true);
+        options()
+            .to_string_pretty(value, pretty)
+            .map_err(|e| Error::Scene(format!("this cannot be written as a page: {e}")))
     }
 
     /// A path written in the page, relative to the page's folder.
@@ -59,18 +99,36 @@ impl Page {
         self.fault(&Fault { raw_len: self.text.len(), start, end: start + len, message, help })
     }
 
+    /// An error about the value that `path` leads to. What was found while building, in words with ` help:` on a line of
+    /// its own, gets its place in the page; other errors stay as they are.
+    pub fn blame(&self, path: &[Step<'_>], error: Error) -> Error {
+        let Error::Scene(words) = error else { return error };
+        let (message, help) = words.split_once("\n help: ").unwrap_or((&words, ""));
+        let mut at = place(&self.text, path);
+        // Of a long value only its name or bracket.
+        let value = &self.text[at.clone()];
+        if value.len() > MOST_UNDERLINED || value.contains('\n') {
+            at.end = at.start + value.find(['(', '[', '{']).map_or(value.len(), |i| i.max(1));
+        }
+        let (message, help) = (message.to_owned(), help.to_owned());
+        self.fault(&Fault { raw_len: self.text.len(), start: at.start, end: at.end, message, help })
+    }
+
     /// Checks that a file named in the page is there.
     pub fn need_file(&self, path: &str) -> Result<PathBuf> {
         let full = self.resolve(path);
         if full.is_file() {
             return Ok(full);
         }
-        let folder = full.parent().unwrap_or(Path::new("")).display().to_string();
-        Err(self.about(
-            path,
-            format!("there is no file `{path}`"),
-            format!("paths are relative to the page: looked in {folder}"),
-        ))
+        let folder = tidy(full.parent().unwrap_or(Path::new("")));
+        let name = full.file_name().unwrap_or_default().to_string_lossy();
+        let mut files: Vec<String> = std::fs::read_dir(&folder)
+            .map(|entries| entries.filter_map(|e| e.ok()?.file_name().into_string().ok()).collect())
+            .unwrap_or_default();
+        files.sort();
+        let near = nearest(&files, &name).map(|n| format!("did you mean `{n}`? ")).unwrap_or_default();
+        let help = format!("{near}a path counts from the page's folder: looked in {}", folder.display());
+        Err(self.about(path, format!("there is no file `{path}`"), help))
     }
 
     fn fault(&self, fault: &Fault) -> Error {
@@ -100,6 +158,44 @@ impl Page {
         }
         .into()
     }
+}
+
+/// A folder without `..` behind other folders, as a reader would name it.
+fn tidy(folder: &Path) -> PathBuf {
+    use std::path::Component;
+    let mut short = PathBuf::new();
+    for part in folder.components() {
+        match (part, short.components().next_back()) {
+            (Component::ParentDir, Some(Component::Normal(_))) => {
+                short.pop();
+            }
+            (Component::CurDir, _) => {}
+            _ => short.push(part),
+        }
+    }
+    if short.as_os_str().is_empty() { ".".into() } else { short }
+}
+
+/// What to tell who writes 0,85: a comma ends a number, which then is out of range, or is followed by what is no field.
+fn decimal_comma(text: &str, fault: &Fault) -> Option<String> {
+    let is_number = |t: &str| !t.is_empty() && t.bytes().all(|b| b.is_ascii_digit());
+    let (before, at, after) = (text.get(..fault.start)?, text.get(fault.start..fault.end)?, text.get(fault.end..)?);
+    if !is_number(at) {
+        return None;
+    }
+    let digit = |c: char| c.is_ascii_digit();
+    let (whole, part) = match (before.strip_suffix(','), after.strip_prefix(',')) {
+        (_, Some(rest)) if rest.starts_with(digit) => (at, &rest[..rest.find(|c| !digit(c)).unwrap_or(rest.len())]),
+        (Some(rest), _) if rest.ends_with(digit) => (&rest[rest.rfind(|c| !digit(c)).map_or(0, |i| i + 1)..], at),
+        _ => return None,
+    };
+    Some(format!("decimals are written with a point: {whole}.{part}"))
+}
+
+/// `notch: 0.05`, `Leaf(size: …)`: a page needs neither `Some` nor doubled brackets.
+fn options() -> ron::Options {
+    use ron::extensions::Extensions;
+    ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME | Extensions::UNWRAP_VARIANT_NEWTYPES)
 }
 
 #[cfg(test)]
@@ -132,8 +228,8 @@ mod tests {
     #[test]
     fn an_impossible_value_is_underlined() {
         let m = message("Sun(elevation_deg: Uniform(-3, 2), azimuth_deg: 1)");
-        assert!(m.contains("page.ron:1:20: the lower end -3 is out of range"), "{m}");
-        assert!(m.contains("^^^^^^^^^^^^^^"), "{m}");
+        assert!(m.contains("page.ron:1:28: the lower end -3 is out of range"), "{m}");
+        assert!(m.contains(" ^^\n") || m.ends_with(" ^^"), "{m}");
         let m = message("Sun(elevation_deg: Unifrom(1, 2), azimuth_deg: 1)");
         assert!(m.contains("page.ron:1:20") && m.contains("did you mean `Uniform`"), "{m}");
     }

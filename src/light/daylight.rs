@@ -29,7 +29,7 @@ pub struct AboveHorizon;
 impl Bound for AboveHorizon {
     const MIN: f64 = 0.0;
     const MAX: f64 = 90.0;
-    const WORDS: &'static str = "between 0 and 90 degrees: there is no daylight from below the horizon";
+    const WORDS: &'static str = "between 0 and 90 degrees, for there is no daylight from below the horizon";
 }
 
 /// Turbidity of the air: 2 very clear, 3 clear, 6 hazy.

@@ -8,6 +8,9 @@ use solar_positioning::time::JulianDate;
 use solar_positioning::{Location, RefractionCorrection, SolarPositions, delta_t};
 use std::fmt;
 
+/// How a time is written.
+const FORM: &str = "write universal time (not local time) as \"2016-05-27T14:30:00Z\"";
+
 /// A second of universal time, written `YYYY-MM-DDThh:mm:ssZ`.
 ///
 /// ```
@@ -30,7 +33,7 @@ pub struct Utc {
 impl Utc {
     /// Reads the one form that is allowed; the error says what is wrong with it.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let form = || format!("`{text}` is not a time; write UTC as \"2016-05-27T14:30:00Z\"");
+        let form = || format!("`{text}` is not a time");
         let shape_holds = text.len() == 20
             && text.bytes().zip(b"0000-00-00T00:00:00Z".iter()).all(|(byte, &like)| match like {
                 b'0' => byte.is_ascii_digit(),
@@ -84,7 +87,7 @@ impl<'de> Deserialize<'de> for Utc {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         from_raw(deserializer, |raw| {
             let text: String = parse_in(raw)?;
-            Self::parse(&text).map_err(|message| whole(raw, message))
+            Self::parse(&text).map_err(|message| whole(raw, message, FORM))
         })
     }
 }

@@ -36,7 +36,7 @@ pub use organ::{Organ, OrganKind};
 pub use stage::{BUD, LayerDesc, StageDesc};
 
 use crate::sampling::Stream;
-use crate::sampling::vary::{self, Finite, Positive, Vary};
+use crate::sampling::vary::{self, Finite, Positive, Step, Vary};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 
@@ -163,7 +163,7 @@ impl<'de> Deserialize<'de> for PlantDesc {
                 hypocotyl_skin: w.hypocotyl_skin,
                 stem_skin: w.stem_skin,
             };
-            desc.check().map_err(|message| vary::whole(raw, message))?;
+            desc.check_at().map_err(|(at, message, help)| vary::inside(raw, &at, message, help))?;
             Ok(desc)
         })
     }
@@ -172,30 +172,57 @@ impl<'de> Deserialize<'de> for PlantDesc {
 impl PlantDesc {
     /// What does not fit together, in words. A page that was read has passed this.
     pub fn check(&self) -> Result<(), String> {
+        self.check_at().map_err(|(_, message, _)| message)
+    }
+
+    /// The same, with the place in the page.
+    fn check_at(&self) -> Result<(), (Vec<Step<'static>>, String, String)> {
+        use Step::{Field, Item};
         if self.stages.is_empty() {
-            return Err("a plant needs at least one stage".into());
+            let help = "write (bbch: 10, days: 4, hypocotyl_mm: 8, stem_mm: 1, layers: […])";
+            return Err((vec![Field("stages")], "a plant needs at least one stage".into(), help.into()));
         }
-        let kinds = || self.kinds.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
-        for stage in &self.stages {
+        for (i, stage) in self.stages.iter().enumerate() {
+            let mut at = vec![Field("stages"), Item(i), Field("layers")];
             let leaves: f64 = stage.layers.iter().map(|l| l.leaves.get()).sum();
             if leaves > 1000.0 {
-                return Err(format!("{leaves} leaves at BBCH {}: at most 1000 can be numbered", stage.bbch));
+                let message = format!("{leaves} leaves at BBCH {}: labels number at most 1000 of a plant", stage.bbch);
+                return Err((at, message, "write fewer layers, or fewer leaves in each".into()));
             }
-            if let Some(layer) = stage.layers.iter().find(|l| !self.kinds.contains_key(&l.kind)) {
-                return Err(format!("no kind of leaf is called \"{}\"; there are: {}", layer.kind, kinds()));
+            if let Some(k) = stage.layers.iter().position(|l| !self.kinds.contains_key(&l.kind)) {
+                at.extend([Item(k), Field("kind")]);
+                let kind = &stage.layers[k].kind;
+                let known: Vec<&str> = self.kinds.keys().map(String::as_str).collect();
+                let message = format!("no kind of leaf is called \"{kind}\"");
+                return Err((at, message, vary::choose("kinds", &known, kind)));
             }
         }
-        for pair in self.stages.windows(2) {
+        for (i, pair) in self.stages.windows(2).enumerate() {
             let [from, to] = pair else { continue };
-            let at = format!("between BBCH {} and {}", from.bbch, to.bbch);
-            if to.bbch <= from.bbch || to.days.get() <= from.days.get() {
-                return Err(format!("{at}: stages must rise in bbch and in days"));
+            let wrong = |field: Step<'static>, what: &str, help: &str| {
+                let at = vec![Field("stages"), Item(i + 1), field];
+                Err((at, format!("between BBCH {} and {}: {what}", from.bbch, to.bbch), help.to_owned()))
+            };
+            if to.bbch <= from.bbch {
+                return wrong(Field("bbch"), "stages must rise in bbch and in days", "write the youngest stage first");
+            }
+            if to.days.get() <= from.days.get() {
+                return wrong(Field("days"), "stages must rise in bbch and in days", "write the youngest stage first");
             }
             if to.layers.len() < from.layers.len() {
-                return Err(format!("{at}: layers are lost; write blade_mm: 0 for a leaf that is gone"));
+                return wrong(Field("layers"), "layers are lost", "write blade_mm: 0 for a leaf that is gone");
             }
-            if from.layers.iter().zip(&to.layers).any(|(a, b)| a.kind != b.kind || a.leaves != b.leaves) {
-                return Err(format!("{at}: a layer changes its kind or its number of leaves"));
+            let differs = |k: &usize| {
+                let (a, b) = (&from.layers[*k], &to.layers[*k]);
+                a.kind != b.kind || a.leaves != b.leaves
+            };
+            if let Some(k) = (0..from.layers.len()).find(differs) {
+                let at = vec![Field("stages"), Item(i + 1), Field("layers"), Item(k)];
+                let message = format!(
+                    "between BBCH {} and {}: a layer changes its kind or its number of leaves",
+                    from.bbch, to.bbch
+                );
+                return Err((at, message, "new layers come after those of the stage before".into()));
             }
         }
         Ok(())

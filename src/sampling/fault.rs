@@ -4,6 +4,7 @@
 //! text here. A [`Fault`] carries its place outward through serde's string-only errors, between control characters that no
 //! page's text can bring in by itself.
 
+use super::place::{Step, mismatch, place, token};
 use ron::error::{Error as Ron, SpannedError};
 use serde::{Deserialize, Deserializer, de};
 use std::fmt;
@@ -44,10 +45,15 @@ impl Fault {
     }
 }
 
-/// A fault that covers the whole value.
-pub fn whole(raw: &str, message: impl Into<String>) -> Fault {
-    let end = raw.trim_end().len();
-    Fault { raw_len: raw.len(), start: 0, end, message: message.into(), help: String::new() }
+/// A fault that covers the whole value; `help` says what to do.
+pub fn whole(raw: &str, message: impl Into<String>, help: impl Into<String>) -> Fault {
+    inside(raw, &[], message, help)
+}
+
+/// A fault of what `path` leads to within the value.
+pub fn inside(raw: &str, path: &[Step<'_>], message: impl Into<String>, help: impl Into<String>) -> Fault {
+    let at = place(raw, path);
+    Fault { raw_len: raw.len(), start: at.start, end: at.end, message: message.into(), help: help.into() }
 }
 
 /// Reads one value by its raw text; what `read` refuses becomes an error at that text.
@@ -76,7 +82,55 @@ pub fn locate(text: &str, error: &SpannedError) -> Fault {
         return Fault { raw_len: text.len(), start: origin + inner.start, end: origin + inner.end, ..inner };
     }
     let (message, help) = explain(&error.code);
-    Fault { raw_len: text.len(), start, end, message, help }
+    let fault = |at: std::ops::Range<usize>, message: String, help: String| Fault {
+        raw_len: text.len(),
+        start: at.start,
+        end: at.end,
+        message,
+        help,
+    };
+    let behind = &text[start..];
+    match &error.code {
+        Ron::TrailingCharacters | Ron::ExpectedStringEnd | Ron::InvalidEscape(_) => fault(start..end, message, help),
+        Ron::UnclosedBlockComment => fault(start.saturating_sub(2)..start, message, help),
+        Ron::Eof
+        | Ron::UnexpectedChar(_)
+        | Ron::ExpectedComma
+        | Ron::ExpectedIdentifier
+        | Ron::ExpectedMapColon
+        | Ron::ExpectedArrayEnd
+        | Ron::ExpectedMapEnd
+        | Ron::ExpectedStructLikeEnd => {
+            if behind.starts_with('.') {
+                let from = text[..start].rfind(|c: char| !c.is_ascii_digit()).map_or(0, |i| i + 1);
+                let at = from..token(text, start).end;
+                return fault(at, "a whole number belongs here".into(), "write it without a point".into());
+            }
+            let line = |at: usize| text[..at].matches('\n').count() + 1;
+            match mismatch(text) {
+                Some((at, Some(open))) if at < text.len() => {
+                    let (is, was) = (&text[at..=at], &text[open..=open]);
+                    let message = format!("this `{is}` stands where the `{was}` of line {} must be closed", line(open));
+                    fault(
+                        at..at + 1,
+                        message,
+                        format!("is a closing bracket missing between line {} and here?", line(open)),
+                    )
+                }
+                Some((_, Some(open))) => {
+                    let message =
+                        format!("the page ends, but the `{}` of line {} is still open", &text[open..=open], line(open));
+                    fault(text.len()..text.len(), message, "add the closing bracket where it belongs".into())
+                }
+                _ => fault(if end > start { start..end } else { token(text, start) }, message, help),
+            }
+        }
+        Ron::InvalidIntegerDigit { .. } | Ron::ExpectedInteger if text[..start].ends_with('-') => {
+            fault(start - 1..token(text, start).end, message, help)
+        }
+        _ if end > start && !behind.starts_with(char::is_whitespace) => fault(start..end, message, help),
+        _ => fault(token(text, start), message, help),
+    }
 }
 
 /// The byte offset of a line and column (both from 1, columns in characters); the text's end when it lies beyond.
@@ -88,43 +142,90 @@ pub fn offset_of(text: &str, line: usize, column: usize) -> usize {
 
 /// A parser's error in our words: what is wrong, and what to do.
 fn explain(code: &Ron) -> (String, String) {
-    match code {
+    let (message, help) = match code {
         Ron::NoSuchStructField { expected, found, outer } => {
             let of = outer.as_ref().map(|o| format!(" in {o}")).unwrap_or_default();
-            (format!("unknown field `{found}`{of}"), choose("fields", expected, found))
+            return (format!("unknown field `{found}`{of}"), choose("fields", expected, found));
         }
-        Ron::NoSuchEnumVariant { expected, found, outer } => {
-            let of = outer.as_ref().map(|o| format!(" for {o}")).unwrap_or_default();
-            (format!("unknown name `{found}`{of}"), choose("names", expected, found))
+        Ron::NoSuchEnumVariant { expected, found, .. } => {
+            return (format!("unknown name `{found}`"), choose("names that can stand here", expected, found));
         }
         Ron::MissingStructField { field, outer } => {
             let of = outer.as_ref().map(|o| format!(" of {o}")).unwrap_or_default();
-            (format!("field `{field}`{of} is missing"), format!("add `{field}: …`"))
+            return (format!("field `{field}`{of} is missing"), format!("add `{field}: …` before this bracket closes"));
         }
         Ron::DuplicateStructField { field, .. } => {
-            (format!("field `{field}` is given twice"), "keep one of them".to_owned())
+            return (format!("field `{field}` is given twice"), "keep one of them".to_owned());
+        }
+        Ron::ExpectedDifferentStructName { expected, found } => {
+            return (format!("`{found}` stands where `{expected}` belongs"), format!("write {expected}(…)"));
+        }
+        Ron::InvalidValueForType { expected, found } => {
+            return (format!("this is {found}"), format!("write {expected}"));
+        }
+        Ron::ExpectedDifferentLength { expected, found } => {
+            // "a tuple of size 3", "tuple variant Distribution::Uniform with 2 elements"
+            let wanted = expected.split(|c: char| !c.is_ascii_digit()).find(|n| !n.is_empty()).unwrap_or("others");
+            let name = expected.split("::").nth(1).and_then(|rest| rest.split(' ').next()).unwrap_or_default();
+            let verb = if *found == 1 { "value stands" } else { "values stand" };
+            let help = format!("write all {wanted}, separated by commas: {name}(…, …)");
+            return (format!("{found} {verb} here, where {wanted} belong"), help);
+        }
+        Ron::Message(text) => return (text.clone(), String::new()),
+        Ron::UnexpectedChar(c) => {
+            return (format!("{c:?} has no place here"), "is a quote or a comma missing before it?".to_owned());
         }
         Ron::ExpectedFloat | Ron::ExpectedInteger => {
-            ("a number is expected here".to_owned(), "write a number such as 0.5, without quotes".to_owned())
+            ("a number is expected here", "write a number such as 0.5, without quotes and with a point")
         }
-        Ron::ExpectedString => ("a text is expected here".to_owned(), "put it in double quotes".to_owned()),
-        Ron::ExpectedComma => {
-            ("a comma or the end of the list is expected here".to_owned(), "fields are separated by commas".to_owned())
+        Ron::IntegerOutOfBounds
+        | Ron::InvalidIntegerDigit { .. }
+        | Ron::FloatUnderscore
+        | Ron::UnderscoreAtBeginning => ("a whole number, 0 or above, is expected here", "write a number such as 12"),
+        Ron::ExpectedString => ("a text is expected here", "put it in double quotes: \"…\""),
+        Ron::ExpectedStringEnd => ("this text has no end", "close it with a double quote"),
+        Ron::InvalidEscape(_) => ("this escape is unknown", "write \\\\ for a backslash, or use / in paths"),
+        Ron::ExpectedBoolean => ("true or false is expected here", "write true or false, without quotes"),
+        Ron::ExpectedComma | Ron::ExpectedArrayEnd | Ron::ExpectedMapEnd | Ron::ExpectedStructLikeEnd => {
+            ("a comma or a closing bracket is expected here", "fields and items are separated by commas")
         }
-        Ron::Eof => ("the page ends too early".to_owned(), "a bracket or a quote is still open".to_owned()),
-        Ron::Message(text) => (text.clone(), String::new()),
-        other => (other.to_string(), String::new()),
+        Ron::ExpectedMapColon => ("a colon is expected here", "a field is written `name: value`"),
+        Ron::ExpectedArray => ("a list is expected here", "put it in square brackets: […]"),
+        Ron::ExpectedMap => ("a table is expected here", "put it in braces: {\"name\": value}"),
+        Ron::ExpectedStructLike | Ron::ExpectedNamedStructLike(_) => {
+            ("an opening bracket is expected here", "fields stand in round brackets: (name: value)")
+        }
+        Ron::ExpectedIdentifier | Ron::InvalidIdentifier(_) | Ron::SuggestRawIdentifier(_) => {
+            ("a name is expected here", "names are letters, digits and _, without quotes")
+        }
+        Ron::Eof => ("the page ends too early", "a bracket or a quote that was opened above is not closed"),
+        Ron::UnclosedBlockComment => ("this comment has no end", "close it with */"),
+        Ron::TrailingCharacters => {
+            ("the page's bracket is closed before this", "look for one closing bracket too many above")
+        }
+        Ron::ExceededRecursionLimit => ("brackets are nested too deeply", "no page needs a hundred of them"),
+        other => return (other.to_string(), String::new()),
+    };
+    (message.to_owned(), help.to_owned())
+}
+
+/// Words for a list of what could stand there: "fields are a, b, c", with the likely one first when the name was nearly right.
+pub fn choose(what: &str, expected: &[&str], found: &str) -> String {
+    let near = nearest(expected, found);
+    if expected.is_empty() {
+        return format!("there are no {what}");
+    }
+    let all = expected.join(", ");
+    match near {
+        Some(e) => format!("did you mean `{e}`? {what} are {all}"),
+        None => format!("{what} are {all}"),
     }
 }
 
-/// "fields are a, b, c", with the likely one first when the name was nearly right.
-fn choose(what: &str, expected: &[&'static str], found: &str) -> String {
-    let near = expected.iter().map(|e| (distance(e, found), e)).min().filter(|(d, e)| *d <= 1 + e.len() / 4);
-    let all = expected.join(", ");
-    match near {
-        Some((_, e)) => format!("did you mean `{e}`? {what} are {all}"),
-        None => format!("{what} are {all}"),
-    }
+/// The name that was probably meant; `None` where none is like it.
+pub fn nearest<'a, S: AsRef<str>>(known: &'a [S], found: &str) -> Option<&'a str> {
+    let near = known.iter().map(|k| (distance(k.as_ref(), found), k.as_ref())).min();
+    near.filter(|(d, k)| *d <= 1 + k.len() / 4).map(|(_, k)| k)
 }
 
 /// Edit distance. Source: Wagner & Fischer 1974.

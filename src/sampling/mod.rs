@@ -2,6 +2,7 @@
 
 pub mod distribution;
 pub mod fault;
+pub mod place;
 pub mod rng;
 pub mod sampler;
 pub mod vary;

@@ -9,7 +9,8 @@
 //!
 //! The bound is part of the type, so an impossible value is an error at its place in the file.
 
-pub use super::fault::{from_raw, parse_in, whole};
+pub use super::fault::{Fault, choose, from_raw, inside, parse_in, whole};
+pub use super::place::Step;
 use super::rng::Stream;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de, ser};
 use std::fmt;
@@ -30,12 +31,31 @@ pub trait Bound: Copy + Clone + fmt::Debug + PartialEq {
 
     /// Whether `x` will do.
     fn holds(x: f64) -> bool {
-        x.is_finite()
+        x.abs() <= LARGEST
+            && (x == 0.0 || x.abs() >= SMALLEST)
             && x <= Self::MAX
             && (x > Self::MIN || (x == Self::MIN && !Self::ABOVE_MIN))
             && (!Self::WHOLE || x.fract() == 0.0)
     }
+
+    /// Why `x` will not do.
+    fn refuse(x: f64) -> String {
+        if !x.is_finite() {
+            format!("{x} cannot be used: it must be {}", Self::WORDS)
+        } else if x.abs() > LARGEST {
+            format!("{x:e} is out of range: numbers here go up to {LARGEST:e}")
+        } else if x != 0.0 && x.abs() < SMALLEST {
+            format!("{x:e} is too close to 0 to be told from it")
+        } else {
+            format!("{x} is out of range: it must be {}", Self::WORDS)
+        }
+    }
 }
+
+/// Largest number in a page: beyond any metre, count or watt, and its square is still a single-precision number.
+const LARGEST: f64 = 1e12;
+/// Smallest number above zero in a page.
+const SMALLEST: f64 = 1e-12;
 
 macro_rules! bounds {
     ($($(#[$doc:meta])* $name:ident { $($body:tt)* })*) => {$(
@@ -63,10 +83,25 @@ bounds! {
     Elevation { const MIN: f64 = -90.0; const MAX: f64 = 90.0; const WORDS: &'static str = "between -90 and 90 degrees"; }
 }
 
-fn starts_with_name(raw: &str) -> bool {
+/// The name that a value starts with; `None` for a number, `inf` and `NaN` among them.
+fn name_of(raw: &str) -> Option<&str> {
     let t = raw.trim_start();
-    t.starts_with(|c: char| c.is_alphabetic() || c == '_') && !t.starts_with("inf") && !t.starts_with("NaN")
+    let name = &t[..t.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(t.len())];
+    (name.starts_with(|c: char| c.is_alphabetic() || c == '_') && !["inf", "NaN"].contains(&name)).then_some(name)
 }
+
+/// One number within its bound.
+fn number<B: Bound>(raw: &str, help: &str) -> Result<f64, Fault> {
+    let x: f64 = parse_in(raw)?;
+    if B::holds(x) { Ok(x) } else { Err(whole(raw, B::refuse(x), help)) }
+}
+
+/// How a number is drawn.
+const DRAWN: &str =
+    "write one number, or draw it for every field: Uniform(a, b), Normal(mean: a, sd: b), Choice([a, b])";
+
+/// The distributions' names.
+const NAMES: [&str; 5] = ["Uniform", "Normal", "LogNormal", "Choice", "Weighted"];
 
 /// A fixed number within its bound.
 ///
@@ -96,13 +131,14 @@ impl<B: Bound> Num<B> {
 
 impl<'de, B: Bound> Deserialize<'de> for Num<B> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        from_raw(deserializer, |raw| {
-            let x: f64 = parse_in(raw)?;
-            if B::holds(x) {
-                Ok(Self::new(x))
-            } else {
-                Err(whole(raw, format!("{x} is out of range: it must be {}", B::WORDS)))
-            }
+        from_raw(deserializer, |raw| match name_of(raw) {
+            Some(name) if NAMES.contains(&name) => Err(whole(
+                raw,
+                format!("{name} cannot stand here: this number is the same in every field"),
+                "write one number",
+            )),
+            Some(name) => Err(whole(raw, format!("`{name}` is not a number"), "write one number, such as 2 or 0.5")),
+            None => number::<B>(raw, "write one number; it is the same in every field").map(Self::new),
         })
     }
 }
@@ -210,59 +246,106 @@ impl<B: Bound> Vary<B> {
         self.draw(stream) as f32
     }
 
-    fn check(distribution: &Distribution) -> Result<(), String> {
-        let within = |name: &str, x: f64| {
-            if B::holds(x) { Ok(()) } else { Err(format!("{name} {x} is out of range: it must be {}", B::WORDS)) }
-        };
-        let spread = |name: &str, x: f64| {
-            if x.is_finite() && x >= 0.0 {
+    /// What is wrong with a distribution: where in it, what, and what to do.
+    fn check(distribution: &Distribution) -> Result<(), Wrong> {
+        use Step::{Field, Item};
+        let wrong = |at: &[Step<'static>], what: String, help: &str| Err((at.to_vec(), what, help.to_owned()));
+        let within = |at: &[Step<'static>], name: &str, x: f64| {
+            if B::holds(x) {
                 Ok(())
             } else {
-                Err(format!("{name} {x} is out of range: it must be 0 or above"))
+                wrong(
+                    at,
+                    format!("{name} {}", B::refuse(x)),
+                    &format!("every value that may be drawn must be {}", B::WORDS),
+                )
             }
         };
-        let ordered =
-            |min: f64, max: f64| if min < max { Ok(()) } else { Err(format!("min {min} is not below max {max}")) };
+        let spread = |at: &[Step<'static>], name: &str, x: f64| {
+            if NonNegative::holds(x) {
+                Ok(())
+            } else {
+                wrong(at, format!("{name} {}", NonNegative::refuse(x)), "write 0 or a number above it")
+            }
+        };
+        let bell = |name: &'static str, centre: f64, min: f64, max: f64| {
+            if min.is_nan() || max.is_nan() || min >= max {
+                return wrong(
+                    &[Field("min")],
+                    format!("min {min} is not below max {max}"),
+                    "min is the smallest value that may be drawn, max the largest",
+                );
+            }
+            if (min..=max).contains(&centre) {
+                return Ok(());
+            }
+            wrong(
+                &[Field(name)],
+                format!("{name} {centre} lies outside min..max"),
+                "move it between them, or widen them",
+            )
+        };
         match distribution {
             Distribution::Uniform(lo, hi) => {
-                within("the lower end", *lo)?;
-                within("the upper end", *hi)?;
-                if lo <= hi { Ok(()) } else { Err(format!("the lower end {lo} is above the upper end {hi}")) }
+                within(&[Item(0)], "the lower end", *lo)?;
+                within(&[Item(1)], "the upper end", *hi)?;
+                if lo <= hi {
+                    return Ok(());
+                }
+                let help = format!("swap them: Uniform({hi}, {lo})");
+                wrong(&[], format!("the lower end {lo} is above the upper end {hi}"), &help)
             }
             Distribution::Normal { mean, sd, min, max } => {
-                within("mean", *mean)?;
-                spread("sd", *sd)?;
-                ordered(*min, *max)?;
-                if (min..=max).contains(&mean) { Ok(()) } else { Err(format!("mean {mean} lies outside min..max")) }
+                within(&[Field("mean")], "mean", *mean)?;
+                spread(&[Field("sd")], "sd", *sd)?;
+                bell("mean", *mean, *min, *max)
             }
             Distribution::LogNormal { median, sigma, min, max } => {
-                within("median", *median)?;
+                within(&[Field("median")], "median", *median)?;
                 if *median <= 0.0 {
-                    return Err(format!("median {median} is out of range: it must be above 0"));
+                    return wrong(
+                        &[Field("median")],
+                        format!("median {}", Positive::refuse(*median)),
+                        "all values of a LogNormal are above 0",
+                    );
                 }
-                spread("sigma", *sigma)?;
-                ordered(*min, *max)?;
-                if (min..=max).contains(&median) {
-                    Ok(())
-                } else {
-                    Err(format!("median {median} lies outside min..max"))
-                }
+                spread(&[Field("sigma")], "sigma", *sigma)?;
+                bell("median", *median, *min, *max)
             }
             Distribution::Choice(of) => {
                 if of.is_empty() {
-                    return Err("an empty choice: there is nothing to draw".into());
+                    return wrong(&[], NOTHING.into(), "name at least one value: Choice([1, 2])");
                 }
-                of.iter().try_for_each(|x| within("the choice", *x))
+                of.iter().enumerate().try_for_each(|(i, x)| within(&[Item(0), Item(i)], "the choice", *x))
             }
             Distribution::Weighted(of) => {
-                if !of.iter().any(|(_, w)| *w > 0.0) {
-                    return Err("an empty choice: no weight is above 0".into());
+                for (i, (x, weight)) in of.iter().enumerate() {
+                    within(&[Item(0), Item(i), Item(0)], "the choice", *x)?;
+                    spread(&[Item(0), Item(i), Item(1)], "the weight", *weight)?;
                 }
-                of.iter().try_for_each(|(x, w)| within("the choice", *x).and_then(|()| spread("the weight", *w)))
+                if of.iter().any(|(_, w)| *w > 0.0) {
+                    return Ok(());
+                }
+                let help = "give one a weight above 0: Weighted([(value, weight), …])";
+                wrong(
+                    &[],
+                    if of.is_empty() {
+                        NOTHING.into()
+                    } else {
+                        "no weight is above 0: there is nothing to draw".into()
+                    },
+                    help,
+                )
             }
         }
     }
 }
+
+/// What a choice of nothing is told.
+const NOTHING: &str = "an empty choice: there is nothing to draw";
+
+/// Where, what, and what to do.
+type Wrong = (Vec<Step<'static>>, String, String);
 
 /// Draws until the value lies within both ranges, so that the shape between the cuts stays; the median of what remains is
 /// inside by the page's checks, so a hundred misses in a row only happen at the far end of a bound, where it clamps.
@@ -279,18 +362,18 @@ fn cut<B: Bound>(min: f64, max: f64, mut draw: impl FnMut() -> f64) -> f64 {
 impl<'de, B: Bound> Deserialize<'de> for Vary<B> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         from_raw(deserializer, |raw| {
-            if starts_with_name(raw) {
-                let distribution: Distribution = parse_in(raw)?;
-                Self::check(&distribution).map_err(|message| whole(raw, message))?;
-                Ok(Self::Drawn(distribution))
-            } else {
-                let x: f64 = parse_in(raw)?;
-                if B::holds(x) {
-                    Ok(Self::fixed(x))
-                } else {
-                    Err(whole(raw, format!("{x} is out of range: it must be {}", B::WORDS)))
-                }
+            let Some(name) = name_of(raw) else {
+                return number::<B>(raw, DRAWN).map(Self::fixed);
+            };
+            if !NAMES.contains(&name) {
+                let start = raw.len() - raw.trim_start().len();
+                let help = format!("write a number or a distribution; {}", choose("distributions", &NAMES, name));
+                let unknown = whole(raw, format!("`{name}` is neither a number nor a distribution"), help);
+                return Err(Fault { end: start + name.len(), ..unknown });
             }
+            let distribution: Distribution = parse_in(raw)?;
+            Self::check(&distribution).map_err(|(at, message, help)| inside(raw, &at, message, help))?;
+            Ok(Self::Drawn(distribution))
         })
     }
 }
@@ -368,7 +451,7 @@ impl<'de, T: de::DeserializeOwned> Deserialize<'de> for Pick<T> {
                 return parse_in(raw).map(Self::fixed);
             }
             let Many::Choice(of) = parse_in(raw)?;
-            if of.is_empty() { Err(whole(raw, "an empty choice: there is nothing to draw")) } else { Ok(Self(of)) }
+            if of.is_empty() { Err(whole(raw, NOTHING, "name at least one: Choice([…, …])")) } else { Ok(Self(of)) }
         })
     }
 }

@@ -8,8 +8,8 @@ mod field;
 mod rows;
 mod weeds;
 
-pub use rows::{Rows, RowsDesc, rows};
-pub use weeds::{ClustersDesc, WeedsDesc, weeds};
+pub use rows::{Rows, RowsDesc, rows, rows_looked_at};
+pub use weeds::{ClustersDesc, WeedsDesc, weeds, weeds_looked_at};
 
 use crate::math::{Vec2, Vec3};
 use crate::sampling::Stream;

@@ -71,6 +71,15 @@ pub struct Rows {
     stream: Stream,
 }
 
+/// About how many places for seeds [`rows`] looks at in `area`.
+pub fn rows_looked_at(desc: &RowsDesc, area: Area, stream: &Stream) -> f64 {
+    let rows = Rows::draw(desc, stream);
+    let size = f64::from((area[1] - area[0]).length());
+    let across = (size + 10.0 * f64::from(rows.jitter.x)) / f64::from(rows.spacing_m);
+    let along = (size + 10.0 * f64::from(rows.jitter.y)) / f64::from(rows.in_row_m);
+    (across + 1.0) * (along + 1.0)
+}
+
 impl Rows {
     /// Draws a field's rows; the numbers of the seed rows' relief are among them.
     pub fn draw(desc: &RowsDesc, stream: &Stream) -> Self {

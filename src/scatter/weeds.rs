@@ -68,6 +68,20 @@ impl Default for ClustersDesc {
 /// Side of the cells that plants and mothers are addressed by; the intensity is taken at their middle.
 const CELL_M: f32 = 0.1;
 
+/// About how many places [`weeds`] looks at: plants that are expected, and the cells that could hold them.
+pub fn weeds_looked_at(desc: &WeedsDesc, area: Area, stream: &Stream) -> f64 {
+    let child = |k| stream.child(Purpose::Page, k);
+    let share = desc.clusters.share.draw(&mut child(4));
+    let plants = desc.clusters.plants.draw(&mut child(5));
+    let reach = if share > 0.0 { 4.0 * desc.clusters.sd_m.draw(&mut child(6)) } else { 0.0 };
+    let beyond = 2.0 * (desc.min_distance_m.draw(&mut child(7)) + reach);
+    let size = area[1] - area[0];
+    let wide = (f64::from(size.x) + beyond) * (f64::from(size.y) + beyond);
+    // A cluster's mother is looked at however few its children are.
+    let mothers = 1.0 + share / plants;
+    wide * (desc.per_m2.draw(&mut child(0)) * mothers + 1.0 / f64::from(CELL_M * CELL_M))
+}
+
 /// Where the weeds of one species stand in `area`, none of them starting in `discs`.
 pub fn weeds(desc: &WeedsDesc, area: Area, discs: &[Disc], stream: &Stream) -> Vec<Spot> {
     let child = |k| stream.child(Purpose::Page, k);

@@ -9,6 +9,7 @@ use crate::material::{Ground as GroundMaterial, GroundSkin, Material, Solid};
 use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3, vec2};
 use crate::page::Page;
 use crate::plant::{self, OrganKind, Stage};
+use crate::sampling::place::Step;
 use crate::sampling::rng::mix;
 use crate::sampling::{Purpose, Stream};
 use crate::scatter::{self, Disc, Rows, Spot};
@@ -99,7 +100,7 @@ struct Seedling {
     species: Arc<Species>,
     growth: Growth,
     position: Vec2,
-    heading: Option<f64>,
+    turn: f32,
     only_leaf: Option<u16>,
     stream: Stream,
 }
@@ -126,7 +127,7 @@ impl<'a> Builder<'a> {
     fn new(page: &'a Page, desc: &'a FieldDesc, options: &Options, library: Library) -> Result<Self> {
         let (seed, index) = (options.seed.unwrap_or(desc.seed), options.index);
         let mut stream = Stream::of(seed, index, Purpose::Page, 0);
-        let camera = desc.camera.build(&mut stream)?;
+        let camera = desc.camera.build(&mut stream).map_err(|e| page.blame(&[Step::Field("camera")], e))?;
         let camera = match (options.width, options.height) {
             (None, None) => camera,
             (w, h) => {
@@ -139,7 +140,8 @@ impl<'a> Builder<'a> {
         };
         let mut lights = Vec::new();
         for (i, light) in desc.lights.iter().enumerate() {
-            lights.extend(light.build(&mut Stream::of(seed, index, Purpose::Page, 1 + i as u64))?);
+            let light = light.build(&mut Stream::of(seed, index, Purpose::Page, 1 + i as u64));
+            lights.extend(light.map_err(|e| page.blame(&[Step::Field("lights"), Step::Item(i)], e))?);
         }
         let mut warnings = Vec::new();
         if lights.is_empty() {
@@ -169,7 +171,9 @@ impl<'a> Builder<'a> {
         let (Some(lo), Some(hi)) =
             (corners.iter().copied().reduce(Vec2::min), corners.iter().copied().reduce(Vec2::max))
         else {
-            return Err(Error::Scene(format!("{}: the camera does not look at the ground", self.page.path.display())));
+            let words =
+                "the camera does not look at the ground\n help: turn it down; its height is counted from the ground";
+            return Err(self.page.blame(&[Step::Field("camera")], Error::Scene(words.into())));
         };
         // A camera that looks along the ground sees to the horizon; only what is near can be made of crumbs.
         let below = camera.pose().position.truncate();
@@ -235,7 +239,8 @@ impl<'a> Builder<'a> {
             margin_m: GROUND_REACH,
             rows,
         };
-        let ground = Ground::new(desc, &maps, &site, &self.stream(Purpose::Soil, 0))?;
+        let ground = Ground::new(desc, &maps, &site, &self.stream(Purpose::Soil, 0))
+            .map_err(|e| self.page.blame(&[Step::Field("soil")], e))?;
         let skin = Arc::new(GroundSkin::bake(&ground.skin(&maps, (0.9 * pixel).clamp(2e-4, 2e-3))));
         let mut pile = Pile::new(&ground);
         let stones = soil::stones(&desc.stones, &ground, &mut pile, &self.stream(Purpose::Debris, 0));
@@ -268,12 +273,16 @@ impl<'a> Builder<'a> {
         let (desc, page) = (self.desc, self.page);
         for (k, crop) in desc.crops.iter().enumerate() {
             let species = self.library.species(page, &crop.species)?;
+            let places = scatter::rows_looked_at(&crop.rows, area, &self.stream(Purpose::Scatter, k as u64));
+            self.check_number(places, all.len(), ["crops", "rows"], k)?;
             for spot in scatter::rows(&crop.rows, area, stones, &self.stream(Purpose::Scatter, k as u64)) {
                 all.push(self.seedling(&species, &crop.growth, spot, 1 + k as u64));
             }
         }
         for (k, weed) in desc.weeds.iter().enumerate() {
             let species = self.library.species(page, &weed.species)?;
+            let places = scatter::weeds_looked_at(&weed.spread, area, &self.stream(Purpose::Scatter, 1000 + k as u64));
+            self.check_number(places, all.len(), ["weeds", "spread"], k)?;
             for spot in scatter::weeds(&weed.spread, area, stones, &self.stream(Purpose::Scatter, 1000 + k as u64)) {
                 all.push(self.seedling(&species, &weed.growth, spot, 1001 + k as u64));
             }
@@ -286,18 +295,28 @@ impl<'a> Builder<'a> {
                 species,
                 growth: placed.growth.clone(),
                 position,
-                heading: Some(placed.heading_deg.draw(&mut stream)),
+                turn: placed.turn_deg.draw32(&mut stream).to_radians(),
                 only_leaf: placed.only_leaf.map(|l| l.get() as u16),
                 stream: stream.child(Purpose::Plant, 0),
             });
         }
-        if all.len() > MOST_PLANTS {
-            return Err(Error::Scene(format!(
-                "{} plants: labels can number {MOST_PLANTS}; lower the density",
-                all.len()
-            )));
-        }
+        self.check_number(0.0, all.len(), ["plants", ""], 0)?;
         Ok(all)
+    }
+
+    /// Refuses more plants than labels can number, before they take the memory: so many so far, and places for so many more.
+    fn check_number(&self, places: f64, known: usize, fields: [&str; 2], item: usize) -> Result<()> {
+        let plants = places.ceil() + known as f64;
+        // An expected number may be missed; one far beyond the limit may not.
+        if known <= MOST_PLANTS && places <= 2.0 * MOST_PLANTS as f64 {
+            return Ok(());
+        }
+        let words = format!(
+            "about {plants:.3e} plants or places for them: labels can number {MOST_PLANTS}\n \
+             help: lower the density here, widen the distances in the rows, or lower the camera"
+        );
+        let path = [Step::Field(fields[0]), Step::Item(item), Step::Field(fields[1])];
+        Err(self.page.blame(&path, Error::Scene(words)))
     }
 
     fn seedling(&self, species: &Arc<Species>, growth: &Growth, spot: Spot, population: u64) -> Seedling {
@@ -305,7 +324,7 @@ impl<'a> Builder<'a> {
             species: species.clone(),
             growth: growth.clone(),
             position: spot.at,
-            heading: None,
+            turn: 0.0,
             only_leaf: None,
             stream: self.stream(Purpose::Plant, population).child(Purpose::Plant, spot.key),
         }
@@ -321,7 +340,11 @@ impl<'a> Builder<'a> {
             let mut made: Vec<(String, usize, u32)> = Vec::new();
             for organ in organs {
                 if let Some(fault) = organ.part.mesh.fault() {
-                    return Err(Error::Scene(format!("plant {} grew a broken mesh: {fault}", record.number)));
+                    let (species, number) = (&record.species, record.number);
+                    return Err(Error::Scene(format!(
+                        "{}: plant {number}, a {species}, grew a broken mesh: {fault}\n help: look for extreme sizes in its page",
+                        self.page.path.display()
+                    )));
                 }
                 let known = made.iter().find(|(s, c, _)| *s == organ.skin && *c == organ.choice).map(|m| m.2);
                 let material = known.unwrap_or_else(|| {
@@ -358,16 +381,14 @@ fn grow(s: &Seedling, number: u16, ground: Option<&Ground>) -> (PlantRecord, Vec
         Growth::AgeDays(days) => Stage::Age(days.draw32(&mut stream)),
         Growth::Bbch(code) => Stage::Bbch(code.draw(&mut stream) as u32),
     };
-    let any = stream.range(0.0, 360.0);
-    let heading = s.heading.unwrap_or(any).to_radians() as f32;
     let green = (1.0 + desc.chlorophyll_sd.get() * stream.normal()).clamp(0.6, 1.5) as f32;
     let (x, y) = (s.position.x, s.position.y);
     let (z, normal) = ground.map_or((0.0, Vec3::Z), |g| (g.height(x, y), g.trend(x, y, STANCE)));
     let axis = scatter::axis(normal, AXIS_NOISE_DEG, &mut stream);
     let plant = plant::grow(&desc.plant, stage, &stream);
     let foot = Vec3::new(x, y, z);
-    // Plant coordinates: y to the heading, z along the axis.
-    let ahead = Vec3::new(heading.sin(), heading.cos(), 0.0);
+    // Plant coordinates: y to the north before the turn, z along the axis. Growing has given it a turn of its own.
+    let ahead = Vec3::new(s.turn.sin(), s.turn.cos(), 0.0);
     let frame = Frame::with_tangent(axis, ahead.cross(axis));
     let rotation = Mat3::from_cols(frame.x, frame.y, frame.z);
     let class = desc.role.class();
@@ -399,7 +420,6 @@ fn grow(s: &Seedling, number: u16, ground: Option<&Ground>) -> (PlantRecord, Vec
         class,
         position: foot,
         axis,
-        heading,
         bbch: plant.bbch,
         age_days: plant.age_days,
         height: plant.height,

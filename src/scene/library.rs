@@ -5,6 +5,8 @@ use crate::geometry::AlphaMask;
 use crate::material::{LeafMaterial, Picture};
 use crate::math::Vec2;
 use crate::page::Page;
+use crate::sampling::fault::choose;
+use crate::sampling::place::Step;
 use crate::soil::{LayerDesc, LayerMaps};
 use crate::texture::{ColorSpace, Height, Maps, Relief, Texture, Wrap};
 use crate::{Error, Result};
@@ -66,10 +68,18 @@ impl Library {
         let desc: SpeciesDesc = own.parse()?;
         for key in desc.plant.skins() {
             if !desc.skins.contains_key(&key) {
-                return Err(Error::Scene(format!(
-                    "{}: the plant uses the skin \"{key}\", which `skins` does not have; add \"{key}\": Leaf(…)",
-                    full.display()
-                )));
+                let known: Vec<&str> = desc.skins.keys().map(String::as_str).collect();
+                let message = format!("the plant uses a skin \"{key}\", which `skins` does not have");
+                let help = format!(
+                    "add \"{key}\": Leaf(…) to `skins`, or name one of them; {}",
+                    choose("skins", &known, &key)
+                );
+                // Where the key is written, or else the table that lacks it: some keys are defaults.
+                return Err(if own.text.contains(&format!("\"{key}\"")) {
+                    own.about(&key, message, help)
+                } else {
+                    own.blame(&[Step::Field("skins")], Error::Scene(format!("{message}\n help: {help}")))
+                });
             }
         }
         let mut skins = BTreeMap::new();
@@ -79,7 +89,7 @@ impl Library {
                 Some(of) => {
                     let mut choices = Vec::new();
                     for path in of.all() {
-                        let (picture, mask) = self.picture(&own, path)?;
+                        let (picture, mask) = self.picture(&own, path, skin.relief_range.f32())?;
                         choices.push((LeafMaterial::new(skin, Some(picture)), mask));
                     }
                     choices
@@ -92,7 +102,7 @@ impl Library {
         Ok(species)
     }
 
-    fn picture(&mut self, page: &Page, path: &str) -> Result<Cut> {
+    fn picture(&mut self, page: &Page, path: &str, relief_range: f32) -> Result<Cut> {
         let full = page.need_file(path)?;
         if let Some(known) = self.pictures.get(&full) {
             return Ok(known.clone());
@@ -103,7 +113,7 @@ impl Library {
         let beside = full.with_extension("height.png");
         let maps = if beside.is_file() {
             self.note(&beside)?;
-            Maps::from_height(Height::load(&beside, Relief::LEAF.amplitude.abs() * 2.0)?)
+            Maps::from_height(Height::load(&beside, relief_range).map_err(|e| at_its_place(page, path, e))?)
         } else {
             Maps::derive(&color, &Relief::LEAF)
         };
@@ -138,7 +148,14 @@ impl Library {
 /// A file that cannot be read as an image is the page's fault: shown where the page names it.
 fn at_its_place(page: &Page, literal: &str, error: Error) -> Error {
     match error {
-        Error::Image { what, .. } => page.about(literal, format!("`{literal}`: {what}"), "name a PNG or JPEG image"),
+        Error::Image { path, what } => {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            page.about(
+                literal,
+                format!("`{name}` cannot be used: {what}"),
+                "name a PNG or JPEG image, or draw it: trace texture RECIPE.ron",
+            )
+        }
         other => other,
     }
 }

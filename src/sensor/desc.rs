@@ -281,7 +281,8 @@ impl CameraDesc {
                         let angle = horizontal_deg.draw(stream);
                         if angle >= 180.0 {
                             return Err(Error::Scene(format!(
-                                "horizontal_deg {angle} is out of range: a pinhole sees less than 180 degrees"
+                                "horizontal_deg {angle} is out of range: a pinhole sees less than 180 degrees\n \
+                                 help: write an angle of view such as 60"
                             )));
                         }
                         ([middle[0] / (angle / 2.0).to_radians().tan(); 2], middle, None)

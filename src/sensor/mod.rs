@@ -61,7 +61,7 @@ impl Camera {
         let (width, height) = size;
         if width == 0 || height == 0 || focal.iter().any(|f| !(f.is_finite() && *f > 0.0)) {
             return Err(Error::Scene(format!(
-                "a camera of {width} × {height} pixels and focal lengths {focal:?} sees nothing: all must be above 0"
+                "a camera of {width} × {height} pixels and focal lengths {focal:?} sees nothing\n help: all of them must be above 0"
             )));
         }
         let mut camera =

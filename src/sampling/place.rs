@@ -1,0 +1,242 @@
+//! Where a value stands in a page's text, by the fields and items that lead to it.
+//!
+//! What is found wrong after the parser is done (two numbers that do not fit together, a sun below the horizon) has lost its
+//! place; this reads it off the text again. The text has been parsed before, so brackets match; where they do not, the
+//! deepest place that could be reached is the answer, never a panic.
+
+use std::ops::Range;
+
+/// One step into a value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step<'a> {
+    /// The field, or the key of a table, of this name.
+    Field(&'a str),
+    /// The item of this number, from 0.
+    Item(usize),
+}
+
+/// The bytes of the value that `path` leads to from the value that `text` is; where a step leads nowhere, of the last value
+/// before it.
+///
+/// ```
+/// use furrow::sampling::place::{Step, place};
+/// let text = "Field(seed: 3, lights: [Sun(), Sky(haze: /* much */ 7)])";
+/// assert_eq!(&text[place(text, &[Step::Field("lights"), Step::Item(1), Step::Field("haze")])], "7");
+/// ```
+pub fn place(text: &str, path: &[Step<'_>]) -> Range<usize> {
+    let start = skip(text, 0);
+    let mut at = start..value_end(text, start);
+    for step in path {
+        match find(text, &at, *step) {
+            Some(inner) => at = inner,
+            None => break,
+        }
+    }
+    at
+}
+
+/// The value one step into the bracketed value at `whole`.
+fn find(text: &str, whole: &Range<usize>, step: Step<'_>) -> Option<Range<usize>> {
+    let open = whole.start + text[whole.clone()].find(['(', '[', '{'])?;
+    let mut at = skip(text, open + 1);
+    let mut number = 0;
+    while at < whole.end && !text[at..].starts_with([')', ']', '}']) {
+        let end = value_end(text, at);
+        let (key, value) = match key_end(text, at).map(|k| (k, skip(text, k))) {
+            Some((k, colon)) if text[colon..].starts_with(':') => {
+                (Some(text[at..k].trim_matches('"')), skip(text, colon + 1))
+            }
+            _ => (None, at),
+        };
+        let wanted = match step {
+            Step::Field(name) => key == Some(name),
+            Step::Item(n) => n == number,
+        };
+        if wanted {
+            return Some(value.min(end)..end);
+        }
+        number += 1;
+        at = skip(text, end);
+        if !text[at..].starts_with(',') {
+            return None;
+        }
+        at = skip(text, at + 1);
+    }
+    None
+}
+
+/// A bracket that does not fit: where it stands or the text ends, and the one that is still open there, if any.
+pub fn mismatch(text: &str) -> Option<(usize, Option<usize>)> {
+    let mut open: Vec<(usize, char)> = Vec::new();
+    let mut at = skip(text, 0);
+    while let Some(c) = text[at..].chars().next() {
+        match c {
+            '(' => open.push((at, ')')),
+            '[' => open.push((at, ']')),
+            '{' => open.push((at, '}')),
+            ')' | ']' | '}' => match open.pop() {
+                Some((_, close)) if close == c => {}
+                other => return Some((at, other.map(|o| o.0))),
+            },
+            _ => {}
+        }
+        at = skip(text, if c == '"' { quote_end(text, at) } else { at + c.len_utf8() });
+    }
+    open.pop().map(|o| (text.len(), Some(o.0)))
+}
+
+/// The token at or behind `at`: a name, a number, a quoted text or one character; empty at the text's end.
+pub fn token(text: &str, at: usize) -> Range<usize> {
+    let start = skip(text, at);
+    let end = match text[start..].chars().next() {
+        None => start,
+        Some('"') => quote_end(text, start),
+        Some(c) if c.is_alphanumeric() || "_+-.".contains(c) => {
+            text[start..].find(|c: char| !(c.is_alphanumeric() || "_+-.".contains(c))).map_or(text.len(), |i| start + i)
+        }
+        Some(c) => start + c.len_utf8(),
+    };
+    start..end
+}
+
+/// Where a name or a quoted key that begins at `at` ends.
+fn key_end(text: &str, at: usize) -> Option<usize> {
+    if text[at..].starts_with('"') {
+        return Some(quote_end(text, at));
+    }
+    let len = text[at..].find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(text.len() - at);
+    (len > 0).then_some(at + len)
+}
+
+/// Where the value that begins at `at` ends: before the comma or the bracket that closes what it stands in, without the
+/// space and comments before that.
+fn value_end(text: &str, mut at: usize) -> usize {
+    let (mut depth, mut end) = (0_usize, at);
+    while let Some(c) = text[at..].chars().next() {
+        match c {
+            '(' | '[' | '{' => depth += 1,
+            ')' | ']' | '}' if depth == 0 => break,
+            ')' | ']' | '}' => depth -= 1,
+            ',' if depth == 0 => break,
+            _ => {}
+        }
+        at = if c == '"' { quote_end(text, at) } else { at + c.len_utf8() };
+        end = at;
+        at = skip(text, at);
+    }
+    end
+}
+
+/// Behind the quote that closes the one at `at`, raw strings included.
+fn quote_end(text: &str, at: usize) -> usize {
+    let hashes = text[..at].bytes().rev().take_while(|b| *b == b'#').count();
+    if text[..at - hashes].ends_with('r') {
+        let close = format!("\"{}", "#".repeat(hashes));
+        return text[at + 1..].find(&close).map_or(text.len(), |i| at + 1 + i + close.len());
+    }
+    let mut escaped = false;
+    for (i, c) in text[at + 1..].char_indices() {
+        match c {
+            '"' if !escaped => return at + 2 + i,
+            _ => escaped = c == '\\' && !escaped,
+        }
+    }
+    text.len()
+}
+
+/// Behind the space, comments and attributes at `at`.
+fn skip(text: &str, mut at: usize) -> usize {
+    loop {
+        let rest = &text[at..];
+        let past = |close: &str| rest.find(close).map_or(text.len(), |i| at + i + close.len());
+        let next = rest.len() - rest.trim_start().len();
+        if next > 0 {
+            at += next;
+        } else if rest.starts_with("//") {
+            at = past("\n");
+        } else if rest.starts_with("/*") {
+            at = block_end(text, at);
+        } else if rest.starts_with("#!") {
+            at = past("]");
+        } else {
+            return at;
+        }
+    }
+}
+
+/// Behind a block comment, in which others may stand.
+fn block_end(text: &str, mut at: usize) -> usize {
+    let mut depth = 0_usize;
+    loop {
+        let rest = &text[at..];
+        if rest.starts_with("/*") {
+            depth += 1;
+            at += 2;
+        } else if rest.starts_with("*/") {
+            depth -= 1;
+            at += 2;
+            if depth == 0 {
+                return at;
+            }
+        } else {
+            match rest.chars().next() {
+                Some(c) => at += c.len_utf8(),
+                None => return at,
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Step::{Field, Item};
+    use super::*;
+    use proptest::prelude::*;
+
+    const PAGE: &str = r##"#![enable(implicit_some)]
+// A page, with (odd) things in it.
+Field(
+    name: "a \" b, (", /* one /* two */ , */ raw: r#"c " ("#,
+    plants: [(at: (1, -2)), Beet(at: (3, 4), /* é */ age: Uniform(5, 6))],
+    skins: {"leaf": Leaf(size: 7), "stalk": Leaf()},
+)"##;
+
+    fn at<'a>(path: &[Step<'_>]) -> &'a str {
+        &PAGE[place(PAGE, path)]
+    }
+
+    #[test]
+    fn fields_items_and_keys_are_found() {
+        assert_eq!(at(&[Field("name")]), r#""a \" b, (""#);
+        assert_eq!(at(&[Field("raw")]), r##"r#"c " ("#"##);
+        assert_eq!(at(&[Field("plants"), Item(0)]), "(at: (1, -2))");
+        assert_eq!(at(&[Field("plants"), Item(1), Field("at"), Item(1)]), "4");
+        assert_eq!(at(&[Field("plants"), Item(1), Field("age")]), "Uniform(5, 6)");
+        assert_eq!(at(&[Field("skins"), Field("leaf"), Field("size")]), "7");
+    }
+
+    #[test]
+    fn a_step_that_leads_nowhere_ends_the_way() {
+        assert_eq!(at(&[Field("skins"), Field("stalk"), Field("size")]), "Leaf()");
+        assert!(at(&[Field("lights"), Item(3)]).starts_with("Field("));
+        assert_eq!(place("", &[Item(1)]), 0..0);
+    }
+
+    #[test]
+    fn brackets_that_do_not_fit_are_found() {
+        assert_eq!(mismatch("(a: [1, {\"b\": (2)}]) // )"), None);
+        assert_eq!(mismatch("(a: [1, 2)"), Some((9, Some(4))));
+        assert_eq!(mismatch("(a: 1))"), Some((6, None)));
+        assert_eq!(mismatch("(a: [1, 2]"), Some((10, Some(0))));
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_has_a_place(text in "[ -~\n\"()\\[\\]{},:#r/*é]{0,60}", n in 0_usize..4) {
+            let range = place(&text, &[Item(n), Field("a"), Item(0)]);
+            prop_assert!(text.get(range).is_some());
+            prop_assert!(text.get(token(&text, 0)).is_some());
+            let _ = mismatch(&text);
+        }
+    }
+}

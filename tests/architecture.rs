@@ -1,0 +1,446 @@
+//! Method 13: architecture. Floors, nevers and doors, read from the sources' `use` lines and paths.
+//!
+//! Rationale: rooms that import only what lies below them can be understood, tested and replaced one at a time; a label that
+//! cannot name a light cannot be lit. Expected: no violation. Source: the table in `src/lib.rs` for floors; the rules here.
+//!
+//! What counts: `crate::room`, `use crate::{…}`, `super::` chains that leave their room, `furrow::room` in programs, and the
+//! first name of a path for foreign crates. Tests inside the sources are free: they may look anywhere to check something.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+
+/// Rooms (left) that never import others (right), beyond what floors forbid.
+///
+/// A path with a slash is one file. `material` and `light` sit on neighbouring floors, `bsdf` and `scene` far apart; floors
+/// alone would let some of these through, or would if a room moved.
+const NEVER: &[(&str, &str)] = &[
+    // Botany, soil and the places of plants know no optics.
+    ("plant", "material bsdf scene light accel sensor integrator"),
+    ("soil", "material bsdf scene light accel sensor integrator"),
+    ("scatter", "material bsdf scene light accel sensor integrator"),
+    // Local frame, pure functions, testable alone.
+    ("bsdf", "geometry texture scene light material sampling"),
+    ("material", "light"),
+    ("light", "material"),
+    // Meshes and their masks; the rest holds a `&dyn Intersect`.
+    ("accel", "material light scene sensor"),
+    // A label cannot be filtered, noisy or lit.
+    ("render/label.rs", "film sampling bsdf material light integrator"),
+    ("integrator", "accel film output plant soil scatter texture"),
+    ("film", "scene sampling"),
+    // `cli` is what the programs share.
+    ("*", "cli bin"),
+];
+
+/// Foreign crates and the only files (or folders, or rooms) that may name them. `*` is anywhere.
+const DOORS: &[(&str, &str)] = &[
+    ("clap", "bin/"),
+    ("ctrlc", "bin/"),
+    ("embree3", "accel/embree.rs"),
+    ("exr", "output/exr.rs"),
+    // Vectors are re-exported by `math`; two files sum in double precision.
+    ("glam", "math/ film.rs accel/brute.rs"),
+    ("hw_skymodel", "light/hosek.rs"),
+    ("image", "texture/"),
+    ("indicatif", "bin/"),
+    ("noise", "texture/noise.rs"),
+    // Labels need bits that stay, drawn textures need 16 bits and words inside.
+    ("png", "output/png.rs texture/draw/"),
+    ("rand", "sampling/rng.rs"),
+    ("rand_pcg", "sampling/rng.rs"),
+    // Parallel at the top only.
+    ("rayon", "render/ scene/build.rs"),
+    // One reader for all pages; faults inside a value are found where they lie.
+    ("ron", "page.rs sampling/fault.rs"),
+    ("serde", "*"),
+    ("sha2", "scene/library.rs"),
+    ("sobol_burley", "sampling/sampler.rs"),
+    ("solar_positioning", "light/position.rs"),
+    // Files appear whole or not at all: images of fields, and drawn textures two floors below them.
+    ("tempfile", "output/mod.rs texture/draw/write.rs"),
+    ("thiserror", "error.rs"),
+];
+
+/// A source file without its comments, strings and tests.
+struct Source {
+    /// Below `src`, with `/`.
+    path: String,
+    code: String,
+}
+
+impl Source {
+    fn new(path: &str, text: &str) -> Self {
+        Self { path: path.to_owned(), code: bare(text) }
+    }
+
+    /// The room that the file belongs to; "bin" for programs.
+    fn room(&self) -> &str {
+        self.path.split('/').next().unwrap_or_default().trim_end_matches(".rs")
+    }
+
+    /// Module path of the file: `plant/mod.rs` is `[plant]`, `plant/leaf.rs` is `[plant, leaf]`.
+    fn module(&self) -> Vec<&str> {
+        let parts = self.path.trim_end_matches(".rs").split('/');
+        parts.filter(|p| !matches!(*p, "mod" | "lib")).collect()
+    }
+
+    /// Rooms that the file names, its own among them.
+    fn rooms(&self) -> BTreeSet<String> {
+        let own = if self.room() == "bin" { "furrow" } else { "crate" };
+        let mut rooms: BTreeSet<String> = named(&self.code, own).into_iter().collect();
+        let depth = self.module().len();
+        let climb = "super::".repeat(depth);
+        if depth > 0 {
+            // As many steps up as the module is deep lead to the crate's root.
+            let shorter = format!("{climb}super::");
+            rooms.extend(named(&self.code.replace(&shorter, ""), &format!("{climb}self").replace("::self", "")));
+        }
+        rooms
+    }
+}
+
+fn is_name(c: char) -> bool {
+    c.is_alphanumeric() || c == '_'
+}
+
+/// The first names behind `prefix::`, alone or in braces.
+fn named(code: &str, prefix: &str) -> Vec<String> {
+    let mut names = Vec::new();
+    for (at, found) in code.match_indices(prefix) {
+        let before = code[..at].chars().next_back();
+        let rest = code[at + found.len()..].trim_start();
+        let Some(rest) = rest.strip_prefix("::") else { continue };
+        if before.is_some_and(|c| is_name(c) || c == ':') {
+            continue;
+        }
+        let rest = rest.trim_start();
+        match rest.strip_prefix('{') {
+            Some(list) => names.extend(first_names(list)),
+            None => names.push(rest.chars().take_while(|c| is_name(*c)).collect()),
+        }
+    }
+    names
+}
+
+/// The first name of each item of a list in braces.
+fn first_names(list: &str) -> Vec<String> {
+    let (mut names, mut depth, mut fresh) = (Vec::new(), 0, true);
+    let mut chars = list.char_indices();
+    while let Some((at, c)) = chars.next() {
+        match c {
+            '}' if depth == 0 => break,
+            '}' => depth -= 1,
+            '{' => depth += 1,
+            ',' if depth == 0 => fresh = true,
+            c if fresh && is_name(c) => {
+                let name: String = list[at..].chars().take_while(|c| is_name(*c)).collect();
+                for _ in 1..name.chars().count() {
+                    chars.next();
+                }
+                names.push(name);
+                fresh = false;
+            }
+            _ => {}
+        }
+    }
+    names
+}
+
+/// Code without comments, texts, characters and `#[cfg(test)]` modules.
+fn bare(text: &str) -> String {
+    let mut out = String::new();
+    let mut rest = text;
+    while let Some(c) = rest.chars().next() {
+        if rest.starts_with("//") {
+            rest = &rest[rest.find('\n').unwrap_or(rest.len())..];
+        } else if rest.starts_with("/*") {
+            rest = &rest[rest.find("*/").map_or(rest.len(), |i| i + 2)..];
+        } else if let Some(len) = raw_text(rest).filter(|_| !out.ends_with(is_name)) {
+            rest = &rest[len..];
+        } else if c == '"' {
+            let mut escaped = false;
+            let end = rest[1..].find(|c| {
+                let ends = c == '"' && !escaped;
+                escaped = c == '\\' && !escaped;
+                ends
+            });
+            rest = &rest[end.map_or(rest.len(), |e| e + 2)..];
+        } else if c == '\'' {
+            // A character, or a lifetime.
+            let mut after = rest[1..].char_indices();
+            let (first, second) = (after.next(), after.next());
+            let len = match (first, second) {
+                (Some((_, '\\')), _) => rest[3..].find('\'').map_or(rest.len(), |i| i + 4),
+                (_, Some((at, '\''))) => at + 2,
+                _ => 1,
+            };
+            rest = &rest[len..];
+        } else {
+            out.push(c);
+            rest = &rest[c.len_utf8()..];
+        }
+    }
+    without_tests(&out)
+}
+
+/// Length of the raw text that begins here.
+fn raw_text(rest: &str) -> Option<usize> {
+    let body = rest.strip_prefix('r').or_else(|| rest.strip_prefix("br"))?;
+    let hashes = body.len() - body.trim_start_matches('#').len();
+    if !body[hashes..].starts_with('"') {
+        return None;
+    }
+    let close = format!("\"{}", "#".repeat(hashes));
+    let start = rest.len() - body.len() + hashes + 1;
+    Some(rest[start..].find(&close).map_or(rest.len(), |i| start + i + close.len()))
+}
+
+fn without_tests(code: &str) -> String {
+    let mut out = String::new();
+    let mut rest = code;
+    while let Some(at) = rest.find("#[cfg(test)]") {
+        out.push_str(&rest[..at]);
+        let item = &rest[at..];
+        let open = item.find('{').unwrap_or(item.len());
+        let end = item.find(';').unwrap_or(item.len());
+        if end < open {
+            rest = item.get(end + 1..).unwrap_or_default();
+            continue;
+        }
+        let mut depth = 0;
+        let close = item[open..].find(|c| {
+            depth += i32::from(c == '{') - i32::from(c == '}');
+            depth == 0
+        });
+        rest = close.and_then(|c| item.get(open + c + 1..)).unwrap_or_default();
+    }
+    out + rest
+}
+
+/// Every source file; tests of a room in a file of their own left out.
+fn sources() -> Vec<Source> {
+    fn walk(folder: &Path, root: &Path, out: &mut Vec<Source>) {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                walk(&path, root, out);
+            } else if path.extension().is_some_and(|e| e == "rs") && !path.ends_with("tests.rs") {
+                let name = path.strip_prefix(root).unwrap().to_str().unwrap().replace('\\', "/");
+                out.push(Source::new(&name, &fs::read_to_string(&path).unwrap()));
+            }
+        }
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut out = Vec::new();
+    walk(&root, &root, &mut out);
+    out.sort_by(|a, b| a.path.cmp(&b.path));
+    out
+}
+
+/// Floors by room, from the table in `src/lib.rs`.
+fn floors(lib: &str) -> BTreeMap<String, u32> {
+    let mut floors = BTreeMap::new();
+    for line in lib.lines() {
+        let cells: Vec<&str> = line.trim_start_matches("//!").split('|').map(str::trim).collect();
+        let [_, floor, rooms, _] = cells.as_slice() else { continue };
+        let Ok(floor) = floor.parse() else { continue };
+        for room in rooms.split(',') {
+            floors.insert(room.trim().trim_matches(['[', ']', '`']).to_owned(), floor);
+        }
+    }
+    floors
+}
+
+fn floor_faults(sources: &[Source], floors: &BTreeMap<String, u32>) -> Vec<String> {
+    let mut faults = Vec::new();
+    for source in sources.iter().filter(|s| !matches!(s.room(), "lib" | "bin")) {
+        let Some(own) = floors.get(source.room()) else {
+            faults.push(format!("src/{}: its room has no floor in the table of src/lib.rs", source.path));
+            continue;
+        };
+        for room in source.rooms().iter().filter(|r| *r != source.room()) {
+            if let Some(other) = floors.get(room)
+                && other >= own
+            {
+                faults.push(format!(
+                    "src/{}: imports `{room}` of floor {other}, but stands on floor {own}: move what is shared below both",
+                    source.path
+                ));
+            }
+        }
+    }
+    faults
+}
+
+fn never_faults(sources: &[Source]) -> Vec<String> {
+    let mut faults = Vec::new();
+    for source in sources.iter().filter(|s| !matches!(s.room(), "lib" | "bin")) {
+        let rooms = source.rooms();
+        for (who, whom) in NEVER {
+            if *who == "*" || *who == source.room() || *who == source.path {
+                for room in whom.split(' ').filter(|r| rooms.contains(*r) && *r != source.room()) {
+                    faults.push(format!("src/{}: `{who}` never imports `{room}`", source.path));
+                }
+            }
+        }
+    }
+    faults
+}
+
+fn door_faults(sources: &[Source]) -> Vec<String> {
+    let mut faults = Vec::new();
+    for source in sources {
+        for (krate, doors) in DOORS {
+            if names(source, krate) && !doors.split(' ').any(|door| opens(door, &source.path)) {
+                faults.push(format!("src/{}: names the crate `{krate}`, whose only doors are: {doors}", source.path));
+            }
+        }
+    }
+    faults
+}
+
+fn opens(door: &str, path: &str) -> bool {
+    door == "*" || path == door || door.ends_with('/') && path.starts_with(door)
+}
+
+/// Whether a source names a foreign crate. A room may have a crate's name: behind `mod noise;`, `noise::` is ours.
+fn names(source: &Source, krate: &str) -> bool {
+    !own_module(source, krate) && named(&source.code, krate).len() + renamed(&source.code, krate) > 0
+}
+
+/// How often a crate is imported under another name or as a whole: `use embree3 as rtc;`, `use ::noise::Perlin;`.
+fn renamed(code: &str, krate: &str) -> usize {
+    let forms =
+        [format!("use {krate} as "), format!("use {krate};"), format!("::{krate}::"), format!("extern crate {krate}")];
+    forms
+        .iter()
+        .flat_map(|form| code.match_indices(form.as_str()))
+        .filter(|(at, _)| !code[..*at].ends_with(|c: char| is_name(c) || c == '>'))
+        .count()
+}
+
+/// Whether a name means a module or an import of this file rather than a crate.
+fn own_module(source: &Source, name: &str) -> bool {
+    let declared = source.code.lines().any(|l| {
+        let l = l
+            .trim_start()
+            .trim_start_matches("pub ")
+            .trim_start_matches("pub(super) ")
+            .trim_start_matches("pub(crate) ");
+        l == format!("mod {name};") || l.starts_with(&format!("mod {name} "))
+    });
+    let imported = source
+        .code
+        .split(';')
+        .filter(|s| s.contains("use ") && !s.contains(&format!("use {name}")) && !s.contains(&format!("use ::{name}")))
+        .any(|s| s.split(|c: char| !is_name(c)).any(|word| word == name));
+    declared || imported
+}
+
+fn lib() -> String {
+    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("src/lib.rs")).unwrap()
+}
+
+#[test]
+fn rooms_import_only_lower_floors() {
+    let faults = floor_faults(&sources(), &floors(&lib()));
+    assert!(faults.is_empty(), "\n{}", faults.join("\n"));
+}
+
+#[test]
+fn the_codemap_lists_every_room_once() {
+    let lib = lib();
+    let declared: BTreeSet<String> =
+        lib.lines().filter_map(|l| l.strip_prefix("pub mod ")?.strip_suffix(';')).map(str::to_owned).collect();
+    let listed: BTreeSet<String> = floors(&lib).into_keys().collect();
+    assert_eq!(declared, listed);
+    assert!(listed.len() > 15);
+}
+
+#[test]
+fn some_rooms_never_import_others() {
+    let sources = sources();
+    let faults = never_faults(&sources);
+    assert!(faults.is_empty(), "\n{}", faults.join("\n"));
+    // A rule about a file or room that is gone would hold for ever.
+    for (who, _) in NEVER {
+        assert!(*who == "*" || sources.iter().any(|s| s.room() == *who || s.path == *who), "no source is called {who}");
+    }
+}
+
+#[test]
+fn every_foreign_crate_has_its_doors() {
+    let sources = sources();
+    let faults = door_faults(&sources);
+    assert!(faults.is_empty(), "\n{}", faults.join("\n"));
+    // A door that nobody uses is a hole in the wall.
+    for (krate, doors) in DOORS {
+        for door in doors.split(' ') {
+            assert!(sources.iter().any(|s| opens(door, &s.path) && names(s, krate)), "nothing in {door} names {krate}");
+        }
+    }
+}
+
+#[test]
+fn every_dependency_is_in_the_table_of_doors() {
+    let manifest = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml")).unwrap();
+    let section = manifest.split("[dependencies]").nth(1).unwrap().split("\n[").next().unwrap();
+    let named: BTreeSet<String> =
+        section.lines().filter_map(|l| l.split_once(" = ")).map(|(name, _)| name.replace('-', "_")).collect();
+    let listed: BTreeSet<String> = DOORS.iter().map(|(name, _)| (*name).to_owned()).collect();
+    assert_eq!(named, listed);
+}
+
+/// The test must be able to fail.
+#[test]
+fn made_up_violations_are_found() {
+    let floors = floors("//! | 3 | [`light`] |\n//! | 2 | [`film`], [`sampling`] |\n//! | 1 | [`math`] |");
+    assert_eq!(floors.len(), 4);
+    for code in [
+        "use crate::light::Sun;",
+        "use crate::{Error, light::{self, Sun}, math};",
+        "fn f() -> crate::light::Sun { todo!() }",
+        "use super::light::Sun;",
+        "use crate::sampling::Stream;",
+    ] {
+        assert_eq!(floor_faults(&[Source::new("film.rs", code)], &floors).len(), 1, "{code}");
+    }
+    assert_eq!(floor_faults(&[Source::new("film/tile.rs", "use super::super::light::Sun;")], &floors).len(), 1);
+    assert_eq!(floor_faults(&[Source::new("film/tile.rs", "use super::light::Sun;")], &floors).len(), 0);
+    for code in [
+        "// use crate::light::Sun;",
+        "const A: &str = \"crate::light\"; const B: char = '\"'; fn f<'a>() {} const C: &str = r#\"crate::light \"#;",
+        "#[cfg(test)]\nmod tests { use crate::light::Sun; }",
+        "use crate::math::Vec3; use crate::Error;",
+    ] {
+        assert_eq!(floor_faults(&[Source::new("film.rs", code)], &floors), Vec::<String>::new(), "{code}");
+    }
+    assert_eq!(floor_faults(&[Source::new("attic/mod.rs", "")], &floors).len(), 1);
+
+    for (path, code) in [
+        ("plant/leaf.rs", "use crate::material::Leaf;"),
+        ("render/label.rs", "use crate::film::Film;"),
+        ("scene/build.rs", "crate::cli::fail(&e);"),
+    ] {
+        assert_eq!(never_faults(&[Source::new(path, code)]).len(), 1, "{code}");
+    }
+    assert!(never_faults(&[Source::new("render/mod.rs", "use crate::film::Film;")]).is_empty());
+
+    for (path, code) in [
+        ("accel/brute.rs", "use embree3 as rtc;"),
+        ("output/mod.rs", "exr::prelude::read();"),
+        ("plant/leaf.rs", "use rayon::prelude::*;"),
+        ("soil/relief.rs", "let p = noise::Perlin::new(3);"),
+        ("soil/relief.rs", "use ::noise::Perlin;"),
+    ] {
+        assert_eq!(door_faults(&[Source::new(path, code)]).len(), 1, "{code}");
+    }
+    for (path, code) in [
+        ("accel/embree.rs", "use embree3 as rtc;"),
+        ("soil/relief.rs", "use crate::texture::noise; let p = noise::Perlin::new(3);"),
+        ("output/mod.rs", "mod exr;\nexr::encode();"),
+    ] {
+        assert_eq!(door_faults(&[Source::new(path, code)]), Vec::<String>::new(), "{code}");
+    }
+}

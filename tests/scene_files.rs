@@ -1,0 +1,250 @@
+//! Method 11: scene files. Every page that ships builds, says the same after printing and reading, and every mistake in
+//! `tests/bad` is answered by exactly the words beside it.
+//!
+//! Rationale: people write pages by hand, at night, in editors that know nothing of them. Expected: a page builds or its
+//! error shows file, line, column, the characters at fault and a way out. Source: none; the words are ours. After a change of
+//! words: `FURROW_BLESS=1 cargo test --test scene_files` writes them anew; read the difference before committing it.
+
+use furrow::page::Page;
+use furrow::plant::{Stage, grow};
+use furrow::sampling::{Purpose, Stream};
+use furrow::scene::build::{self, Options};
+use furrow::scene::desc::{FieldDesc, SpeciesDesc};
+use furrow::texture::draw::Recipe;
+use furrow::{Error, Result};
+use proptest::prelude::*;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::fmt::Debug;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The `.ron` files of a folder and the folders in it, in order; paths relative to the repository, where tests run.
+fn pages(folder: &str) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.extend(pages(path.to_str().unwrap()));
+        } else if path.extension().is_some_and(|e| e == "ron") {
+            found.push(path);
+        }
+    }
+    found.sort();
+    found
+}
+
+fn is_species(path: &Path) -> bool {
+    path.components().any(|c| c.as_os_str() == "species")
+}
+
+fn fields() -> Vec<PathBuf> {
+    pages("scenes").into_iter().filter(|p| !is_species(p)).collect()
+}
+
+fn species() -> Vec<PathBuf> {
+    pages("scenes").into_iter().filter(|p| is_species(p)).collect()
+}
+
+#[test]
+fn every_field_page_builds() {
+    assert!(fields().len() >= 7, "scene pages are missing");
+    for path in fields() {
+        // Few pixels: the ground is grown as fine as a pixel sees it.
+        let options = Options { width: Some(48), ..Options::default() };
+        let field = build::field(&path, &options).unwrap_or_else(|e| panic!("{e}"));
+        assert!(!field.scene.parts.is_empty() && !field.scene.lights.is_empty(), "{}: nothing to see", path.display());
+        assert!(field.warnings.is_empty(), "{}: {:?}", path.display(), field.warnings);
+        for part in &field.scene.parts {
+            assert_eq!(part.mesh.fault(), None, "{}", path.display());
+        }
+    }
+}
+
+#[test]
+fn every_species_page_grows_at_every_stage() {
+    assert!(species().len() >= 6, "species pages are missing");
+    for path in species() {
+        let desc: SpeciesDesc = Page::read(&path).unwrap().parse().unwrap_or_else(|e| panic!("{e}"));
+        for stage in &desc.plant.stages {
+            let plant = grow(&desc.plant, Stage::Bbch(stage.bbch), &Stream::of(1, 0, Purpose::Test, 0));
+            assert!(!plant.organs.is_empty(), "{} BBCH {}", path.display(), stage.bbch);
+            for organ in &plant.organs {
+                assert_eq!(organ.mesh.fault(), None, "{} BBCH {}", path.display(), stage.bbch);
+                assert!(desc.skins.contains_key(&organ.skin), "{}: no skin {}", path.display(), organ.skin);
+            }
+        }
+        for texture in desc.textures() {
+            assert!(path.parent().unwrap().join(texture).is_file(), "{}: no {texture}", path.display());
+        }
+    }
+}
+
+fn survives_printing<T: Debug + PartialEq + Serialize + DeserializeOwned>(path: &Path) {
+    let first: T = Page::read(path).unwrap().parse().unwrap_or_else(|e| panic!("{e}"));
+    let printed = Page::print(&first).unwrap();
+    let second: T = Page::of(&printed).parse().unwrap_or_else(|e| panic!("{} printed: {e}\n{printed}", path.display()));
+    assert_eq!(first, second, "{}", path.display());
+    assert_eq!(printed, Page::print(&second).unwrap(), "{}", path.display());
+}
+
+#[test]
+fn a_printed_page_reads_the_same() {
+    fields().iter().for_each(|p| survives_printing::<FieldDesc>(p));
+    species().iter().for_each(|p| survives_printing::<SpeciesDesc>(p));
+    pages("textures").iter().for_each(|p| survives_printing::<Recipe>(p));
+}
+
+/// What a bad page is told, as the program prints it.
+fn told(path: &Path) -> String {
+    match build::field(path, &Options { width: Some(16), ..Options::default() }) {
+        Ok(_) => panic!("{}: it builds", path.display()),
+        Err(e) => format!("error: {e}\n").replace('\\', "/"),
+    }
+}
+
+fn bad() -> Vec<PathBuf> {
+    pages("tests/bad").into_iter().filter(|p| p.parent().unwrap().ends_with("bad")).collect()
+}
+
+#[test]
+fn every_mistake_gets_exactly_the_words_beside_it() {
+    let bless = std::env::var_os("FURROW_BLESS").is_some();
+    assert!(bad().len() >= 24, "bad pages are missing");
+    let mut wrong = Vec::new();
+    for path in bad() {
+        let (words, beside) = (told(&path), path.with_extension("txt"));
+        if bless {
+            std::fs::write(&beside, &words).unwrap();
+        }
+        let expected = std::fs::read_to_string(&beside).unwrap_or_default();
+        if words != expected {
+            wrong.push(format!("{}\n--- expected\n{expected}--- told\n{words}", path.display()));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Line, column, underlined characters of a message: what a reader's eye follows.
+fn pointed_at(words: &str) -> (usize, usize, String) {
+    let mut lines = words.lines();
+    let head = lines.next().unwrap().strip_prefix("error: tests/bad/").unwrap();
+    let mut numbers = head.split(':').skip(1).map(|n| n.parse::<usize>());
+    let (line, column) = (numbers.next().unwrap().unwrap(), numbers.next().unwrap().unwrap());
+    let (shown, carets) = (lines.next().unwrap(), lines.next().unwrap());
+    let from = carets.chars().position(|c| c == '^').unwrap();
+    let count = carets.chars().filter(|c| *c == '^').count();
+    (line, column, shown.chars().skip(from).take(count).collect())
+}
+
+#[test]
+fn every_message_points_into_its_page_and_helps() {
+    for path in bad() {
+        let words = told(&path);
+        assert!(words.contains("\n help: "), "no help: {words}");
+        if path.file_stem().unwrap() == "binary" {
+            continue;
+        }
+        let (line, column, under) = pointed_at(&words);
+        // The page at fault may be one that the page names.
+        let file = words.strip_prefix("error: ").unwrap().split(':').next().unwrap();
+        let text = String::from_utf8_lossy(&std::fs::read(file).unwrap()).into_owned();
+        let there: String =
+            text.lines().nth(line - 1).unwrap_or("").chars().skip(column - 1).take(under.chars().count()).collect();
+        assert_eq!(under.trim_end(), there.trim_end(), "{words}");
+    }
+}
+
+#[test]
+fn the_caret_is_under_the_right_characters() {
+    for (name, line, column, under) in [
+        ("tabs_and_umlauts", 3, 46, "lihgts"),
+        ("unknown_field", 3, 54, "azimut_deg"),
+        ("fraction_above_one", 4, 111, "1.2"),
+        ("negative_weight", 2, 55, "-1"),
+        ("missing_comma", 3, 5, "lights"),
+        ("long_line", 1, 577, "groth"),
+        ("text_for_number", 2, 32, "\"0.85\""),
+        ("too_many_plants", 6, 84, "(per_m2: 1e9)"),
+    ] {
+        let words = told(Path::new(&format!("tests/bad/{name}.ron")));
+        assert_eq!(pointed_at(&words), (line, column, under.to_owned()), "{words}");
+    }
+}
+
+#[test]
+fn the_program_refuses_bad_pages_and_writes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    for path in bad() {
+        let out = folder.path().join("out");
+        let done = Command::new(env!("CARGO_BIN_EXE_trace"))
+            .args(["--spp", "1", "--width", "16", "--threads", "1", "--scene"])
+            .arg(&path)
+            .arg("--out")
+            .arg(&out)
+            .output()
+            .unwrap();
+        assert_eq!(done.status.code(), Some(2), "{}", path.display());
+        assert!(done.stdout.is_empty(), "{}", path.display());
+        assert_eq!(String::from_utf8(done.stderr).unwrap(), told(&path));
+        assert!(!out.exists(), "{}: a folder was made", path.display());
+    }
+}
+
+/// A page, or an error that a terminal can show.
+fn tidy<T>(read: Result<T>) -> Result<(), TestCaseError> {
+    let Err(error) = read else { return Ok(()) };
+    prop_assert!(matches!(error, Error::Page(_)), "{error}");
+    let words = error.to_string();
+    prop_assert!(words.lines().count() <= 4 && words.lines().all(|l| l.chars().count() < 2000), "{words}");
+    prop_assert!(words.chars().all(|c| c == '\n' || !c.is_control()), "{words:?}");
+    prop_assert!(words.contains('^'), "{words}");
+    Ok(())
+}
+
+fn read_as_any(text: &str) -> Result<(), TestCaseError> {
+    let page = Page::of(text);
+    tidy(page.parse::<FieldDesc>())?;
+    tidy(page.parse::<SpeciesDesc>())?;
+    tidy(page.parse::<Recipe>())
+}
+
+/// One edit of a text: bytes taken away, put in or doubled.
+fn edited(text: &str, (at, len, kind, with): &(prop::sample::Index, usize, u8, String)) -> String {
+    let chars: Vec<char> = text.chars().collect();
+    let at = at.index(chars.len() + 1);
+    let end = (at + len).min(chars.len());
+    let middle: String = match kind % 4 {
+        0 => String::new(),
+        1 => with.clone(),
+        2 => chars[at..end].iter().chain(&chars[at..end]).collect(),
+        _ => chars[at..end].iter().rev().collect(),
+    };
+    chars[..at].iter().collect::<String>() + &middle + &chars[end..].iter().collect::<String>()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(400) })]
+
+    #[test]
+    fn random_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        read_as_any(&String::from_utf8_lossy(&bytes))?;
+    }
+
+    #[test]
+    fn random_page_like_text_never_panics(text in "(Field\\()?[a-z_ (){}\\[\\]:,.0-9\"'#/*\n\t\\\\éＦ-]{0,120}") {
+        read_as_any(&text)?;
+    }
+
+    #[test]
+    fn mutilated_pages_never_panic(
+        edits in prop::collection::vec(
+            (any::<prop::sample::Index>(), 0_usize..12, any::<u8>(), "[-a-zA-Z0-9(){}\\[\\]:,.\" \n/*\u{1}\u{1b}é]{1,6}"),
+            1..4,
+        ),
+    ) {
+        let page = std::fs::read_to_string("scenes/field.ron").unwrap();
+        let text = edits.iter().fold(page, |text, edit| edited(&text, edit));
+        tidy(Page::of(&text).parse::<FieldDesc>())?;
+    }
+}
