@@ -5,7 +5,8 @@ use crate::math::{Spectrum, Vec3};
 use std::f32::consts::FRAC_1_PI;
 
 /// Oren & Nayar 1994, the qualitative model: `f = ρ/π (A + B max(0, cos Δφ) sin α tan β)`.
-/// Never returns more than a Lambert surface of the same albedo, which it is for σ = 0.
+/// Never returns more than a Lambert surface of the same albedo, which it is for σ = 0: the model as printed returns
+/// ρ (A + B/2) at grazing angles, up to 1.5 % too much for small σ, so A and B are divided by that where it exceeds one.
 #[derive(Clone, Copy, Debug)]
 pub struct OrenNayar {
     albedo: Spectrum,
@@ -17,7 +18,9 @@ impl OrenNayar {
     /// `albedo` 0–1 per band; `sigma`: standard deviation of the facets' slope angle, radians, 0–1.
     pub fn new(albedo: Spectrum, sigma: f32) -> Self {
         let s = sigma * sigma;
-        Self { albedo, a: 1.0 - 0.5 * s / (s + 0.33), b: 0.45 * s / (s + 0.09) }
+        let (a, b) = (1.0 - 0.5 * s / (s + 0.33), 0.45 * s / (s + 0.09));
+        let most = (a + 0.5 * b).max(1.0);
+        Self { albedo, a: a / most, b: b / most }
     }
 
     /// The albedo it was made with.

@@ -44,8 +44,11 @@ pub struct LeafDesc {
     pub ior: Num<Index>,
     /// How much more visible light the lower side reflects: 1.3–1.8 on most dicots.
     pub back_paleness: Num<NonNegative>,
-    /// Strength of the relief read from the picture; 1 is a vein relief of 0.2 mm on a leaf of 100 mm.
+    /// Strength of the relief; 1 takes the height map as it is, or reads a vein relief of 0.2 mm on a leaf of 100 mm off
+    /// the picture where there is none.
     pub relief: Num<NonNegative>,
+    /// White over black of the height map that lies beside the picture (`NAME.height.png`), in lengths of the image.
+    pub relief_range: Num<NonNegative>,
     /// What the leaf is made of.
     pub pigments: Pigments,
 }
@@ -60,6 +63,7 @@ impl Default for LeafDesc {
             ior: Num::new(1.45),
             back_paleness: Num::new(1.4),
             relief: Num::new(1.0),
+            relief_range: Num::new(0.023),
             pigments: Pigments::default(),
         }
     }

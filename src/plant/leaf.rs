@@ -17,8 +17,11 @@ use std::f32::consts::FRAC_PI_2;
 const SIDES: u32 = 9;
 /// Shortest cell of a blade's mesh, metres: about what four pixels of a field camera see.
 const CELL: f32 = 0.9e-3;
-/// A chain never comes nearer to the soil than this, metres: a leaf that would, lies on it. A low crown halves it.
-const LYING: f32 = 0.003;
+/// A midrib never comes nearer to the soil than this, metres, plus [`LYING_WIDTH`] of the blade's width for its hanging
+/// sides: a leaf that would, lies on the soil's crumbs. Near the crown the bound falls to half the crown's height.
+const LYING: f32 = 0.004;
+/// See [`LYING`].
+const LYING_WIDTH: f32 = 0.15;
 
 /// Where a leaf stands on its axis.
 #[derive(Clone, Copy, Debug)]
@@ -136,7 +139,8 @@ fn pose(skeleton: &mut Skeleton, leaf: &LeafNow<'_>, root: Pose, stream: &mut St
         .collect();
     let total: f32 = sag.iter().sum::<f32>().max(1e-6);
     let mut height = root.origin.z;
-    let lying = LYING.min(0.5 * height);
+    let (near, far) = (0.5 * height, LYING.min(0.2 * leaf.blade) + LYING_WIDTH * leaf.width);
+    let (start, whole) = (along[0], along[along.len() - 1] - along[0]);
     let mut elevation = root.rotation.col(0).z.clamp(-1.0, 1.0).asin();
     for k in 0..along.len() - 1 {
         let (designed, load) = if k < base {
@@ -149,7 +153,8 @@ fn pose(skeleton: &mut Skeleton, leaf: &LeafNow<'_>, root: Pose, stream: &mut St
         // A young stalk's base is held by its neighbours.
         bend += wobble * stream.normal() as f32 * if k == 0 { 0.4 } else { 1.0 };
         let link = along[k + 1] - along[k];
-        let lowest = ((lying - height) / link.max(1e-6)).clamp(-1.0, 0.2).asin();
+        let lying = lerp(near, far.max(near), ((along[k + 1] - start) / whole).min(1.0));
+        let lowest = ((lying - height) / link.max(1e-6)).clamp(-1.0, 0.25).asin();
         if k > 0 || lowest < 0.0 {
             bend = bend.max(lowest - elevation);
         }
@@ -167,7 +172,7 @@ fn relief(leaf: &LeafNow<'_>, stream: &mut Stream) -> Relief {
     let angle = kind.vein_angle_deg.f32().to_radians();
     Relief {
         fold: leaf.fold,
-        fold_tip: 0.5 * leaf.fold,
+        fold_tip: 0.6 * leaf.fold,
         curl: kind.curl_deg.draw32(stream).to_radians(),
         wave: kind.wave.draw32(stream),
         period: kind.wave_period.draw32(stream),

@@ -59,17 +59,20 @@ impl Relief {
             let fold = self.fold + (self.fold_tip - self.fold) * t;
             for side in [-1.0_f32, 1.0] {
                 let widen = 1.0 + 0.5 * side * self.asymmetry;
-                let (mut x, mut z, mut s) = (0.0, 0.0, 0.0);
+                let (mut x, mut z, mut s, mut lift) = (0.0_f32, 0.0_f32, 0.0_f32, 0.0_f32);
                 for step in 1..=middle {
                     let k = if side < 0.0 { middle - step } else { middle + step };
                     let next = row[k].x.abs() * widen;
                     // The angle in the middle of this cell: the fold rounds itself off over the inner sixth.
                     let across = (0.5 * (s + next) / half_width).min(1.3);
                     let angle = fold * smoothstep(-0.08, 0.16, across) + self.curl * across;
-                    x += (next - s) * angle.cos();
-                    z += (next - s) * angle.sin();
-                    s = next;
-                    let lift = self.lift(&noise, t, (s / half_width).min(1.15), side, s / length) * length;
+                    let higher = self.lift(&noise, t, (next / half_width).min(1.15), side, next / length) * length;
+                    // What a wave climbs it lacks in width: margins of wavy leaves look notched from above.
+                    let (wide, climb) = (next - s, higher - lift);
+                    let reach = (wide * wide - climb * climb).max(0.1 * wide * wide).sqrt();
+                    x += reach * angle.cos();
+                    z += reach * angle.sin();
+                    (s, lift) = (next, higher);
                     row[k].x = side * (x - lift * angle.sin());
                     row[k].z = z + lift * angle.cos();
                 }
@@ -103,7 +106,7 @@ impl Relief {
             let drift = noise.at2(wander, f64::from(side) * 7.3 + 0.5) as f32;
             let swell = 1.0 + 1.3 * noise.at2(2.0 * wander + 31.7, f64::from(side) * 5.1 + 0.5) as f32;
             let phase = TAU * (origin / self.period.max(0.02) + 0.8 * drift) + side;
-            lift += self.wave * swell.max(0.1) * ends * across.powf(1.8) * phase.sin();
+            lift += self.wave * swell.max(0.1) * ends * across.powf(1.5) * phase.sin();
         }
         if self.quilt != 0.0 {
             // One cell between neighbouring secondaries, high in its middle, tied down on the veins and the midrib.

@@ -47,7 +47,7 @@ pub struct LayerDesc {
     /// How far gravity bends the blade from base to tip when it is held level.
     #[serde(default = "vary::<Finite>")]
     pub bend_deg: Vary<Finite>,
-    /// Angle by which each half rises from the midrib at the base; the tip keeps half of it.
+    /// Angle by which each half rises from the midrib at the base; the tip keeps three fifths of it.
     #[serde(default = "vary::<Finite>")]
     pub fold_deg: Vary<Finite>,
     /// Stem between the layer below and this one.

@@ -102,7 +102,7 @@ struct Seedling {
     species: Arc<Species>,
     growth: Growth,
     position: Vec2,
-    heading: Option<f64>,
+    turn: f32,
     only_leaf: Option<u16>,
     stream: Stream,
 }
@@ -304,7 +304,7 @@ impl<'a> Builder<'a> {
                 species,
                 growth: placed.growth.clone(),
                 position,
-                heading: Some(placed.heading_deg.draw(&mut stream)),
+                turn: placed.turn_deg.draw32(&mut stream).to_radians(),
                 only_leaf: placed.only_leaf.map(|l| l.get() as u16),
                 stream: stream.child(Purpose::Plant, 0),
             });
@@ -333,7 +333,7 @@ impl<'a> Builder<'a> {
             species: species.clone(),
             growth: growth.clone(),
             position: spot.at,
-            heading: None,
+            turn: 0.0,
             only_leaf: None,
             stream: self.stream(Purpose::Plant, population).child(Purpose::Plant, spot.key),
         }
@@ -390,16 +390,14 @@ fn grow(s: &Seedling, number: u16, ground: Option<&Ground>) -> (PlantRecord, Vec
         Growth::AgeDays(days) => Stage::Age(days.draw32(&mut stream)),
         Growth::Bbch(code) => Stage::Bbch(code.draw(&mut stream) as u32),
     };
-    let any = stream.range(0.0, 360.0);
-    let heading = s.heading.unwrap_or(any).to_radians() as f32;
     let green = (1.0 + desc.chlorophyll_sd.get() * stream.normal()).clamp(0.6, 1.5) as f32;
     let (x, y) = (s.position.x, s.position.y);
     let (z, normal) = ground.map_or((0.0, Vec3::Z), |g| (g.height(x, y), g.trend(x, y, STANCE)));
     let axis = scatter::axis(normal, AXIS_NOISE_DEG, &mut stream);
     let plant = plant::grow(&desc.plant, stage, &stream);
     let foot = Vec3::new(x, y, z);
-    // Plant coordinates: y to the heading, z along the axis.
-    let ahead = Vec3::new(heading.sin(), heading.cos(), 0.0);
+    // Plant coordinates: y to the north before the turn, z along the axis. Growing has given it a turn of its own.
+    let ahead = Vec3::new(s.turn.sin(), s.turn.cos(), 0.0);
     let frame = Frame::with_tangent(axis, ahead.cross(axis));
     let rotation = Mat3::from_cols(frame.x, frame.y, frame.z);
     let class = desc.role.class();
@@ -431,7 +429,6 @@ fn grow(s: &Seedling, number: u16, ground: Option<&Ground>) -> (PlantRecord, Vec
         class,
         position: foot,
         axis,
-        heading,
         bbch: plant.bbch,
         age_days: plant.age_days,
         height: plant.height,

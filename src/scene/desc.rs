@@ -111,9 +111,9 @@ pub struct PlacedDesc {
     /// Where its stem meets the ground, metres east and north.
     #[serde(default = "origin")]
     pub position_m: (Vary<Finite>, Vary<Finite>),
-    /// Which way its first leaf points, degrees clockwise from north.
-    #[serde(default = "any_heading")]
-    pub heading_deg: Vary<Finite>,
+    /// Turns it about its axis, degrees clockwise from above.
+    #[serde(default = "no_turn")]
+    pub turn_deg: Vary<Finite>,
     /// Only this leaf of it, counted from 1 with the seed leaves; the whole plant unless given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub only_leaf: Option<Num<PositiveCount>>,
@@ -123,8 +123,8 @@ fn origin() -> (Vary<Finite>, Vary<Finite>) {
     (Vary::fixed(0.0), Vary::fixed(0.0))
 }
 
-fn any_heading() -> Vary<Finite> {
-    Vary::uniform(0.0, 360.0)
+fn no_turn() -> Vary<Finite> {
+    Vary::fixed(0.0)
 }
 
 /// A species, as its page writes it.

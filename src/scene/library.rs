@@ -89,7 +89,7 @@ impl Library {
                 Some(of) => {
                     let mut choices = Vec::new();
                     for path in of.all() {
-                        let (picture, mask) = self.picture(&own, path)?;
+                        let (picture, mask) = self.picture(&own, path, skin.relief_range.f32())?;
                         choices.push((LeafMaterial::new(skin, Some(picture)), mask));
                     }
                     choices
@@ -102,7 +102,7 @@ impl Library {
         Ok(species)
     }
 
-    fn picture(&mut self, page: &Page, path: &str) -> Result<Cut> {
+    fn picture(&mut self, page: &Page, path: &str, relief_range: f32) -> Result<Cut> {
         let full = page.need_file(path)?;
         if let Some(known) = self.pictures.get(&full) {
             return Ok(known.clone());
@@ -113,9 +113,7 @@ impl Library {
         let beside = full.with_extension("height.png");
         let maps = if beside.is_file() {
             self.note(&beside)?;
-            Maps::from_height(
-                Height::load(&beside, Relief::LEAF.amplitude.abs() * 2.0).map_err(|e| at_its_place(page, path, e))?,
-            )
+            Maps::from_height(Height::load(&beside, relief_range).map_err(|e| at_its_place(page, path, e))?)
         } else {
             Maps::derive(&color, &Relief::LEAF)
         };

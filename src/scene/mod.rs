@@ -45,8 +45,6 @@ pub struct PlantRecord {
     pub position: Vec3,
     /// Its growth axis, unit.
     pub axis: Vec3,
-    /// Where its first leaf points, radians clockwise from north.
-    pub heading: f32,
     /// Growth stage, BBCH.
     pub bbch: u32,
     /// Days after emergence.

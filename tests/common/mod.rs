@@ -2,4 +2,6 @@
 #![allow(dead_code, unreachable_pub, reason = "each test uses its part")]
 
 pub mod chi2;
+pub mod pictures;
+pub mod program;
 pub mod scenes;

@@ -1,0 +1,98 @@
+//! The program itself and the small page that most tests give it.
+
+use furrow::accel::EmbreeAccel;
+use furrow::film::Film;
+use furrow::geometry::Window;
+use furrow::integrator::{Path as PathTracer, World};
+use furrow::render::{self, LabelMap, Settings, Watch};
+use furrow::scene::Field;
+use furrow::scene::build::{self, Options};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::atomic::AtomicBool;
+
+/// A few plants on a square of soil.
+pub const SMALL: &str = "tests/ref/small.ron";
+
+/// The files of an image, by name.
+pub const FILES: [&str; 7] =
+    ["leaves.png", "nir.png", "overlay.png", "plants.png", "radiance.exr", "rgb.png", "semantics.png"];
+
+/// The text of the small page, its paths made relative to the package.
+pub fn small_text() -> String {
+    std::fs::read_to_string(SMALL).expect("the small page").replace("../../", "")
+}
+
+/// `trace` with these arguments.
+pub fn trace(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_trace"));
+    command.current_dir(env!("CARGO_MANIFEST_DIR")).args(arguments);
+    command
+}
+
+/// Runs `trace` on the small page into `out`, one sample a pixel unless said otherwise, and expects it to succeed.
+pub fn run(out: &Path, arguments: &[&str]) -> Output {
+    let mut command = trace(&["--scene", SMALL, "--out", out.to_str().expect("a path")]);
+    if !arguments.contains(&"--spp") {
+        command.args(["--spp", "1"]);
+    }
+    let output = command.args(arguments).output().expect("the program");
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    output
+}
+
+/// Names in a folder, sorted; hidden ones too. Nothing where there is no folder.
+pub fn names(folder: &Path) -> Vec<String> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
+    let mut names: Vec<String> =
+        entries.map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+/// A folder that goes away with the test.
+pub fn scratch() -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("image");
+    (folder, out)
+}
+
+/// A field from a page's text, without the program.
+pub fn field(text: &str, options: &Options) -> Field {
+    build::field_of(text, options).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Film and labels of a whole field at this many threads.
+pub fn shoot(field: &Field, spp: u32, threads: usize) -> (Film, LabelMap) {
+    let scene = &field.scene;
+    let pool = render::pool(threads).expect("a pool");
+    pool.install(|| {
+        let geometry = EmbreeAccel::build(&scene.surfaces(), threads as u32).expect("an accelerator");
+        let window = Window::full(scene.camera.width(), scene.camera.height());
+        let settings = Settings { spp, seed: field.sample_seed(), window, filter: scene.filter };
+        let stop = AtomicBool::new(false);
+        let watch = Watch { done: &|_| (), stop: &stop };
+        let world = World { scene, geometry: &geometry };
+        let film = render::render(&world, &PathTracer::default(), &settings, &watch).expect("a film");
+        (film, render::label(&geometry, &scene.tags(), &scene.camera, window))
+    })
+}
+
+/// SHA-256 of numbers, hex.
+pub fn hash(numbers: impl IntoIterator<Item = u32>) -> String {
+    use sha2::{Digest, Sha256};
+    let mut sha = Sha256::new();
+    for n in numbers {
+        sha.update(n.to_le_bytes());
+    }
+    sha.finalize().iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// Every bit of a film, as numbers.
+pub fn bits(film: &Film) -> Vec<u32> {
+    let pixels = film.pixels.iter().flat_map(|p| {
+        let bands = [p.mean, p.variance, p.albedo].map(furrow::math::Spectrum::to_array);
+        bands.into_iter().flatten().chain(p.normal.to_array()).chain([p.depth])
+    });
+    pixels.map(f32::to_bits).collect()
+}

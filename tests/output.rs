@@ -1,0 +1,208 @@
+//! Files hold what they promise, or are not there.
+//!
+//! Rationale: what is written is all that anyone else sees. Expected: the EXR has the documented channels with the film's and the
+//! labels' numbers and says where it comes from; PNGs hold no clock time and no path; a folder that cannot be written and a disk
+//! that is full give a clear error, exit code 1 and no half-written file.
+//! Source: the documentation of `output` and `output::exr`.
+
+mod common;
+
+use common::program::{FILES, SMALL, bits, field, names, run, scratch, shoot, small_text, trace};
+use exr::prelude::*;
+use furrow::film::Film;
+use furrow::math::Spectrum;
+use furrow::output::{self, Provenance};
+use furrow::render::{LabelMap, label::NONE};
+use furrow::scene::build::Options;
+use std::collections::BTreeMap;
+use std::path::Path as File;
+
+fn provenance(hash: &str) -> Provenance {
+    Provenance {
+        scene_hash: hash.into(),
+        seed: 3,
+        index: 0,
+        spp: 3,
+        integrator: "path".into(),
+        kernels: "Embree of the test".into(),
+    }
+}
+
+/// The small page's image, in memory and on disk.
+fn written() -> (tempfile::TempDir, std::path::PathBuf, Film, LabelMap, Provenance) {
+    let field = field(&small_text(), &Options { width: Some(64), ..Options::default() });
+    let (film, labels) = shoot(&field, 3, 2);
+    let provenance = provenance(&field.hash);
+    let (keep, out) = scratch();
+    output::write_image(&out, &film, &labels, &field.photograph(&film), &provenance).unwrap();
+    (keep, out, film, labels, provenance)
+}
+
+/// f32, f16 widened to f32, or u32.
+#[derive(Debug, PartialEq)]
+enum Samples {
+    Whole(Vec<u32>),
+    Single(Vec<f32>),
+    Half(Vec<f32>),
+}
+
+/// Channels by name, and the header's comment.
+fn channels(path: &File) -> (BTreeMap<String, Samples>, String) {
+    let image = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
+    let layer = image.from_file(path).unwrap().layer_data;
+    let comment = layer.attributes.comments.as_ref().map(ToString::to_string).unwrap_or_default();
+    let channels = layer.channel_data.list.into_iter().map(|c| {
+        let samples = match c.sample_data {
+            FlatSamples::U32(v) => Samples::Whole(v),
+            FlatSamples::F32(v) => Samples::Single(v),
+            FlatSamples::F16(v) => Samples::Half(v.into_iter().map(f16::to_f32).collect()),
+        };
+        (c.name.to_string(), samples)
+    });
+    (channels.collect(), comment)
+}
+
+#[test]
+fn the_exr_holds_the_film_and_the_labels() {
+    let (_keep, out, film, labels, provenance) = written();
+    let (channels, comment) = channels(&out.join("radiance.exr"));
+    assert_eq!(comment, provenance.text());
+    let names: Vec<&str> = channels.keys().map(String::as_str).collect();
+    let mut documented: Vec<String> =
+        ["depth.Z", "id.class", "id.leaf", "id.part", "id.plant"].map(String::from).into();
+    for band in Spectrum::NAMES {
+        documented.extend([band.to_string(), format!("variance.{band}"), format!("albedo.{band}")]);
+    }
+    documented.extend(["normal.X", "normal.Y", "normal.Z"].map(String::from));
+    documented.sort();
+    assert_eq!(names, documented);
+    let single = |name: &str| match &channels[name] {
+        Samples::Single(v) => v,
+        other => panic!("{name} is not f32: {other:?}"),
+    };
+    let half = |name: &str| match &channels[name] {
+        Samples::Half(v) => v,
+        other => panic!("{name} is not f16: {other:?}"),
+    };
+    for (band, name) in Spectrum::NAMES.iter().enumerate() {
+        let of = |f: fn(&furrow::film::Pixel) -> Spectrum| {
+            film.pixels.iter().map(|p| f(p).to_array()[band]).collect::<Vec<_>>()
+        };
+        assert_eq!(single(name), &of(|p| p.mean), "{name} is the film's mean, to the bit");
+        assert_eq!(single(&format!("variance.{name}")), &of(|p| p.variance));
+        assert!(single(name).iter().all(|v| v.is_finite() && *v >= 0.0), "{name} is finite and not negative");
+        assert!(single(&format!("variance.{name}")).iter().all(|v| v.is_finite() && *v >= 0.0));
+        for (stored, kept) in half(&format!("albedo.{name}")).iter().zip(of(|p| p.albedo)) {
+            assert!((stored - kept).abs() <= 1e-3 * kept + 1e-7 && *stored <= 1.01, "albedo {stored} for {kept}");
+        }
+    }
+    for (axis, name) in ["normal.X", "normal.Y", "normal.Z"].iter().enumerate() {
+        for (stored, pixel) in half(name).iter().zip(&film.pixels) {
+            assert!((stored - pixel.normal.to_array()[axis]).abs() < 1e-3, "{name}");
+        }
+    }
+    let depth: Vec<f32> = film.pixels.iter().map(|p| p.depth).collect();
+    assert_eq!(single("depth.Z"), &depth);
+    assert!(depth.iter().all(|d| *d > 0.0), "nothing lies behind the camera");
+    let ids = |f: fn(&furrow::scene::tag::Tag) -> u32| Samples::Whole(labels.tags.iter().map(f).collect());
+    assert_eq!(channels["id.class"], ids(|t| t.class as u32));
+    assert_eq!(channels["id.plant"], ids(|t| u32::from(t.plant)));
+    assert_eq!(channels["id.leaf"], ids(|t| u32::from(t.leaf)));
+    let parts = labels.parts.iter().map(|p| if *p == NONE { 0 } else { p + 1 }).collect();
+    assert_eq!(channels["id.part"], Samples::Whole(parts));
+    assert!(bits(&film).iter().any(|b| *b != 0));
+}
+
+/// The text chunks of a PNG; any chunk that is not pixels, palette or colour space counts as text.
+fn text_of(path: &File) -> Vec<(String, String)> {
+    let bytes = std::fs::read(path).unwrap();
+    let mut at = 8;
+    let mut texts = Vec::new();
+    while at < bytes.len() {
+        let length = u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+        let kind = String::from_utf8_lossy(&bytes[at + 4..at + 8]).into_owned();
+        if !["IHDR", "PLTE", "IDAT", "IEND", "sRGB", "gAMA", "cHRM"].contains(&kind.as_str()) {
+            texts.push((kind, String::from_utf8_lossy(&bytes[at + 8..at + 8 + length]).into_owned()));
+        }
+        at += length + 12;
+    }
+    texts
+}
+
+#[test]
+fn a_pngs_text_tells_its_origin_but_no_path_and_no_time() {
+    let (_keep, out, .., provenance) = written();
+    for name in FILES.iter().filter(|f| f.ends_with(".png")) {
+        let texts = text_of(&out.join(name));
+        assert_eq!(texts, [("tEXt".to_string(), format!("Comment\0{}", provenance.text()))], "{name}");
+    }
+    let text = provenance.text();
+    for key in
+        ["program: furrow ", "scene: sha256 ", "seed: 3", "index: 0", "spp: 3", "integrator: path", "kernels: Embree"]
+    {
+        assert!(text.lines().any(|l| l.starts_with(key)), "{key} is missing:\n{text}");
+    }
+    let year = 1970 + std::time::SystemTime::UNIX_EPOCH.elapsed().unwrap().as_secs() / 31_556_952;
+    let prose = text.replace(&text.lines().nth(1).unwrap()["scene: sha256 ".len()..], "");
+    for hint in ["/", "\\", ".ron", &year.to_string()] {
+        assert!(!prose.contains(hint), "`{hint}` in\n{text}");
+    }
+}
+
+/// Expected: exit code 1, the path and the system's reason on stderr, nothing on stdout.
+#[test]
+fn a_folder_that_cannot_be_made_is_a_clear_error() {
+    let (keep, _) = scratch();
+    let file = keep.path().join("file");
+    std::fs::write(&file, "not a folder").unwrap();
+    let under = file.join("image");
+    for out in [&under, &file] {
+        let args = ["--scene", SMALL, "--spp", "1", "--width", "24", "--out", out.to_str().unwrap()];
+        let output = trace(&args).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        let error = said.lines().find(|l| l.starts_with("error: ")).unwrap_or_else(|| panic!("no error in {said}"));
+        assert!(error.contains(file.to_str().unwrap()), "which path? {error}");
+        assert_eq!(output.status.code(), Some(1), "{error}");
+        assert!(output.stdout.is_empty(), "{}", String::from_utf8_lossy(&output.stdout));
+        assert_eq!(names(keep.path()), ["file"]);
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), "not a folder");
+    }
+}
+
+/// Rationale: disks fill up in the middle of a file. The shell's limit on a file's size fails a write in the same way. Expected:
+/// an error about the file, exit code 1; the files before it are whole, the others absent, no temporary file stays.
+#[cfg(unix)]
+#[test]
+fn a_full_disk_leaves_no_half_written_file() {
+    let (_keep, whole) = scratch();
+    run(&whole, &["--width", "64"]);
+    let (_keep_too, out) = scratch();
+    let program = env!("CARGO_BIN_EXE_trace");
+    // Blocks of 512 or 1024 bytes: enough for the pictures of 64 × 48 pixels, not for the radiance.
+    let script = format!(
+        "trap '' XFSZ; ulimit -f 24; exec '{program}' --scene {SMALL} --spp 1 --width 64 --out '{}'",
+        out.display()
+    );
+    let output = std::process::Command::new("sh").args(["-c", &script]).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    let error = said.lines().find(|l| l.starts_with("error: ")).unwrap_or_else(|| panic!("no error in {said}"));
+    assert!(error.contains("radiance.exr") && error.contains("File too large"), "{error}");
+    assert_eq!(names(&out), ["nir.png", "rgb.png"], "what was done before, and no temporary file");
+    for name in names(&out) {
+        assert!(
+            std::fs::read(out.join(&name)).unwrap() == std::fs::read(whole.join(&name)).unwrap(),
+            "{name} is not whole"
+        );
+    }
+}
+
+#[test]
+fn a_file_is_replaced_whole() {
+    let (_keep, out) = scratch();
+    let path = out.join("deep").join("file");
+    output::write_atomically(&path, b"first, and long").unwrap();
+    output::write_atomically(&path, b"second").unwrap();
+    assert_eq!(std::fs::read(&path).unwrap(), b"second");
+    assert_eq!(names(path.parent().unwrap()), ["file"]);
+}
