@@ -282,7 +282,7 @@ fn check_every_pixel(name: &str, scene: &Scene) {
     let mut seen = map.parts.clone();
     seen.sort_unstable();
     seen.dedup();
-    println!("{name}: {} pixels show {} of {} parts, {doubtful} in doubt", parts.len(), seen.len(), scene.parts.len());
+    eprintln!("{name}: {} pixels show {} of {} parts, {doubtful} in doubt", parts.len(), seen.len(), scene.parts.len());
     pictures::same(&format!("every-triangle-{name}"), camera.width(), &ids(&map.parts), &ids(&expected));
     assert!(doubtful * 4000 <= parts.len(), "{name}: {doubtful} of {} pixels in doubt", parts.len());
 }
@@ -421,7 +421,7 @@ fn label_files_read_back_as_the_label_map() {
     assert_eq!(palette(&out.join("semantics.png")), [0, 0, 0, 0, 255, 0, 255, 0, 0]);
     assert_eq!(output::read_gray16(&out.join("plants.png")).unwrap(), (w, h, of(|t| t.plant)));
     assert_eq!(output::read_gray16(&out.join("leaves.png")).unwrap(), (w, h, of(|t| t.leaf)));
-    let areas = Class::ALL.map(|c| classes.iter().filter(|i| **i == c as u8).count());
+    let areas = Class::ALL.map(|c| classes.iter().map(|i| usize::from(*i == c as u8)).sum::<usize>());
     assert_eq!(areas.iter().sum::<usize>(), (w * h) as usize, "{areas:?}");
     assert!(areas.iter().all(|a| *a > 20), "{areas:?}: a class is missing");
     // A plant has one class, a leaf one plant: numbers alone tell them apart.

@@ -71,7 +71,7 @@ struct RenderArgs {
     /// Samples a pixel.
     #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=i64::from(Sampler::MAX_SAMPLES)))]
     spp: u32,
-    /// Folder for the files [default: out/<scene>].
+    /// Folder for the files; `out/` and the page's name unless given.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Seed, instead of the page's.
@@ -203,7 +203,7 @@ fn render(args: &RenderArgs) -> Result<Vec<PathBuf>> {
         scene.parts.len(),
         scene.triangles() as f64 / 1e6,
         built.as_secs_f64(),
-        (begin.elapsed() - built).as_secs_f64()
+        begin.elapsed().as_secs_f64() - built.as_secs_f64()
     ));
 
     let world = World { scene, geometry: &geometry };

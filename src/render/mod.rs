@@ -57,11 +57,10 @@ pub fn render(world: &World<'_>, integrator: &dyn Integrator, settings: &Setting
     let rendered: Vec<Vec<Pixel>> = (0..tiles)
         .into_par_iter()
         .map(|i| {
-            if watch.stop.load(Ordering::Relaxed) {
-                return Vec::new();
-            }
             let tile = tile(w, i % columns, i / columns);
-            let pixels = rows(tile).map(|(x, y)| pixel(world, integrator, settings, x, y)).collect::<Vec<_>>();
+            // Asked at every pixel: a tile of many samples takes a minute.
+            let going = rows(tile).take_while(|_| !watch.stop.load(Ordering::Relaxed));
+            let pixels = going.map(|(x, y)| pixel(world, integrator, settings, x, y)).collect::<Vec<_>>();
             (watch.done)(u64::from(settings.spp) * pixels.len() as u64);
             pixels
         })

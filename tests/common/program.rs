@@ -85,7 +85,7 @@ pub fn hash(numbers: impl IntoIterator<Item = u32>) -> String {
     for n in numbers {
         sha.update(n.to_le_bytes());
     }
-    sha.finalize().iter().map(|b| format!("{b:02x}")).collect()
+    sha.finalize().iter().fold(String::new(), |hex, byte| hex + &format!("{byte:02x}"))
 }
 
 /// Every bit of a film, as numbers.
