@@ -1,7 +1,9 @@
 //! What the command lines share: how an error looks, how a crop is written.
 
-use crate::Error;
 use crate::geometry::Window;
+use crate::sampling::fault::nearest;
+use crate::{Error, Result};
+use std::path::Path;
 use std::process::ExitCode;
 
 /// Prints an error to stderr and returns its exit code: 1 failed, 2 misused, 75 stopped cleanly.
@@ -14,7 +16,7 @@ pub fn fail(error: &Error) -> ExitCode {
 pub fn pixel(text: &str) -> Result<(u32, u32), String> {
     match numbers(text)?.as_slice() {
         [x, y] => Ok((*x, *y)),
-        _ => Err("write it as x,y".into()),
+        _ => Err("write it as x,y such as 648,483".into()),
     }
 }
 
@@ -25,9 +27,65 @@ pub fn crop(text: &str) -> Result<Window, String> {
             let end = |a: u32, b: u32| a.checked_add(b).ok_or("the crop is too large");
             Ok(Window { x0: *x, y0: *y, x1: end(*x, *w)?, y1: end(*y, *h)? })
         }
-        [_, _, _, _] => Err("the crop is empty".into()),
-        _ => Err("write it as x,y,width,height".into()),
+        [_, _, _, _] => Err("the crop is empty: width and height must be above 0".into()),
+        _ => Err("write it as x,y,width,height such as 400,300,200,150".into()),
     }
+}
+
+/// Checks that files can be written into `folder`, before hours are spent on what would go there.
+pub fn check_folder(folder: &Path) -> Result<()> {
+    match folder.ancestors().find(|f| f.exists()) {
+        Some(there) if !there.is_dir() => Err(Error::Scene(format!(
+            "{}: this is a file, so no files can be written into it\n help: give --out a folder; it is made where it is missing",
+            there.display()
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// Checks that a scene page is there, and says which pages are where it is not.
+pub fn check_scene(page: &Path) -> Result<()> {
+    if page.exists() {
+        return Ok(());
+    }
+    let folder = page.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut pages: Vec<String> = std::fs::read_dir(folder)
+        .map(|entries| entries.filter_map(|e| e.ok()?.file_name().into_string().ok()).collect())
+        .unwrap_or_default();
+    pages.retain(|name| Path::new(name).extension().is_some_and(|e| e == "ron"));
+    pages.sort();
+    let name = page.file_name().unwrap_or_default().to_string_lossy();
+    let help = match (nearest(&pages, &name), pages.is_empty()) {
+        (Some(near), _) => format!("did you mean {}?", folder.join(near).display()),
+        (None, false) => format!("pages in {} are {}", folder.display(), pages.join(", ")),
+        (None, true) => "the main scene is scenes/field.ron in the project's folder".to_owned(),
+    };
+    Err(Error::Scene(format!("{}: there is no such page\n help: {help}", page.display())))
+}
+
+/// Checks that a crop lies in the image.
+pub fn check_crop(crop: Window, width: u32, height: u32) -> Result<()> {
+    if crop.x1 <= width && crop.y1 <= height {
+        return Ok(());
+    }
+    let Window { x0, y0, x1, y1 } = crop;
+    Err(Error::Scene(format!(
+        "the crop reaches to pixel {x1},{y1}, past the image of {width} × {height} pixels\n \
+         help: x + width may be {width} at most, y + height {height}; the crop begins at {x0},{y0}"
+    )))
+}
+
+/// Checks that a pixel lies in the image.
+pub fn check_pixel((x, y): (u32, u32), width: u32, height: u32) -> Result<()> {
+    if x < width && y < height {
+        return Ok(());
+    }
+    Err(Error::Scene(format!(
+        "pixel {x},{y} lies outside the image of {width} × {height} pixels\n \
+         help: pixels count from 0,0 at the top left to {},{}",
+        width - 1,
+        height - 1
+    )))
 }
 
 fn numbers(text: &str) -> Result<Vec<u32>, String> {

@@ -392,7 +392,7 @@ fn pages_that_cannot_be_lit_say_why() {
             "below the horizon",
         ),
         (r#"Daylight(sun: At(latitude_deg: 50.6, longitude_deg: 7, utc: "2016-02-30T12:00:00Z"))"#, "day 30"),
-        (r#"Daylight(sun: At(latitude_deg: 50.6, longitude_deg: 7, utc: "27.5.2016"))"#, "write UTC as"),
+        (r#"Daylight(sun: At(latitude_deg: 50.6, longitude_deg: 7, utc: "27.5.2016"))"#, "write universal time"),
         (r#"Daylight(sun: At(latitude_deg: 96, longitude_deg: 7, utc: "2016-05-27T12:00:00Z"))"#, "between -90 and 90"),
         ("Daylight(sun: Angles(elevation_deg: -3, azimuth_deg: 0))", "below the horizon"),
         ("Daylight(sun: Angles(elevation_deg: 3, azimut_deg: 0))", "azimut_deg"),

@@ -90,9 +90,15 @@ fn survives_printing<T: Debug + PartialEq + Serialize + DeserializeOwned>(path: 
 
 #[test]
 fn a_printed_page_reads_the_same() {
-    fields().iter().for_each(|p| survives_printing::<FieldDesc>(p));
-    species().iter().for_each(|p| survives_printing::<SpeciesDesc>(p));
-    pages("textures").iter().for_each(|p| survives_printing::<Recipe>(p));
+    for path in fields() {
+        survives_printing::<FieldDesc>(&path);
+    }
+    for path in species() {
+        survives_printing::<SpeciesDesc>(&path);
+    }
+    for path in pages("textures") {
+        survives_printing::<Recipe>(&path);
+    }
 }
 
 /// What a bad page is told, as the program prints it.
@@ -129,7 +135,7 @@ fn every_mistake_gets_exactly_the_words_beside_it() {
 fn pointed_at(words: &str) -> (usize, usize, String) {
     let mut lines = words.lines();
     let head = lines.next().unwrap().strip_prefix("error: tests/bad/").unwrap();
-    let mut numbers = head.split(':').skip(1).map(|n| n.parse::<usize>());
+    let mut numbers = head.split(':').skip(1).map(str::parse::<usize>);
     let (line, column) = (numbers.next().unwrap().unwrap(), numbers.next().unwrap().unwrap());
     let (shown, carets) = (lines.next().unwrap(), lines.next().unwrap());
     let from = carets.chars().position(|c| c == '^').unwrap();

@@ -9,7 +9,7 @@ use furrow::output::{self, Provenance};
 use furrow::render::{self, Settings, Watch};
 use furrow::sampling::Sampler;
 use furrow::scene::{Field, build};
-use furrow::{Error, Result, cli, texture};
+use furrow::{Result, cli, texture};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -22,7 +22,7 @@ use std::time::Instant;
 ///
 /// A scene page describes a distribution over fields; page + seed + index is one field, and always the same bits.
 #[derive(Parser)]
-#[command(version, args_conflicts_with_subcommands = true, arg_required_else_help = true, after_help = EXAMPLES)]
+#[command(name = "trace", version, args_conflicts_with_subcommands = true, arg_required_else_help = true, after_help = EXAMPLES)]
 struct Cli {
     #[command(subcommand)]
     verb: Option<Verb>,
@@ -32,14 +32,25 @@ struct Cli {
 
 const EXAMPLES: &str = "\
 Examples:
-  trace --scene scenes/field.ron --spp 64             the main scene, into out/field/
-  trace --scene scenes/field.ron --index 7            another field of the same kind
-  trace --scene scenes/field.ron --width 324 --spp 16 a quick look, the same view at a quarter of the size
-  trace --scene scenes/field.ron --integrator ids     which part each pixel belongs to, in false colours
-  trace --scene scenes/field.ron --pixel 648,483      what that pixel shows, in words
-  trace texture textures/leaf/sugar_beet.ron          draw a texture from its recipe
+  trace --scene scenes/field.ron --spp 64               the main scene, into out/field/
+  trace --scene scenes/field.ron --index 7              another field of the same kind
+  trace --scene scenes/field.ron --width 324 --spp 16   a quick look: the same view, a quarter of the size
+  trace --scene scenes/field.ron --crop 500,400,200,150 only a part of it, at full size
+  trace --scene scenes/field.ron --integrator ids       which part each pixel belongs to, in false colours
+  trace --scene scenes/field.ron --pixel 648,483        what that pixel shows, in words
+  trace texture textures/leaf/sugar_beet.ron            draw a texture from its recipe
 
-Files of an image: rgb.png nir.png radiance.exr semantics.png plants.png leaves.png overlay.png
+Files of an image:
+  rgb.png, nir.png   photographs in colour and near infrared, 8 bit
+  radiance.exr       linear radiance in R, G, B, NIR; variance, albedo, normal, depth, ids
+  semantics.png      class of each pixel: 0 soil, 1 crop, 2 weed (indexed, with a palette)
+  plants.png         number of its plant, 16 bit, 0 for none
+  leaves.png         number of its leaf on that plant, 16 bit, 0 for none
+  overlay.png        labels drawn over the photograph, to look at
+
+More samples make less noise: twice the --spp takes twice the time and leaves 0.7 of it.
+The pages scenes/01-one-leaf.ron to 06 teach how a scene is written.
+Paths go to stdout, everything else to stderr.
 Exit codes: 0 done, 1 failed, 2 wrong input, 75 stopped cleanly (Ctrl-C).";
 
 #[derive(Subcommand)]
@@ -54,20 +65,20 @@ enum Verb {
 
 #[derive(Args)]
 struct RenderArgs {
-    /// Scene page (RON).
+    /// Scene page (RON): what grows, what shines, who looks.
     #[arg(long, value_name = "PAGE", required = true)]
     scene: Option<PathBuf>,
     /// Samples a pixel.
     #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=i64::from(Sampler::MAX_SAMPLES)))]
     spp: u32,
-    /// Folder for the files [default: out/<scene>].
+    /// Folder for the files; `out/` and the page's name unless given.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Seed, instead of the page's.
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     seed: Option<u64>,
     /// Which field of the distribution.
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
     index: u64,
     /// Image width in pixels; the field of view stays, the height follows unless given.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=16384))]
@@ -76,16 +87,16 @@ struct RenderArgs {
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=16384))]
     height: Option<u32>,
     /// Threads; 0 for one on each core. The files do not depend on it.
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = threads)]
     threads: usize,
     /// What to draw.
     #[arg(long, value_enum, default_value_t = Draw::Path)]
     integrator: Draw,
     /// Render only this part of the image: x,y,width,height in pixels.
-    #[arg(long, value_parser = cli::crop, value_name = "X,Y,W,H")]
+    #[arg(long, value_parser = cli::crop, allow_hyphen_values = true, value_name = "X,Y,W,H")]
     crop: Option<Window>,
-    /// Explain one pixel instead of rendering.
-    #[arg(long, value_parser = cli::pixel, value_name = "X,Y")]
+    /// Explain one pixel instead of rendering: its label, surface and light.
+    #[arg(long, value_parser = cli::pixel, allow_hyphen_values = true, value_name = "X,Y", conflicts_with_all = ["crop", "out"])]
     pixel: Option<(u32, u32)>,
     /// Print nothing but errors and the paths of the files.
     #[arg(long)]
@@ -165,6 +176,11 @@ fn render(args: &RenderArgs) -> Result<Vec<PathBuf>> {
         }
     };
     let page = args.scene.as_deref().unwrap_or(Path::new(""));
+    cli::check_scene(page)?;
+    let out = args.out.clone().unwrap_or_else(|| default_folder(page));
+    if args.pixel.is_none() {
+        cli::check_folder(&out)?;
+    }
     let options = build::Options { seed: args.seed, index: args.index, width: args.width, height: args.height };
     let pool = render::pool(args.threads)?;
     let field: Field = pool.install(|| build::field(page, &options))?;
@@ -172,6 +188,12 @@ fn render(args: &RenderArgs) -> Result<Vec<PathBuf>> {
         say(format!("warning: {warning}"));
     }
     let scene = &field.scene;
+    let (width, height) = (scene.camera.width(), scene.camera.height());
+    let window = args.crop.unwrap_or(Window::full(width, height));
+    cli::check_crop(window, width, height)?;
+    if let Some(pixel) = args.pixel {
+        cli::check_pixel(pixel, width, height)?;
+    }
     let built = begin.elapsed();
     let geometry = pool.install(|| EmbreeAccel::build(&scene.surfaces(), pool.current_num_threads() as u32))?;
     say(format!(
@@ -181,22 +203,16 @@ fn render(args: &RenderArgs) -> Result<Vec<PathBuf>> {
         scene.parts.len(),
         scene.triangles() as f64 / 1e6,
         built.as_secs_f64(),
-        (begin.elapsed() - built).as_secs_f64()
+        begin.elapsed().as_secs_f64() - built.as_secs_f64()
     ));
 
-    let (width, height) = (scene.camera.width(), scene.camera.height());
-    let window = args.crop.unwrap_or(Window::full(width, height));
-    if window.x1 > width || window.y1 > height {
-        return Err(Error::Scene(format!("the crop reaches past the image of {width}×{height} pixels")));
-    }
     let world = World { scene, geometry: &geometry };
     let integrator = args.integrator.integrator();
     let settings = Settings { spp: args.spp, seed: field.sample_seed(), window, filter: scene.filter };
     if let Some((x, y)) = args.pixel {
-        if x >= width || y >= height {
-            return Err(Error::Scene(format!("pixel {x},{y} lies outside the image of {width}×{height} pixels")));
-        }
-        say(pool.install(|| render::explain(&world, &field.plants, integrator.as_ref(), &settings, x, y)));
+        let words = pool.install(|| render::explain(&world, &field.plants, integrator.as_ref(), &settings, x, y));
+        // The words are the result; a closed pipe is no failure.
+        let _ = writeln!(std::io::stdout(), "{words}");
         return Ok(Vec::new());
     }
 
@@ -217,7 +233,6 @@ fn render(args: &RenderArgs) -> Result<Vec<PathBuf>> {
         integrator: args.integrator.name(),
         kernels: accel::version()?,
     };
-    let out = args.out.clone().unwrap_or_else(|| default_folder(page));
     let paths = pool.install(|| output::write_image(&out, &film, &labels, &photograph, &provenance))?;
     say(format!(
         "{} Msamples in {:.1} s: {:.2} Msamples/s; median relative error {:.1} %; {:.1} s in all; files in {}",
@@ -229,6 +244,11 @@ fn render(args: &RenderArgs) -> Result<Vec<PathBuf>> {
         out.display()
     ));
     Ok(paths)
+}
+
+/// A number of threads that a machine may have.
+fn threads(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|n| *n <= 1024).ok_or_else(|| "write a number from 0 (one for each core) to 1024".into())
 }
 
 /// `out/<name of the page>`.

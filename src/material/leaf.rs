@@ -23,9 +23,10 @@ impl Bound for Index {
 /// A leaf as a species page writes it.
 ///
 /// ```
-/// use furrow::material::LeafDesc;
-/// let leaf: LeafDesc = ron::from_str(r#"(texture: "leaf.png", roughness: 0.3, pigments: (chlorophyll: 38))"#).unwrap();
-/// assert!(ron::from_str::<LeafDesc>("(roughnes: 0.3)").is_err());
+/// use furrow::{material::LeafDesc, page::Page};
+/// let page = Page::of(r#"Leaf(texture: "leaf.png", roughness: 0.3, pigments: (chlorophyll: 38))"#);
+/// let leaf: LeafDesc = page.parse().unwrap();
+/// assert!(Page::of("Leaf(roughnes: 0.3)").parse::<LeafDesc>().is_err());
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default, rename = "Leaf")]

@@ -115,9 +115,8 @@ fn value_end(text: &str, mut at: usize) -> usize {
     while let Some(c) = text[at..].chars().next() {
         match c {
             '(' | '[' | '{' => depth += 1,
-            ')' | ']' | '}' if depth == 0 => break,
+            ')' | ']' | '}' | ',' if depth == 0 => break,
             ')' | ']' | '}' => depth -= 1,
-            ',' if depth == 0 => break,
             _ => {}
         }
         at = if c == '"' { quote_end(text, at) } else { at + c.len_utf8() };

@@ -77,6 +77,8 @@ const GROUND_MARGIN: f32 = 0.04;
 const GROUND_REACH: f32 = 2.5;
 /// Radius around a stem that clods leave free, metres.
 const STEM_ROOM: f32 = 0.004;
+/// Most pixels of an image.
+const MOST_PIXELS: u64 = 1 << 28;
 /// Most plants that a field can number.
 const MOST_PLANTS: usize = u16::MAX as usize;
 
@@ -138,6 +140,13 @@ impl<'a> Builder<'a> {
                 camera.with_size(width, height)
             }
         };
+        let (w, h) = (camera.width(), camera.height());
+        if u64::from(w) * u64::from(h) > MOST_PIXELS {
+            let words = format!(
+                "an image of {w} × {h} pixels is too large\n help: at most {MOST_PIXELS} pixels, 16384 × 16384"
+            );
+            return Err(page.blame(&[Step::Field("camera"), Step::Field("size")], Error::Scene(words)));
+        }
         let mut lights = Vec::new();
         for (i, light) in desc.lights.iter().enumerate() {
             let light = light.build(&mut Stream::of(seed, index, Purpose::Page, 1 + i as u64));

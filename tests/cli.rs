@@ -1,0 +1,176 @@
+//! The program as its user meets it: flags, streams, exit codes.
+//!
+//! Rationale: the program is called by people who guess and by scripts that cannot. Expected: results on stdout, talk on
+//! stderr, exit code 2 with clear words for what the user can mend, and nothing written then.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// A scene that renders in a blink.
+const PAGE: &str = r"Field(
+    camera: Pinhole(size: (48, 36), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.5)),
+    lights: [Constant(radiance: (1, 1, 1, 1))],
+    plants: [(species: SPECIES, growth: Bbch(14))],
+)";
+
+/// A folder with `page.ron`; files go below it.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let species = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/species/sugar_beet.ron");
+    let page = PAGE.replace("SPECIES", &format!("{:?}", species.to_str().unwrap()));
+    std::fs::write(folder.path().join("page.ron"), page).unwrap();
+    folder
+}
+
+fn run(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_trace")).current_dir(folder).args(args).output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+/// What a misuse is told; checks that it exits with 2, says nothing on stdout and writes nothing.
+fn refused(args: &[&str]) -> String {
+    let folder = folder();
+    let done = run(folder.path(), args);
+    assert_eq!(done.status.code(), Some(2), "{args:?}: {}", text(&done.stderr));
+    assert!(done.stdout.is_empty(), "{args:?}");
+    assert!(!folder.path().join("out").exists(), "{args:?}");
+    text(&done.stderr)
+}
+
+#[test]
+fn help_teaches() {
+    let folder = folder();
+    let done = run(folder.path(), &["--help"]);
+    assert!(done.status.success());
+    let help = text(&done.stdout);
+    for word in
+        ["--scene", "--spp", "--pixel", "Examples:", "scenes/field.ron", "semantics.png", "Exit codes", "texture"]
+    {
+        assert!(help.contains(word), "no {word} in\n{help}");
+    }
+}
+
+#[test]
+fn without_arguments_the_help_is_shown() {
+    let said = refused(&[]);
+    assert!(said.contains("Usage: trace") && said.contains("Examples:"), "{said}");
+}
+
+#[test]
+fn the_version_is_told() {
+    let done = run(folder().path(), &["--version"]);
+    assert_eq!(text(&done.stdout), format!("trace {}\n", env!("CARGO_PKG_VERSION")));
+}
+
+#[test]
+fn quiet_leaves_only_paths_on_stdout() {
+    let folder = folder();
+    let done = run(folder.path(), &["--scene", "page.ron", "--spp", "1", "--quiet"]);
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    assert!(done.stderr.is_empty(), "{}", text(&done.stderr));
+    let paths = text(&done.stdout);
+    let names: Vec<&str> = paths.lines().map(|p| p.strip_prefix("out/page/").unwrap()).collect();
+    let all = ["rgb.png", "nir.png", "radiance.exr", "semantics.png", "plants.png", "leaves.png", "overlay.png"];
+    assert_eq!(names, all);
+    let mut there: Vec<_> =
+        std::fs::read_dir(folder.path().join("out/page")).unwrap().map(|f| f.unwrap().file_name()).collect();
+    there.sort();
+    assert_eq!(there.len(), all.len(), "something else was left behind: {there:?}");
+}
+
+#[test]
+fn talk_goes_to_stderr() {
+    let folder = folder();
+    let done = run(folder.path(), &["--scene", "page.ron", "--spp", "1", "--out", "there/deep"]);
+    assert!(done.status.success());
+    assert!(text(&done.stderr).contains("1 plants"), "{}", text(&done.stderr));
+    assert!(text(&done.stdout).lines().all(|l| folder.path().join(l).is_file()));
+    assert!(folder.path().join("there/deep/rgb.png").is_file());
+}
+
+#[test]
+fn a_pixel_is_explained_in_words() {
+    let folder = folder();
+    assert!(run(folder.path(), &["--scene", "page.ron", "--spp", "1", "--out", "labels"]).status.success());
+    let (width, _, plants) = furrow::output::read_gray16(&folder.path().join("labels/plants.png")).unwrap();
+    let at = plants.iter().position(|p| *p == 1).unwrap() as u32;
+    let pixel = format!("{},{}", at % width, at / width);
+    let done = run(folder.path(), &["--scene", "page.ron", "--spp", "4", "--pixel", &pixel, "--quiet"]);
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    let words = text(&done.stdout);
+    for word in [format!("pixel {pixel}\n").as_str(), "label: crop plant 1", "sugar beet", "radiance:", "4 samples"] {
+        assert!(words.contains(word), "no {word} in\n{words}");
+    }
+    assert!(!folder.path().join("out").exists());
+}
+
+#[test]
+fn a_crop_is_the_same_pixels_of_a_smaller_image() {
+    let folder = folder();
+    let render = |out: &str, more: &[&str]| {
+        let args = [&["--scene", "page.ron", "--spp", "1", "--quiet", "--out", out], more].concat();
+        assert!(run(folder.path(), &args).status.success());
+        furrow::output::read_gray16(&folder.path().join(out).join("plants.png")).unwrap()
+    };
+    let (w, _, whole) = render("whole", &[]);
+    let (cw, ch, crop) = render("crop", &["--crop", "20,10,9,7"]);
+    assert_eq!((cw, ch), (9, 7));
+    for (i, plant) in crop.iter().enumerate() {
+        let (x, y) = (20 + i % 9, 10 + i / 9);
+        assert_eq!(*plant, whole[y * w as usize + x]);
+    }
+    assert!(crop.contains(&1));
+}
+
+#[test]
+fn misuse_is_answered_with_a_way_out() {
+    for (args, words) in [
+        (&["--scene", "page.ron", "--sp", "3"][..], "--spp"),
+        (&["--spp", "3"], "--scene"),
+        (&["--scene", "page.ron", "--spp", "0"], "0 is not in 1.."),
+        (&["--scene", "page.ron", "--spp", "many"], "--spp"),
+        (&["--scene", "page.ron", "--width", "0"], "--width"),
+        (&["--scene", "page.ron", "--seed", "-1"], "seed"),
+        (&["--scene", "page.ron", "--threads", "9999"], "1024"),
+        (&["--scene", "page.ron", "--integrator", "paht"], "path"),
+        (&["--scene", "page.ron", "--crop", "1,2,3"], "400,300,200,150"),
+        (&["--scene", "page.ron", "--crop", "-1,0,5,5"], "not a pixel number"),
+        (&["--scene", "page.ron", "--crop", "0,0,0,5"], "empty"),
+        (&["--scene", "page.ron", "--crop", "40,0,20,10"], "past the image of 48 × 36"),
+        (&["--scene", "page.ron", "--pixel", "48,0"], "from 0,0 at the top left to 47,35"),
+        (&["--scene", "page.ron", "--pixel", "1,1", "--crop", "0,0,5,5"], "cannot be used with"),
+        (&["--scene", "page.ron", "--out", "page.ron"], "this is a file"),
+        (&["--scene", "page.ron", "--out", "page.ron/deep"], "this is a file"),
+        (&["--scene", "pages.ron"], "did you mean ./page.ron?"),
+        (&["--scene", "nowhere/field.ron"], "scenes/field.ron"),
+        (&["--scene", "."], "folder"),
+        (&["texture"], "RECIPES"),
+        (&["texture", "page.ron"], "Leaf, Soil"),
+        (&["textures", "page.ron"], "texture"),
+    ] {
+        let said = refused(args);
+        assert!(said.starts_with("error: "), "{args:?}: {said}");
+        assert!(said.contains(words), "{args:?}: no `{words}` in\n{said}");
+    }
+}
+
+#[test]
+fn a_texture_is_drawn_beside_its_recipe() {
+    let folder = tempfile::tempdir().unwrap();
+    let recipe = "Leaf(seed: 3, size: 64, length_mm: 30, aspect: 0.6, outline: Power(a: 0.55, b: 1.0), \
+                  veins: Pinnate(pairs: 5, angle_deg: 55, midrib: 0.03, fine: 50), pigments: (chlorophyll: 45))";
+    std::fs::write(folder.path().join("small.ron"), recipe).unwrap();
+    let done = run(folder.path(), &["texture", "small.ron"]);
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    let paths = text(&done.stdout);
+    assert!(
+        paths.lines().any(|l| l == "small.png") && paths.lines().all(|l| folder.path().join(l).is_file()),
+        "{paths}"
+    );
+    let first = std::fs::read(folder.path().join("small.png")).unwrap();
+    assert!(run(folder.path(), &["texture", "small.ron"]).status.success());
+    assert_eq!(first, std::fs::read(folder.path().join("small.png")).unwrap());
+}

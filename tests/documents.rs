@@ -1,0 +1,60 @@
+//! What the README promises: its page parses, its commands are those that are run, its files are there.
+//!
+//! Rationale: a README is the first program that a newcomer runs. Expected: nothing in it is stale. Source: the README.
+
+use furrow::page::Page;
+use furrow::scene::desc::FieldDesc;
+use std::path::Path;
+
+fn read(path: &str) -> String {
+    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
+}
+
+/// The text of the code blocks of one language.
+fn blocks(text: &str, language: &str) -> Vec<String> {
+    let open = format!("```{language}\n");
+    text.split(&open).skip(1).map(|b| b.split("```").next().unwrap_or_default().to_owned()).collect()
+}
+
+#[test]
+fn the_readme_is_short() {
+    assert!(read("README.md").lines().count() <= 200);
+}
+
+#[test]
+fn the_page_in_the_readme_is_a_page() {
+    let pages = blocks(&read("README.md"), "ron");
+    assert!(!pages.is_empty());
+    for page in pages {
+        let page = Page { path: "scenes/readme.ron".into(), text: page };
+        let desc: FieldDesc = page.parse().unwrap_or_else(|e| panic!("{e}"));
+        let species = desc.crops.iter().map(|c| &c.species).chain(desc.weeds.iter().map(|w| &w.species));
+        for file in species {
+            page.need_file(file).unwrap_or_else(|e| panic!("{e}"));
+        }
+    }
+}
+
+#[test]
+fn the_test_command_is_the_one_that_is_run() {
+    let readme = read("README.md");
+    let run = read(".ci/run");
+    let command = blocks(&readme, "sh").into_iter().find(|b| b.contains("cargo test")).unwrap();
+    assert_eq!(command.trim().lines().count(), 1);
+    assert_eq!(run.trim().lines().last().unwrap(), command.trim());
+}
+
+#[test]
+fn files_that_the_readme_names_are_there() {
+    let readme = read("README.md");
+    let mut checked = 0;
+    for name in readme.split('`').skip(1).step_by(2) {
+        let path = Path::new(name);
+        let ours = ["scenes/", "src/", "tests/", "textures/", ".ci/", "LICENSE"].iter().any(|f| name.starts_with(f));
+        if ours && !name.contains("/x.rs") && !name.contains("/x.ron") && !name.contains(' ') {
+            assert!(Path::new(env!("CARGO_MANIFEST_DIR")).join(path).exists(), "README.md names {name}");
+            checked += 1;
+        }
+    }
+    assert!(checked > 8, "{checked}");
+}
