@@ -98,7 +98,7 @@ fn a_species_added_at_the_end_moves_no_plant_before_it() {
     let text = small_text();
     let weeds = text.find("weeds: [").unwrap();
     let end = weeds + text[weeds..].find("],\n").unwrap();
-    let galium = "(species: \"scenes/species/galium.ron\", growth: AgeDays(8), spread: (per_m2: 20))";
+    let galium = "(species: \"scenes/species/galium.ron\", growth: AgeDays(8), spread: (per_m2: 150))";
     let more = format!("{}, {galium}{}", &text[..end], &text[end..]);
     // Placed plants come after all weeds: leave them out on both sides.
     let without = |t: &str| format!("{})", &t[..t.find("plants: [").unwrap()]);
@@ -107,7 +107,8 @@ fn a_species_added_at_the_end_moves_no_plant_before_it() {
     assert!(after.plants.len() > before.plants.len() + 3, "{} and {}", after.plants.len(), before.plants.len());
     assert_eq!(before.plants[..], after.plants[..before.plants.len()]);
     let organs = |f: &furrow::scene::Field| {
-        let old = f.scene.parts.iter().filter(|p| (1..=before.plants.len()).contains(&usize::from(p.tag.plant)));
+        let last = before.plants.last().map_or(0, |p| p.number);
+        let old = f.scene.parts.iter().filter(|p| (1..=last).contains(&p.tag.plant));
         old.map(|p| (p.tag, p.mesh.clone())).collect::<Vec<_>>()
     };
     assert!(organs(&before) == organs(&after), "a mesh of an earlier plant has moved");

@@ -331,7 +331,7 @@ fn check_tags(field: &Field, map: &LabelMap) {
         assert_eq!(tag.plant > 0, tag.class != Class::Soil, "{tag:?}: only plants are crop or weed");
         assert!(tag.leaf == 0 || tag.plant > 0, "{tag:?}: a leaf without a plant");
         if tag.plant > 0 {
-            let record = &field.plants[usize::from(tag.plant) - 1];
+            let record = field.plants.iter().find(|p| p.number == tag.plant).expect("a record of every plant in view");
             assert_eq!((record.number, record.class), (tag.plant, tag.class), "{tag:?} is not {record:?}");
             assert!(tag.leaf <= record.leaves, "{tag:?}: plant {} has {} leaves", record.number, record.leaves);
         }

@@ -149,7 +149,7 @@ fn a_pngs_text_tells_its_origin_but_no_path_and_no_time() {
     }
 }
 
-/// Expected: exit code 1, the path and the system's reason on stderr, nothing on stdout.
+/// Expected: exit code 2, for the command must change; the path on stderr, nothing on stdout.
 #[test]
 fn a_folder_that_cannot_be_made_is_a_clear_error() {
     let (keep, _) = scratch();
@@ -162,7 +162,7 @@ fn a_folder_that_cannot_be_made_is_a_clear_error() {
         let said = String::from_utf8_lossy(&output.stderr);
         let error = said.lines().find(|l| l.starts_with("error: ")).unwrap_or_else(|| panic!("no error in {said}"));
         assert!(error.contains(file.to_str().unwrap()), "which path? {error}");
-        assert_eq!(output.status.code(), Some(1), "{error}");
+        assert_eq!(output.status.code(), Some(2), "{error}");
         assert!(output.stdout.is_empty(), "{}", String::from_utf8_lossy(&output.stdout));
         assert_eq!(names(keep.path()), ["file"]);
         assert_eq!(std::fs::read_to_string(&file).unwrap(), "not a folder");

@@ -100,40 +100,39 @@ impl Leaf {
         Chances { coat: coat / total, reflect: reflect / total, transmit: transmit / total }
     }
 
+    /// Value and density for directions that lie on a side each.
     #[inline]
-    fn density(chances: &Chances, side: &Side, wo: Vec3, wi: Vec3) -> f32 {
+    fn both(&self, chances: &Chances, wo: Vec3, wi: Vec3) -> (Spectrum, f32) {
+        let (near, far) = self.sides(wo);
+        let lambert = wi.z.abs() * FRAC_1_PI;
+        let through = near.through(wo.z.abs()) * lambert;
         if wo.z * wi.z < 0.0 {
-            return chances.transmit * wi.z.abs() * FRAC_1_PI;
+            return (self.transmittance * (through * far.through(wi.z.abs())), chances.transmit * lambert);
         }
         let s = wo.z.signum();
-        let coat = side.coat.map_or(0.0, |c| c.pdf(facing(wo, s), facing(wi, s)));
-        chances.coat * coat + chances.reflect * wi.z.abs() * FRAC_1_PI
+        let (coat, coat_pdf) = near.coat.map_or((0.0, 0.0), |c| c.eval_pdf(facing(wo, s), facing(wi, s)));
+        let value = near.diffuse * (through * near.through(wi.z.abs())) + Spectrum::splat(coat);
+        (value, chances.coat * coat_pdf + chances.reflect * lambert)
     }
 }
 
 impl Scatter for Leaf {
     #[inline]
     fn eval(&self, wo: Vec3, wi: Vec3) -> Spectrum {
-        if wo.z == 0.0 || wi.z == 0.0 {
-            return Spectrum::ZERO;
-        }
-        let (near, far) = self.sides(wo);
-        let through = near.through(wo.z.abs()) * wi.z.abs() * FRAC_1_PI;
-        if wo.z * wi.z < 0.0 {
-            return self.transmittance * (through * far.through(wi.z.abs()));
-        }
-        let s = wo.z.signum();
-        let coat = near.coat.map_or(0.0, |c| c.eval(facing(wo, s), facing(wi, s)));
-        near.diffuse * (through * near.through(wi.z.abs())) + Spectrum::splat(coat)
+        self.eval_pdf(wo, wi).0
     }
 
     #[inline]
     fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        self.eval_pdf(wo, wi).1
+    }
+
+    #[inline]
+    fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Spectrum, f32) {
         if wo.z == 0.0 || wi.z == 0.0 {
-            return 0.0;
+            return (Spectrum::ZERO, 0.0);
         }
-        let (near, _) = self.sides(wo);
-        Self::density(&self.chances(near, wo.z.abs()), near, wo, wi)
+        self.both(&self.chances(self.sides(wo).0, wo.z.abs()), wo, wi)
     }
 
     #[inline]
@@ -153,7 +152,10 @@ impl Scatter for Leaf {
         if u[0] < chances.coat && wi.z * s <= 0.0 {
             return None;
         }
-        let pdf = Self::density(&chances, near, wo, wi);
-        (pdf > 0.0 && wi.z != 0.0).then(|| BsdfSample { wi, weight: self.eval(wo, wi) / pdf, pdf })
+        if wi.z == 0.0 {
+            return None;
+        }
+        let (value, pdf) = self.both(&chances, wo, wi);
+        (pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf })
     }
 }

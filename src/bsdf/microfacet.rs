@@ -44,6 +44,19 @@ impl Ggx {
         fresnel::dielectric(wo.dot(m), self.ior) * self.d(m) * g / (4.0 * wo.z)
     }
 
+    /// [`Ggx::eval`] and [`Ggx::pdf`] at once: they share the distribution and the masking.
+    #[inline]
+    pub fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (f32, f32) {
+        let m = (wo + wi).normalize_or_zero();
+        if wo.z <= 0.0 || wi.z <= 0.0 || m.z <= 0.0 {
+            return (0.0, 0.0);
+        }
+        let lambda = self.lambda(wo);
+        let d = self.d(m) / (4.0 * wo.z);
+        let f = fresnel::dielectric(wo.dot(m), self.ior);
+        (f * d / (1.0 + lambda + self.lambda(wi)), d / (1.0 + lambda))
+    }
+
     /// Density of [`Ggx::sample`], per solid angle.
     #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {

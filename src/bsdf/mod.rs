@@ -48,6 +48,12 @@ impl Bsdf {
         each!(self, b => b.pdf(wo, wi))
     }
 
+    /// See [`Scatter::eval_pdf`].
+    #[inline]
+    pub fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Spectrum, f32) {
+        each!(self, b => b.eval_pdf(wo, wi))
+    }
+
     /// See [`Scatter::sample`].
     #[inline]
     pub fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {

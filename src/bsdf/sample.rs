@@ -20,6 +20,11 @@ pub trait Scatter {
     fn eval(&self, wo: Vec3, wi: Vec3) -> Spectrum;
     /// Density with which [`Scatter::sample`] returns `wi`, per solid angle.
     fn pdf(&self, wo: Vec3, wi: Vec3) -> f32;
+    /// Both at once, for those that can share the work.
+    #[inline]
+    fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Spectrum, f32) {
+        (self.eval(wo, wi), self.pdf(wo, wi))
+    }
     /// Draws a direction from `u` ∈ [0, 1)³ (one number to choose a lobe, two for the direction); `None`: absorbed.
     fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample>;
 }

@@ -52,27 +52,35 @@ impl Wet {
     }
 }
 
+impl Wet {
+    /// Value and density for directions that both lie above.
+    #[inline]
+    fn upper(&self, wo: Vec3, wi: Vec3) -> (Spectrum, f32) {
+        let (coat, coat_pdf) = self.coat.eval_pdf(wo, wi);
+        let base = self.base.upper(wo, wi) * (self.through(wo.z) * self.through(wi.z));
+        let p = self.chance(wo.z);
+        (base + Spectrum::splat(self.film * coat), p * coat_pdf + (1.0 - p) * wi.z * FRAC_1_PI)
+    }
+}
+
 impl Scatter for Wet {
     #[inline]
     fn eval(&self, wo: Vec3, wi: Vec3) -> Spectrum {
-        if wo.z * wi.z <= 0.0 {
-            return Spectrum::ZERO;
-        }
-        let s = wo.z.signum();
-        let (wo, wi) = (facing(wo, s), facing(wi, s));
-        let base = self.base.upper(wo, wi) * (self.through(wo.z) * self.through(wi.z));
-        base + Spectrum::splat(self.film * self.coat.eval(wo, wi))
+        self.eval_pdf(wo, wi).0
     }
 
     #[inline]
     fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        self.eval_pdf(wo, wi).1
+    }
+
+    #[inline]
+    fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Spectrum, f32) {
         if wo.z * wi.z <= 0.0 {
-            return 0.0;
+            return (Spectrum::ZERO, 0.0);
         }
         let s = wo.z.signum();
-        let (wo, wi) = (facing(wo, s), facing(wi, s));
-        let p = self.chance(wo.z);
-        p * self.coat.pdf(wo, wi) + (1.0 - p) * wi.z * FRAC_1_PI
+        self.upper(facing(wo, s), facing(wi, s))
     }
 
     #[inline]
@@ -86,8 +94,7 @@ impl Scatter for Wet {
         if wi.z <= 0.0 {
             return None;
         }
-        let wi = facing(wi, s);
-        let pdf = self.pdf(wo, wi);
-        (pdf > 0.0).then(|| BsdfSample { wi, weight: self.eval(wo, wi) / pdf, pdf })
+        let (value, pdf) = self.upper(up, wi);
+        (pdf > 0.0).then(|| BsdfSample { wi: facing(wi, s), weight: value / pdf, pdf })
     }
 }

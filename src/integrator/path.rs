@@ -92,7 +92,7 @@ impl Path {
         }
         let Some((light, chance)) = chosen else { return Spectrum::ZERO };
         let Some(s) = light.sample_li(at.p, [u[1], u[2]]) else { return Spectrum::ZERO };
-        let f = local.eval(at, s.wi);
+        let (f, bsdf_pdf) = local.eval_pdf(at, s.wi);
         if f.is_black() || s.pdf <= 0.0 {
             return Spectrum::ZERO;
         }
@@ -102,7 +102,7 @@ impl Path {
             return Spectrum::ZERO;
         }
         let light_pdf = chance * s.pdf;
-        let weight = if self.technique.mis { light_pdf / (light_pdf + local.pdf(s.wi)) } else { 1.0 };
+        let weight = if self.technique.mis { light_pdf / (light_pdf + bsdf_pdf) } else { 1.0 };
         f * s.radiance * (weight / light_pdf)
     }
 }
@@ -129,15 +129,11 @@ impl Local {
         (at.ng.dot(self.wo) * at.ng.dot(wi) > 0.0) == (self.seen.z * wi_local_z > 0.0)
     }
 
+    /// f · |cos θi| and its density.
     #[inline]
-    fn eval(&self, at: &Interaction, wi: Vec3) -> Spectrum {
+    fn eval_pdf(&self, at: &Interaction, wi: Vec3) -> (Spectrum, f32) {
         let local = self.frame.to_local(wi);
-        if self.consistent(at, wi, local.z) { self.bsdf.eval(self.seen, local) } else { Spectrum::ZERO }
-    }
-
-    #[inline]
-    fn pdf(&self, wi: Vec3) -> f32 {
-        self.bsdf.pdf(self.seen, self.frame.to_local(wi))
+        if self.consistent(at, wi, local.z) { self.bsdf.eval_pdf(self.seen, local) } else { (Spectrum::ZERO, 0.0) }
     }
 }
 

@@ -55,7 +55,7 @@ pub struct Options {
 pub struct Field {
     /// What is out there.
     pub scene: Scene,
-    /// Its plants, by number − 1.
+    /// Its plants, in the order of their numbers.
     pub plants: Vec<PlantRecord>,
     /// How its film becomes a picture.
     pub sensor: SensorDesc,
@@ -75,6 +75,8 @@ const PLANT_MARGIN: f32 = 0.35;
 const GROUND_MARGIN: f32 = 0.04;
 /// How far the coarse ground goes on.
 const GROUND_REACH: f32 = 2.5;
+/// Length of the longest shadow that counts, in plant heights: that of a sun 20° above the horizon.
+const SHADOW: f32 = 2.75;
 /// Radius around a stem that clods leave free, metres.
 const STEM_ROOM: f32 = 0.004;
 /// Most pixels of an image.
@@ -219,7 +221,7 @@ impl<'a> Builder<'a> {
         if let (Some(earth), Some(soil)) = (&mut earth, &self.desc.soil) {
             self.cover(soil, earth, &seedlings);
         }
-        let plants = self.plant(&seedlings, earth.as_ref().map(|e| &e.ground))?;
+        let plants = self.plant(&seedlings, earth.as_ref().map(|e| &e.ground), wanted.then_some(view))?;
         Ok(Field {
             scene: self.scene,
             plants,
@@ -340,11 +342,21 @@ impl<'a> Builder<'a> {
     }
 
     /// Grows every plant and stands it on the ground.
-    fn plant(&mut self, seedlings: &[Seedling], ground: Option<&Ground>) -> Result<Vec<PlantRecord>> {
+    fn plant(
+        &mut self,
+        seedlings: &[Seedling],
+        ground: Option<&Ground>,
+        view: Option<Rect>,
+    ) -> Result<Vec<PlantRecord>> {
         let grown: Vec<(PlantRecord, Vec<Grown>)> =
             seedlings.par_iter().enumerate().map(|(i, s)| grow(s, i as u16 + 1, ground)).collect();
         let mut records = Vec::with_capacity(grown.len());
         for (record, organs) in grown {
+            // Grown to know its size, dropped where neither it nor its shadow reaches the view.
+            let reach = record.radius + SHADOW * record.height;
+            if view.is_some_and(|v| !v.grown(reach).contains(record.position.truncate())) {
+                continue;
+            }
             // One material a plant and skin: plants differ in their green.
             let mut made: Vec<(String, usize, u32)> = Vec::new();
             for organ in organs {
@@ -432,6 +444,7 @@ fn grow(s: &Seedling, number: u16, ground: Option<&Ground>) -> (PlantRecord, Vec
         bbch: plant.bbch,
         age_days: plant.age_days,
         height: plant.height,
+        radius: plant.radius,
         leaves: organs.iter().map(|o| o.part.tag.leaf).max().unwrap_or(0),
     };
     (record, organs)

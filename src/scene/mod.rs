@@ -51,6 +51,8 @@ pub struct PlantRecord {
     pub age_days: f32,
     /// Its height, metres.
     pub height: f32,
+    /// Radius of the upright cylinder about its stem that holds it, metres.
+    pub radius: f32,
     /// Number of its leaves, seed leaves included.
     pub leaves: u16,
 }

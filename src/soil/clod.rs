@@ -23,7 +23,9 @@ const GROUPS: usize = 7;
 /// The middle and the short axis over the long one. Source: Aubertot et al. 1999.
 const AXES: (f32, f32) = (0.77, 0.55);
 
-/// Shortest clod, mm, of each level of detail: a pixel is about 0.25 mm.
+/// Grid spacing that the levels are made for, metres: about four pixels of 0.25 mm.
+const FINE_M: f32 = 0.0009;
+/// Shortest clod, mm, of each level of detail on a grid of [`FINE_M`]; on a coarser grid, for larger pixels, in proportion.
 const FROM_MM: [f32; LEVELS] = [0.0, 4.0, 8.0, 14.0, 30.0];
 
 /// Logarithm of how much brighter clods are than the moister ground between them (1.1–1.25 when it dries), on average.
@@ -50,11 +52,12 @@ struct Candidate {
 pub fn clods(ground: &Ground, pile: &mut Pile, clear: &[(Vec2, f32)]) -> Vec<(f32, Mesh)> {
     let stream = ground.stream.child(Purpose::Debris, 101);
     let own = stream.child(Purpose::Page, 0);
+    let scale = (FINE_M / ground.step()).min(1.0);
     let mut shapes: Vec<Vec<Option<Shape>>> = vec![vec![None; SHAPES]; LEVELS];
     let mut groups: Vec<Mesh> = vec![Mesh::default(); GROUPS];
     for clod in candidates(ground, &stream) {
         let mut s = own.child(Purpose::Debris, u64::from(clod.key));
-        let level = FROM_MM.iter().rposition(|from| clod.mm >= *from).unwrap_or(0);
+        let level = FROM_MM.iter().rposition(|from| clod.mm * scale >= *from).unwrap_or(0);
         let k = s.index(SHAPES);
         let shape = shapes[level][k]
             .get_or_insert_with(|| Shape::new(level, CUT, &mut stream.child(Purpose::Texture, k as u64)));
