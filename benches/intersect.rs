@@ -1,17 +1,20 @@
-//! Rays a second in the main scene's canopy: from the camera, scattered, and to the light; with the leaves' masks and with the same
-//! blades opaque. `cargo bench --bench intersect`; the last lines say what masks cost.
+//! Rays a second on the main scene: from the camera, scattered, and to the light; over the whole image, and over its plants
+//! alone, with the leaves' masks and with the same blades opaque. `cargo bench --bench intersect`; the last lines say what
+//! masks cost where there are leaves.
 
 use criterion::{BenchmarkId, Criterion, Throughput};
 use furrow::accel::{EmbreeAccel, Surface, prepare_thread};
 use furrow::geometry::{Interaction, Intersect, Ray};
 use furrow::math::{Frame, Vec3};
 use furrow::sampling::{Purpose, Stream, warp};
-use furrow::scene::{Field, build};
+use furrow::scene::{Field, Part, build};
 use std::hint::black_box;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-const WIDTH: u32 = 324;
+const WIDTH: u32 = 1296;
+/// Every so many pixels of the whole image give rays.
+const STRIDE: u32 = 13;
 /// Where the light stands: 45° up in the south.
 const LIGHT: Vec3 = Vec3::new(0.0, -std::f32::consts::FRAC_1_SQRT_2, std::f32::consts::FRAC_1_SQRT_2);
 
@@ -27,16 +30,21 @@ struct Rays {
     shadow: Vec<Ray>,
 }
 
-fn rays(field: &Field, geometry: &EmbreeAccel) -> Rays {
+/// Rays through the centres of every `stride`th pixel whose first surface `wanted` accepts.
+fn rays(field: &Field, geometry: &EmbreeAccel, stride: u32, wanted: fn(&Part) -> bool) -> Rays {
     let (scene, camera) = (&field.scene, &field.scene.camera);
     let mut stream = Stream::of(1, 0, Purpose::Test, 0);
     let mut rays = Rays { primary: Vec::new(), bounce: Vec::new(), shadow: Vec::new() };
-    for i in 0..camera.width() * camera.height() {
+    for i in (0..camera.width() * camera.height()).step_by(stride as usize) {
         let (origin, direction) = camera.centre_ray(i % camera.width(), i / camera.width());
         let ray = Ray::new(origin, direction);
-        rays.primary.push(ray);
         let Some(hit) = geometry.closest(&ray) else { continue };
-        let at = Interaction::new(&scene.parts[hit.part as usize].mesh, &hit, 0.0);
+        let part = &scene.parts[hit.part as usize];
+        if !wanted(part) {
+            continue;
+        }
+        rays.primary.push(ray);
+        let at = Interaction::new(&part.mesh, &hit, 0.0);
         let up = if at.ng.dot(direction) > 0.0 { -at.ng } else { at.ng };
         let scattered = warp::cosine_hemisphere([stream.uniform32(), stream.uniform32()]);
         rays.bounce.push(at.ray(Frame::about(up).to_world(scattered), f32::INFINITY));
@@ -71,9 +79,16 @@ fn main() {
     let masked = EmbreeAccel::build(&field.scene.surfaces(), 0).expect("an accelerator");
     let bare: Vec<Surface<'_>> = field.scene.parts.iter().map(|p| Surface { mesh: &p.mesh, mask: None }).collect();
     let opaque = EmbreeAccel::build(&bare, 0).expect("an accelerator");
-    let rays = rays(&field, &masked);
-    let kinds: [(&str, &[Ray], Query); 3] =
-        [("primary", &rays.primary, closest), ("bounce", &rays.bounce, closest), ("shadow", &rays.shadow, occluded)];
+    let image = rays(&field, &masked, STRIDE, |_| true);
+    let leaves = rays(&field, &opaque, 1, |part| part.mask.is_some());
+    let kinds: [(&str, &[Ray], Query); 6] = [
+        ("primary", &image.primary, closest),
+        ("bounce", &image.bounce, closest),
+        ("shadow", &image.shadow, occluded),
+        ("primary on leaves", &leaves.primary, closest),
+        ("bounce on leaves", &leaves.bounce, closest),
+        ("shadow on leaves", &leaves.shadow, occluded),
+    ];
 
     let mut criterion = Criterion::default()
         .sample_size(10)

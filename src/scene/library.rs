@@ -132,10 +132,15 @@ impl Library {
             Ok((full, text))
         };
         let (albedo, albedo_text) = need(&desc.albedo)?;
-        let (height, height_text) = need(&desc.height)?;
         let albedo = Texture::load(&albedo, ColorSpace::Srgb).map_err(|e| at_its_place(page, &albedo_text, e))?;
-        let height = Height::load(&height, 1.0).map_err(|e| at_its_place(page, &height_text, e))?;
-        Ok(Layer { albedo: albedo.wrapped(Wrap::Repeat), height: height.wrapped(Wrap::Repeat) })
+        let albedo = albedo.wrapped(Wrap::Repeat);
+        let height = if desc.height.as_os_str().is_empty() {
+            read_off(&albedo)
+        } else {
+            let (height, text) = need(&desc.height)?;
+            Height::load(&height, 1.0).map_err(|e| at_its_place(page, &text, e))?
+        };
+        Ok(Layer { albedo, height: height.wrapped(Wrap::Repeat) })
     }
 
     fn note(&mut self, path: &Path) -> Result<()> {
@@ -143,6 +148,14 @@ impl Library {
         self.files.insert(path.into(), Sha256::digest(&bytes).into());
         Ok(())
     }
+}
+
+/// Heights 0 to 1 read off a soil's brightness, for a photograph without a height map.
+fn read_off(albedo: &Texture) -> Height {
+    let height = Maps::derive(albedo, &Relief::SOIL).height;
+    let (columns, rows) = height.size();
+    let unit = |h: &f32| (0.5 + 0.5 * h / Relief::SOIL.amplitude).clamp(0.0, 1.0);
+    Height::from_values(columns, rows, height.values().iter().map(unit).collect())
 }
 
 /// A file that cannot be read as an image is the page's fault: shown where the page names it.
@@ -174,5 +187,21 @@ impl LayerMaps for Layer {
     fn albedo(&self, uv: Vec2) -> [f32; 3] {
         let [r, g, b, _] = self.albedo.sample(uv, 0.0);
         [r, g, b]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_soil_photograph_without_a_height_map_gets_one() {
+        let texel =
+            |i: u32| if (i / 8 + i / 64 / 8).is_multiple_of(2) { [150, 120, 90, 255] } else { [90, 70, 50, 255] };
+        let pixels: Vec<u8> = (0..64 * 64).flat_map(texel).collect();
+        let height = read_off(&Texture::from_rgba8(64, 64, &pixels, ColorSpace::Srgb).wrapped(Wrap::Repeat));
+        assert!(height.values().iter().all(|h| (0.0..=1.0).contains(h)));
+        let (low, high) = height.values().iter().fold((1.0_f32, 0.0_f32), |(l, h), v| (l.min(*v), h.max(*v)));
+        assert!(low < 0.35 && high > 0.65, "{low} to {high}: bright should stand up, dark lie low");
     }
 }

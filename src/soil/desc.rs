@@ -59,7 +59,8 @@ pub struct SoilDesc {
 pub struct LayerDesc {
     /// Colour of the dry soil, a tile.
     pub albedo: PathBuf,
-    /// Height, a linear tile; 16 bit is best.
+    /// Height, a linear tile; 16 bit is best. Left out, it is read off the albedo: what is bright stands up.
+    #[serde(default, skip_serializing_if = "unnamed")]
     pub height: PathBuf,
     /// Side of one tile, metres.
     pub size_m: Num<Positive>,
@@ -71,6 +72,10 @@ pub struct LayerDesc {
     /// How many of the clods and crumbs lie on it: 1 all, 0 none (a bare crust).
     #[serde(default = "whole")]
     pub clods: Num<Fraction>,
+}
+
+fn unnamed(path: &std::path::Path) -> bool {
+    path.as_os_str().is_empty()
 }
 
 fn one() -> Vary<Positive> {
