@@ -155,12 +155,8 @@ fn importance_and_uniform_estimates_agree() {
 struct Any(Bsdf);
 
 impl Scatter for Any {
-    fn eval(&self, wo: Vec3, wi: Vec3) -> Spectrum {
-        self.0.eval(wo, wi)
-    }
-
-    fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
-        self.0.pdf(wo, wi)
+    fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Spectrum, f32) {
+        self.0.eval_pdf(wo, wi)
     }
 
     fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<furrow::bsdf::BsdfSample> {

@@ -234,12 +234,13 @@ fn render(args: &RenderArgs) -> Result<Vec<PathBuf>> {
         kernels: accel::version()?,
     };
     let paths = pool.install(|| output::write_image(&out, &film, &labels, &photograph, &provenance))?;
+    // One sample has no spread to tell an error by.
+    let error = if args.spp > 1 { format!("{:.1} %", 100.0 * film.median_relative_error()) } else { "unknown".into() };
     say(format!(
-        "{} Msamples in {:.1} s: {:.2} Msamples/s; median relative error {:.1} %; {:.1} s in all; files in {}",
+        "{} Msamples in {:.1} s: {:.2} Msamples/s; median relative error {error}; {:.1} s in all; files in {}",
         samples / 1_000_000,
         rendered.as_secs_f64(),
         samples as f64 / 1e6 / rendered.as_secs_f64(),
-        100.0 * film.median_relative_error(),
         begin.elapsed().as_secs_f64(),
         out.display()
     ));

@@ -45,17 +45,12 @@ impl OrenNayar {
 
 impl Scatter for OrenNayar {
     #[inline]
-    fn eval(&self, wo: Vec3, wi: Vec3) -> Spectrum {
+    fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Spectrum, f32) {
         if wo.z * wi.z <= 0.0 {
-            return Spectrum::ZERO;
+            return (Spectrum::ZERO, 0.0);
         }
         let side = wo.z.signum();
-        self.upper(facing(wo, side), facing(wi, side))
-    }
-
-    #[inline]
-    fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
-        if wo.z * wi.z <= 0.0 { 0.0 } else { wi.z.abs() * FRAC_1_PI }
+        (self.upper(facing(wo, side), facing(wi, side)), wi.z.abs() * FRAC_1_PI)
     }
 
     #[inline]

@@ -16,14 +16,18 @@ pub struct BsdfSample {
 /// Scattering in a local frame whose z axis is the normal of the upper side. `wo` points to the eye, `wi` to the light, both
 /// away from the surface, unit; a negative z lies below. What is opaque looks the same from below as from above.
 pub trait Scatter {
-    /// f(wo, wi) · |cos θi|, 1/sr. Zero where nothing scatters.
-    fn eval(&self, wo: Vec3, wi: Vec3) -> Spectrum;
-    /// Density with which [`Scatter::sample`] returns `wi`, per solid angle.
-    fn pdf(&self, wo: Vec3, wi: Vec3) -> f32;
-    /// Both at once, for those that can share the work.
+    /// f(wo, wi) · |cos θi|, 1/sr, zero where nothing scatters; and the density with which [`Scatter::sample`] returns `wi`,
+    /// per solid angle. They share most of their work.
+    fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Spectrum, f32);
+    /// f(wo, wi) · |cos θi| alone.
     #[inline]
-    fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Spectrum, f32) {
-        (self.eval(wo, wi), self.pdf(wo, wi))
+    fn eval(&self, wo: Vec3, wi: Vec3) -> Spectrum {
+        self.eval_pdf(wo, wi).0
+    }
+    /// The density alone.
+    #[inline]
+    fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        self.eval_pdf(wo, wi).1
     }
     /// Draws a direction from `u` ∈ [0, 1)³ (one number to choose a lobe, two for the direction); `None`: absorbed.
     fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample>;

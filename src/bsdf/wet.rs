@@ -65,16 +65,6 @@ impl Wet {
 
 impl Scatter for Wet {
     #[inline]
-    fn eval(&self, wo: Vec3, wi: Vec3) -> Spectrum {
-        self.eval_pdf(wo, wi).0
-    }
-
-    #[inline]
-    fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
-        self.eval_pdf(wo, wi).1
-    }
-
-    #[inline]
     fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Spectrum, f32) {
         if wo.z * wi.z <= 0.0 {
             return (Spectrum::ZERO, 0.0);

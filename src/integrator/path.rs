@@ -74,14 +74,15 @@ impl Path {
     #[inline]
     fn direct(&self, world: &World<'_>, at: &Interaction, local: &Local, u: [f32; 4]) -> Spectrum {
         let two_sided = local.bsdf.transmits();
-        let total = total_importance(world, at.p, local.frame.z, two_sided);
+        let normal = local.normal();
+        let total = total_importance(world, at.p, normal, two_sided);
         if total <= 0.0 {
             return Spectrum::ZERO;
         }
         let mut left = u[0] * total;
         let mut chosen = None;
         for light in &world.scene.lights {
-            let importance = light.importance(at.p, local.frame.z, two_sided);
+            let importance = light.importance(at.p, normal, two_sided);
             if importance > 0.0 {
                 chosen = Some((light, importance / total));
                 left -= importance;
@@ -122,6 +123,12 @@ struct Local {
 }
 
 impl Local {
+    /// The normal by which lights are chosen: on the side that scatters, which is that of the eye unless light passes through.
+    #[inline]
+    fn normal(&self) -> Vec3 {
+        if self.seen.z < 0.0 && !self.bsdf.transmits() { -self.frame.z } else { self.frame.z }
+    }
+
     /// Whether going from `wo` to `wi` passes through the real triangle exactly when it passes through the shading frame's
     /// plane. Where the two disagree a normal map would leak light; nothing scatters there.
     #[inline]
@@ -199,7 +206,7 @@ impl Integrator for Path {
                 }
                 throughput *= 1.0 / survive;
             }
-            origin = Some(Origin { p: at.p, normal: frame.z, two_sided: bsdf.transmits(), pdf: s.pdf });
+            origin = Some(Origin { p: at.p, normal: local.normal(), two_sided: bsdf.transmits(), pdf: s.pdf });
             ray = at.ray(wi, f32::INFINITY);
             width = at.footprint;
             spread = DIFFUSE_SPREAD;
