@@ -1,6 +1,7 @@
 //! `trace`: grows a field, path traces it, labels it, writes it.
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use crate::field::FieldArgs;
+use clap::ValueEnum;
 use furrow::accel::{self, EmbreeAccel};
 use furrow::film::Film;
 use furrow::geometry::Window;
@@ -8,84 +9,26 @@ use furrow::integrator::{FalseColor, Integrator, Path as PathTracer, World};
 use furrow::output::{self, Provenance};
 use furrow::render::{self, Settings, Watch};
 use furrow::sampling::Sampler;
-use furrow::scene::{Field, build};
-use furrow::{Result, cli, texture};
+use furrow::scene::Field;
+use furrow::{Result, cli};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, Write};
-use std::path::{Path, PathBuf};
-use std::process::ExitCode;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-/// Grows a procedural crop field, path traces it, and labels every pixel exactly.
-///
-/// A scene page describes a distribution over fields; page + seed + index is one field, and always the same bits.
-#[derive(Parser)]
-#[command(name = "trace", version, args_conflicts_with_subcommands = true, arg_required_else_help = true, after_help = EXAMPLES)]
-struct Cli {
-    #[command(subcommand)]
-    verb: Option<Verb>,
+/// What to render, and how.
+#[derive(clap::Args)]
+pub(crate) struct Args {
     #[command(flatten)]
-    render: RenderArgs,
-}
-
-const EXAMPLES: &str = "\
-Examples:
-  trace --scene scenes/field.ron --spp 64               the main scene, into out/field/
-  trace --scene scenes/field.ron --index 7              another field of the same kind
-  trace --scene scenes/field.ron --width 324 --spp 16   a quick look: the same view, a quarter of the size
-  trace --scene scenes/field.ron --crop 500,400,200,150 only a part of it, at full size
-  trace --scene scenes/field.ron --integrator ids       which part each pixel belongs to, in false colours
-  trace --scene scenes/field.ron --pixel 648,483        what that pixel shows, in words
-  trace texture textures/leaf/sugar_beet.ron            draw a texture from its recipe
-
-Files of an image:
-  rgb.png, nir.png   photographs in colour and near infrared, 8 bit
-  radiance.exr       linear radiance in R, G, B, NIR; variance, albedo, normal, depth, ids
-  semantics.png      class of each pixel: 0 soil, 1 crop, 2 weed (indexed, with a palette)
-  plants.png         number of its plant, 16 bit, 0 for none
-  leaves.png         number of its leaf on that plant, 16 bit, 0 for none
-  overlay.png        labels drawn over the photograph, to look at
-
-More samples make less noise: twice the --spp takes twice the time and leaves 0.7 of it.
-The pages scenes/01-one-leaf.ron to 06 teach how a scene is written.
-Paths go to stdout, everything else to stderr.
-Exit codes: 0 done, 1 failed, 2 wrong input, 75 stopped cleanly (Ctrl-C).";
-
-#[derive(Subcommand)]
-enum Verb {
-    /// Draw textures from their recipes; images are written beside them.
-    Texture {
-        /// Recipe pages, for example textures/leaf/sugar_beet.ron.
-        #[arg(required = true)]
-        recipes: Vec<PathBuf>,
-    },
-}
-
-#[derive(Args)]
-struct RenderArgs {
-    /// Scene page (RON): what grows, what shines, who looks.
-    #[arg(long, value_name = "PAGE", required = true)]
-    scene: Option<PathBuf>,
+    field: FieldArgs,
     /// Samples a pixel.
     #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=i64::from(Sampler::MAX_SAMPLES)))]
     spp: u32,
     /// Folder for the files; `out/` and the page's name unless given.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Seed, instead of the page's.
-    #[arg(long, allow_negative_numbers = true)]
-    seed: Option<u64>,
-    /// Which field of the distribution.
-    #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
-    index: u64,
-    /// Image width in pixels; the field of view stays, the height follows unless given.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=16384))]
-    width: Option<u32>,
-    /// Image height in pixels.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=16384))]
-    height: Option<u32>,
     /// Threads; 0 for one on each core. The files do not depend on it.
     #[arg(long, default_value_t = 0, value_parser = threads)]
     threads: usize,
@@ -136,38 +79,8 @@ impl Draw {
     }
 }
 
-fn main() -> ExitCode {
-    let cli = Cli::parse();
-    let done = match cli.verb {
-        Some(Verb::Texture { recipes }) => draw_textures(&recipes),
-        None => render(&cli.render),
-    };
-    match done {
-        Ok(paths) => print_paths(&paths),
-        Err(e) => cli::fail(&e),
-    }
-}
-
-/// Paths go to stdout, one a line, for the next program; a closed pipe is no failure.
-fn print_paths(paths: &[PathBuf]) -> ExitCode {
-    let mut out = std::io::stdout().lock();
-    for path in paths {
-        if writeln!(out, "{}", path.display()).is_err() {
-            break;
-        }
-    }
-    ExitCode::SUCCESS
-}
-
-fn draw_textures(recipes: &[PathBuf]) -> Result<Vec<PathBuf>> {
-    let mut paths = Vec::new();
-    for recipe in recipes {
-        paths.extend(texture::draw::write(recipe)?);
-    }
-    Ok(paths)
-}
-
-fn render(args: &RenderArgs) -> Result<Vec<PathBuf>> {
+/// Renders one field, or explains one pixel of it; returns the paths of the files.
+pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     let begin = Instant::now();
     let stop = stop_on_signal();
     let say = |text: String| {
@@ -175,15 +88,13 @@ fn render(args: &RenderArgs) -> Result<Vec<PathBuf>> {
             eprintln!("{text}");
         }
     };
-    let page = args.scene.as_deref().unwrap_or(Path::new(""));
-    cli::check_scene(page)?;
-    let out = args.out.clone().unwrap_or_else(|| default_folder(page));
+    args.field.check()?;
+    let out = args.out.clone().unwrap_or_else(|| args.field.default_folder());
     if args.pixel.is_none() {
         cli::check_folder(&out)?;
     }
-    let options = build::Options { seed: args.seed, index: args.index, width: args.width, height: args.height };
     let pool = render::pool(args.threads)?;
-    let field: Field = pool.install(|| build::field(page, &options))?;
+    let field: Field = pool.install(|| args.field.grow())?;
     for warning in &field.warnings {
         say(format!("warning: {warning}"));
     }
@@ -198,7 +109,7 @@ fn render(args: &RenderArgs) -> Result<Vec<PathBuf>> {
     let geometry = pool.install(|| EmbreeAccel::build(&scene.surfaces(), pool.current_num_threads() as u32))?;
     say(format!(
         "{}: {} plants, {} parts, {:.2} M triangles; grown in {:.2} s, built in {:.2} s",
-        page.display(),
+        args.field.page().display(),
         field.plants.len(),
         scene.parts.len(),
         scene.triangles() as f64 / 1e6,
@@ -250,11 +161,6 @@ fn render(args: &RenderArgs) -> Result<Vec<PathBuf>> {
 /// A number of threads that a machine may have.
 fn threads(text: &str) -> Result<usize, String> {
     text.parse().ok().filter(|n| *n <= 1024).ok_or_else(|| "write a number from 0 (one for each core) to 1024".into())
-}
-
-/// `out/<name of the page>`.
-fn default_folder(page: &Path) -> PathBuf {
-    Path::new("out").join(page.file_stem().unwrap_or_default())
 }
 
 /// A flag that Ctrl-C and SIGTERM raise; raised twice, the process ends at once.

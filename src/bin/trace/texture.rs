@@ -1,0 +1,21 @@
+//! `trace texture`: draws textures from their recipes.
+
+use furrow::{Result, texture};
+use std::path::PathBuf;
+
+/// What to draw.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Recipe pages, for example textures/leaf/sugar_beet.ron.
+    #[arg(required = true)]
+    recipes: Vec<PathBuf>,
+}
+
+/// Draws; returns the images' paths.
+pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
+    let mut paths = Vec::new();
+    for recipe in &args.recipes {
+        paths.extend(texture::draw::write(recipe)?);
+    }
+    Ok(paths)
+}
