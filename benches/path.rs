@@ -5,6 +5,7 @@ use furrow::accel::EmbreeAccel;
 use furrow::geometry::Window;
 use furrow::integrator::{Path as PathTracer, World};
 use furrow::render::{self, Settings, Watch};
+use furrow::sampling::Points;
 use furrow::scene::build;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -20,7 +21,8 @@ fn main() {
     let geometry = EmbreeAccel::build(&scene.surfaces(), 0).expect("an accelerator");
     let world = World { scene, geometry: &geometry };
     let window = Window::full(scene.camera.width(), scene.camera.height());
-    let settings = Settings { spp: SPP, seed: field.sample_seed(), window, filter: scene.filter };
+    let settings =
+        Settings { spp: SPP, seed: field.sample_seed(), window, filter: scene.filter, points: Points::Sobol };
     let stop = AtomicBool::new(false);
     let watch = Watch { done: &|_| (), stop: &stop };
 

@@ -17,9 +17,12 @@ pub struct Pixel {
     pub normal: Vec3,
     /// Mean distance to the first surface along the ray, metres; infinite where no sample met one.
     pub depth: f32,
+    /// Number of samples.
+    pub samples: u32,
 }
 
-/// Adds up one pixel. One thread sums a pixel in sample order, so any number of threads makes the same bits.
+/// Adds up one pixel. One thread sums a pixel in sample order, so any number of threads makes the same bits; where one call
+/// ends and the next goes on makes no difference either.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Accumulator {
     count: u32,
@@ -61,6 +64,7 @@ impl Accumulator {
             albedo: Spectrum(self.albedo / n as f32),
             normal: self.normal / n as f32,
             depth: if self.hits == 0 { f32::INFINITY } else { (self.depth / f64::from(self.hits)) as f32 },
+            samples: self.count,
         }
     }
 }

@@ -9,6 +9,7 @@ use furrow::light::Light;
 use furrow::material::Material;
 use furrow::math::{Vec2, Vec3, vec2, vec3};
 use furrow::render::{self, Settings, Watch};
+use furrow::sampling::Points;
 use furrow::scene::tag::Tag;
 use furrow::scene::{Part, Scene};
 use furrow::sensor::{Camera, Distortion, Pose};
@@ -66,7 +67,7 @@ pub fn shoot(scene: &Scene, integrator: &dyn Integrator, spp: u32, seed: u64) ->
     let accel = EmbreeAccel::build(&scene.surfaces(), 1).expect("an accelerator");
     let world = World { scene, geometry: &accel };
     let window = Window::full(scene.camera.width(), scene.camera.height());
-    let settings = Settings { spp, seed, window, filter: scene.filter };
+    let settings = Settings { spp, seed, window, filter: scene.filter, points: Points::Sobol };
     let stop = AtomicBool::new(false);
     let watch = Watch { done: &|_| (), stop: &stop };
     let pool = render::pool(2).expect("a pool");

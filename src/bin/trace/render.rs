@@ -8,7 +8,7 @@ use furrow::geometry::Window;
 use furrow::integrator::{FalseColor, Integrator, Path as PathTracer, World};
 use furrow::output::{self, Provenance};
 use furrow::render::{self, Settings, Watch};
-use furrow::sampling::Sampler;
+use furrow::sampling::{Points, Sampler};
 use furrow::scene::Field;
 use furrow::{Result, cli};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -119,7 +119,8 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
 
     let world = World { scene, geometry: &geometry };
     let integrator = args.integrator.integrator();
-    let settings = Settings { spp: args.spp, seed: field.sample_seed(), window, filter: scene.filter };
+    let settings =
+        Settings { spp: args.spp, seed: field.sample_seed(), window, filter: scene.filter, points: Points::Sobol };
     if let Some((x, y)) = args.pixel {
         let words = pool.install(|| render::explain(&world, &field.plants, integrator.as_ref(), &settings, x, y));
         // The words are the result; a closed pipe is no failure.
