@@ -41,6 +41,7 @@ const DOORS: &[(&str, &str)] = &[
     ("exr", "output/exr.rs"),
     // Vectors are re-exported by `math`; two files sum in double precision.
     ("glam", "math/ film.rs accel/brute.rs"),
+    ("humantime", "bin/"),
     ("hw_skymodel", "light/hosek.rs"),
     ("image", "texture/"),
     ("indicatif", "bin/"),

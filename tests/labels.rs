@@ -18,7 +18,7 @@ use furrow::film::{Film, Filter, Pixel};
 use furrow::geometry::{AlphaMask, Intersect, Mesh, Ray, Window};
 use furrow::material::Material;
 use furrow::math::{Mat3, Vec3, vec3};
-use furrow::output::{self, Provenance};
+use furrow::output::{self, Provenance, Spp};
 use furrow::render::label::NONE;
 use furrow::render::{LabelMap, label};
 use furrow::sampling::{Purpose, Stream};
@@ -408,8 +408,9 @@ fn label_files_read_back_as_the_label_map() {
         scene_hash: field.hash.clone(),
         seed: 0,
         index: 0,
-        spp: 1,
+        spp: Spp::Uniform(1),
         integrator: "path".into(),
+        deviations: Vec::new(),
         kernels: "none".into(),
     };
     let (_keep, out) = program::scratch();

@@ -1,5 +1,6 @@
 //! Tiles in parallel → film. The same bits at any number of threads.
 
+mod adaptive;
 mod explain;
 pub mod label;
 mod progressive;
@@ -16,9 +17,10 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+pub use adaptive::adaptive;
 pub use explain::explain;
 pub use label::{LabelMap, label};
-pub use progressive::Progressive;
+pub use progressive::{Progressive, timed};
 
 /// What to render.
 #[derive(Clone, Copy, Debug)]
