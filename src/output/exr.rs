@@ -6,6 +6,7 @@
 //! The header's comment holds the provenance.
 
 use crate::film::Film;
+use crate::geometry::Window;
 use crate::math::Spectrum;
 use crate::render::{LabelMap, label::NONE};
 use crate::{Error, Result};
@@ -43,7 +44,17 @@ pub(super) fn encode(film: &Film, labels: &LabelMap, with_spp: bool, text: &str)
     if with_spp {
         channels.push(channel("spp", FlatSamples::U32(pixels.iter().map(|p| p.samples).collect())));
     }
-    let w = film.window;
+    write(film.window, channels, text)
+}
+
+/// Encodes a film's radiance alone.
+pub(super) fn encode_radiance(film: &Film, text: &str) -> Result<Vec<u8>> {
+    let band = |i: usize| FlatSamples::F32(film.pixels.iter().map(|p| p.mean.to_array()[i]).collect());
+    let channels = Spectrum::NAMES.iter().enumerate().map(|(i, name)| channel(name, band(i))).collect();
+    write(film.window, channels, text)
+}
+
+fn write(w: Window, channels: SmallVec<[AnyChannel<FlatSamples>; 4]>, text: &str) -> Result<Vec<u8>> {
     let attributes = LayerAttributes {
         layer_position: Vec2(w.x0 as i32, w.y0 as i32),
         comments: Text::new_or_none(text),

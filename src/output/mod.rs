@@ -1,6 +1,7 @@
 //! Files: pictures for people, radiance for programs, labels for both. Each appears whole or not at all, and holds neither
 //! clock times nor paths, so equal runs write equal bytes.
 
+mod denoise;
 mod exr;
 mod overlay;
 mod png;
@@ -14,6 +15,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 pub use self::png::{Picture, read_gray16, read_indexed, write_png};
+pub use denoise::Denoiser;
 
 /// How many samples the pixels of an image have.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -121,6 +123,31 @@ pub fn write_image(
         ("leaves.png", png::encode(w, h, &Picture::Gray16(&leaves), &text)?),
         ("overlay.png", png::encode(w, h, &Picture::Rgb(&overlay), &text)?),
     ];
+    write_all(folder, files)
+}
+
+/// Writes what a denoiser made of an image beside it, and returns the paths: `rgb_denoised.png`, `nir_denoised.png`,
+/// `denoised.exr` (R, G, B, NIR alone).
+pub fn write_denoised(
+    folder: &Path,
+    film: &Film,
+    photograph: &Photograph,
+    provenance: &Provenance,
+) -> Result<Vec<PathBuf>> {
+    let (w, h) = (film.window.width(), film.window.height());
+    let text = provenance.text() + "\ndenoised: Open Image Denoise";
+    let rgb = photograph.rgb.as_chunks::<3>().0;
+    write_all(
+        folder,
+        [
+            ("rgb_denoised.png", png::encode(w, h, &Picture::Rgb(rgb), &text)?),
+            ("nir_denoised.png", png::encode(w, h, &Picture::Gray(&photograph.nir), &text)?),
+            ("denoised.exr", exr::encode_radiance(film, &text)?),
+        ],
+    )
+}
+
+fn write_all<const N: usize>(folder: &Path, files: [(&str, Vec<u8>); N]) -> Result<Vec<PathBuf>> {
     files
         .into_iter()
         .map(|(name, bytes)| {

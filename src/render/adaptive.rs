@@ -10,7 +10,7 @@ use crate::Result;
 use crate::film::{Film, Pixel, median_relative_error};
 use crate::integrator::{Integrator, World};
 use crate::sampling::rng::mix;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Samples a pixel of the first look: 4096 for a full tile. Also the fewest that a pixel is given.
 const LOOK: u32 = 16;
@@ -39,20 +39,20 @@ pub fn adaptive(
 ) -> Result<Film> {
     let apart = Settings { seed: mix(settings.seed ^ OTHER), ..*settings };
     let mut look = Progressive::new(world, integrator, &apart);
-    // Looking may take half of the time; if that is not enough, there is no time to look at all.
-    let halfway = deadline.map(|end| {
+    // Looking may take a quarter of the time; if that is not enough, there is no time to look at all.
+    let quarter = deadline.map(|end| {
         let now = Instant::now();
-        now + end.saturating_duration_since(now) / 2
+        now + end.saturating_duration_since(now) / 4
     });
     let tiles = look.of_tiles(|_| ()).len();
-    if !look.approach(&vec![LOOK.min(settings.spp); tiles], halfway, watch)? {
+    if !look.approach(&vec![LOOK.min(settings.spp); tiles], quarter, watch)? {
         // Nothing has been decided by these samples yet, so they may be shown.
         look.approach(&vec![settings.spp; tiles], deadline, watch)?;
         return Ok(look.film());
     }
     let need = |pixels: &[Pixel]| needed(pixels, error, settings.spp);
     let more: Vec<u32> = look.of_tiles(need).into_iter().map(|n| (n / SHARE).max(LOOK)).collect();
-    look.approach(&more, halfway.map(|end| end.max(Instant::now() + Duration::from_millis(1))), watch)?;
+    look.approach(&more, quarter, watch)?;
     let goals = look.of_tiles(need);
     drop(look);
     let mut image = Progressive::new(world, integrator, settings);

@@ -43,6 +43,7 @@ Files of an image:
   plants.png         number of its plant, 16 bit, 0 for none
   leaves.png         number of its leaf on that plant, 16 bit, 0 for none
   overlay.png        labels drawn over the photograph, to look at
+  *_denoised.png, denoised.exr   with --denoise
 
 More samples make less noise: twice the --spp takes twice the time and leaves 0.7 of it.
 The pages scenes/01-one-leaf.ron to 06 teach how a scene is written.

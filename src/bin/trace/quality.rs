@@ -12,6 +12,9 @@ use std::time::{Duration, Instant};
 /// Seconds a pixel that are kept for the photograph and the files.
 const WRITING: f64 = 5e-6;
 
+/// Seconds a pixel that are kept for denoising.
+const DENOISING: f64 = 10e-6;
+
 /// When there are samples enough.
 #[derive(clap::Args)]
 #[command(group = clap::ArgGroup::new("enough").multiple(true))]
@@ -66,10 +69,11 @@ impl QualityArgs {
     }
 
     /// When rendering must end so that the files are there in time.
-    pub(crate) fn deadline(&self, begin: Instant, window: Window) -> Option<Instant> {
+    pub(crate) fn deadline(&self, begin: Instant, window: Window, denoise: bool) -> Option<Instant> {
         let pixels = f64::from(window.width()) * f64::from(window.height());
-        let writing = Duration::from_secs_f64(0.1 + WRITING * pixels);
-        self.time.map(|time| begin + time.saturating_sub(writing))
+        let each = WRITING + if denoise { DENOISING } else { 0.0 };
+        let rest = Duration::from_secs_f64(if denoise { 2.0 } else { 0.2 } + each * pixels);
+        self.time.map(|time| begin + time.saturating_sub(rest))
     }
 
     /// Renders. Call it inside a pool.

@@ -8,7 +8,7 @@ use furrow::accel::{self, EmbreeAccel};
 use furrow::film::Film;
 use furrow::geometry::Window;
 use furrow::integrator::{FalseColor, Integrator, World};
-use furrow::output::{self, Provenance};
+use furrow::output::{self, Denoiser, Provenance};
 use furrow::render::{self, Settings, Watch};
 use furrow::scene::Field;
 use furrow::{Result, cli};
@@ -37,11 +37,14 @@ pub(crate) struct Args {
     integrator: Draw,
     #[command(flatten)]
     technique: TechniqueArgs,
+    /// Also write the picture without its noise, beside the noisy one; needs Open Image Denoise, for `--integrator path`.
+    #[arg(long)]
+    denoise: bool,
     /// Render only this part of the image: x,y,width,height in pixels.
     #[arg(long, value_parser = cli::crop, allow_hyphen_values = true, value_name = "X,Y,W,H")]
     crop: Option<Window>,
     /// Explain one pixel instead of rendering: its label, surface and light.
-    #[arg(long, value_parser = cli::pixel, allow_hyphen_values = true, value_name = "X,Y", conflicts_with_all = ["crop", "out", "enough"])]
+    #[arg(long, value_parser = cli::pixel, allow_hyphen_values = true, value_name = "X,Y", conflicts_with_all = ["crop", "out", "enough", "denoise"])]
     pixel: Option<(u32, u32)>,
     /// Print nothing but errors and the paths of the files.
     #[arg(long)]
@@ -94,6 +97,8 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     if !matches!(args.integrator, Draw::Path) {
         args.technique.check_unused()?;
     }
+    // Before hours are spent on what could not be denoised then.
+    let denoiser = args.denoise.then(Denoiser::find).transpose()?;
     let out = args.out.clone().unwrap_or_else(|| args.field.default_folder());
     if args.pixel.is_none() {
         cli::check_folder(&out)?;
@@ -148,7 +153,7 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     };
     let watch = Watch { done: &done, stop: &stop };
     let start = Instant::now();
-    let deadline = args.quality.deadline(begin, window);
+    let deadline = args.quality.deadline(begin, window, args.denoise);
     let film: Film = pool.install(|| args.quality.render(&world, integrator.as_ref(), &settings, deadline, &watch))?;
     let rendered = start.elapsed();
     bar.finish_and_clear();
@@ -162,7 +167,11 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
         deviations: args.technique.deviations(),
         kernels: accel::version()?,
     };
-    let paths = pool.install(|| output::write_image(&out, &film, &labels, &photograph, &provenance))?;
+    let mut paths = pool.install(|| output::write_image(&out, &film, &labels, &photograph, &provenance))?;
+    if let Some(denoiser) = denoiser {
+        let clean = denoiser.denoise(&film, args.threads)?;
+        paths.extend(output::write_denoised(&out, &clean, &field.photograph(&clean), &provenance)?);
+    }
     // One sample has no spread to tell an error by.
     let (_, mean, most) = film.samples();
     let error = if most > 1 { format!("{:.1} %", 100.0 * film.median_relative_error()) } else { "unknown".into() };
