@@ -64,14 +64,25 @@ pub fn scene(parts: Vec<(Mesh, Bsdf)>, lights: Vec<Light>, camera: Camera) -> Sc
 
 /// Renders all of a scene on two threads.
 pub fn shoot(scene: &Scene, integrator: &dyn Integrator, spp: u32, seed: u64) -> Film {
-    let accel = EmbreeAccel::build(&scene.surfaces(), 1).expect("an accelerator");
-    let world = World { scene, geometry: &accel };
-    let window = Window::full(scene.camera.width(), scene.camera.height());
-    let settings = Settings { spp, seed, window, filter: scene.filter, points: Points::Sobol };
-    let stop = AtomicBool::new(false);
-    let watch = Watch { done: &|_| (), stop: &stop };
-    let pool = render::pool(2).expect("a pool");
-    pool.install(|| render::render(&world, integrator, &settings, &watch)).expect("a film")
+    shoot_with(scene, integrator, Points::Sobol, spp, seed)
+}
+
+/// The same with numbers of a kind.
+pub fn shoot_with(scene: &Scene, integrator: &dyn Integrator, points: Points, spp: u32, seed: u64) -> Film {
+    with_world(scene, 2, |world, watch| {
+        let window = Window::full(scene.camera.width(), scene.camera.height());
+        let settings = Settings { spp, seed, window, filter: scene.filter, points };
+        render::render(world, integrator, &settings, watch).expect("a film")
+    })
+}
+
+/// Calls `f` in a pool with a scene that answers rays.
+pub fn with_world<T: Send>(scene: &Scene, threads: usize, f: impl FnOnce(&World<'_>, &Watch<'_>) -> T + Send) -> T {
+    render::pool(threads).expect("a pool").install(|| {
+        let accel = EmbreeAccel::build(&scene.surfaces(), 1).expect("an accelerator");
+        let stop = AtomicBool::new(false);
+        f(&World { scene, geometry: &accel }, &Watch { done: &|_| (), stop: &stop })
+    })
 }
 
 /// The pixel's centre.

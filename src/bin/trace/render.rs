@@ -95,7 +95,7 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     };
     args.field.check()?;
     if !matches!(args.integrator, Draw::Path) {
-        args.technique.check_unused()?;
+        args.technique.check_unused(args.denoise)?;
     }
     // Before hours are spent on what could not be denoised then.
     let denoiser = args.denoise.then(Denoiser::find).transpose()?;

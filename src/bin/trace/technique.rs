@@ -71,11 +71,12 @@ impl TechniqueArgs {
     }
 
     /// Refuses flags of the path tracer where another integrator draws.
-    pub(crate) fn check_unused(&self) -> Result<()> {
+    pub(crate) fn check_unused(&self, denoise: bool) -> Result<()> {
         let path_only = self.without.iter().any(|part| *part != Part::Qmc);
-        if path_only || self.max_depth.is_some() || self.clamp.is_some() {
+        if path_only || denoise || self.max_depth.is_some() || self.clamp.is_some() {
             return Err(Error::Scene(
-                "--without, --max-depth and --clamp are about light\n help: use them with --integrator path".into(),
+                "--without, --max-depth, --clamp and --denoise are about light\n help: use them with --integrator path"
+                    .into(),
             ));
         }
         Ok(())
