@@ -4,10 +4,13 @@
 //! Every ray of a render is written down and asked again alone, by the same threads in the same order; the time of that over
 //! the time of the render is Embree's share. Medians of [`RUNS`] runs, render and replay in turn.
 
+#![allow(clippy::print_stdout, reason = "its table is its result")]
+
 use furrow::accel::EmbreeAccel;
 use furrow::geometry::{Hit, Intersect, Ray, Window};
 use furrow::integrator::{Path as PathTracer, World};
 use furrow::render::{self, Settings, Watch};
+use furrow::sampling::Points;
 use furrow::scene::build;
 use std::hint::black_box;
 use std::path::Path;
@@ -97,7 +100,7 @@ fn main() {
         let geometry = accel();
 
         let window = Window::full(scene.camera.width(), scene.camera.height());
-        let settings = Settings { spp: SPP, seed: field.sample_seed(), window, filter: scene.filter };
+        let settings = Settings { spp: SPP, seed: field.sample_seed(), window, points: Points::Sobol };
         let (stop, integrator) = (AtomicBool::new(false), PathTracer::default());
         let watch = Watch { done: &|_| (), stop: &stop };
         let render = |geometry: &dyn Intersect| {
@@ -106,10 +109,15 @@ fn main() {
         };
         let recorder = Recorder { geometry: &geometry, asked: (0..threads).map(|_| Mutex::default()).collect() };
         render(&recorder);
-        let asked: Vec<Vec<Query>> = recorder.asked.into_iter().map(|list| list.into_inner().expect("a list")).collect();
+        let asked: Vec<Vec<Query>> =
+            recorder.asked.into_iter().map(|list| list.into_inner().expect("a list")).collect();
         let replay = || {
             // Each thread its own list, all at once: the wall time of the longest, made even by their lengths.
-            let times = pool.broadcast(|thread| seconds(|| drop(black_box(ask(&geometry, &asked[thread.index()])))));
+            let times = pool.broadcast(|thread| {
+                seconds(|| {
+                    black_box(ask(&geometry, &asked[thread.index()]));
+                })
+            });
             times.iter().sum::<f64>() / threads as f64
         };
         let mut turns = (Vec::new(), Vec::new());
