@@ -40,7 +40,7 @@ const DOORS: &[(&str, &str)] = &[
     ("embree3", "accel/embree.rs"),
     ("exr", "output/exr.rs"),
     // Vectors are re-exported by `math`; two files sum in double precision.
-    ("glam", "math/ film.rs accel/brute.rs"),
+    ("glam", "math/ film/ accel/brute.rs"),
     ("humantime", "bin/"),
     ("hw_skymodel", "light/hosek.rs"),
     ("image", "texture/"),
