@@ -2,6 +2,7 @@
 
 pub mod ground;
 pub mod leaf;
+mod painted;
 mod shading;
 mod solid;
 
@@ -11,6 +12,7 @@ use crate::math::{Frame, Vec3};
 
 pub use ground::{Ground, GroundSkin};
 pub use leaf::{LeafDesc, LeafMaterial, Picture};
+pub use painted::{Painted, Repaint};
 pub use solid::Solid;
 
 /// What a part is made of.
@@ -22,6 +24,8 @@ pub enum Material {
     Ground(Ground),
     /// Stone, wood, straw: one colour, rough.
     Solid(Solid),
+    /// What models from disk wear.
+    Painted(Painted),
     /// The same scattering everywhere: for tests and teaching.
     Plain(Bsdf),
 }
@@ -35,6 +39,7 @@ impl Material {
             Self::Leaf(m) => m.scatter(at, wo),
             Self::Ground(m) => m.scatter(at, wo),
             Self::Solid(m) => m.scatter(at, wo),
+            Self::Painted(m) => m.scatter(at, wo),
             Self::Plain(bsdf) => (*bsdf, shading::frame(at, at.ns, wo)),
         }
     }

@@ -1,5 +1,7 @@
 //! Page + seed + index → one field.
 
+mod models;
+
 use super::desc::{FieldDesc, Growth, SpeciesDesc};
 use super::library::{Layer, Library, Species};
 use super::tag::Tag;
@@ -221,7 +223,9 @@ impl<'a> Builder<'a> {
         if let (Some(earth), Some(soil)) = (&mut earth, &self.desc.soil) {
             self.cover(soil, earth, &seedlings);
         }
-        let plants = self.plant(&seedlings, earth.as_ref().map(|e| &e.ground), wanted.then_some(view))?;
+        let ground = earth.as_ref().map(|e| &e.ground);
+        let mut plants = self.plant(&seedlings, ground, wanted.then_some(view))?;
+        plants.extend(self.models(seedlings.len(), ground)?);
         Ok(Field {
             scene: self.scene,
             plants,

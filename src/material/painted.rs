@@ -1,0 +1,100 @@
+//! What models from disk wear: a base colour and picture under a smooth or rough coat, opaque or a sheet that lets light through.
+//!
+//! A file knows three bands. Near infrared is the page's, or what the program wrote into the file, or an estimate: a sheet that
+//! lets light through is taken for a leaf, which returns and passes 0.45 each (the plateau of PROSPECT-D's green leaves);
+//! what is opaque returns as much as in red, as dry soil, stone and paint roughly do.
+
+use super::shading::frame;
+use crate::bsdf::{self, Bsdf, OrenNayar, Side};
+use crate::geometry::Interaction;
+use crate::math::{Frame, Spectrum, Vec3};
+use crate::model::{Surface, Transmission};
+use crate::texture::Texture;
+use std::sync::Arc;
+
+/// Index of refraction of the coat: glTF's.
+const IOR: f32 = 1.5;
+/// Roughness from which a coat is not told from none.
+const MATTE: f32 = 0.8;
+/// Slope angle of a matte surface's facets, radians.
+const SIGMA: f32 = 0.3;
+/// Reflectance and transmittance of a leaf in near infrared.
+const LEAF_NIR: f32 = 0.45;
+
+/// What a page says about a model's surfaces in place of the file.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Repaint {
+    /// GGX roughness α, 0–1.
+    pub roughness: Option<f32>,
+    /// Transmittance per band, 0–1.
+    pub transmission: Option<Spectrum>,
+    /// Reflectance in near infrared, 0–1.
+    pub nir: Option<f32>,
+}
+
+/// A surface of a model, ready to shade.
+#[derive(Clone, Debug)]
+pub struct Painted {
+    color: Vec3,
+    picture: Option<Arc<Texture>>,
+    /// Near infrared reflectance; the red of the place unless known.
+    nir: Option<f32>,
+    transmission: Option<Sheet>,
+    coat: Option<Side>,
+}
+
+/// What passes.
+#[derive(Clone, Debug)]
+struct Sheet {
+    transmittance: Spectrum,
+    picture: Option<Arc<Texture>>,
+}
+
+impl Painted {
+    /// From a file's surface, as the page changes it.
+    pub fn new(surface: &Surface, page: &Repaint) -> Self {
+        let own = |t: &Transmission| Sheet {
+            transmittance: Spectrum(Vec3::from(t.color).extend(surface.nir_transmission.unwrap_or(LEAF_NIR))),
+            picture: t.picture.clone(),
+        };
+        let transmission = match page.transmission {
+            Some(t) => (!t.is_black()).then_some(Sheet { transmittance: t, picture: None }),
+            None => surface.transmission.as_ref().map(own),
+        };
+        let roughness = page.roughness.or(surface.roughness).unwrap_or(1.0).max(0.02);
+        let leafy = transmission.as_ref().map(|_| LEAF_NIR);
+        Self {
+            color: Vec3::from(surface.color),
+            picture: surface.picture.clone(),
+            nir: page.nir.or(surface.nir).or(leafy),
+            coat: (roughness < MATTE).then(|| Side::new(IOR, [roughness; 2], Spectrum::ZERO)),
+            transmission,
+        }
+    }
+
+    pub(super) fn scatter(&self, at: &Interaction, wo: Vec3) -> (Bsdf, Frame) {
+        let color = self.color * self.picture.as_ref().map_or(Vec3::ONE, |p| read(p, at));
+        let reflectance = Spectrum(color.extend(self.nir.unwrap_or(color.x))).clamp(0.0, 0.95);
+        let transmittance = self.transmission.as_ref().map_or(Spectrum::ZERO, |sheet| {
+            let tint = sheet.picture.as_ref().map_or(Vec3::ONE, |p| read(p, at));
+            let passed = sheet.transmittance * Spectrum(tint.extend(1.0));
+            // Never more than the surface has left.
+            Spectrum(passed.0.min((Spectrum::splat(0.99) - reflectance).0))
+        });
+        let bsdf = match (&self.coat, &self.transmission) {
+            (None, None) => Bsdf::OrenNayar(OrenNayar::new(reflectance, SIGMA)),
+            (coat, _) => {
+                let side = coat.map_or(Side::bare(reflectance), |side| side.with(reflectance));
+                Bsdf::Leaf(bsdf::Leaf::new(side, side, transmittance))
+            }
+        };
+        (bsdf, frame(at, at.ns, wo))
+    }
+}
+
+/// Linear colour of a picture, averaged over what the ray sees.
+fn read(picture: &Texture, at: &Interaction) -> Vec3 {
+    let metres = at.dp_du.length().max(at.dp_dv.length()).max(1e-6);
+    let [r, g, b, _] = picture.sample(at.uv, picture.lod(at.footprint / metres));
+    Vec3::new(r, g, b)
+}
