@@ -5,6 +5,7 @@ pub mod leaf;
 mod painted;
 mod shading;
 mod solid;
+pub mod swatch;
 
 use crate::bsdf::Bsdf;
 use crate::geometry::Interaction;

@@ -5,9 +5,10 @@
 //! what is opaque returns as much as in red, as dry soil, stone and paint roughly do.
 
 use super::shading::frame;
+use super::swatch::{Swatch, Tone};
 use crate::bsdf::{self, Bsdf, OrenNayar, Side};
 use crate::geometry::Interaction;
-use crate::math::{Frame, Spectrum, Vec3};
+use crate::math::{Frame, Spectrum, Vec2, Vec3, vec2};
 use crate::model::{Surface, Transmission};
 use crate::texture::Texture;
 use std::sync::Arc;
@@ -72,15 +73,38 @@ impl Painted {
         }
     }
 
-    pub(super) fn scatter(&self, at: &Interaction, wo: Vec3) -> (Bsdf, Frame) {
-        let color = self.color * self.picture.as_ref().map_or(Vec3::ONE, |p| read(p, at));
+    /// What a place does to light, `of` the pictures there.
+    fn tone(&self, of: impl Fn(&Texture) -> Vec3) -> Tone {
+        let seen = |picture: &Option<Arc<Texture>>| picture.as_ref().map_or(Vec3::ONE, |p| of(p));
+        let color = self.color * seen(&self.picture);
         let reflectance = Spectrum(color.extend(self.nir.unwrap_or(color.x))).clamp(0.0, 0.95);
         let transmittance = self.transmission.as_ref().map_or(Spectrum::ZERO, |sheet| {
-            let tint = sheet.picture.as_ref().map_or(Vec3::ONE, |p| read(p, at));
-            let passed = sheet.transmittance * Spectrum(tint.extend(1.0));
+            let passed = sheet.transmittance * Spectrum(seen(&sheet.picture).extend(1.0));
             // Never more than the surface has left.
             Spectrum(passed.0.min((Spectrum::splat(0.99) - reflectance).0))
         });
+        Tone { reflectance, transmittance }
+    }
+
+    pub(super) fn swatch(&self) -> Swatch<'_> {
+        let color = |[r, g, b, _]: [f32; 4]| Vec3::new(r, g, b);
+        let mean = self.tone(|picture| color(picture.sample(Vec2::splat(0.5), 32.0)));
+        let roughness = self.coat.and_then(|side| side.coat()).map_or(1.0, |coat| coat.alpha[0]);
+        let passed = self.transmission.as_ref().and_then(|sheet| sheet.picture.as_ref());
+        let Some(picture) = self.picture.as_ref().or(passed) else {
+            return Swatch::plain(mean, roughness);
+        };
+        let (w, h) = (picture.width(), picture.height());
+        let texel = move |x: u32, y: u32| {
+            let uv = vec2((x as f32 + 0.5) / w as f32, (y as f32 + 0.5) / h as f32);
+            self.tone(|picture| color(picture.sample(uv, 0.0)))
+        };
+        // What a page repaints does not share the file's picture.
+        Swatch::pictured([std::ptr::from_ref(self) as usize, 1], (w, h), texel, mean, roughness)
+    }
+
+    pub(super) fn scatter(&self, at: &Interaction, wo: Vec3) -> (Bsdf, Frame) {
+        let Tone { reflectance, transmittance } = self.tone(|picture| read(picture, at));
         let bsdf = match (&self.coat, &self.transmission) {
             (None, None) => Bsdf::OrenNayar(OrenNayar::new(reflectance, SIGMA)),
             (coat, _) => {

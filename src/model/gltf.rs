@@ -8,7 +8,9 @@ use super::document::{
     TextureInfo, TextureTransform, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT,
 };
 use super::uri::{Target, follow};
-use super::{Label, MOST_TRIANGLES, Model, Part, Surface, Transmission, Up, bytes, faceted, glb, into_one_tile, settle};
+use super::{
+    Label, MOST_TRIANGLES, Model, Part, Surface, Transmission, Up, bytes, faceted, glb, into_one_tile, settle,
+};
 use crate::geometry::{AlphaMask, Mesh};
 use crate::math::{DMat4, DQuat, DVec3, Vec2, Vec3, vec2};
 use crate::texture::{ColorSpace, Texture, Wrap};
@@ -147,7 +149,9 @@ impl Reader<'_> {
                 let Some(mut mesh) = self.mesh(primitive, look, &name)? else { continue };
                 triangles += mesh.triangles.len();
                 if triangles > MOST_TRIANGLES {
-                    return Err(format!("it has more than {MOST_TRIANGLES} triangles\n help: reduce it in your program"));
+                    return Err(format!(
+                        "it has more than {MOST_TRIANGLES} triangles\n help: reduce it in your program"
+                    ));
                 }
                 settle(&mut mesh, &to, &name)?;
                 let surface = primitive.material.unwrap_or(looks.len());

@@ -139,7 +139,8 @@ impl Model {
             "obj" => obj::read(path, up).map_err(wrong)?,
             _ => {
                 return Err(wrong(
-                    "models are .glb, .gltf or .obj files\n help: export it as glTF binary (.glb) from your program".into(),
+                    "models are .glb, .gltf or .obj files\n help: export it as glTF binary (.glb) from your program"
+                        .into(),
                 ));
             }
         };

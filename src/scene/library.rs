@@ -188,7 +188,8 @@ fn at_its_place(page: &Page, literal: &str, error: Error) -> Error {
         }
         Error::Model { path, what } => {
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            let (what, help) = what.split_once("\n help: ").unwrap_or((&what, "export it again from the program that made it"));
+            let (what, help) =
+                what.split_once("\n help: ").unwrap_or((&what, "export it again from the program that made it"));
             page.about(literal, format!("`{name}` cannot be used: {what}"), help)
         }
         other => other,

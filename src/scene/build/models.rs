@@ -59,7 +59,8 @@ impl Builder<'_> {
         let mut plants: BTreeMap<u16, Vec<usize>> = BTreeMap::new();
         for part in &model.parts {
             let tag = tag(desc.class, part.label.as_ref(), numbered).ok_or_else(|| {
-                let words = format!("labels can number {MOST_PLANTS} plants, and this model has more\n help: place fewer");
+                let words =
+                    format!("labels can number {MOST_PLANTS} plants, and this model has more\n help: place fewer");
                 self.page.blame(&at, Error::Scene(words))
             })?;
             let mut mesh = part.mesh.clone();
