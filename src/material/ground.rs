@@ -1,5 +1,6 @@
 //! The ground and its clods: the baked skin of the soil, made moist, in four bands.
 
+use super::Varies;
 use super::shading::frame;
 use crate::bsdf::{Bsdf, OrenNayar, Wet};
 use crate::geometry::Interaction;
@@ -98,6 +99,10 @@ impl Ground {
     /// Clods of it, brighter by `tint`: they have relief of their own.
     pub fn clods(skin: Arc<GroundSkin>, tint: f32) -> Self {
         Self { skin, tint, relief: false }
+    }
+
+    pub(super) fn varies(&self) -> Varies {
+        Varies::Picture(self.skin.width as u32, self.skin.height as u32)
     }
 
     #[inline]

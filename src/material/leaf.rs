@@ -1,5 +1,6 @@
 //! Blades, petioles, stems: pigments and a picture → coat, reflection of either side, transmission.
 
+use super::Varies;
 use super::shading::{bump, frame};
 use crate::bsdf::{self, Bsdf, Side};
 use crate::geometry::Interaction;
@@ -115,6 +116,13 @@ impl LeafMaterial {
     pub fn with_chlorophyll(&self, base: f32, factor: f32) -> Self {
         let rgb = |c: f32| self.optics.with_chlorophyll(c).reflectance.0.truncate().max(Vec3::splat(1e-3));
         Self { tint: rgb(base * factor) / rgb(base), ..self.clone() }
+    }
+
+    pub(super) fn varies(&self) -> Varies {
+        match &self.picture {
+            Some(picture) => Varies::Picture(picture.color.width(), picture.color.height()),
+            None => Varies::Nowhere,
+        }
     }
 
     pub(super) fn scatter(&self, at: &Interaction, wo: Vec3) -> (Bsdf, Frame) {

@@ -1,5 +1,6 @@
 //! Stone, wood, straw: one colour, rough, opaque.
 
+use super::Varies;
 use super::shading::frame;
 use crate::bsdf::{Bsdf, OrenNayar};
 use crate::geometry::Interaction;
@@ -32,6 +33,10 @@ impl Solid {
     #[must_use]
     pub fn with_grain(self, seed: u32, size: f32, depth: f32) -> Self {
         Self { grain: Some(Grain { noise: Perlin::new(seed), size, depth }), ..self }
+    }
+
+    pub(super) fn varies(&self) -> Varies {
+        if self.grain.is_some() { Varies::Place } else { Varies::Nowhere }
     }
 
     pub(super) fn scatter(&self, at: &Interaction, wo: Vec3) -> (Bsdf, Frame) {

@@ -2,6 +2,7 @@
 //! clock times nor paths, so equal runs write equal bytes.
 
 mod exr;
+pub mod mitsuba;
 mod overlay;
 mod png;
 
@@ -14,6 +15,15 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 pub use self::png::{Picture, read_gray16, read_indexed, write_png};
+
+/// A field written as a scene of another program.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Export {
+    /// The files, the one that names the others last.
+    pub paths: Vec<PathBuf>,
+    /// What the other program cannot hold, one sentence each.
+    pub warnings: Vec<String>,
+}
 
 /// Where an image came from: what its files say about themselves.
 #[derive(Clone, Debug, PartialEq, Eq)]

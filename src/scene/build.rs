@@ -27,6 +27,12 @@ impl Field {
         mix(mix(self.seed) ^ self.index)
     }
 
+    /// Where the field came from, one `key: value` a line: program, pages, seed, index.
+    pub fn provenance(&self) -> String {
+        let Self { hash, seed, index, .. } = self;
+        format!("program: furrow {}\nscene: sha256 {hash}\nseed: {seed}\nindex: {index}", env!("CARGO_PKG_VERSION"))
+    }
+
     /// Takes the photograph of a film of this field.
     pub fn photograph(&self, film: &Film) -> Photograph {
         let stream = |k| Stream::of(self.seed, self.index, Purpose::Sensor, k);

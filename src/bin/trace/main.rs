@@ -1,5 +1,6 @@
 //! `trace`: grows a field, path traces it, labels it, writes it.
 
+mod export;
 mod field;
 mod render;
 mod texture;
@@ -30,6 +31,7 @@ Examples:
   trace --scene scenes/field.ron --crop 500,400,200,150 only a part of it, at full size
   trace --scene scenes/field.ron --integrator ids       which part each pixel belongs to, in false colours
   trace --scene scenes/field.ron --pixel 648,483        what that pixel shows, in words
+  trace export --scene scenes/field.ron --format mitsuba   the same field for another program
   trace texture textures/leaf/sugar_beet.ron            draw a texture from its recipe
 
 Files of an image:
@@ -47,6 +49,8 @@ Exit codes: 0 done, 1 failed, 2 wrong input, 75 stopped cleanly (Ctrl-C).";
 
 #[derive(Subcommand)]
 enum Verb {
+    /// Write a field as a scene of another program.
+    Export(export::Args),
     /// Draw textures from their recipes; images are written beside them.
     Texture(texture::Args),
 }
@@ -54,6 +58,7 @@ enum Verb {
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let done = match cli.verb {
+        Some(Verb::Export(args)) => export::run(&args),
         Some(Verb::Texture(args)) => texture::run(&args),
         None => render::run(&cli.render),
     };
