@@ -1,5 +1,6 @@
 //! The ground and its clods: the baked skin of the soil, made moist, in four bands.
 
+use super::Varies;
 use super::shading::frame;
 use super::swatch::{Swatch, Tone};
 use crate::bsdf::{Bsdf, OrenNayar, Wet};
@@ -112,7 +113,18 @@ impl Ground {
         let mean = tone(sum / count * self.tint);
         let key = [Arc::as_ptr(skin) as usize, 0];
         let size = (skin.width as u32, skin.height as u32);
-        Swatch::pictured(key, size, texel, mean, 1.0).tinted(Vec3::splat(self.tint), Vec3::ONE)
+        // The skin's rows run north, the picture's down: up the picture is south.
+        let slope = move |x: u32, y: u32| {
+            let [east, north] = skin.texels[y as usize * skin.width + x as usize].slope.map(f32::from);
+            vec2(east, -north) / Skin::SLOPE_STEPS
+        };
+        Swatch::pictured(key, size, texel, mean, 1.0)
+            .tinted(Vec3::splat(self.tint), Vec3::ONE)
+            .raised(slope, f32::from(u8::from(self.relief)))
+    }
+
+    pub(super) fn varies(&self) -> Varies {
+        Varies::Picture(self.skin.width as u32, self.skin.height as u32)
     }
 
     #[inline]

@@ -1,7 +1,8 @@
 //! Blades, petioles, stems: pigments and a picture → coat, reflection of either side, transmission.
 
+use super::Varies;
 use super::shading::{bump, frame};
-use super::swatch::{Swatch, Tone};
+use super::swatch::{Swatch, Tone, centre};
 use crate::bsdf::{self, Bsdf, Side};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec2, Vec3};
@@ -136,7 +137,17 @@ impl LeafMaterial {
         let passed = |tone: Tone| tone.transmittance.0.truncate().max(Vec3::splat(1e-4));
         let key = [Arc::as_ptr(picture) as usize, Arc::as_ptr(&self.optics) as usize];
         let size = (picture.color.width(), picture.color.height());
-        Swatch::pictured(key, size, texel, tinted, roughness).tinted(self.tint, passed(tinted) / passed(bare))
+        let slope = move |x, y| picture.maps.normal.sample(centre(size, x, y), 0.0);
+        Swatch::pictured(key, size, texel, tinted, roughness)
+            .tinted(self.tint, passed(tinted) / passed(bare))
+            .raised(slope, self.relief)
+    }
+
+    pub(super) fn varies(&self) -> Varies {
+        match &self.picture {
+            Some(picture) => Varies::Picture(picture.color.width(), picture.color.height()),
+            None => Varies::Nowhere,
+        }
     }
 
     pub(super) fn scatter(&self, at: &Interaction, wo: Vec3) -> (Bsdf, Frame) {

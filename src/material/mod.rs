@@ -31,7 +31,29 @@ pub enum Material {
     Plain(Bsdf),
 }
 
+/// Over what a material's scattering varies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Varies {
+    /// The same everywhere.
+    Nowhere,
+    /// Over texture coordinates, as finely as an image of this many texels across and down.
+    Picture(u32, u32),
+    /// Over the world.
+    Place,
+}
+
 impl Material {
+    /// Over what the scattering varies: what a program that writes the material down must sample.
+    pub fn varies(&self) -> Varies {
+        match self {
+            Self::Leaf(m) => m.varies(),
+            Self::Ground(m) => m.varies(),
+            Self::Solid(m) => m.varies(),
+            Self::Painted(m) => m.varies(),
+            Self::Plain(_) => Varies::Nowhere,
+        }
+    }
+
     /// The scattering at a point seen from `wo` (world, unit), and the frame of its directions. The frame's z axis is the
     /// shading normal on the upper side of the surface; it always sees `wo` from the side that the triangle does.
     #[inline]

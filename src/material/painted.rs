@@ -2,14 +2,16 @@
 //!
 //! A file knows three bands. Near infrared is the page's, or what the program wrote into the file, or an estimate: a sheet that
 //! lets light through is taken for a leaf, which returns and passes 0.45 each (the plateau of PROSPECT-D's green leaves);
-//! what is opaque returns as much as in red, as dry soil, stone and paint roughly do.
+//! what is opaque returns as much as in red, as dry soil, stone and paint roughly do. Where the near infrared
+//! of something opaque is known, it is that of the picture's mean and follows the picture's red.
 
-use super::shading::frame;
-use super::swatch::{Swatch, Tone};
+use super::Varies;
+use super::shading::{bump, frame};
+use super::swatch::{Swatch, Tone, centre};
 use crate::bsdf::{self, Bsdf, OrenNayar, Side};
 use crate::geometry::Interaction;
-use crate::math::{Frame, Spectrum, Vec2, Vec3, vec2};
-use crate::model::{Surface, Transmission};
+use crate::math::{Frame, Spectrum, Vec2, Vec3};
+use crate::model::{Relief, Surface, Transmission};
 use crate::texture::Texture;
 use std::sync::Arc;
 
@@ -38,10 +40,19 @@ pub struct Repaint {
 pub struct Painted {
     color: Vec3,
     picture: Option<Arc<Texture>>,
-    /// Near infrared reflectance; the red of the place unless known.
-    nir: Option<f32>,
+    nir: Nir,
+    relief: Option<Relief>,
     transmission: Option<Sheet>,
     coat: Option<Side>,
+}
+
+/// Near infrared reflectance.
+#[derive(Clone, Copy, Debug)]
+enum Nir {
+    /// The same everywhere.
+    Even(f32),
+    /// So much of the red.
+    OfRed(f32),
 }
 
 /// What passes.
@@ -63,11 +74,21 @@ impl Painted {
             None => surface.transmission.as_ref().map(own),
         };
         let roughness = page.roughness.or(surface.roughness).unwrap_or(1.0).max(0.02);
-        let leafy = transmission.as_ref().map(|_| LEAF_NIR);
+        let known = page.nir.or(surface.nir);
+        let nir = match (&transmission, known) {
+            (Some(_), nir) => Nir::Even(nir.unwrap_or(LEAF_NIR)),
+            (None, None) => Nir::OfRed(1.0),
+            (None, Some(nir)) => {
+                let red = surface.color[0] * surface.picture.as_ref().map_or(1.0, |p| mean(p).x);
+                // Black paint has no red to follow.
+                if red > 0.01 { Nir::OfRed(nir / red) } else { Nir::Even(nir) }
+            }
+        };
         Self {
             color: Vec3::from(surface.color),
             picture: surface.picture.clone(),
-            nir: page.nir.or(surface.nir).or(leafy),
+            nir,
+            relief: surface.relief.clone(),
             coat: (roughness < MATTE).then(|| Side::new(IOR, [roughness; 2], Spectrum::ZERO)),
             transmission,
         }
@@ -77,7 +98,11 @@ impl Painted {
     fn tone(&self, of: impl Fn(&Texture) -> Vec3) -> Tone {
         let seen = |picture: &Option<Arc<Texture>>| picture.as_ref().map_or(Vec3::ONE, |p| of(p));
         let color = self.color * seen(&self.picture);
-        let reflectance = Spectrum(color.extend(self.nir.unwrap_or(color.x))).clamp(0.0, 0.95);
+        let nir = match self.nir {
+            Nir::Even(nir) => nir,
+            Nir::OfRed(share) => share * color.x,
+        };
+        let reflectance = Spectrum(color.extend(nir)).clamp(0.0, 0.95);
         let transmittance = self.transmission.as_ref().map_or(Spectrum::ZERO, |sheet| {
             let passed = sheet.transmittance * Spectrum(seen(&sheet.picture).extend(1.0));
             // Never more than the surface has left.
@@ -87,20 +112,27 @@ impl Painted {
     }
 
     pub(super) fn swatch(&self) -> Swatch<'_> {
-        let color = |[r, g, b, _]: [f32; 4]| Vec3::new(r, g, b);
-        let mean = self.tone(|picture| color(picture.sample(Vec2::splat(0.5), 32.0)));
+        let mean = self.tone(mean);
         let roughness = self.coat.and_then(|side| side.coat()).map_or(1.0, |coat| coat.alpha[0]);
         let passed = self.transmission.as_ref().and_then(|sheet| sheet.picture.as_ref());
         let Some(picture) = self.picture.as_ref().or(passed) else {
             return Swatch::plain(mean, roughness);
         };
-        let (w, h) = (picture.width(), picture.height());
-        let texel = move |x: u32, y: u32| {
-            let uv = vec2((x as f32 + 0.5) / w as f32, (y as f32 + 0.5) / h as f32);
-            self.tone(|picture| color(picture.sample(uv, 0.0)))
-        };
+        let size = (picture.width(), picture.height());
+        let texel = move |x, y| self.tone(|picture| rgb(picture.sample(centre(size, x, y), 0.0)));
         // What a page repaints does not share the file's picture.
-        Swatch::pictured([std::ptr::from_ref(self) as usize, 1], (w, h), texel, mean, roughness)
+        let swatch = Swatch::pictured([std::ptr::from_ref(self) as usize, 1], size, texel, mean, roughness);
+        match &self.relief {
+            Some(Relief { normals, strength }) => {
+                swatch.raised(move |x, y| normals.sample(centre(size, x, y), 0.0), *strength)
+            }
+            None => swatch,
+        }
+    }
+
+    pub(super) fn varies(&self) -> Varies {
+        let passed = self.transmission.as_ref().and_then(|sheet| sheet.picture.as_ref());
+        self.picture.as_ref().or(passed).map_or(Varies::Nowhere, |p| Varies::Picture(p.width(), p.height()))
     }
 
     pub(super) fn scatter(&self, at: &Interaction, wo: Vec3) -> (Bsdf, Frame) {
@@ -112,13 +144,28 @@ impl Painted {
                 Bsdf::Leaf(bsdf::Leaf::new(side, side, transmittance))
             }
         };
-        (bsdf, frame(at, at.ns, wo))
+        let normal = self.relief.as_ref().map_or(at.ns, |Relief { normals, strength }| {
+            bump(at, normals.sample(at.uv, normals.lod(extent(at))) * *strength)
+        });
+        (bsdf, frame(at, normal, wo))
     }
 }
 
 /// Linear colour of a picture, averaged over what the ray sees.
 fn read(picture: &Texture, at: &Interaction) -> Vec3 {
-    let metres = at.dp_du.length().max(at.dp_dv.length()).max(1e-6);
-    let [r, g, b, _] = picture.sample(at.uv, picture.lod(at.footprint / metres));
+    rgb(picture.sample(at.uv, picture.lod(extent(at))))
+}
+
+/// What the ray sees of the surface, as an extent of texture coordinates.
+fn extent(at: &Interaction) -> f32 {
+    at.footprint / at.dp_du.length().max(at.dp_dv.length()).max(1e-6)
+}
+
+/// Mean colour of what is opaque of a picture: its coarsest level.
+fn mean(picture: &Texture) -> Vec3 {
+    rgb(picture.sample(Vec2::splat(0.5), 32.0))
+}
+
+fn rgb([r, g, b, _]: [f32; 4]) -> Vec3 {
     Vec3::new(r, g, b)
 }

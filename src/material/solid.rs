@@ -1,5 +1,6 @@
 //! Stone, wood, straw: one colour, rough, opaque.
 
+use super::Varies;
 use super::shading::frame;
 use super::swatch::{Swatch, Tone};
 use crate::bsdf::{Bsdf, OrenNayar};
@@ -38,6 +39,10 @@ impl Solid {
     /// Without the grain.
     pub(super) fn swatch(&self) -> Swatch<'_> {
         Swatch::plain(Tone { reflectance: self.albedo, transmittance: Spectrum::ZERO }, 1.0)
+    }
+
+    pub(super) fn varies(&self) -> Varies {
+        if self.grain.is_some() { Varies::Place } else { Varies::Nowhere }
     }
 
     pub(super) fn scatter(&self, at: &Interaction, wo: Vec3) -> (Bsdf, Frame) {

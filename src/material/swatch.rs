@@ -4,7 +4,7 @@
 //! Specimens that differ only in their tint share one picture, as they do here: [`Swatch::key`] tells.
 
 use super::Material;
-use crate::math::{Spectrum, Vec3};
+use crate::math::{Spectrum, Vec2, Vec3};
 
 /// Reflectance and transmittance of one place.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,6 +23,9 @@ pub struct Swatch<'a> {
     /// Width and height of the picture; `None` where the material is the same everywhere.
     pub size: Option<(u32, u32)>,
     texel: Box<dyn Fn(u32, u32) -> Tone + 'a>,
+    slope: Box<dyn Fn(u32, u32) -> Vec2 + 'a>,
+    /// Strength of the relief, a factor on [`Swatch::slope`]; 0 for none.
+    pub relief: f32,
     /// Factor on reflected R, G, B.
     pub tint: Vec3,
     /// Factor on transmitted R, G, B.
@@ -40,6 +43,8 @@ impl<'a> Swatch<'a> {
             key: [0; 2],
             size: None,
             texel: Box::new(move |_, _| tone),
+            slope: Box::new(|_, _| Vec2::ZERO),
+            relief: 0.0,
             tint: Vec3::ONE,
             tint_transmitted: Vec3::ONE,
             roughness,
@@ -64,10 +69,25 @@ impl<'a> Swatch<'a> {
         Self { tint: reflected, tint_transmitted: transmitted, ..self }
     }
 
+    /// The same picture with a relief of `strength`.
+    pub(super) fn raised(self, slope: impl Fn(u32, u32) -> Vec2 + 'a, strength: f32) -> Self {
+        Self { slope: Box::new(slope), relief: strength, ..self }
+    }
+
+    /// Slope of the relief at texel (x, y): ∂h/∂x to the picture's right, ∂h/∂y up the picture.
+    pub fn slope(&self, x: u32, y: u32) -> Vec2 {
+        (self.slope)(x, y)
+    }
+
     /// Texel (x, y) of the picture, top left first; the one tone of a material without a picture.
     pub fn texel(&self, x: u32, y: u32) -> Tone {
         (self.texel)(x, y)
     }
+}
+
+/// The middle of texel (x, y) of a picture of this size, as texture coordinates.
+pub(super) fn centre(size: (u32, u32), x: u32, y: u32) -> Vec2 {
+    Vec2::new((x as f32 + 0.5) / size.0 as f32, (y as f32 + 0.5) / size.1 as f32)
 }
 
 impl Material {

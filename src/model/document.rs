@@ -172,6 +172,8 @@ objects! {
         name: Option<String> = "Option::is_none",
         /// Colour and gloss.
         pbr_metallic_roughness: Pbr,
+        /// Relief.
+        normal_texture: Option<NormalInfo> = "Option::is_none",
         /// OPAQUE, MASK or BLEND.
         alpha_mode: Option<String> = "Option::is_none",
         /// Opacity from which a MASK is there; ½ unless given.
@@ -211,6 +213,15 @@ objects! {
         tex_coord: usize = "is_zero",
         /// Data of extensions.
         extensions: Map<String, Value> = "Map::is_empty",
+    }
+    /// Which texture holds normals of the tangent frame.
+    NormalInfo {
+        /// The texture.
+        index: usize,
+        /// Number of the coordinates, TEXCOORD_n.
+        tex_coord: usize = "is_zero",
+        /// Factor on their x and y; 1 unless given.
+        scale: Option<f32> = "Option::is_none",
     }
     /// `KHR_texture_transform`: uv → offset + rotation · scale · uv.
     TextureTransform {

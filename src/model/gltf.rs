@@ -4,16 +4,16 @@
 //! every node is visited once.
 
 use super::document::{
-    DIFFUSE_TRANSMISSION, DiffuseTransmission, Document, FLOAT, LIGHTS, Material, Primitive, REPEAT, TEXTURE_TRANSFORM,
-    TextureInfo, TextureTransform, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT,
+    CLAMP_TO_EDGE, DIFFUSE_TRANSMISSION, DiffuseTransmission, Document, FLOAT, LIGHTS, Material, Primitive, REPEAT,
+    TEXTURE_TRANSFORM, TextureInfo, TextureTransform, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT,
 };
 use super::uri::{Target, follow};
 use super::{
-    Label, MOST_TRIANGLES, Model, Part, Surface, Transmission, Up, bytes, faceted, glb, into_one_tile, settle,
+    Label, MOST_TRIANGLES, Model, Part, Relief, Surface, Transmission, Up, bytes, faceted, glb, into_one_tile, settle,
 };
 use crate::geometry::{AlphaMask, Mesh};
 use crate::math::{DMat4, DQuat, DVec3, Vec2, Vec3, vec2};
-use crate::texture::{ColorSpace, Texture, Wrap};
+use crate::texture::{ColorSpace, NormalMap, Texture, Wrap};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -48,8 +48,15 @@ pub(super) fn read(path: &Path, up: Up) -> Result<Model, String> {
     }
     let folder = path.parent().unwrap_or(Path::new(""));
     let buffers = buffers(&document, own, folder, &mut files)?;
-    let mut reader =
-        Reader { document: &document, buffers, folder, files, textures: BTreeMap::new(), masks: BTreeMap::new() };
+    let mut reader = Reader {
+        document: &document,
+        buffers,
+        folder,
+        files,
+        textures: BTreeMap::new(),
+        masks: BTreeMap::new(),
+        normals: BTreeMap::new(),
+    };
     let looks = document.materials.iter().map(|m| reader.look(m)).collect::<Result<Vec<_>, _>>()?;
     let mut model = Model { surfaces: looks.iter().map(|l| l.surface.clone()).collect(), ..Model::default() };
     // The last is for pieces without a material.
@@ -105,6 +112,8 @@ struct Reader<'a> {
     files: Vec<PathBuf>,
     /// By image and whether it repeats.
     textures: BTreeMap<(usize, bool), Arc<Texture>>,
+    /// By image and whether it repeats.
+    normals: BTreeMap<(usize, bool), Arc<NormalMap>>,
     /// By image and least opacity.
     masks: BTreeMap<(usize, u8), Option<Arc<AlphaMask>>>,
 }
@@ -301,6 +310,15 @@ impl Reader<'_> {
             tiled_mask: false,
             absent: false,
         };
+        if let Some(info) = &material.normal_texture {
+            let (image, repeats) = self.image(info.index)?;
+            if !self.normals.contains_key(&(image, repeats)) {
+                let picture = self.decode(image, repeats, ColorSpace::Linear)?;
+                self.normals.insert((image, repeats), Arc::new(NormalMap::from_picture(&picture)));
+            }
+            let strength = info.scale.filter(|s| s.is_finite()).unwrap_or(1.0);
+            look.surface.relief = Some(Relief { normals: self.normals[&(image, repeats)].clone(), strength });
+        }
         let cutoff = match material.alpha_mode.as_deref() {
             Some("MASK") => material.alpha_cutoff.unwrap_or(0.5),
             Some("BLEND") => 0.5,
@@ -332,16 +350,27 @@ impl Reader<'_> {
 
     /// The image's number, the texture, and whether it repeats.
     fn texture(&mut self, info: &TextureInfo) -> Result<(usize, Arc<Texture>, bool), String> {
-        let texture = item(&self.document.textures, info.index, "texture")?;
-        let image = texture.source.ok_or_else(|| {
-            format!("texture {} has no PNG or JPEG image\n help: export its pictures as PNG or JPEG", info.index)
-        })?;
-        let sampler = texture.sampler.map(|s| item(&self.document.samplers, s, "sampler")).transpose()?;
-        let wraps = |code: Option<u32>| code.unwrap_or(REPEAT) != super::document::CLAMP_TO_EDGE;
-        let repeats = sampler.is_none_or(|s| wraps(s.wrap_s) || wraps(s.wrap_t));
+        let (image, repeats) = self.image(info.index)?;
         if let Some(known) = self.textures.get(&(image, repeats)) {
             return Ok((image, known.clone(), repeats));
         }
+        let decoded = Arc::new(self.decode(image, repeats, ColorSpace::Srgb)?);
+        self.textures.insert((image, repeats), decoded.clone());
+        Ok((image, decoded, repeats))
+    }
+
+    /// The number of a texture's image, and whether it repeats.
+    fn image(&self, texture: usize) -> Result<(usize, bool), String> {
+        let of = item(&self.document.textures, texture, "texture")?;
+        let image = of.source.ok_or_else(|| {
+            format!("texture {texture} has no PNG or JPEG image\n help: export its pictures as PNG or JPEG")
+        })?;
+        let sampler = of.sampler.map(|s| item(&self.document.samplers, s, "sampler")).transpose()?;
+        let wraps = |code: Option<u32>| code.unwrap_or(REPEAT) != CLAMP_TO_EDGE;
+        Ok((image, sampler.is_none_or(|s| wraps(s.wrap_s) || wraps(s.wrap_t))))
+    }
+
+    fn decode(&mut self, image: usize, repeats: bool, space: ColorSpace) -> Result<Texture, String> {
         let source = item(&self.document.images, image, "image")?;
         let data: Cow<'_, [u8]> = match (&source.uri, source.buffer_view) {
             (Some(uri), _) => match follow(uri)? {
@@ -359,10 +388,8 @@ impl Reader<'_> {
         };
         let name = source.uri.as_deref().filter(|u| !u.starts_with("data:")).or(source.name.as_deref());
         let name = name.map_or_else(|| format!("image {image}"), |n| format!("`{n}`"));
-        let decoded = Texture::decode(&data, ColorSpace::Srgb).map_err(|what| format!("its picture {name}: {what}"))?;
-        let decoded = Arc::new(decoded.wrapped(if repeats { Wrap::Repeat } else { Wrap::Clamp }));
-        self.textures.insert((image, repeats), decoded.clone());
-        Ok((image, decoded, repeats))
+        let decoded = Texture::decode(&data, space).map_err(|what| format!("its picture {name}: {what}"))?;
+        Ok(decoded.wrapped(if repeats { Wrap::Repeat } else { Wrap::Clamp }))
     }
 }
 

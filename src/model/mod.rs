@@ -2,7 +2,7 @@
 //!
 //! What is read: triangles with normals and one set of texture coordinates; base colour and picture; opacity, cut at the
 //! file's own threshold or ½; roughness; light that passes diffusely (`KHR_materials_diffuse_transmission`, or the thin sheets of
-//! `KHR_materials_transmission`). What is not: vertex colours, normal maps, metal, skins, morphs, animations, cameras, lights.
+//! `KHR_materials_transmission`); glTF's normal maps. What is not: vertex colours, metal, skins, morphs, animations, cameras, lights.
 //! A surface that the file calls one-sided is seen from both sides.
 //!
 //! Lengths are metres. Files say which axis points up only by custom: glTF has y up, and so have most OBJ files.
@@ -16,7 +16,7 @@ mod uri;
 
 use crate::geometry::{AlphaMask, Mesh};
 use crate::math::{DMat4, Vec2, Vec3};
-use crate::texture::Texture;
+use crate::texture::{NormalMap, Texture};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -95,11 +95,13 @@ pub struct Surface {
     pub picture: Option<Arc<Texture>>,
     /// Where it is there at all; `None` for everywhere.
     pub mask: Option<Arc<AlphaMask>>,
+    /// Its relief.
+    pub relief: Option<Relief>,
     /// GGX roughness α, where the file says it.
     pub roughness: Option<f32>,
     /// What passes through, where the file says it.
     pub transmission: Option<Transmission>,
-    /// Reflectance in near infrared, where the program wrote it.
+    /// Mean reflectance in near infrared, where the program wrote it.
     pub nir: Option<f32>,
     /// Transmittance in near infrared, likewise.
     pub nir_transmission: Option<f32>,
@@ -112,12 +114,22 @@ impl Default for Surface {
             color: [1.0; 3],
             picture: None,
             mask: None,
+            relief: None,
             roughness: None,
             transmission: None,
             nir: None,
             nir_transmission: None,
         }
     }
+}
+
+/// A relief too fine for the triangles.
+#[derive(Clone, Debug)]
+pub struct Relief {
+    /// Its slopes.
+    pub normals: Arc<NormalMap>,
+    /// Factor on them.
+    pub strength: f32,
 }
 
 /// Light that a sheet lets through.

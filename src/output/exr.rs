@@ -14,6 +14,12 @@ fn channel(name: &str, samples: FlatSamples) -> AnyChannel<FlatSamples> {
     AnyChannel { name: name.into(), sample_data: samples, quantize_linearly: false, sampling: Vec2(1, 1) }
 }
 
+/// Encodes numbers as they are: one vector a channel, row by row from the top.
+pub(super) fn encode_map(width: u32, height: u32, channels: &[(&str, Vec<f32>)]) -> Result<Vec<u8>> {
+    let of = |(name, values): &(&str, Vec<f32>)| channel(name, FlatSamples::F32(values.clone()));
+    write(width, height, (0, 0), channels.iter().map(of).collect(), None)
+}
+
 /// Encodes a film and its labels, which must share a window.
 pub(super) fn encode(film: &Film, labels: &LabelMap, text: &str) -> Result<Vec<u8>> {
     let mut channels = SmallVec::new();
@@ -40,18 +46,26 @@ pub(super) fn encode(film: &Film, labels: &LabelMap, text: &str) -> Result<Vec<u
         channels.push(channel(&format!("id.{name}"), FlatSamples::U32(samples)));
     }
     let w = film.window;
-    let attributes = LayerAttributes {
-        layer_position: Vec2(w.x0 as i32, w.y0 as i32),
-        comments: Text::new_or_none(text),
-        ..LayerAttributes::default()
-    };
+    write(w.width(), w.height(), (w.x0 as i32, w.y0 as i32), channels, Text::new_or_none(text))
+}
+
+/// The file of these channels, whose first pixel stands at `corner` of a larger image.
+fn write(
+    width: u32,
+    height: u32,
+    corner: (i32, i32),
+    channels: SmallVec<[AnyChannel<FlatSamples>; 4]>,
+    comments: Option<Text>,
+) -> Result<Vec<u8>> {
+    let attributes =
+        LayerAttributes { layer_position: Vec2(corner.0, corner.1), comments, ..LayerAttributes::default() };
     // Rows in increasing order, whichever thread compressed them first: equal runs write equal bytes.
     let encoding = Encoding {
         compression: Compression::ZIP16,
         blocks: Blocks::ScanLines,
         line_order: exr::prelude::attribute::LineOrder::Increasing,
     };
-    let size = Vec2(w.width() as usize, w.height() as usize);
+    let size = Vec2(width as usize, height as usize);
     let image = Image::from_layer(Layer::new(size, attributes, encoding, AnyChannels::sort(channels)));
     let mut bytes = std::io::Cursor::new(Vec::new());
     image.write().to_unbuffered(&mut bytes).map_err(|e| Error::Scene(format!("cannot encode an EXR: {e}")))?;

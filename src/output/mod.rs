@@ -3,6 +3,7 @@
 
 mod exr;
 pub mod gltf;
+pub mod mitsuba;
 mod overlay;
 mod png;
 

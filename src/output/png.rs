@@ -8,6 +8,8 @@ use std::path::Path;
 pub enum Picture<'a> {
     /// 8-bit sRGB.
     Rgb(&'a [[u8; 3]]),
+    /// 8-bit numbers, three a pixel: no colours.
+    Linear(&'a [[u8; 3]]),
     /// 8-bit sRGB with opacity.
     Rgba(&'a [[u8; 4]]),
     /// 8-bit gray.
@@ -30,6 +32,10 @@ pub(super) fn encode(width: u32, height: u32, picture: &Picture<'_>, text: &str)
         Picture::Rgb(pixels) => {
             encoder.set_color(ColorType::Rgb);
             encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+            pixels.as_flattened().to_vec()
+        }
+        Picture::Linear(pixels) => {
+            encoder.set_color(ColorType::Rgb);
             pixels.as_flattened().to_vec()
         }
         Picture::Rgba(pixels) => {

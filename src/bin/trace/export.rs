@@ -28,12 +28,15 @@ pub(crate) struct Args {
 enum Format {
     /// glTF 2.0: scene.glb with meshes, textures, labels, sun, lamps and camera; for Blender and others.
     Gltf,
+    /// Mitsuba 3: scene.xml with meshes, textures, lights and camera.
+    Mitsuba,
 }
 
 impl Format {
     fn write(self, folder: &Path, field: &Field) -> Result<Export> {
         match self {
             Self::Gltf => output::gltf::write(folder, &field.scene, &field.provenance()),
+            Self::Mitsuba => output::mitsuba::write(folder, &field.scene, &field.provenance()),
         }
     }
 

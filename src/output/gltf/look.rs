@@ -7,7 +7,7 @@ use crate::material::swatch::Swatch;
 use crate::math::Vec3;
 use crate::model::document::{
     CLAMP_TO_EDGE, DIFFUSE_TRANSMISSION, DiffuseTransmission, Document, Image, LINEAR, LINEAR_MIPMAP_LINEAR, Material,
-    NEAREST, Pbr, Sampler, Texture, TextureInfo,
+    NEAREST, NormalInfo, Pbr, Sampler, Texture, TextureInfo,
 };
 use crate::output::png::{self, Picture};
 use crate::scene::Scene;
@@ -36,6 +36,8 @@ struct Sheet<'a> {
     tint_transmitted: f32,
     /// The largest transmittance.
     share: f32,
+    /// Whether any of them has a relief.
+    raised: bool,
 }
 
 fn address(mask: Option<&Arc<AlphaMask>>) -> usize {
@@ -70,9 +72,10 @@ impl<'a> Looks<'a> {
                 order.push(key);
                 let own = scene.materials[*material as usize].swatch();
                 let share = most_transmitted(&own);
-                Sheet { swatch: own, mask: mask.map(|m| &**m), tint: 1.0, tint_transmitted: 1.0, share }
+                Sheet { swatch: own, mask: mask.map(|m| &**m), tint: 1.0, tint_transmitted: 1.0, share, raised: false }
             });
             sheet.tint = sheet.tint.max(swatch.tint.max_element());
+            sheet.raised |= swatch.relief > 0.0;
             sheet.tint_transmitted = sheet.tint_transmitted.max(swatch.tint_transmitted.max_element());
         }
         for sheet in sheets.values_mut() {
@@ -85,10 +88,10 @@ impl<'a> Looks<'a> {
             sampler(LINEAR, LINEAR_MIPMAP_LINEAR),
         ];
         let drawn: Vec<Drawn> = order.iter().map(|key| sheets[key].draw()).collect::<Result<_>>()?;
-        let mut textures: BTreeMap<Key, [Option<usize>; 2]> = BTreeMap::new();
-        for (key, Drawn { reflected, transmitted }) in order.iter().zip(drawn) {
-            let sampler = usize::from(sheets[key].mask.is_none());
-            let mut add = |bytes: Option<Vec<u8>>, what: &str| {
+        let mut textures: BTreeMap<Key, [Option<usize>; 3]> = BTreeMap::new();
+        for (key, Drawn { reflected, transmitted, normals }) in order.iter().zip(drawn) {
+            let cut = usize::from(sheets[key].mask.is_none());
+            let mut add = |bytes: Option<Vec<u8>>, what: &str, sampler: usize| {
                 bytes.map(|bytes| {
                     let name = Some(format!("{what} {}", document.images.len()));
                     let view = Some(pack.picture(bytes));
@@ -102,7 +105,10 @@ impl<'a> Looks<'a> {
                     document.textures.len() - 1
                 })
             };
-            textures.insert(*key, [add(reflected, "reflected"), add(transmitted, "transmitted")]);
+            textures.insert(
+                *key,
+                [add(reflected, "reflected", cut), add(transmitted, "transmitted", 1), add(normals, "relief", 1)],
+            );
         }
         for (i, (material, mask)) in self.worn.iter().enumerate() {
             let swatch = swatch(*material);
@@ -135,6 +141,7 @@ fn most_transmitted(swatch: &Swatch<'_>) -> f32 {
 struct Drawn {
     reflected: Option<Vec<u8>>,
     transmitted: Option<Vec<u8>>,
+    normals: Option<Vec<u8>>,
 }
 
 impl Sheet<'_> {
@@ -151,7 +158,7 @@ impl Sheet<'_> {
     fn draw(&self) -> Result<Drawn> {
         let pictured = self.swatch.size.is_some();
         let Some((w, h)) = self.mask.map(AlphaMask::size).or(self.swatch.size) else {
-            return Ok(Drawn { reflected: None, transmitted: None });
+            return Ok(Drawn { reflected: None, transmitted: None, normals: None });
         };
         let (sw, sh) = self.swatch.size.unwrap_or((1, 1));
         // A mask of another size than its picture decides: the picture's nearest texels are taken.
@@ -174,11 +181,21 @@ impl Sheet<'_> {
         let transmitted = (pictured && self.share > 0.0)
             .then(|| png::encode(w, h, &Picture::Rgb(&places().map(transmitted).collect::<Vec<_>>()), ""))
             .transpose()?;
-        Ok(Drawn { reflected: Some(reflected), transmitted })
+        let normal = |(x, y): (u32, u32)| {
+            let slope = self.swatch.slope(scaled(x, w, sw), scaled(y, h, sh));
+            let n = Vec3::new(-slope.x, -slope.y, 1.0).normalize();
+            n.to_array().map(|c| ((0.5 * c + 0.5) * 255.0 + 0.5) as u8)
+        };
+        let normals = (pictured && self.raised)
+            .then(|| png::encode(w, h, &Picture::Linear(&places().map(normal).collect::<Vec<_>>()), ""))
+            .transpose()?;
+        Ok(Drawn { reflected: Some(reflected), transmitted, normals })
     }
 
-    fn material(&self, swatch: &Swatch<'_>, textures: [Option<usize>; 2], number: usize) -> Material {
-        let [reflected, transmitted] = textures.map(|t| t.map(|index| TextureInfo { index, ..TextureInfo::default() }));
+    fn material(&self, swatch: &Swatch<'_>, textures: [Option<usize>; 3], number: usize) -> Material {
+        let relief = textures[2].filter(|_| swatch.relief > 0.0);
+        let [reflected, transmitted, _] =
+            textures.map(|t| t.map(|index| TextureInfo { index, ..TextureInfo::default() }));
         let pictured = swatch.size.is_some();
         // With a picture the factor is the tint beside the largest tint; without one it is the colour.
         let factor =
@@ -194,6 +211,11 @@ impl Sheet<'_> {
                 // glTF's roughness is the root of α.
                 roughness_factor: Some(swatch.roughness.sqrt()),
             },
+            normal_texture: relief.map(|index| NormalInfo {
+                index,
+                scale: Some(swatch.relief),
+                ..NormalInfo::default()
+            }),
             double_sided: true,
             extras: json!({ "nir_reflectance": mean.reflectance.0.w, "nir_transmittance": mean.transmittance.0.w }),
             ..Material::default()
