@@ -169,3 +169,41 @@ fn mean(picture: &Texture) -> Vec3 {
 fn rgb([r, g, b, _]: [f32; 4]) -> Vec3 {
     Vec3::new(r, g, b)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Rationale: files and pages say reflectance and transmittance apart, and nothing keeps them from more than one together.
+        #[test]
+        fn no_surface_returns_and_passes_more_than_it_receives(
+            color in prop::array::uniform3(0f32..=1.0),
+            passed in prop::array::uniform3(0f32..=1.0),
+            nir in prop::option::of(0f32..=1.0),
+            page in prop::option::of(prop::array::uniform4(0f32..=1.0)),
+        ) {
+            let transmission = Some(Transmission { color: passed, picture: None });
+            let surface = Surface { color, transmission, ..Surface::default() };
+            let repaint = Repaint { nir, transmission: page.map(Spectrum::from), ..Repaint::default() };
+            let tone = Painted::new(&surface, &repaint).tone(|_| Vec3::ONE);
+            let sum = (tone.reflectance + tone.transmittance).max();
+            prop_assert!(sum <= 0.9901 && tone.transmittance.0.min_element() >= 0.0, "{tone:?}");
+        }
+    }
+
+    #[test]
+    fn near_infrared_follows_red_where_nothing_passes_and_stands_where_something_does() {
+        let picture = Texture::from_rgba8(2, 1, &[255, 0, 0, 255, 128, 0, 0, 255], crate::texture::ColorSpace::Srgb);
+        let surface = Surface { picture: Some(Arc::new(picture)), ..Surface::default() };
+        let nir =
+            |page: Repaint, red: f32| Painted::new(&surface, &page).tone(|_| Vec3::new(red, 0.0, 0.0)).reflectance.0.w;
+        assert_eq!(nir(Repaint::default(), 0.3), 0.3);
+        let mean = mean(surface.picture.as_ref().unwrap()).x;
+        assert!((nir(Repaint { nir: Some(0.2), ..Repaint::default() }, mean) - 0.2).abs() < 1e-6);
+        assert!((nir(Repaint { nir: Some(0.2), ..Repaint::default() }, 0.5 * mean) - 0.1).abs() < 1e-6);
+        let leaf = Repaint { transmission: Some(Spectrum::splat(0.1)), ..Repaint::default() };
+        assert_eq!(nir(leaf, 0.3), LEAF_NIR);
+    }
+}
