@@ -4,7 +4,7 @@ mod explain;
 pub mod label;
 
 use crate::accel::prepare_thread;
-use crate::film::{Accumulator, Film, Filter, Pixel};
+use crate::film::{Accumulator, Film, Filter, Footprint, Pixel};
 use crate::geometry::{Ray, Window};
 use crate::integrator::{Integrator, World};
 use crate::math::vec2;
@@ -52,6 +52,7 @@ pub fn pool(threads: usize) -> Result<rayon::ThreadPool> {
 /// Renders a window. Call it inside [`pool`]'s `install`.
 pub fn render(world: &World<'_>, integrator: &dyn Integrator, settings: &Settings, watch: &Watch<'_>) -> Result<Film> {
     let w = settings.window;
+    let footprint = settings.filter.footprint();
     let columns = w.width().div_ceil(TILE);
     let tiles = columns * w.height().div_ceil(TILE);
     let rendered: Vec<Vec<Pixel>> = (0..tiles)
@@ -64,7 +65,7 @@ pub fn render(world: &World<'_>, integrator: &dyn Integrator, settings: &Setting
             // Asked at every pixel: with thousands of samples a tile takes minutes. What is left out then is never shown.
             let pixels: Vec<Pixel> = rows(tile)
                 .take_while(|_| !watch.stop.load(Ordering::Relaxed))
-                .map(|(x, y)| pixel(world, integrator, settings, x, y))
+                .map(|(x, y)| pixel(world, integrator, settings, &footprint, x, y))
                 .collect();
             (watch.done)(u64::from(settings.spp) * pixels.len() as u64);
             pixels
@@ -93,23 +94,26 @@ fn rows(w: Window) -> impl Iterator<Item = (u32, u32)> {
 }
 
 /// Renders one pixel: what a tile does, and what `--pixel` explains.
-pub fn pixel(world: &World<'_>, integrator: &dyn Integrator, settings: &Settings, x: u32, y: u32) -> Pixel {
+pub fn pixel(
+    world: &World<'_>,
+    integrator: &dyn Integrator,
+    settings: &Settings,
+    footprint: &Footprint,
+    x: u32,
+    y: u32,
+) -> Pixel {
     let camera = &world.scene.camera;
     let spread = camera.pixel_angle();
     let mut sum = Accumulator::default();
     for index in 0..settings.spp {
         let sampler = Sampler::new(settings.seed, x, y, index);
-        let [u, v, lens_u, lens_v] = sampler.get4(sets::CAMERA);
-        let blur = match settings.filter {
-            Filter::Box => [0.0; 2],
-            // Far beyond any path's sets.
-            Filter::Gaussian(_) => {
-                let [a, b, ..] = sampler.get4(sets::BLUR);
-                [a, b]
-            }
-        };
-        let at = vec2(x as f32 + 0.5, y as f32 + 0.5) + settings.filter.sample([u, v], blur);
-        let (origin, direction) = camera.ray(at, [lens_u, lens_v]);
+        let [u, v, ..] = sampler.get4(sets::FIRST);
+        let at = vec2(x as f32 + 0.5, y as f32 + 0.5) + footprint.sample([u, v]);
+        let lens = camera.aperture().map_or([0.0; 2], |_| {
+            let [u, v, ..] = sampler.get4(sets::LENS);
+            [u, v]
+        });
+        let (origin, direction) = camera.ray(at, lens);
         let seen = integrator.li(world, &Ray::new(origin, direction), spread, &sampler);
         sum.add(seen.radiance);
         if let Some(first) = seen.first {
