@@ -9,7 +9,8 @@ use super::document::{
 };
 use super::uri::{Target, follow};
 use super::{
-    Label, MOST_TRIANGLES, Model, Part, Relief, Surface, Transmission, Up, bytes, faceted, glb, into_one_tile, settle,
+    Label, MOST_TRIANGLES, Model, Part, Relief, Surface, Transmission, Up, bytes, faceted, fraction, glb,
+    into_one_tile, settle,
 };
 use crate::geometry::{AlphaMask, Mesh};
 use crate::math::{DMat4, DQuat, DVec3, Vec2, Vec3, vec2};
@@ -126,15 +127,15 @@ impl Reader<'_> {
     /// Visits the nodes of the scene, parents before children.
     fn walk(&mut self, up: Up, looks: &[Look], model: &mut Model) -> Result<(), String> {
         let document = self.document;
-        let roots = match document.scene.or((!document.scenes.is_empty()).then_some(0)) {
-            Some(scene) => item(&document.scenes, scene, "scene")?.nodes.clone(),
-            None => {
-                let mut child = vec![false; document.nodes.len()];
-                for c in document.nodes.iter().flat_map(|n| &n.children).filter(|c| **c < document.nodes.len()) {
-                    child[*c] = true;
-                }
-                (0..child.len()).filter(|i| !child[*i]).collect()
+        let shown = document.scene.or((!document.scenes.is_empty()).then_some(0));
+        let roots = if let Some(scene) = shown {
+            item(&document.scenes, scene, "scene")?.nodes.clone()
+        } else {
+            let mut child = vec![false; document.nodes.len()];
+            for c in document.nodes.iter().flat_map(|n| &n.children).filter(|c| **c < document.nodes.len()) {
+                child[*c] = true;
             }
+            (0..child.len()).filter(|i| !child[*i]).collect()
         };
         let mut seen = vec![false; document.nodes.len()];
         let mut open: Vec<(usize, DMat4)> = roots.into_iter().rev().map(|node| (node, up.rotation())).collect();
@@ -185,7 +186,9 @@ impl Reader<'_> {
             None => vec![Vec2::ZERO; positions.len()],
         };
         if let Some(transform) = look.and_then(|l| l.transform.as_ref()) {
-            uvs.iter_mut().for_each(|uv| *uv = transformed(transform, *uv));
+            for uv in &mut uvs {
+                *uv = transformed(transform, *uv);
+            }
         }
         if look.is_some_and(|l| l.tiled_mask) {
             into_one_tile(&mut uvs, name)?;
@@ -330,7 +333,7 @@ impl Reader<'_> {
             look.absent = least > 255.0;
             if let (Some((image, texture, repeats)), false) = (&picture, look.absent) {
                 let mask = || texture.alpha_mask_from(least as u8).map(Arc::new);
-                look.surface.mask = self.masks.entry((*image, least as u8)).or_insert_with(mask).clone();
+                look.surface.mask.clone_from(self.masks.entry((*image, least as u8)).or_insert_with(mask));
                 look.tiled_mask = *repeats && look.surface.mask.is_some();
             }
         }
@@ -405,11 +408,6 @@ impl Look {
 
 fn word(bytes: &[u8], i: usize) -> u32 {
     u32::from_le_bytes([bytes[4 * i], bytes[4 * i + 1], bytes[4 * i + 2], bytes[4 * i + 3]])
-}
-
-/// Held to 0..1; what is not a number is 0.
-fn fraction(x: f32) -> f32 {
-    x.max(0.0).min(1.0)
 }
 
 fn number(of: &serde_json::Value, key: &str) -> Option<f32> {

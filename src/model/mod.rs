@@ -181,6 +181,11 @@ fn bytes(path: &Path, files: &mut Vec<PathBuf>) -> Result<Vec<u8>, String> {
     std::fs::read(path).map_err(|e| format!("{name}: {e}"))
 }
 
+/// Held to 0..1; what is not a number is 0.
+fn fraction(x: f32) -> f32 {
+    if x > 0.0 { x.min(1.0) } else { 0.0 }
+}
+
 /// Brings a part into the model's frame and checks it; in words what is wrong.
 fn settle(mesh: &mut Mesh, to: &DMat4, name: &str) -> Result<(), String> {
     // Exact: what the program exported comes back bit for bit.

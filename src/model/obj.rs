@@ -3,7 +3,7 @@
 //! Of materials: `Kd`, `map_Kd`, `d`, `map_d`, `Ns`. A picture's own opacity cuts the surface as `map_d` does; `map_d` counts
 //! by its opacity where it has one, else by its brightness. v runs up in OBJ and down here.
 
-use super::{MOST_TRIANGLES, Model, Part, Surface, Up, bytes, faceted, into_one_tile, settle};
+use super::{MOST_TRIANGLES, Model, Part, Surface, Up, bytes, faceted, fraction, into_one_tile, settle};
 use crate::geometry::{AlphaMask, Mesh};
 use crate::math::{Vec3, vec2};
 use crate::texture::{ColorSpace, Texture, Wrap};
@@ -117,7 +117,7 @@ impl Pictures<'_> {
             (None, None) => None,
         };
         // A picture takes the colour's place where writers leave it black.
-        let color = match material.diffuse.unwrap_or([1.0; 3]).map(|c| c.max(0.0).min(1.0)) {
+        let color = match material.diffuse.unwrap_or([1.0; 3]).map(fraction) {
             [0.0, 0.0, 0.0] if picture.is_some() => [1.0; 3],
             color => color,
         };

@@ -159,11 +159,14 @@ pub struct ModelDesc {
     pub roughness: Option<Num<Fraction>>,
     /// Share of light that passes in R, G, B, NIR, instead of the file's: (0.05, 0.12, 0.03, 0.45) for a green leaf.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub transmission: Option<(Num<Fraction>, Num<Fraction>, Num<Fraction>, Num<Fraction>)>,
+    pub transmission: Option<Shares>,
     /// Reflectance in near infrared. Unless given: 0.45 for what lets light through, as much as in red for what does not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nir: Option<Num<Fraction>>,
 }
+
+/// A fraction in each of R, G, B, NIR.
+pub type Shares = (Num<Fraction>, Num<Fraction>, Num<Fraction>, Num<Fraction>);
 
 fn as_it_is() -> Vary<Positive> {
     Vary::fixed(1.0)

@@ -39,7 +39,7 @@ impl Pack {
 
     fn triples(&mut self, of: &[Vec3]) -> &mut Accessor {
         let at = self.triples.len();
-        self.triples.extend(of.iter().flat_map(|v| v.to_array()).flat_map(f32::to_le_bytes));
+        self.triples.extend(of.iter().flat_map(Vec3::to_array).flat_map(f32::to_le_bytes));
         self.accessor(TRIPLES, at, of.len(), "VEC3")
     }
 
@@ -62,7 +62,7 @@ impl Pack {
     /// Likewise.
     pub(super) fn uvs(&mut self, of: &[Vec2]) -> usize {
         let at = self.pairs.len();
-        self.pairs.extend(of.iter().flat_map(|v| v.to_array()).flat_map(f32::to_le_bytes));
+        self.pairs.extend(of.iter().flat_map(Vec2::to_array).flat_map(f32::to_le_bytes));
         self.accessor(PAIRS, at, of.len(), "VEC2");
         self.accessors.len() - 1
     }

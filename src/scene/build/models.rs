@@ -7,6 +7,7 @@ use crate::math::{Mat3, Spectrum, Vec3};
 use crate::model::{Label, Model};
 use crate::sampling::Purpose;
 use crate::sampling::place::Step;
+use crate::sampling::vary::Num;
 use crate::scene::desc::ModelDesc;
 use crate::scene::tag::{Class, Tag};
 use crate::scene::{Part, PlantRecord};
@@ -50,9 +51,9 @@ impl Builder<'_> {
         let scale = desc.scale.draw32(&mut stream);
         let foot = Vec3::new(x, y, ground.map_or(0.0, |g| g.height(x, y)) + desc.lift_m.draw32(&mut stream));
         let repaint = Repaint {
-            roughness: desc.roughness.map(|r| r.f32()),
+            roughness: desc.roughness.map(Num::f32),
             transmission: desc.transmission.map(|(r, g, b, nir)| Spectrum::new(r.f32(), g.f32(), b.f32(), nir.f32())),
-            nir: desc.nir.map(|n| n.f32()),
+            nir: desc.nir.map(Num::f32),
         };
         let materials: Vec<u32> =
             model.surfaces.iter().map(|s| self.material(Material::Painted(Painted::new(s, &repaint)))).collect();
@@ -68,9 +69,9 @@ impl Builder<'_> {
             if turn != 0.0 || scale != 1.0 || foot != Vec3::ZERO {
                 mesh.transform(Mat3::from_rotation_z(-turn) * scale, foot);
             }
-            if let Some((lo, hi)) = mesh.bounds()
-                && !(lo.abs().max(hi.abs()).max_element() <= FARTHEST)
-            {
+            let (lo, hi) = mesh.bounds().unwrap_or_default();
+            let reach = lo.abs().max(hi.abs()).max_element();
+            if !reach.is_finite() || reach > FARTHEST {
                 let size = (hi - lo).max_element();
                 let words = format!(
                     "`{}` of this model is {size:.0} m large or lies that far away\n help: lengths are metres; a file in millimetres takes scale: 0.001",
