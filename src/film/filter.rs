@@ -14,10 +14,11 @@ pub enum Filter {
 impl Filter {
     /// The footprint, ready to draw from.
     pub fn footprint(self) -> Footprint {
-        match self {
-            Self::Gaussian(sigma) if sigma > 0.0 => Footprint { quantiles: Some(blurred_square(f64::from(sigma))) },
-            Self::Box | Self::Gaussian(_) => Footprint { quantiles: None },
-        }
+        let quantiles = match self {
+            Self::Gaussian(sigma) if sigma > 0.0 => Some(blurred_square(f64::from(sigma))),
+            Self::Box | Self::Gaussian(_) => None,
+        };
+        Footprint { filter: self, quantiles }
     }
 }
 
@@ -28,11 +29,17 @@ const CELLS: usize = 1024;
 /// sequence stays stratified over the footprint.
 #[derive(Clone, Debug)]
 pub struct Footprint {
+    filter: Filter,
     /// Quantiles of an offset at k / [`CELLS`]; `None` for the square alone.
     quantiles: Option<Box<[f32]>>,
 }
 
 impl Footprint {
+    /// What it was made of.
+    pub fn filter(&self) -> Filter {
+        self.filter
+    }
+
     /// An offset from the pixel's centre, pixels, from two numbers in [0, 1).
     #[inline]
     pub fn sample(&self, u: [f32; 2]) -> Vec2 {

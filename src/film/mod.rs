@@ -21,9 +21,22 @@ pub struct Pixel {
     pub normal: Vec3,
     /// Mean distance to the first surface along the ray, metres; infinite where no sample met one.
     pub depth: f32,
+    /// Number of samples.
+    pub samples: u32,
 }
 
-/// Adds up one pixel. One thread sums a pixel in sample order, so any number of threads makes the same bits.
+impl Pixel {
+    /// Standard error of the radiance over the radiance, both as means of the bands; `None` for a black pixel.
+    ///
+    /// The variance is that of independent samples. Stratified ones err less, so this is what the error is at most.
+    pub fn relative_error(&self) -> Option<f32> {
+        let mean = self.mean.mean();
+        (mean > 0.0).then(|| self.variance.map(f32::sqrt).mean() / mean)
+    }
+}
+
+/// Adds up one pixel. One thread sums a pixel in sample order, so any number of threads makes the same bits; where one call
+/// ends and the next goes on makes no difference either.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Accumulator {
     count: u32,
@@ -65,6 +78,7 @@ impl Accumulator {
             albedo: Spectrum(self.albedo / n as f32),
             normal: self.normal / n as f32,
             depth: if self.hits == 0 { f32::INFINITY } else { (self.depth / f64::from(self.hits)) as f32 },
+            samples: self.count,
         }
     }
 }
@@ -84,20 +98,27 @@ impl Film {
         &self.pixels[(y * self.window.width() + x) as usize]
     }
 
-    /// Median over pixels of the relative standard error of the radiance's luminance-like mean of the bands: one honest figure.
+    /// Median over pixels of [`Pixel::relative_error`]: one honest figure.
     pub fn median_relative_error(&self) -> f32 {
-        let mut errors: Vec<f32> = self
-            .pixels
-            .iter()
-            .filter(|p| p.mean.mean() > 0.0)
-            .map(|p| p.variance.map(f32::sqrt).mean() / p.mean.mean())
-            .collect();
-        if errors.is_empty() {
-            return 0.0;
-        }
-        let middle = errors.len() / 2;
-        *errors.select_nth_unstable_by(middle, f32::total_cmp).1
+        median_relative_error(&self.pixels)
     }
+
+    /// Samples of the pixel that has the fewest, of the mean pixel, of the one that has the most.
+    pub fn samples(&self) -> (u32, f64, u32) {
+        let counts = || self.pixels.iter().map(|p| p.samples);
+        let mean = counts().map(f64::from).sum::<f64>() / self.pixels.len().max(1) as f64;
+        (counts().min().unwrap_or(0), mean, counts().max().unwrap_or(0))
+    }
+}
+
+/// Median over some pixels of [`Pixel::relative_error`]; zero where all are black.
+pub fn median_relative_error<'a>(pixels: impl IntoIterator<Item = &'a Pixel>) -> f32 {
+    let mut errors: Vec<f32> = pixels.into_iter().filter_map(Pixel::relative_error).collect();
+    if errors.is_empty() {
+        return 0.0;
+    }
+    let middle = errors.len() / 2;
+    *errors.select_nth_unstable_by(middle, f32::total_cmp).1
 }
 
 #[cfg(test)]

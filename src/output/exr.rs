@@ -2,7 +2,8 @@
 //!
 //! Channels: `R G B NIR` (radiance, W·m⁻²·sr⁻¹·nm⁻¹, f32), `variance.*` (of that mean, f32), `albedo.*` and `normal.{X,Y,Z}`
 //! (f16), `depth.Z` (metres along the ray, f32, infinite where nothing was met), `id.class`, `id.plant`, `id.leaf`,
-//! `id.part` (u32, from the label pass; part + 1, 0 for none). The header's comment holds the provenance.
+//! `id.part` (u32, from the label pass; part + 1, 0 for none); where pixels have different numbers of samples, `spp` (u32).
+//! The header's comment holds the provenance.
 
 use crate::film::Film;
 use crate::math::Spectrum;
@@ -20,8 +21,8 @@ pub(super) fn encode_map(width: u32, height: u32, channels: &[(&str, Vec<f32>)])
     write(width, height, (0, 0), channels.iter().map(of).collect(), None)
 }
 
-/// Encodes a film and its labels, which must share a window.
-pub(super) fn encode(film: &Film, labels: &LabelMap, text: &str) -> Result<Vec<u8>> {
+/// Encodes a film and its labels, which must share a window; `with_spp` adds each pixel's number of samples.
+pub(super) fn encode(film: &Film, labels: &LabelMap, with_spp: bool, text: &str) -> Result<Vec<u8>> {
     let mut channels = SmallVec::new();
     let pixels = &film.pixels;
     for (band, name) in Spectrum::NAMES.iter().enumerate() {
@@ -45,6 +46,21 @@ pub(super) fn encode(film: &Film, labels: &LabelMap, text: &str) -> Result<Vec<u
     for (name, samples) in ids {
         channels.push(channel(&format!("id.{name}"), FlatSamples::U32(samples)));
     }
+    if with_spp {
+        channels.push(channel("spp", FlatSamples::U32(pixels.iter().map(|p| p.samples).collect())));
+    }
+    write_film(film, channels, text)
+}
+
+/// Encodes a film's radiance alone.
+pub(super) fn encode_radiance(film: &Film, text: &str) -> Result<Vec<u8>> {
+    let band = |i: usize| FlatSamples::F32(film.pixels.iter().map(|p| p.mean.to_array()[i]).collect());
+    let channels = Spectrum::NAMES.iter().enumerate().map(|(i, name)| channel(name, band(i))).collect();
+    write_film(film, channels, text)
+}
+
+/// The file of a film's channels, which lie in its window.
+fn write_film(film: &Film, channels: SmallVec<[AnyChannel<FlatSamples>; 4]>, text: &str) -> Result<Vec<u8>> {
     let w = film.window;
     write(w.width(), w.height(), (w.x0 as i32, w.y0 as i32), channels, Text::new_or_none(text))
 }

@@ -52,7 +52,7 @@ pub fn explain(
             );
         }
     }
-    let seen = pixel(world, integrator, settings, &settings.filter.footprint(), x, y);
+    let seen = pixel(world, integrator, settings, x, y);
     let _ = write!(
         text,
         "\n  radiance: {}\n  ± error:  {}  ({} samples)",

@@ -2,6 +2,8 @@
 #![allow(dead_code, unreachable_pub, reason = "each test uses its part")]
 
 pub mod chi2;
+pub mod layers;
 pub mod pictures;
 pub mod program;
 pub mod scenes;
+pub mod stats;

@@ -260,7 +260,7 @@ fn camera_warnings(scene: &Scene) -> Vec<String> {
         warnings
             .push("the optical axis is written through the image's middle: Mitsuba's thin lens has no other".into());
     }
-    if scene.filter != Filter::Box {
+    if scene.filter.filter() != Filter::Box {
         warnings.push("the point spread is written as a Gaussian of the same variance".into());
     }
     warnings
@@ -328,7 +328,7 @@ impl Whole<'_> {
                 .float("principal_point_offset_x", cx / w - 0.5)
                 .float("principal_point_offset_y", cy / h - 0.5),
         };
-        let filter = match self.scene.filter {
+        let filter = match self.scene.filter.filter() {
             Filter::Box => Element::plugin("rfilter", "box"),
             // The square's own variance is 1/12.
             Filter::Gaussian(sigma) => {
