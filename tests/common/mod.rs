@@ -4,4 +4,5 @@
 pub mod chi2;
 pub mod pictures;
 pub mod program;
+pub mod python;
 pub mod scenes;
