@@ -33,6 +33,9 @@ pub enum Error {
     /// The ray tracing kernels refused.
     #[error("Embree: {0}")]
     Embree(String),
+    /// The denoiser failed; the picture that it was to denoise is there.
+    #[error("{0}")]
+    Denoise(String),
     /// The user asked to stop; nothing half-written is left.
     #[error("stopped before it was done; nothing was written")]
     Interrupted,
@@ -51,7 +54,7 @@ impl Error {
             Self::Page(_) | Self::Image { .. } | Self::Scene(_) => 2,
             Self::Interrupted => 75,
             Self::Io { source, .. } if source.kind() == std::io::ErrorKind::NotFound => 2,
-            Self::Io { .. } | Self::Embree(_) => 1,
+            Self::Io { .. } | Self::Embree(_) | Self::Denoise(_) => 1,
         }
     }
 }

@@ -18,7 +18,7 @@ use furrow::film::{Film, Filter, Pixel};
 use furrow::geometry::{AlphaMask, Intersect, Mesh, Ray, Window};
 use furrow::material::Material;
 use furrow::math::{Mat3, Vec3, vec3};
-use furrow::output::{self, Provenance};
+use furrow::output::{self, Provenance, Spp};
 use furrow::render::label::NONE;
 use furrow::render::{LabelMap, label};
 use furrow::sampling::{Purpose, Stream};
@@ -37,7 +37,7 @@ fn part(mesh: Mesh, mask: Option<Arc<AlphaMask>>, tag: Tag) -> Part {
 }
 
 fn scene(parts: Vec<Part>, camera: Camera) -> Scene {
-    Scene { parts, materials: Vec::new(), lights: Vec::new(), camera, filter: Filter::Box }
+    Scene { parts, materials: Vec::new(), lights: Vec::new(), camera, filter: Filter::Box.footprint() }
 }
 
 fn labels_of(scene: &Scene) -> LabelMap {
@@ -351,7 +351,7 @@ fn light_and_material_change_no_label() {
     for material in &mut field.scene.materials {
         *material = Material::Plain(furrow::bsdf::Bsdf::examples()[0].1);
     }
-    field.scene.filter = Filter::Box;
+    field.scene.filter = Filter::Box.footprint();
     assert_eq!(before, labels_of(&field.scene));
     // The same asked of the page: another sky, another sensor.
     let text = program::small_text();
@@ -408,8 +408,9 @@ fn label_files_read_back_as_the_label_map() {
         scene_hash: field.hash.clone(),
         seed: 0,
         index: 0,
-        spp: 1,
+        spp: Spp::Uniform(1),
         integrator: "path".into(),
+        deviations: Vec::new(),
         kernels: "none".into(),
     };
     let (_keep, out) = program::scratch();

@@ -70,7 +70,7 @@ fn sheets() -> Scene {
     let lights = vec![Light::Sun(sun.expect("a sun")), Light::Sky(Box::new(dome.expect("a sky")))];
     let materials = [soil, green, pale].map(Material::Plain).to_vec();
     let camera = camera((120, 90), vec3(0.2, -0.5, 0.6), vec3(0.0, 0.0, 0.05), 38.0);
-    Scene { parts, materials, lights, camera, filter: Filter::Box }
+    Scene { parts, materials, lights, camera, filter: Filter::Box.footprint() }
 }
 
 /// A ball on a plane under two lamps, the optical axis far from the image's middle.
@@ -95,7 +95,13 @@ fn lamps() -> Scene {
     ];
     let pose = Pose::look_at(vec3(0.1, -0.3, 0.5), vec3(0.0, 0.0, 0.0)).expect("a direction");
     let camera = Camera::new((110, 80), [140.0; 2], [48.3, 52.9], Distortion::default(), pose).expect("a camera");
-    Scene { parts, materials: [plane, ball].map(Material::Plain).to_vec(), lights, camera, filter: Filter::Box }
+    Scene {
+        parts,
+        materials: [plane, ball].map(Material::Plain).to_vec(),
+        lights,
+        camera,
+        filter: Filter::Box.footprint(),
+    }
 }
 
 /// A folder below cargo's own for temporary files, emptied.
@@ -134,7 +140,7 @@ fn prepare(name: &str, scene: &Scene, spp: u32) -> PathBuf {
 fn field(page: &str, width: u32) -> Scene {
     let options = Options { width: Some(width), ..Options::default() };
     let mut field = build::field(Path::new(page), &options).unwrap_or_else(|e| panic!("{e}"));
-    field.scene.filter = Filter::Box;
+    field.scene.filter = Filter::Box.footprint();
     field.scene
 }
 
@@ -289,7 +295,7 @@ fn what_is_lost_is_said() {
     scene.camera =
         Camera::new((60, 40), [80.0, 81.0], [30.0, 20.0], distortion, *scene.camera.pose()).expect("a camera");
     scene.materials[0] = Material::Plain(Bsdf::OrenNayar(OrenNayar::new(Spectrum::splat(0.3), 0.4)));
-    scene.filter = Filter::Gaussian(0.4);
+    scene.filter = Filter::Gaussian(0.4).footprint();
     let warnings = output::mitsuba::write(folder.path(), &scene, "").expect("files").warnings.join("\n");
     for word in ["distortion", "square", "Gaussian", "Oren–Nayar"] {
         assert!(warnings.contains(word), "{word} in {warnings}");

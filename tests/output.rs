@@ -11,7 +11,7 @@ use common::program::{FILES, SMALL, bits, field, names, run, scratch, shoot, sma
 use exr::prelude::*;
 use furrow::film::Film;
 use furrow::math::Spectrum;
-use furrow::output::{self, Provenance};
+use furrow::output::{self, Provenance, Spp};
 use furrow::render::{LabelMap, label::NONE};
 use furrow::scene::build::Options;
 use std::collections::BTreeMap;
@@ -22,8 +22,9 @@ fn provenance(hash: &str) -> Provenance {
         scene_hash: hash.into(),
         seed: 3,
         index: 0,
-        spp: 3,
+        spp: Spp::Uniform(3),
         integrator: "path".into(),
+        deviations: Vec::new(),
         kernels: "Embree of the test".into(),
     }
 }

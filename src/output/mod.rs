@@ -1,6 +1,7 @@
 //! Files: pictures for people, radiance for programs, labels for both. Each appears whole or not at all, and holds neither
 //! clock times nor paths, so equal runs write equal bytes.
 
+mod denoise;
 mod exr;
 pub mod mitsuba;
 mod overlay;
@@ -15,6 +16,32 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 pub use self::png::{Picture, read_gray16, read_indexed, write_png};
+pub use denoise::Denoiser;
+
+/// How many samples the pixels of an image have.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Spp {
+    /// All the same.
+    Uniform(u32),
+    /// As many as a tile needed to come to a relative error; the EXR holds each pixel's number in `spp`.
+    Adaptive {
+        /// The fewest, the mean, the most.
+        samples: (u32, f64, u32),
+        /// The error that was asked for.
+        target: f32,
+    },
+}
+
+impl std::fmt::Display for Spp {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Uniform(n) => write!(f, "{n}"),
+            Self::Adaptive { samples: (least, mean, most), target } => {
+                write!(f, "{least} to {most}, {mean:.1} on average, for a relative error of {target}")
+            }
+        }
+    }
+}
 
 /// A field written as a scene of another program.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -26,7 +53,7 @@ pub struct Export {
 }
 
 /// Where an image came from: what its files say about themselves.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Provenance {
     /// SHA-256 of the page and every page, texture and table that it names, in hex.
     pub scene_hash: String,
@@ -35,9 +62,11 @@ pub struct Provenance {
     /// Index of the field.
     pub index: u64,
     /// Samples a pixel.
-    pub spp: u32,
+    pub spp: Spp,
     /// What was drawn: the integrator's name.
     pub integrator: String,
+    /// What was asked for beyond the defaults, each `key: value`: techniques left out, limits that bias.
+    pub deviations: Vec<String>,
     /// The ray tracing kernels.
     pub kernels: String,
 }
@@ -45,7 +74,7 @@ pub struct Provenance {
 impl Provenance {
     /// One `key: value` a line.
     pub fn text(&self) -> String {
-        format!(
+        let text = format!(
             "program: furrow {}\nscene: sha256 {}\nseed: {}\nindex: {}\nspp: {}\nintegrator: {}\nkernels: {}",
             env!("CARGO_PKG_VERSION"),
             self.scene_hash,
@@ -54,7 +83,8 @@ impl Provenance {
             self.spp,
             self.integrator,
             self.kernels
-        )
+        );
+        self.deviations.iter().fold(text, |text, deviation| text + "\n" + deviation)
     }
 }
 
@@ -97,12 +127,37 @@ pub fn write_image(
     let files: [(&str, Vec<u8>); 7] = [
         ("rgb.png", png::encode(w, h, &Picture::Rgb(rgb), &text)?),
         ("nir.png", png::encode(w, h, &Picture::Gray(&photograph.nir), &text)?),
-        ("radiance.exr", exr::encode(film, labels, &text)?),
+        ("radiance.exr", exr::encode(film, labels, matches!(provenance.spp, Spp::Adaptive { .. }), &text)?),
         ("semantics.png", png::encode(w, h, &Picture::Indexed(&classes, &palette), &text)?),
         ("plants.png", png::encode(w, h, &Picture::Gray16(&plants), &text)?),
         ("leaves.png", png::encode(w, h, &Picture::Gray16(&leaves), &text)?),
         ("overlay.png", png::encode(w, h, &Picture::Rgb(&overlay), &text)?),
     ];
+    write_all(folder, files)
+}
+
+/// Writes what a denoiser made of an image beside it, and returns the paths: `rgb_denoised.png`, `nir_denoised.png`,
+/// `denoised.exr` (R, G, B, NIR alone).
+pub fn write_denoised(
+    folder: &Path,
+    film: &Film,
+    photograph: &Photograph,
+    provenance: &Provenance,
+) -> Result<Vec<PathBuf>> {
+    let (w, h) = (film.window.width(), film.window.height());
+    let text = provenance.text() + "\ndenoised: Open Image Denoise";
+    let rgb = photograph.rgb.as_chunks::<3>().0;
+    write_all(
+        folder,
+        [
+            ("rgb_denoised.png", png::encode(w, h, &Picture::Rgb(rgb), &text)?),
+            ("nir_denoised.png", png::encode(w, h, &Picture::Gray(&photograph.nir), &text)?),
+            ("denoised.exr", exr::encode_radiance(film, &text)?),
+        ],
+    )
+}
+
+fn write_all<const N: usize>(folder: &Path, files: [(&str, Vec<u8>); N]) -> Result<Vec<PathBuf>> {
     files
         .into_iter()
         .map(|(name, bytes)| {

@@ -1,23 +1,26 @@
 //! Tiles in parallel → film. The same bits at any number of threads.
 
+mod adaptive;
 mod explain;
 pub mod label;
+mod progressive;
+mod tiles;
 
 use crate::accel::prepare_thread;
-use crate::film::{Accumulator, Film, Filter, Pixel};
+use crate::film::{Accumulator, Film, Pixel};
 use crate::geometry::{Ray, Window};
 use crate::integrator::{Integrator, World};
 use crate::math::vec2;
-use crate::sampling::{Sampler, sets};
+use crate::sampling::{Points, Sampler, sets};
 use crate::{Error, Result};
 use rayon::prelude::*;
+use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+pub use adaptive::adaptive;
 pub use explain::explain;
 pub use label::{LabelMap, label};
-
-/// Side of a tile, pixels: small enough to share out evenly, large enough that its rays meet the same leaves.
-const TILE: u32 = 16;
+pub use progressive::{Progressive, timed};
 
 /// What to render.
 #[derive(Clone, Copy, Debug)]
@@ -28,8 +31,8 @@ pub struct Settings {
     pub seed: u64,
     /// The pixels.
     pub window: Window,
-    /// How pixels gather light.
-    pub filter: Filter,
+    /// Which numbers the samples draw.
+    pub points: Points,
 }
 
 /// How the work is watched: told of every finished tile's samples, asked whether to stop.
@@ -38,6 +41,13 @@ pub struct Watch<'a> {
     pub done: &'a (dyn Fn(u64) + Sync),
     /// Set it to stop.
     pub stop: &'a AtomicBool,
+}
+
+impl Watch<'_> {
+    /// Whether to stop.
+    fn stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
 }
 
 /// A pool of `threads` workers (0: one for each core) whose arithmetic flushes denormals as Embree's does.
@@ -51,70 +61,57 @@ pub fn pool(threads: usize) -> Result<rayon::ThreadPool> {
 
 /// Renders a window. Call it inside [`pool`]'s `install`.
 pub fn render(world: &World<'_>, integrator: &dyn Integrator, settings: &Settings, watch: &Watch<'_>) -> Result<Film> {
-    let w = settings.window;
-    let columns = w.width().div_ceil(TILE);
-    let tiles = columns * w.height().div_ceil(TILE);
-    let rendered: Vec<Vec<Pixel>> = (0..tiles)
-        .into_par_iter()
-        .map(|i| {
-            if watch.stop.load(Ordering::Relaxed) {
-                return Vec::new();
-            }
-            let tile = tile(w, i % columns, i / columns);
+    let tiles = tiles::tiles(settings.window);
+    let rendered: Vec<Vec<Pixel>> = tiles
+        .par_iter()
+        .map(|tile| {
             // Asked at every pixel: with thousands of samples a tile takes minutes. What is left out then is never shown.
-            let pixels: Vec<Pixel> = rows(tile)
-                .take_while(|_| !watch.stop.load(Ordering::Relaxed))
+            let pixels: Vec<Pixel> = tiles::pixels(*tile)
+                .take_while(|_| !watch.stopped())
                 .map(|(x, y)| pixel(world, integrator, settings, x, y))
                 .collect();
             (watch.done)(u64::from(settings.spp) * pixels.len() as u64);
             pixels
         })
         .collect();
-    if watch.stop.load(Ordering::Relaxed) {
+    if watch.stopped() {
         return Err(Error::Interrupted);
     }
-    let mut pixels = vec![Pixel::default(); (w.width() * w.height()) as usize];
-    for (i, done) in rendered.iter().enumerate() {
-        let tile = tile(w, i as u32 % columns, i as u32 / columns);
-        for ((x, y), pixel) in rows(tile).zip(done) {
-            pixels[((y - w.y0) * w.width() + x - w.x0) as usize] = *pixel;
-        }
-    }
-    Ok(Film { window: w, pixels })
-}
-
-fn tile(w: Window, column: u32, row: u32) -> Window {
-    let (x0, y0) = (w.x0 + column * TILE, w.y0 + row * TILE);
-    Window { x0, y0, x1: (x0 + TILE).min(w.x1), y1: (y0 + TILE).min(w.y1) }
-}
-
-fn rows(w: Window) -> impl Iterator<Item = (u32, u32)> {
-    (w.y0..w.y1).flat_map(move |y| (w.x0..w.x1).map(move |x| (x, y)))
+    let pixels = tiles::assemble(settings.window, tiles.into_iter().zip(rendered));
+    Ok(Film { window: settings.window, pixels })
 }
 
 /// Renders one pixel: what a tile does, and what `--pixel` explains.
 pub fn pixel(world: &World<'_>, integrator: &dyn Integrator, settings: &Settings, x: u32, y: u32) -> Pixel {
+    let mut sum = Accumulator::default();
+    gather(world, integrator, settings, (x, y), 0..settings.spp, &mut sum);
+    sum.finish()
+}
+
+/// Adds samples of one pixel to its sum, in order.
+fn gather(
+    world: &World<'_>,
+    integrator: &dyn Integrator,
+    settings: &Settings,
+    (x, y): (u32, u32),
+    samples: Range<u32>,
+    sum: &mut Accumulator,
+) {
     let camera = &world.scene.camera;
     let spread = camera.pixel_angle();
-    let mut sum = Accumulator::default();
-    for index in 0..settings.spp {
-        let sampler = Sampler::new(settings.seed, x, y, index);
-        let [u, v, lens_u, lens_v] = sampler.get4(sets::CAMERA);
-        let blur = match settings.filter {
-            Filter::Box => [0.0; 2],
-            // Far beyond any path's sets.
-            Filter::Gaussian(_) => {
-                let [a, b, ..] = sampler.get4(sets::BLUR);
-                [a, b]
-            }
-        };
-        let at = vec2(x as f32 + 0.5, y as f32 + 0.5) + settings.filter.sample([u, v], blur);
-        let (origin, direction) = camera.ray(at, [lens_u, lens_v]);
+    for index in samples {
+        let sampler = Sampler::of(settings.points, settings.seed, x, y, index);
+        let [u, v, ..] = sampler.get4(sets::FIRST);
+        let at = vec2(x as f32 + 0.5, y as f32 + 0.5) + world.scene.filter.sample([u, v]);
+        let lens = camera.aperture().map_or([0.0; 2], |_| {
+            let [u, v, ..] = sampler.get4(sets::LENS);
+            [u, v]
+        });
+        let (origin, direction) = camera.ray(at, lens);
         let seen = integrator.li(world, &Ray::new(origin, direction), spread, &sampler);
         sum.add(seen.radiance);
         if let Some(first) = seen.first {
             sum.add_first(first.albedo, first.normal, first.distance);
         }
     }
-    sum.finish()
 }

@@ -9,4 +9,4 @@ pub mod vary;
 pub mod warp;
 
 pub use rng::{Purpose, Stream};
-pub use sampler::{Sampler, sets};
+pub use sampler::{Points, Sampler, sets};

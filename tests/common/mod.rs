@@ -2,7 +2,9 @@
 #![allow(dead_code, unreachable_pub, reason = "each test uses its part")]
 
 pub mod chi2;
+pub mod layers;
 pub mod pictures;
 pub mod program;
 pub mod python;
 pub mod scenes;
+pub mod stats;

@@ -9,6 +9,7 @@ use furrow::light::Light;
 use furrow::material::Material;
 use furrow::math::{Vec2, Vec3, vec2, vec3};
 use furrow::render::{self, Settings, Watch};
+use furrow::sampling::Points;
 use furrow::scene::tag::Tag;
 use furrow::scene::{Part, Scene};
 use furrow::sensor::{Camera, Distortion, Pose};
@@ -58,19 +59,30 @@ pub fn scene(parts: Vec<(Mesh, Bsdf)>, lights: Vec<Light>, camera: Camera) -> Sc
     let part =
         |(i, (mesh, _)): (usize, (Mesh, Bsdf))| Part { mesh, mask: None, material: i as u32, tag: Tag::default() };
     let parts = parts.into_iter().enumerate().map(part).collect();
-    Scene { parts, materials, lights, camera, filter: Filter::Box }
+    Scene { parts, materials, lights, camera, filter: Filter::Box.footprint() }
 }
 
 /// Renders all of a scene on two threads.
 pub fn shoot(scene: &Scene, integrator: &dyn Integrator, spp: u32, seed: u64) -> Film {
-    let accel = EmbreeAccel::build(&scene.surfaces(), 1).expect("an accelerator");
-    let world = World { scene, geometry: &accel };
-    let window = Window::full(scene.camera.width(), scene.camera.height());
-    let settings = Settings { spp, seed, window, filter: scene.filter };
-    let stop = AtomicBool::new(false);
-    let watch = Watch { done: &|_| (), stop: &stop };
-    let pool = render::pool(2).expect("a pool");
-    pool.install(|| render::render(&world, integrator, &settings, &watch)).expect("a film")
+    shoot_with(scene, integrator, Points::Sobol, spp, seed)
+}
+
+/// The same with numbers of a kind.
+pub fn shoot_with(scene: &Scene, integrator: &dyn Integrator, points: Points, spp: u32, seed: u64) -> Film {
+    with_world(scene, 2, |world, watch| {
+        let window = Window::full(scene.camera.width(), scene.camera.height());
+        let settings = Settings { spp, seed, window, points };
+        render::render(world, integrator, &settings, watch).expect("a film")
+    })
+}
+
+/// Calls `f` in a pool with a scene that answers rays.
+pub fn with_world<T: Send>(scene: &Scene, threads: usize, f: impl FnOnce(&World<'_>, &Watch<'_>) -> T + Send) -> T {
+    render::pool(threads).expect("a pool").install(|| {
+        let accel = EmbreeAccel::build(&scene.surfaces(), 1).expect("an accelerator");
+        let stop = AtomicBool::new(false);
+        f(&World { scene, geometry: &accel }, &Watch { done: &|_| (), stop: &stop })
+    })
 }
 
 /// The pixel's centre.

@@ -2,7 +2,9 @@
 
 mod export;
 mod field;
+mod quality;
 mod render;
+mod technique;
 mod texture;
 
 use clap::{Parser, Subcommand};
@@ -28,6 +30,8 @@ Examples:
   trace --scene scenes/field.ron --spp 64               the main scene, into out/field/
   trace --scene scenes/field.ron --index 7              another field of the same kind
   trace --scene scenes/field.ron --width 324 --spp 16   a quick look: the same view, a quarter of the size
+  trace --scene scenes/field.ron --target-error 0.02    as many samples as 2 % noise needs, where it needs them
+  trace --scene scenes/field.ron --time 30s             the best picture within half a minute
   trace --scene scenes/field.ron --crop 500,400,200,150 only a part of it, at full size
   trace --scene scenes/field.ron --integrator ids       which part each pixel belongs to, in false colours
   trace --scene scenes/field.ron --pixel 648,483        what that pixel shows, in words
@@ -41,6 +45,7 @@ Files of an image:
   plants.png         number of its plant, 16 bit, 0 for none
   leaves.png         number of its leaf on that plant, 16 bit, 0 for none
   overlay.png        labels drawn over the photograph, to look at
+  *_denoised.png, denoised.exr   with --denoise
 
 More samples make less noise: twice the --spp takes twice the time and leaves 0.7 of it.
 The pages scenes/01-one-leaf.ron to 06 teach how a scene is written.

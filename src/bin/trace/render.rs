@@ -1,21 +1,22 @@
 //! `trace`: grows a field, path traces it, labels it, writes it.
 
 use crate::field::FieldArgs;
+use crate::quality::QualityArgs;
+use crate::technique::TechniqueArgs;
 use clap::ValueEnum;
 use furrow::accel::{self, EmbreeAccel};
 use furrow::film::Film;
 use furrow::geometry::Window;
-use furrow::integrator::{FalseColor, Integrator, Path as PathTracer, World};
-use furrow::output::{self, Provenance};
+use furrow::integrator::{FalseColor, Integrator, World};
+use furrow::output::{self, Denoiser, Provenance};
 use furrow::render::{self, Settings, Watch};
-use furrow::sampling::Sampler;
 use furrow::scene::Field;
 use furrow::{Result, cli};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Instant;
 
 /// What to render, and how.
@@ -23,9 +24,8 @@ use std::time::Instant;
 pub(crate) struct Args {
     #[command(flatten)]
     field: FieldArgs,
-    /// Samples a pixel.
-    #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=i64::from(Sampler::MAX_SAMPLES)))]
-    spp: u32,
+    #[command(flatten)]
+    quality: QualityArgs,
     /// Folder for the files; `out/` and the page's name unless given.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -35,11 +35,16 @@ pub(crate) struct Args {
     /// What to draw.
     #[arg(long, value_enum, default_value_t = Draw::Path)]
     integrator: Draw,
+    #[command(flatten)]
+    technique: TechniqueArgs,
+    /// Also write the picture without its noise, beside the noisy one; needs Open Image Denoise, for `--integrator path`.
+    #[arg(long)]
+    denoise: bool,
     /// Render only this part of the image: x,y,width,height in pixels.
     #[arg(long, value_parser = cli::crop, allow_hyphen_values = true, value_name = "X,Y,W,H")]
     crop: Option<Window>,
     /// Explain one pixel instead of rendering: its label, surface and light.
-    #[arg(long, value_parser = cli::pixel, allow_hyphen_values = true, value_name = "X,Y", conflicts_with_all = ["crop", "out"])]
+    #[arg(long, value_parser = cli::pixel, allow_hyphen_values = true, value_name = "X,Y", conflicts_with_all = ["crop", "out", "enough", "denoise"])]
     pixel: Option<(u32, u32)>,
     /// Print nothing but errors and the paths of the files.
     #[arg(long)]
@@ -63,9 +68,9 @@ enum Draw {
 }
 
 impl Draw {
-    fn integrator(self) -> Box<dyn Integrator> {
+    fn integrator(self, technique: &TechniqueArgs) -> Box<dyn Integrator> {
         match self {
-            Self::Path => Box::new(PathTracer::default()),
+            Self::Path => Box::new(technique.path()),
             Self::Normals => Box::new(FalseColor::Normals),
             Self::Ids => Box::new(FalseColor::Ids),
             Self::Uv => Box::new(FalseColor::Uv),
@@ -89,6 +94,11 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
         }
     };
     args.field.check()?;
+    if !matches!(args.integrator, Draw::Path) {
+        args.technique.check_unused(args.denoise)?;
+    }
+    // Before hours are spent on what could not be denoised then.
+    let denoiser = args.denoise.then(Denoiser::find).transpose()?;
     let out = args.out.clone().unwrap_or_else(|| args.field.default_folder());
     if args.pixel.is_none() {
         cli::check_folder(&out)?;
@@ -118,8 +128,9 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     ));
 
     let world = World { scene, geometry: &geometry };
-    let integrator = args.integrator.integrator();
-    let settings = Settings { spp: args.spp, seed: field.sample_seed(), window, filter: scene.filter };
+    let integrator = args.integrator.integrator(&args.technique);
+    let settings =
+        Settings { spp: args.quality.most(), seed: field.sample_seed(), window, points: args.technique.points() };
     if let Some((x, y)) = args.pixel {
         let words = pool.install(|| render::explain(&world, &field.plants, integrator.as_ref(), &settings, x, y));
         // The words are the result; a closed pipe is no failure.
@@ -127,34 +138,50 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
         return Ok(Vec::new());
     }
 
-    let samples = u64::from(window.width()) * u64::from(window.height()) * u64::from(args.spp);
-    let bar = progress(samples, args.quiet);
-    let watch = Watch { done: &|n| bar.inc(n), stop: &stop };
+    // First, so that the clock of `--time` need not guess how long they take.
+    let labels = pool.install(|| render::label(&geometry, &scene.tags(), &scene.camera, window));
+    let traced = AtomicU64::new(0);
+    let bar = progress(args.quality.samples(window), args.quiet);
+    let done = |n| {
+        traced.fetch_add(n, Ordering::Relaxed);
+        bar.inc(n);
+    };
+    let watch = Watch { done: &done, stop: &stop };
     let start = Instant::now();
-    let film: Film = pool.install(|| render::render(&world, integrator.as_ref(), &settings, &watch))?;
+    let deadline = args.quality.deadline(begin, window, args.denoise);
+    let film: Film = pool.install(|| args.quality.render(&world, integrator.as_ref(), &settings, deadline, &watch))?;
     let rendered = start.elapsed();
     bar.finish_and_clear();
-    let labels = pool.install(|| render::label(&geometry, &scene.tags(), &scene.camera, window));
     let photograph = field.photograph(&film);
     let provenance = Provenance {
         scene_hash: field.hash.clone(),
         seed: field.seed,
         index: field.index,
-        spp: args.spp,
+        spp: args.quality.spp(&film),
         integrator: args.integrator.name(),
+        deviations: args.technique.deviations(),
         kernels: accel::version()?,
     };
-    let paths = pool.install(|| output::write_image(&out, &film, &labels, &photograph, &provenance))?;
+    let mut paths = pool.install(|| output::write_image(&out, &film, &labels, &photograph, &provenance))?;
+    if let Some(denoiser) = denoiser {
+        let clean = denoiser.denoise(&film, args.threads)?;
+        paths.extend(output::write_denoised(&out, &clean, &field.photograph(&clean), &provenance)?);
+    }
     // One sample has no spread to tell an error by.
-    let error = if args.spp > 1 { format!("{:.1} %", 100.0 * film.median_relative_error()) } else { "unknown".into() };
+    let (_, mean, most) = film.samples();
+    let error = if most > 1 { format!("{:.1} %", 100.0 * film.median_relative_error()) } else { "unknown".into() };
+    let samples = traced.into_inner() as f64 / 1e6;
     say(format!(
-        "{} Msamples in {:.1} s: {:.2} Msamples/s; median relative error {error}; {:.1} s in all; files in {}",
-        samples / 1_000_000,
+        "{samples:.0} Msamples in {:.1} s: {:.2} Msamples/s; {}median relative error {error}; {:.1} s in all; files in {}",
         rendered.as_secs_f64(),
-        samples as f64 / 1e6 / rendered.as_secs_f64(),
+        samples / rendered.as_secs_f64(),
+        if args.quality.is_open() { format!("{mean:.0} samples a pixel; ") } else { String::new() },
         begin.elapsed().as_secs_f64(),
         out.display()
     ));
+    for warning in args.quality.missed(&film, begin.elapsed()) {
+        say(format!("warning: {warning}"));
+    }
     Ok(paths)
 }
 
@@ -178,11 +205,14 @@ fn stop_on_signal() -> Arc<AtomicBool> {
     stop
 }
 
-fn progress(samples: u64, quiet: bool) -> ProgressBar {
+/// A bar where the number of samples is known, else a count of them.
+fn progress(samples: Option<u64>, quiet: bool) -> ProgressBar {
     if quiet || !std::io::stderr().is_terminal() {
         return ProgressBar::hidden();
     }
-    let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {elapsed} gone, {eta} left")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::new(samples).with_style(style)
+    let (bar, template) = match samples {
+        Some(samples) => (ProgressBar::new(samples), "{bar:40} {percent:>3} %  {elapsed} gone, {eta} left"),
+        None => (ProgressBar::new_spinner(), "{spinner} {human_pos} samples  {elapsed} gone"),
+    };
+    bar.with_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()))
 }

@@ -261,7 +261,7 @@ fn camera_warnings(scene: &Scene) -> Vec<String> {
         warnings
             .push("the optical axis is written through the image's middle: Mitsuba's thin lens has no other".into());
     }
-    if scene.filter != Filter::Box {
+    if scene.filter.filter() != Filter::Box {
         warnings.push("the point spread is written as a Gaussian of the same variance".into());
     }
     warnings
@@ -330,7 +330,7 @@ impl Whole<'_> {
                 .float("principal_point_offset_x", 0.5 - cx / w)
                 .float("principal_point_offset_y", 0.5 - cy / h),
         };
-        let filter = match self.scene.filter {
+        let filter = match self.scene.filter.filter() {
             Filter::Box => Element::plugin("rfilter", "box"),
             // The square's own variance is 1/12.
             Filter::Gaussian(sigma) => {

@@ -1,8 +1,12 @@
 //! Where samples become pixels: mean and variance of each band, and the first surface's channels.
 
+mod filter;
+
 use crate::geometry::Window;
-use crate::math::{Spectrum, Vec2, Vec3};
+use crate::math::{Spectrum, Vec3};
 use glam::{DVec4, Vec4};
+
+pub use filter::{Filter, Footprint};
 
 /// What is known of one pixel after all its samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -17,9 +21,22 @@ pub struct Pixel {
     pub normal: Vec3,
     /// Mean distance to the first surface along the ray, metres; infinite where no sample met one.
     pub depth: f32,
+    /// Number of samples.
+    pub samples: u32,
 }
 
-/// Adds up one pixel. One thread sums a pixel in sample order, so any number of threads makes the same bits.
+impl Pixel {
+    /// Standard error of the radiance over the radiance, both as means of the bands; `None` for a black pixel.
+    ///
+    /// The variance is that of independent samples. Stratified ones err less, so this is what the error is at most.
+    pub fn relative_error(&self) -> Option<f32> {
+        let mean = self.mean.mean();
+        (mean > 0.0).then(|| self.variance.map(f32::sqrt).mean() / mean)
+    }
+}
+
+/// Adds up one pixel. One thread sums a pixel in sample order, so any number of threads makes the same bits; where one call
+/// ends and the next goes on makes no difference either.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Accumulator {
     count: u32,
@@ -61,31 +78,7 @@ impl Accumulator {
             albedo: Spectrum(self.albedo / n as f32),
             normal: self.normal / n as f32,
             depth: if self.hits == 0 { f32::INFINITY } else { (self.depth / f64::from(self.hits)) as f32 },
-        }
-    }
-}
-
-/// How a pixel gathers light over its surroundings. Samples are drawn from the filter's shape, so pixels stay independent.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub enum Filter {
-    /// The pixel's own square, as a sensor with full fill factor and a perfect lens.
-    Box,
-    /// A normal blur of this standard deviation in pixels on top of the square: the lens's point spread.
-    Gaussian(f32),
-}
-
-impl Filter {
-    /// An offset from the pixel's centre, pixels, from four numbers in [0, 1).
-    #[inline]
-    pub fn sample(self, u: [f32; 2], v: [f32; 2]) -> Vec2 {
-        let square = Vec2::from(u) - 0.5;
-        match self {
-            Self::Box => square,
-            Self::Gaussian(sigma) => {
-                let r = sigma * (-2.0 * (1.0 - v[0]).ln()).sqrt();
-                let (sin, cos) = (std::f32::consts::TAU * v[1]).sin_cos();
-                square + Vec2::new(r * cos, r * sin)
-            }
+            samples: self.count,
         }
     }
 }
@@ -105,20 +98,27 @@ impl Film {
         &self.pixels[(y * self.window.width() + x) as usize]
     }
 
-    /// Median over pixels of the relative standard error of the radiance's luminance-like mean of the bands: one honest figure.
+    /// Median over pixels of [`Pixel::relative_error`]: one honest figure.
     pub fn median_relative_error(&self) -> f32 {
-        let mut errors: Vec<f32> = self
-            .pixels
-            .iter()
-            .filter(|p| p.mean.mean() > 0.0)
-            .map(|p| p.variance.map(f32::sqrt).mean() / p.mean.mean())
-            .collect();
-        if errors.is_empty() {
-            return 0.0;
-        }
-        let middle = errors.len() / 2;
-        *errors.select_nth_unstable_by(middle, f32::total_cmp).1
+        median_relative_error(&self.pixels)
     }
+
+    /// Samples of the pixel that has the fewest, of the mean pixel, of the one that has the most.
+    pub fn samples(&self) -> (u32, f64, u32) {
+        let counts = || self.pixels.iter().map(|p| p.samples);
+        let mean = counts().map(f64::from).sum::<f64>() / self.pixels.len().max(1) as f64;
+        (counts().min().unwrap_or(0), mean, counts().max().unwrap_or(0))
+    }
+}
+
+/// Median over some pixels of [`Pixel::relative_error`]; zero where all are black.
+pub fn median_relative_error<'a>(pixels: impl IntoIterator<Item = &'a Pixel>) -> f32 {
+    let mut errors: Vec<f32> = pixels.into_iter().filter_map(Pixel::relative_error).collect();
+    if errors.is_empty() {
+        return 0.0;
+    }
+    let middle = errors.len() / 2;
+    *errors.select_nth_unstable_by(middle, f32::total_cmp).1
 }
 
 #[cfg(test)]

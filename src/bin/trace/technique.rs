@@ -1,0 +1,91 @@
+//! Which techniques are at work: flags to leave out one that should not move the mean, and two limits that do.
+
+use clap::ValueEnum;
+use furrow::integrator::{Path, Technique};
+use furrow::sampling::Points;
+use furrow::{Error, Result};
+
+/// How light is gathered; for `--integrator path`.
+#[derive(clap::Args)]
+pub(crate) struct TechniqueArgs {
+    /// Leave out a technique, to see what it does: the picture gets noisier, its mean stays.
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "TECHNIQUE")]
+    without: Vec<Part>,
+    /// Most surfaces on a path; 12 unless given. Few are biased: light that comes by more is missing.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    max_depth: Option<u32>,
+    /// Most radiance that one path may bring, W·m⁻²·sr⁻¹·nm⁻¹; no limit unless given. Biased: what is cut off is missing.
+    #[arg(long, value_name = "RADIANCE", value_parser = radiance)]
+    clamp: Option<f32>,
+}
+
+/// A technique that can be left out without moving the mean.
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum Part {
+    /// Lights are met by chance only; the sun almost never is.
+    LightSampling,
+    /// Lights are found by sampling them only, never by chance.
+    Mis,
+    /// Dim paths go on to the greatest depth.
+    Roulette,
+    /// Random numbers are independent instead of spread evenly (quasi-Monte Carlo).
+    Qmc,
+}
+
+impl TechniqueArgs {
+    fn has(&self, part: Part) -> bool {
+        !self.without.contains(&part)
+    }
+
+    /// The path tracer.
+    pub(crate) fn path(&self) -> Path {
+        let default = Path::default();
+        Path {
+            max_depth: self.max_depth.unwrap_or(default.max_depth),
+            clamp: self.clamp.unwrap_or(default.clamp),
+            technique: Technique {
+                light_sampling: self.has(Part::LightSampling),
+                mis: self.has(Part::Mis),
+                roulette: self.has(Part::Roulette),
+            },
+        }
+    }
+
+    /// The samples' numbers.
+    pub(crate) fn points(&self) -> Points {
+        if self.has(Part::Qmc) { Points::Sobol } else { Points::Independent }
+    }
+
+    /// Whatever differs from the defaults, for the files.
+    pub(crate) fn deviations(&self) -> Vec<String> {
+        let name = |part: &Part| part.to_possible_value().map(|v| v.get_name().to_owned());
+        let without: Vec<String> =
+            Part::value_variants().iter().filter(|part| !self.has(**part)).filter_map(name).collect();
+        let mut all = Vec::new();
+        if !without.is_empty() {
+            all.push(format!("without: {}", without.join(", ")));
+        }
+        all.extend(self.max_depth.map(|n| format!("max depth: {n}")));
+        all.extend(self.clamp.map(|c| format!("clamp: {c}")));
+        all
+    }
+
+    /// Refuses flags of the path tracer where another integrator draws.
+    pub(crate) fn check_unused(&self, denoise: bool) -> Result<()> {
+        let path_only = self.without.iter().any(|part| *part != Part::Qmc);
+        if path_only || denoise || self.max_depth.is_some() || self.clamp.is_some() {
+            return Err(Error::Scene(
+                "--without, --max-depth, --clamp and --denoise are about light\n help: use them with --integrator path"
+                    .into(),
+            ));
+        }
+        Ok(())
+    }
+}
+
+fn radiance(text: &str) -> Result<f32, String> {
+    text.parse()
+        .ok()
+        .filter(|c: &f32| *c > 0.0 && c.is_finite())
+        .ok_or_else(|| "write a number above 0 such as 10".into())
+}

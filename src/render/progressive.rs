@@ -1,0 +1,156 @@
+//! An image that grows: samples are added in passes over all of it, and any number of passes makes the bits that one would
+//! have made. So a clock may say when to stop: it decides how many samples there are, and nothing else.
+
+use super::{Settings, Watch, gather, tiles};
+use crate::film::{Accumulator, Film, Pixel};
+use crate::geometry::Window;
+use crate::integrator::{Integrator, World};
+use crate::{Error, Result};
+use rayon::prelude::*;
+use std::time::Instant;
+
+/// One tile and its sums so far.
+struct Tile {
+    window: Window,
+    /// Samples that each of its pixels has.
+    done: u32,
+    sums: Vec<Accumulator>,
+}
+
+impl Tile {
+    fn pixels(&self) -> Vec<Pixel> {
+        self.sums.iter().map(Accumulator::finish).collect()
+    }
+}
+
+/// An image under way. The sums of all pixels are kept: about 130 bytes a pixel.
+pub struct Progressive<'a> {
+    world: &'a World<'a>,
+    integrator: &'a dyn Integrator,
+    settings: &'a Settings,
+    tiles: Vec<Tile>,
+}
+
+impl<'a> Progressive<'a> {
+    /// An image without samples. Of the settings' `spp` nothing is asked here.
+    pub fn new(world: &'a World<'a>, integrator: &'a dyn Integrator, settings: &'a Settings) -> Self {
+        let empty = |window: Window| Tile {
+            window,
+            done: 0,
+            sums: vec![Accumulator::default(); (window.width() * window.height()) as usize],
+        };
+        Self { world, integrator, settings, tiles: tiles::tiles(settings.window).into_iter().map(empty).collect() }
+    }
+
+    /// Adds samples until every pixel has `spp` of them. Call it inside a pool's `install`.
+    pub fn advance(&mut self, spp: u32, watch: &Watch<'_>) -> Result<()> {
+        self.advance_each(|_| spp, watch)
+    }
+
+    /// Adds samples until the pixels of the tile with number `i` have `goal(i)` of them; a tile that has more keeps them.
+    fn advance_each(&mut self, goal: impl Fn(usize) -> u32 + Sync, watch: &Watch<'_>) -> Result<()> {
+        let Self { world, integrator, settings, tiles } = self;
+        tiles.par_iter_mut().enumerate().for_each(|(i, tile)| {
+            let range = tile.done..goal(i).max(tile.done);
+            for (at, sum) in tiles::pixels(tile.window).zip(&mut tile.sums) {
+                if watch.stopped() {
+                    return;
+                }
+                gather(world, *integrator, settings, at, range.clone(), sum);
+            }
+            tile.done = range.end;
+            (watch.done)((range.len() * tile.sums.len()) as u64);
+        });
+        // Some sums may have more samples than their tile knows of: nothing may be shown of them.
+        if watch.stopped() { Err(Error::Interrupted) } else { Ok(()) }
+    }
+
+    /// Adds passes until each tile has its goal or the time is up, and tells whether the goals are met. At least one pass is
+    /// made. Each pass brings all tiles to the same share of their goals.
+    pub(super) fn approach(&mut self, goals: &[u32], deadline: Option<Instant>, watch: &Watch<'_>) -> Result<bool> {
+        let most = goals.iter().copied().max().unwrap_or(0);
+        let Some(deadline) = deadline else {
+            self.advance_each(|i| goals[i], watch)?;
+            return Ok(true);
+        };
+        // The share of the goals that is done, in parts of `most`.
+        let mut done = 0;
+        let mut step = 1;
+        while done < most && step > 0 {
+            let begin = Instant::now();
+            let next = done.saturating_add(step).min(most);
+            let share = |goal: u32| (u64::from(goal) * u64::from(next)).div_ceil(u64::from(most)) as u32;
+            self.advance_each(|i| share(goals[i]), watch)?;
+            let each = begin.elapsed().as_secs_f64() / f64::from(next - done);
+            done = next;
+            step = next_step(done, each, deadline.saturating_duration_since(Instant::now()).as_secs_f64());
+        }
+        Ok(done >= most)
+    }
+
+    /// One number for each tile, from its pixels so far.
+    pub(super) fn of_tiles<T: Send>(&self, f: impl Fn(&[Pixel]) -> T + Sync) -> Vec<T> {
+        self.tiles.par_iter().map(|tile| f(&tile.pixels())).collect()
+    }
+
+    /// The image so far.
+    pub fn film(&self) -> Film {
+        let window = self.settings.window;
+        let made = self.tiles.iter().map(|t| (t.window, t.pixels()));
+        Film { window, pixels: tiles::assemble(window, made) }
+    }
+}
+
+/// How far the next pass goes, given how far the work is, the seconds that one step took in the last pass and those that are
+/// left. Passes double; towards the end each takes three quarters of what fits, so that a wrong guess is small when it counts.
+fn next_step(done: u32, each: f64, left: f64) -> u32 {
+    let fits = (left / each.max(1e-9)) as u32;
+    if fits >= 2 * done.max(1) { done.max(1) } else { (fits - fits / 4).min(done.max(1)) }
+}
+
+/// Renders a window in passes until the deadline, or until every pixel has `settings.spp` samples. Every pixel has the same
+/// number of samples then, at least one, and the film is that of [`super::render`] with that number. Call it inside a pool.
+pub fn timed(
+    world: &World<'_>,
+    integrator: &dyn Integrator,
+    settings: &Settings,
+    deadline: Instant,
+    watch: &Watch<'_>,
+) -> Result<Film> {
+    let mut image = Progressive::new(world, integrator, settings);
+    let goals = vec![settings.spp; image.tiles.len()];
+    image.approach(&goals, Some(deadline), watch)?;
+    Ok(image.film())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Steps of one second each, of which the program knows: none may end after the deadline, and little may be left unused.
+    #[test]
+    fn passes_fill_the_time_and_end_in_it() {
+        for total in [1.0, 2.0, 7.5, 60.0, 1000.0] {
+            let (mut done, mut step) = (0, 1);
+            while step > 0 {
+                done += step;
+                step = next_step(done, 1.0, total - f64::from(done));
+            }
+            assert!(f64::from(done) <= total && f64::from(done) > total - 1.0, "{done} of {total}");
+        }
+    }
+
+    #[test]
+    fn a_machine_that_slows_down_is_late_by_one_step_only() {
+        // From half of the time on every step takes three times as long.
+        let cost = |from: u32, to: u32| (from..to).map(|i| if i < 50 { 1.0 } else { 3.0 }).sum::<f64>();
+        let (mut done, mut step, mut now) = (0, 1, 0.0);
+        while step > 0 {
+            let spent = cost(done, done + step);
+            now += spent;
+            done += step;
+            step = next_step(done, spent / f64::from(step), 100.0 - now);
+        }
+        assert!(now <= 125.0, "{now}");
+    }
+}
