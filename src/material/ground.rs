@@ -124,7 +124,7 @@ impl Ground {
     }
 
     pub(super) fn varies(&self) -> Varies {
-        Varies::Picture(self.skin.width as u32, self.skin.height as u32)
+        Varies::Raster(self.skin.width as u32, self.skin.height as u32)
     }
 
     #[inline]

@@ -36,8 +36,10 @@ pub enum Material {
 pub enum Varies {
     /// The same everywhere.
     Nowhere,
-    /// Over texture coordinates, as finely as an image of this many texels across and down.
+    /// Over texture coordinates, as finely as an image of this many texels across and down, or coarser where the ray is wider.
     Picture(u32, u32),
+    /// The same, whatever the ray's width.
+    Raster(u32, u32),
     /// Over the world.
     Place,
 }

@@ -6,6 +6,7 @@
 //! The header's comment holds the provenance.
 
 use crate::film::Film;
+use crate::geometry::Window;
 use crate::math::Spectrum;
 use crate::render::{LabelMap, label::NONE};
 use crate::{Error, Result};
@@ -18,7 +19,7 @@ fn channel(name: &str, samples: FlatSamples) -> AnyChannel<FlatSamples> {
 /// Encodes numbers as they are: one vector a channel, row by row from the top.
 pub(super) fn encode_map(width: u32, height: u32, channels: &[(&str, Vec<f32>)]) -> Result<Vec<u8>> {
     let of = |(name, values): &(&str, Vec<f32>)| channel(name, FlatSamples::F32(values.clone()));
-    write(width, height, (0, 0), channels.iter().map(of).collect(), None)
+    write(Window::full(width, height), channels.iter().map(of).collect(), "")
 }
 
 /// Encodes a film and its labels, which must share a window; `with_spp` adds each pixel's number of samples.
@@ -49,39 +50,29 @@ pub(super) fn encode(film: &Film, labels: &LabelMap, with_spp: bool, text: &str)
     if with_spp {
         channels.push(channel("spp", FlatSamples::U32(pixels.iter().map(|p| p.samples).collect())));
     }
-    write_film(film, channels, text)
+    write(film.window, channels, text)
 }
 
 /// Encodes a film's radiance alone.
 pub(super) fn encode_radiance(film: &Film, text: &str) -> Result<Vec<u8>> {
     let band = |i: usize| FlatSamples::F32(film.pixels.iter().map(|p| p.mean.to_array()[i]).collect());
     let channels = Spectrum::NAMES.iter().enumerate().map(|(i, name)| channel(name, band(i))).collect();
-    write_film(film, channels, text)
+    write(film.window, channels, text)
 }
 
-/// The file of a film's channels, which lie in its window.
-fn write_film(film: &Film, channels: SmallVec<[AnyChannel<FlatSamples>; 4]>, text: &str) -> Result<Vec<u8>> {
-    let w = film.window;
-    write(w.width(), w.height(), (w.x0 as i32, w.y0 as i32), channels, Text::new_or_none(text))
-}
-
-/// The file of these channels, whose first pixel stands at `corner` of a larger image.
-fn write(
-    width: u32,
-    height: u32,
-    corner: (i32, i32),
-    channels: SmallVec<[AnyChannel<FlatSamples>; 4]>,
-    comments: Option<Text>,
-) -> Result<Vec<u8>> {
-    let attributes =
-        LayerAttributes { layer_position: Vec2(corner.0, corner.1), comments, ..LayerAttributes::default() };
+fn write(w: Window, channels: SmallVec<[AnyChannel<FlatSamples>; 4]>, text: &str) -> Result<Vec<u8>> {
+    let attributes = LayerAttributes {
+        layer_position: Vec2(w.x0 as i32, w.y0 as i32),
+        comments: Text::new_or_none(text),
+        ..LayerAttributes::default()
+    };
     // Rows in increasing order, whichever thread compressed them first: equal runs write equal bytes.
     let encoding = Encoding {
         compression: Compression::ZIP16,
         blocks: Blocks::ScanLines,
         line_order: exr::prelude::attribute::LineOrder::Increasing,
     };
-    let size = Vec2(width as usize, height as usize);
+    let size = Vec2(w.width() as usize, w.height() as usize);
     let image = Image::from_layer(Layer::new(size, attributes, encoding, AnyChannels::sort(channels)));
     let mut bytes = std::io::Cursor::new(Vec::new());
     image.write().to_unbuffered(&mut bytes).map_err(|e| Error::Scene(format!("cannot encode an EXR: {e}")))?;

@@ -48,7 +48,7 @@ Files of an image:
   *_denoised.png, denoised.exr   with --denoise
 
 More samples make less noise: twice the --spp takes twice the time and leaves 0.7 of it.
-The pages scenes/01-one-leaf.ron to 06 teach how a scene is written.
+The pages scenes/01-one-leaf.ron to 07 teach how a scene is written.
 Paths go to stdout, everything else to stderr.
 Exit codes: 0 done, 1 failed, 2 wrong input, 75 stopped cleanly (Ctrl-C).";
 

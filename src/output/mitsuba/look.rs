@@ -52,15 +52,14 @@ pub(super) struct Look {
 impl Look {
     /// Samples `material` as it lies on `mesh`, whose texture the camera sees `footprint` metres to a pixel.
     pub(super) fn of(material: &Material, mesh: &Mesh, footprint: f32) -> Self {
-        let (w, h) = match material.varies() {
-            Varies::Picture(w, h) => (w, h),
-            Varies::Nowhere | Varies::Place => (1, 1),
-        };
         let metres = image_length(mesh);
-        let fine = w.max(h) as f32;
-        let level = (footprint / metres * fine).max(1.0).log2().round() as u32;
+        let (w, h, level) = match material.varies() {
+            Varies::Picture(w, h) => (w, h, (footprint / metres * w.max(h) as f32).max(1.0).log2().round() as u32),
+            Varies::Raster(w, h) => (w, h, 0),
+            Varies::Nowhere | Varies::Place => (1, 1, 0),
+        };
         let (width, height) = ((w >> level.min(31)).max(1), (h >> level.min(31)).max(1));
-        let footprint = metres * 2.0_f32.powi(level as i32) / fine;
+        let footprint = metres * 2.0_f32.powi(level as i32) / w.max(h) as f32;
         let mut kind = None;
         let mut texels = Vec::with_capacity((width * height) as usize);
         for y in 0..height {

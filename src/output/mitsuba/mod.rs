@@ -150,13 +150,14 @@ pub fn write(folder: &Path, scene: &Scene, text: &str) -> Result<Export> {
         let mask = group.mask.as_ref().map(|m| mask_file(m, text, &mut masks, &mut files)).transpose()?;
         let material = &scene.materials[group.material as usize];
         let look = Look::of(material, &group.mesh, footprint(&scene.camera, &group.mesh));
-        let surface = if group.colors.is_some() {
-            Surface::of_corners(look.kind)
-        } else {
-            Surface::write(&look, &group.name, mask, &mut files)?
+        let factor = Surface::corner_factor(look.kind);
+        let colors: Option<Vec<Spectrum>> = group.colors.as_ref().map(|c| c.iter().map(|s| *s * factor).collect());
+        let surface = match colors {
+            Some(_) => Surface::of_corners(look.kind),
+            None => Surface::write(&look, &group.name, mask, &mut files)?,
         };
         surface.warnings(&group.name, &mut lost);
-        files.write(&mesh_file(&group.name), &ply::encode(&group.mesh, group.colors.as_deref()))?;
+        files.write(&mesh_file(&group.name), &ply::encode(&group.mesh, colors.as_deref()))?;
         surfaces.push(surface);
     }
     warnings.extend(summary(&lost));
@@ -324,9 +325,10 @@ impl Whole<'_> {
             Some(lens) => Element::plugin("sensor", "thinlens")
                 .float("aperture_radius", lens.radius * SCALE)
                 .float("focus_distance", lens.focus * SCALE),
+            // Their offset is added to a pixel before its ray is made: that of the image's middle from the axis.
             None => Element::plugin("sensor", "perspective")
-                .float("principal_point_offset_x", cx / w - 0.5)
-                .float("principal_point_offset_y", cy / h - 0.5),
+                .float("principal_point_offset_x", 0.5 - cx / w)
+                .float("principal_point_offset_y", 0.5 - cy / h),
         };
         let filter = match self.scene.filter.filter() {
             Filter::Box => Element::plugin("rfilter", "box"),

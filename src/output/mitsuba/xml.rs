@@ -16,6 +16,7 @@ enum Node {
     Comment(String),
 }
 
+#[expect(clippy::needless_pass_by_value, reason = "numbers and texts alike, as they come")]
 impl Element {
     /// An empty element.
     pub(super) fn new(tag: &'static str) -> Self {
