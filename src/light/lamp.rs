@@ -56,6 +56,31 @@ impl Lamp {
         Self { outline, centre, frame, radiance, area, reach }
     }
 
+    /// Its outline.
+    pub fn outline(&self) -> Outline {
+        self.outline
+    }
+
+    /// Its centre, metres.
+    pub fn centre(&self) -> Vec3 {
+        self.centre
+    }
+
+    /// Its frame: it shines along z; a rectangle's width lies along x.
+    pub fn frame(&self) -> Frame {
+        self.frame
+    }
+
+    /// Its radiance, W·m⁻²·sr⁻¹·nm⁻¹ per band.
+    pub fn radiance(&self) -> Spectrum {
+        self.radiance
+    }
+
+    /// Its area, m².
+    pub fn area(&self) -> f32 {
+        self.area
+    }
+
     /// A point of the area.
     #[inline]
     fn point(&self, u: [f32; 2]) -> Vec3 {

@@ -1,5 +1,7 @@
 //! Page + seed + index → one field.
 
+mod models;
+
 use super::desc::{FieldDesc, Growth, SpeciesDesc};
 use super::library::{Layer, Library, Species};
 use super::tag::Tag;
@@ -25,6 +27,12 @@ impl Field {
     /// Seed of the samples: a field of its own noise for every image.
     pub fn sample_seed(&self) -> u64 {
         mix(mix(self.seed) ^ self.index)
+    }
+
+    /// Where the field came from, one `key: value` a line: program, pages, seed, index.
+    pub fn provenance(&self) -> String {
+        let Self { hash, seed, index, .. } = self;
+        format!("program: furrow {}\nscene: sha256 {hash}\nseed: {seed}\nindex: {index}", env!("CARGO_PKG_VERSION"))
     }
 
     /// Takes the photograph of a film of this field.
@@ -221,7 +229,9 @@ impl<'a> Builder<'a> {
         if let (Some(earth), Some(soil)) = (&mut earth, &self.desc.soil) {
             self.cover(soil, earth, &seedlings);
         }
-        let plants = self.plant(&seedlings, earth.as_ref().map(|e| &e.ground), wanted.then_some(view))?;
+        let ground = earth.as_ref().map(|e| &e.ground);
+        let mut plants = self.plant(&seedlings, ground, wanted.then_some(view))?;
+        plants.extend(self.models(seedlings.len(), ground)?);
         Ok(Field {
             scene: self.scene,
             plants,
