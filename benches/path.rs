@@ -1,42 +1,143 @@
-//! Samples a second of the whole path tracer on the main scene, on all cores. `cargo bench --bench path`.
+//! The whole path tracer: samples a second, rays a sample by kind, rays a second, and the share of the render that goes into
+//! Embree, as the table that README shows. `cargo bench --bench path`.
+//!
+//! Every ray of a render is written down and asked again alone, by the same threads in the same order; the time of that over
+//! the time of the render is Embree's share. Medians of [`RUNS`] runs, render and replay in turn.
 
-use criterion::{Criterion, Throughput};
+#![allow(clippy::print_stdout, reason = "its table is its result")]
+
 use furrow::accel::EmbreeAccel;
-use furrow::geometry::Window;
+use furrow::geometry::{Hit, Intersect, Ray, Window};
 use furrow::integrator::{Path as PathTracer, World};
 use furrow::render::{self, Settings, Watch};
 use furrow::sampling::Points;
 use furrow::scene::build;
+use std::hint::black_box;
 use std::path::Path;
+use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
-use std::time::Duration;
+use std::time::Instant;
 
-const SPP: u32 = 4;
+/// Runs of which the median counts.
+const RUNS: usize = 1;
+/// Samples a pixel.
+const SPP: u32 = 2;
+/// Scenes: what it is, its page, and the width of its image.
+const SCENES: [(&str, &str, Option<u32>); 3] = [
+    ("main scene", "scenes/field.ron", None),
+    ("one leaf close up", "scenes/01-one-leaf.ron", Some(640)),
+    ("closed canopy", "benches/canopy.ron", None),
+];
+
+/// A question as it was asked.
+#[derive(Clone, Copy)]
+enum Query {
+    Closest(Ray),
+    Occluded(Ray),
+}
+
+/// Answers by another, and writes every question down, each thread into a list of its own.
+struct Recorder<'a> {
+    geometry: &'a EmbreeAccel,
+    asked: Vec<Mutex<Vec<Query>>>,
+}
+
+impl Recorder<'_> {
+    fn note(&self, query: Query) {
+        let thread = rayon::current_thread_index().expect("a thread of the pool");
+        self.asked[thread].lock().expect("a list").push(query);
+    }
+}
+
+impl Intersect for Recorder<'_> {
+    fn closest(&self, ray: &Ray) -> Option<Hit> {
+        self.note(Query::Closest(*ray));
+        self.geometry.closest(ray)
+    }
+
+    fn occluded(&self, ray: &Ray) -> bool {
+        self.note(Query::Occluded(*ray));
+        self.geometry.occluded(ray)
+    }
+}
+
+fn ask(geometry: &EmbreeAccel, queries: &[Query]) -> usize {
+    let hits = queries.iter().filter(|query| match black_box(query) {
+        Query::Closest(ray) => geometry.closest(ray).is_some(),
+        Query::Occluded(ray) => geometry.occluded(ray),
+    });
+    hits.count()
+}
+
+fn seconds(run: impl FnOnce()) -> f64 {
+    let begin = Instant::now();
+    run();
+    begin.elapsed().as_secs_f64()
+}
+
+fn median(mut of: Vec<f64>) -> f64 {
+    of.sort_by(f64::total_cmp);
+    of[of.len() / 2]
+}
 
 fn main() {
-    let options = build::Options { width: Some(162), ..build::Options::default() };
     let pool = render::pool(0).expect("a pool");
-    let field = pool.install(|| build::field(Path::new("scenes/field.ron"), &options)).expect("the main scene");
-    let scene = &field.scene;
-    let geometry = EmbreeAccel::build(&scene.surfaces(), 0).expect("an accelerator");
-    let world = World { scene, geometry: &geometry };
-    let window = Window::full(scene.camera.width(), scene.camera.height());
-    let settings =
-        Settings { spp: SPP, seed: field.sample_seed(), window, filter: scene.filter, points: Points::Sobol };
-    let stop = AtomicBool::new(false);
-    let watch = Watch { done: &|_| (), stop: &stop };
+    let threads = pool.current_num_threads();
+    println!("{threads} threads, {SPP} samples a pixel, medians of {RUNS} runs\n");
+    println!(
+        "| scene | triangles | grow, s | build, s | Msamples/s | rays a sample: nearest + shadow | Mray/s | share inside Embree |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
+    for (name, page, width) in SCENES {
+        let options = build::Options { width, ..build::Options::default() };
+        let field = || pool.install(|| build::field(Path::new(page), &options)).expect(page);
+        let grow = median((0..RUNS).map(|_| seconds(|| drop(black_box(field())))).collect());
+        let field = field();
+        let scene = &field.scene;
+        let surfaces = scene.surfaces();
+        let accel = || pool.install(|| EmbreeAccel::build(&surfaces, threads as u32)).expect("an accelerator");
+        let build = median((0..RUNS).map(|_| seconds(|| drop(black_box(accel())))).collect());
+        let geometry = accel();
 
-    let mut criterion = Criterion::default()
-        .sample_size(10)
-        .warm_up_time(Duration::from_millis(500))
-        .measurement_time(Duration::from_secs(6))
-        .configure_from_args();
-    let mut group = criterion.benchmark_group("path");
-    group.throughput(Throughput::Elements(u64::from(window.width() * window.height() * SPP)));
-    let integrator = PathTracer::default();
-    group.bench_function("field", |b| {
-        b.iter(|| pool.install(|| render::render(&world, &integrator, &settings, &watch)).expect("a film"));
-    });
-    group.finish();
-    criterion.final_summary();
+        let window = Window::full(scene.camera.width(), scene.camera.height());
+        let settings = Settings { spp: SPP, seed: field.sample_seed(), window, points: Points::Sobol };
+        let (stop, integrator) = (AtomicBool::new(false), PathTracer::default());
+        let watch = Watch { done: &|_| (), stop: &stop };
+        let render = |geometry: &dyn Intersect| {
+            let world = World { scene, geometry };
+            pool.install(|| render::render(&world, &integrator, &settings, &watch)).expect("a film")
+        };
+        let recorder = Recorder { geometry: &geometry, asked: (0..threads).map(|_| Mutex::default()).collect() };
+        render(&recorder);
+        let asked: Vec<Vec<Query>> =
+            recorder.asked.into_iter().map(|list| list.into_inner().expect("a list")).collect();
+        let replay = || {
+            // Each thread its own list, all at once: the wall time of the longest, made even by their lengths.
+            let times = pool.broadcast(|thread| {
+                seconds(|| {
+                    black_box(ask(&geometry, &asked[thread.index()]));
+                })
+            });
+            times.iter().sum::<f64>() / threads as f64
+        };
+        let mut turns = (Vec::new(), Vec::new());
+        for _ in 0..RUNS {
+            turns.0.push(seconds(|| drop(black_box(render(&geometry)))));
+            turns.1.push(replay());
+        }
+        let share = median(turns.0.iter().zip(&turns.1).map(|(render, replay)| replay / render).collect());
+        let (rendered, replayed) = (median(turns.0), median(turns.1));
+        let samples = f64::from(window.width() * window.height() * SPP);
+        let rays = asked.iter().map(Vec::len).sum::<usize>() as f64;
+        let nearest = asked.iter().flatten().filter(|query| matches!(query, Query::Closest(_))).count() as f64;
+        println!(
+            "| {name} | {:.2} M | {grow:.2} | {build:.2} | {:.2} | {:.2} + {:.2} | {:.2} | {:.0} % |",
+            scene.triangles() as f64 / 1e6,
+            samples / rendered / 1e6,
+            nearest / samples,
+            (rays - nearest) / samples,
+            rays / replayed / 1e6,
+            100.0 * share,
+        );
+    }
 }

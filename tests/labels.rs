@@ -37,7 +37,7 @@ fn part(mesh: Mesh, mask: Option<Arc<AlphaMask>>, tag: Tag) -> Part {
 }
 
 fn scene(parts: Vec<Part>, camera: Camera) -> Scene {
-    Scene { parts, materials: Vec::new(), lights: Vec::new(), camera, filter: Filter::Box }
+    Scene { parts, materials: Vec::new(), lights: Vec::new(), camera, filter: Filter::Box.footprint() }
 }
 
 fn labels_of(scene: &Scene) -> LabelMap {
@@ -351,7 +351,7 @@ fn light_and_material_change_no_label() {
     for material in &mut field.scene.materials {
         *material = Material::Plain(furrow::bsdf::Bsdf::examples()[0].1);
     }
-    field.scene.filter = Filter::Box;
+    field.scene.filter = Filter::Box.footprint();
     assert_eq!(before, labels_of(&field.scene));
     // The same asked of the page: another sky, another sensor.
     let text = program::small_text();

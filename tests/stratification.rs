@@ -29,7 +29,7 @@ fn ratio(side: u32, reference_spp: u32, seeds: u64) -> f64 {
             let (x0, y0) = (w * column / 10, h * row / 10);
             let window = Window { x0, y0, x1: x0 + side, y1: y0 + side };
             let shoot = |points, spp, seed| {
-                let settings = Settings { spp, seed, window, filter: scene.filter, points };
+                let settings = Settings { spp, seed, window, points };
                 render::render(world, &PathTracer::default(), &settings, watch).unwrap()
             };
             let reference = shoot(Points::Independent, reference_spp, 999);

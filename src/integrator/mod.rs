@@ -1,7 +1,9 @@
 //! How much light comes back along a ray.
 
+mod effort;
 mod falsecolor;
 mod path;
+mod vertex;
 
 use crate::geometry::{Hit, Interaction, Intersect, Ray};
 use crate::math::Spectrum;

@@ -1,11 +1,14 @@
 //! Path tracing with next-event estimation.
 //!
-//! At every surface one light is chosen by what it can give there, sampled, and tested by a shadow ray; the same emission is
-//! also found by scattered rays, and multiple importance sampling (Veach & Guibas 1995, the balance heuristic) weighs the
-//! two. Long paths end by Russian roulette on their throughput. Unbiased: every choice is paid back by its chance.
+//! The surface that the eye sees asks every light; the surfaces behind it ask one, chosen by what it can give there. The same
+//! emission is also found by scattered rays, and multiple importance sampling (Veach & Guibas 1995, the balance heuristic)
+//! weighs the two. How many rays go on from the first surface, and which paths end, follows from what they can still bring
+//! beside what was found ([`Effort`]). Unbiased: every choice is paid back by its chance.
 
-use super::{FirstHit, Integrator, Sighting, World};
-use crate::geometry::{Interaction, Ray};
+use super::effort::Effort;
+use super::vertex::Vertex;
+use super::{Integrator, Sighting, World};
+use crate::geometry::Ray;
 use crate::light::Light;
 use crate::math::{Spectrum, Vec3};
 use crate::sampling::{Sampler, sets};
@@ -17,7 +20,7 @@ pub struct Technique {
     pub light_sampling: bool,
     /// Weigh light and scattering samples by each other (else light sampling alone counts where it is on).
     pub mis: bool,
-    /// End dim paths by chance.
+    /// Follow by chance what can bring little, and repeatedly what can bring much (else everything once).
     pub roulette: bool,
 }
 
@@ -53,36 +56,134 @@ struct Origin {
     normal: Vec3,
     two_sided: bool,
     pdf: f32,
+    /// Whether every light was asked there, not one of them.
+    asked_all: bool,
+}
+
+/// A scattered ray on its way.
+struct Flight {
+    ray: Ray,
+    /// Its width where it starts, metres.
+    width: f32,
+    /// Growth of its width, metres a metre.
+    spread: f32,
+    throughput: Spectrum,
+    from: Origin,
+}
+
+impl Flight {
+    /// The ray that leaves `vertex` by the numbers `u`, before anyone asks whether it is worth following.
+    #[inline]
+    fn leave(vertex: &Vertex, u: [f32; 3], throughput: Spectrum, asked_all: bool) -> Option<Self> {
+        let s = vertex.sample(u)?;
+        let at = &vertex.at;
+        let (normal, two_sided) = (vertex.normal(), vertex.bsdf.transmits());
+        Some(Self {
+            ray: at.ray(s.wi, f32::INFINITY),
+            width: at.footprint,
+            spread: DIFFUSE_SPREAD,
+            throughput: throughput * s.weight,
+            from: Origin { p: at.p, normal, two_sided, pdf: s.pdf, asked_all },
+        })
+    }
 }
 
 impl Path {
-    /// Weight of emission from `light` found by the scattered ray that left `from` along `wi`.
-    fn weigh(&self, world: &World<'_>, from: Option<&Origin>, light: &Light, light_pdf: impl FnOnce() -> f32) -> f32 {
-        let Some(from) = from else { return 1.0 };
+    /// Light of the infinite lights along a ray that left the scene.
+    fn escaped(&self, world: &World<'_>, ray: &Ray, from: Option<&Origin>) -> Spectrum {
+        let mut sum = Spectrum::ZERO;
+        for light in &world.scene.lights {
+            let emitted = light.le(ray.direction);
+            if !emitted.is_black() {
+                let weight =
+                    from.map_or(1.0, |from| self.weigh(world, from, light, || light.pdf_li(from.p, ray.direction)));
+                sum += emitted * weight;
+            }
+        }
+        sum
+    }
+
+    /// Light of the lamps that a scattered ray meets before `end`. Lamps are seen by scattered light only: to the camera, as
+    /// to the labels, they are not there.
+    fn lamps(&self, world: &World<'_>, ray: &Ray, from: &Origin, end: f32) -> Spectrum {
+        let mut sum = Spectrum::ZERO;
+        for light in &world.scene.lights {
+            if let Some(lamp) = light.hit(ray.origin, ray.direction)
+                && lamp.distance < end
+            {
+                sum += lamp.radiance * self.weigh(world, from, light, || lamp.pdf);
+            }
+        }
+        sum
+    }
+
+    /// Weight of emission from `light` found by the scattered ray that left `from`.
+    #[inline]
+    fn weigh(&self, world: &World<'_>, from: &Origin, light: &Light, light_pdf: impl FnOnce() -> f32) -> f32 {
         match (self.technique.light_sampling, self.technique.mis) {
             (false, _) => 1.0,
             (true, false) => 0.0,
             (true, true) => {
-                let total = total_importance(world, from.p, from.normal, from.two_sided);
-                let chance = light.importance(from.p, from.normal, from.two_sided) / total.max(f32::MIN_POSITIVE);
+                let chance = if from.asked_all {
+                    1.0
+                } else {
+                    let total = total_importance(world, from.p, from.normal, from.two_sided);
+                    light.importance(from.p, from.normal, from.two_sided) / total.max(f32::MIN_POSITIVE)
+                };
                 from.pdf / (from.pdf + chance * light_pdf())
             }
         }
     }
 
-    /// Light that reaches the surface straight from a light and scatters towards `wo`.
+    /// Light from `light`, asked with the probability `chance`, that reaches the surface unhindered and scatters to the eye.
     #[inline]
-    fn direct(&self, world: &World<'_>, at: &Interaction, local: &Local, u: [f32; 4]) -> Spectrum {
-        let two_sided = local.bsdf.transmits();
-        let normal = local.normal();
-        let total = total_importance(world, at.p, normal, two_sided);
+    fn ask(&self, world: &World<'_>, vertex: &Vertex, light: &Light, chance: f32, u: [f32; 2]) -> Spectrum {
+        let Some(s) = light.sample_li(vertex.at.p, u) else { return Spectrum::ZERO };
+        let (f, bsdf_pdf) = vertex.eval_pdf(s.wi);
+        if f.is_black() || s.pdf <= 0.0 {
+            return Spectrum::ZERO;
+        }
+        // A lamp stands at a finite distance; the ray stops just short of it.
+        if world.geometry.occluded(&vertex.at.ray(s.wi, s.distance * (1.0 - 1e-5))) {
+            return Spectrum::ZERO;
+        }
+        let light_pdf = chance * s.pdf;
+        let weight = if self.technique.mis { light_pdf / (light_pdf + bsdf_pdf) } else { 1.0 };
+        f * s.radiance * (weight / light_pdf)
+    }
+
+    /// Direct light at the first surface: every light, in order, as often as it matters beside those before it.
+    #[inline]
+    fn ask_all(&self, world: &World<'_>, vertex: &Vertex, effort: &Effort, sampler: Sampler) -> Spectrum {
+        let (normal, two_sided, albedo) = (vertex.normal(), vertex.bsdf.transmits(), vertex.albedo());
+        let mut found = Spectrum::ZERO;
+        for (k, light) in world.scene.lights.iter().enumerate() {
+            let importance = light.importance(vertex.at.p, normal, two_sided);
+            if importance <= 0.0 {
+                continue;
+            }
+            let chance = effort.light(importance, albedo, found);
+            let u = sampler.get4(sets::first_light(k as u32));
+            if u[2] < chance {
+                // The weight of the other technique knows nothing of this chance, so it is paid back outside.
+                found += self.ask(world, vertex, light, 1.0, [u[0], u[1]]) * (1.0 / chance);
+            }
+        }
+        found
+    }
+
+    /// Direct light at a surface further on: one light, by its share of what all can give there.
+    #[inline]
+    fn ask_one(&self, world: &World<'_>, vertex: &Vertex, u: [f32; 3]) -> Spectrum {
+        let (p, normal, two_sided) = (vertex.at.p, vertex.normal(), vertex.bsdf.transmits());
+        let total = total_importance(world, p, normal, two_sided);
         if total <= 0.0 {
             return Spectrum::ZERO;
         }
         let mut left = u[0] * total;
         let mut chosen = None;
         for light in &world.scene.lights {
-            let importance = light.importance(at.p, normal, two_sided);
+            let importance = light.importance(p, normal, two_sided);
             if importance > 0.0 {
                 chosen = Some((light, importance / total));
                 left -= importance;
@@ -91,20 +192,72 @@ impl Path {
                 }
             }
         }
-        let Some((light, chance)) = chosen else { return Spectrum::ZERO };
-        let Some(s) = light.sample_li(at.p, [u[1], u[2]]) else { return Spectrum::ZERO };
-        let (f, bsdf_pdf) = local.eval_pdf(at, s.wi);
-        if f.is_black() || s.pdf <= 0.0 {
-            return Spectrum::ZERO;
+        chosen.map_or(Spectrum::ZERO, |(light, chance)| self.ask(world, vertex, light, chance, [u[1], u[2]]))
+    }
+
+    /// What comes back along a scattered ray that may meet surfaces number `depth` and on; `branch` names its numbers, `found`
+    /// is the light that its path has brought already.
+    fn follow(
+        &self,
+        world: &World<'_>,
+        mut flight: Flight,
+        effort: &Effort,
+        sampler: Sampler,
+        branch: u32,
+        found: Spectrum,
+    ) -> Spectrum {
+        let mut radiance = Spectrum::ZERO;
+        for depth in 1..=self.max_depth {
+            let Flight { ray, throughput, ref from, .. } = flight;
+            let met = world.interact(&ray, flight.width, flight.spread);
+            radiance +=
+                throughput * self.lamps(world, &ray, from, met.as_ref().map_or(f32::INFINITY, |(hit, _)| hit.t));
+            let Some((hit, at)) = met else {
+                return radiance + throughput * self.escaped(world, &ray, Some(from));
+            };
+            if depth == self.max_depth {
+                break;
+            }
+            let vertex = Vertex::new(world, &ray, &hit, at);
+            let lights = sampler.get4(sets::light(branch, depth));
+            if self.technique.light_sampling {
+                radiance += throughput * self.ask_one(world, &vertex, [lights[0], lights[1], lights[2]]);
+            }
+            let [lobe, u, v, _] = sampler.get4(sets::scatter(branch, depth));
+            let Some(next) = Flight::leave(&vertex, [lobe, u, v], throughput, false) else { break };
+            flight = next;
+            let chance = effort.survive(flight.throughput, found + radiance);
+            if lights[3] >= chance {
+                break;
+            }
+            flight.throughput *= 1.0 / chance;
         }
-        // A lamp stands at a finite distance; the ray stops just short of it.
-        let ray = at.ray(s.wi, s.distance * (1.0 - 1e-5));
-        if world.geometry.occluded(&ray) {
-            return Spectrum::ZERO;
+        radiance
+    }
+
+    /// What the first surface sends to the eye.
+    fn shade(&self, world: &World<'_>, vertex: &Vertex, sampler: Sampler) -> Spectrum {
+        let effort = Effort::new(world, self.technique.roulette);
+        let direct =
+            if self.technique.light_sampling { self.ask_all(world, vertex, &effort, sampler) } else { Spectrum::ZERO };
+        let mut radiance = direct;
+        // What a leaf lets through counts as what it reflects.
+        let returned = if vertex.bsdf.transmits() { vertex.albedo() * 2.0 } else { vertex.albedo() };
+        let mean = effort.split(returned, direct);
+        let [_, _, u, v] = sampler.get4(sets::FIRST);
+        let [lobe, _, _, extra] = sampler.get4(sets::scatter(0, 0));
+        let count = (mean + extra) as u32;
+        for branch in 0..count {
+            let u = if branch == 0 {
+                [lobe, u, v]
+            } else {
+                let [lobe, u, v, _] = sampler.get4(sets::scatter(branch, 0));
+                [lobe, u, v]
+            };
+            let Some(flight) = Flight::leave(vertex, u, Spectrum::splat(1.0 / mean), true) else { continue };
+            radiance += self.follow(world, flight, &effort, sampler, branch, direct);
         }
-        let light_pdf = chance * s.pdf;
-        let weight = if self.technique.mis { light_pdf / (light_pdf + bsdf_pdf) } else { 1.0 };
-        f * s.radiance * (weight / light_pdf)
+        radiance
     }
 }
 
@@ -113,105 +266,15 @@ fn total_importance(world: &World<'_>, p: Vec3, normal: Vec3, two_sided: bool) -
     world.scene.lights.iter().map(|l| l.importance(p, normal, two_sided)).sum()
 }
 
-/// The scattering at a surface, seen from `wo`, in world directions.
-struct Local {
-    bsdf: crate::bsdf::Bsdf,
-    frame: crate::math::Frame,
-    wo: Vec3,
-    /// `wo` in the frame.
-    seen: Vec3,
-}
-
-impl Local {
-    /// The normal by which lights are chosen: on the side that scatters, which is that of the eye unless light passes through.
-    #[inline]
-    fn normal(&self) -> Vec3 {
-        if self.seen.z < 0.0 && !self.bsdf.transmits() { -self.frame.z } else { self.frame.z }
-    }
-
-    /// Whether going from `wo` to `wi` passes through the real triangle exactly when it passes through the shading frame's
-    /// plane. Where the two disagree a normal map would leak light; nothing scatters there.
-    #[inline]
-    fn consistent(&self, at: &Interaction, wi: Vec3, wi_local_z: f32) -> bool {
-        (at.ng.dot(self.wo) * at.ng.dot(wi) > 0.0) == (self.seen.z * wi_local_z > 0.0)
-    }
-
-    /// f · |cos θi| and its density.
-    #[inline]
-    fn eval_pdf(&self, at: &Interaction, wi: Vec3) -> (Spectrum, f32) {
-        let local = self.frame.to_local(wi);
-        if self.consistent(at, wi, local.z) { self.bsdf.eval_pdf(self.seen, local) } else { (Spectrum::ZERO, 0.0) }
-    }
-}
-
 impl Integrator for Path {
     fn li(&self, world: &World<'_>, ray: &Ray, spread: f32, sampler: &Sampler) -> Sighting {
-        let mut sighting = Sighting::default();
-        let mut radiance = Spectrum::ZERO;
-        let mut throughput = Spectrum::ONE;
-        let mut ray = *ray;
-        let (mut width, mut spread) = (0.0, spread);
-        let mut origin: Option<Origin> = None;
-        for depth in 0..=self.max_depth {
-            let found = world.interact(&ray, width, spread);
-            let end = found.as_ref().map_or(f32::INFINITY, |(hit, _)| hit.t);
-            // Lamps are seen by scattered light only: to the camera, as to the labels, they are not there.
-            if origin.is_some() {
-                for light in &world.scene.lights {
-                    if let Some(lamp) = light.hit(ray.origin, ray.direction)
-                        && lamp.distance < end
-                    {
-                        radiance += throughput * lamp.radiance * self.weigh(world, origin.as_ref(), light, || lamp.pdf);
-                    }
-                }
+        let (radiance, first) = match world.interact(ray, 0.0, spread) {
+            None => (self.escaped(world, ray, None), None),
+            Some((hit, at)) => {
+                let vertex = Vertex::new(world, ray, &hit, at);
+                (self.shade(world, &vertex, *sampler), Some(vertex.describe(hit.t)))
             }
-            let Some((hit, at)) = found else {
-                for light in &world.scene.lights {
-                    let emitted = light.le(ray.direction);
-                    if !emitted.is_black() {
-                        let p = origin.as_ref().map_or(ray.origin, |o| o.p);
-                        let weight = self.weigh(world, origin.as_ref(), light, || light.pdf_li(p, ray.direction));
-                        radiance += throughput * emitted * weight;
-                    }
-                }
-                break;
-            };
-            if depth == self.max_depth {
-                break;
-            }
-            let wo = -ray.direction;
-            let part = &world.scene.parts[hit.part as usize];
-            let (bsdf, frame) = world.scene.materials[part.material as usize].scatter(&at, wo);
-            let local = Local { bsdf, frame, wo, seen: frame.to_local(wo) };
-            if depth == 0 {
-                let normal = if frame.z.dot(wo) < 0.0 { -frame.z } else { frame.z };
-                sighting.first = Some(FirstHit { distance: hit.t, normal, albedo: bsdf.reflectance(local.seen.z) });
-            }
-            let lights = sampler.get4(sets::light(depth));
-            let scattering = sampler.get4(sets::scatter(depth));
-            if self.technique.light_sampling {
-                radiance += throughput * self.direct(world, &at, &local, lights);
-            }
-            let Some(s) = bsdf.sample(local.seen, [scattering[0], scattering[1], scattering[2]]) else { break };
-            let wi = frame.to_world(s.wi);
-            if !local.consistent(&at, wi, s.wi.z) {
-                break;
-            }
-            throughput *= s.weight;
-            if self.technique.roulette {
-                // Survival by what the path can still bring; the last number of the light set decides.
-                let survive = throughput.max().min(0.95);
-                if lights[3] >= survive {
-                    break;
-                }
-                throughput *= 1.0 / survive;
-            }
-            origin = Some(Origin { p: at.p, normal: local.normal(), two_sided: bsdf.transmits(), pdf: s.pdf });
-            ray = at.ray(wi, f32::INFINITY);
-            width = at.footprint;
-            spread = DIFFUSE_SPREAD;
-        }
-        sighting.radiance = Spectrum(radiance.0.min(Spectrum::splat(self.clamp).0));
-        sighting
+        };
+        Sighting { radiance: Spectrum(radiance.0.min(Spectrum::splat(self.clamp).0)), first }
     }
 }

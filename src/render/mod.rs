@@ -7,7 +7,7 @@ mod progressive;
 mod tiles;
 
 use crate::accel::prepare_thread;
-use crate::film::{Accumulator, Film, Filter, Pixel};
+use crate::film::{Accumulator, Film, Pixel};
 use crate::geometry::{Ray, Window};
 use crate::integrator::{Integrator, World};
 use crate::math::vec2;
@@ -31,8 +31,6 @@ pub struct Settings {
     pub seed: u64,
     /// The pixels.
     pub window: Window,
-    /// How pixels gather light.
-    pub filter: Filter,
     /// Which numbers the samples draw.
     pub points: Points,
 }
@@ -103,17 +101,13 @@ fn gather(
     let spread = camera.pixel_angle();
     for index in samples {
         let sampler = Sampler::of(settings.points, settings.seed, x, y, index);
-        let [u, v, lens_u, lens_v] = sampler.get4(sets::CAMERA);
-        let blur = match settings.filter {
-            Filter::Box => [0.0; 2],
-            // Far beyond any path's sets.
-            Filter::Gaussian(_) => {
-                let [a, b, ..] = sampler.get4(sets::BLUR);
-                [a, b]
-            }
-        };
-        let at = vec2(x as f32 + 0.5, y as f32 + 0.5) + settings.filter.sample([u, v], blur);
-        let (origin, direction) = camera.ray(at, [lens_u, lens_v]);
+        let [u, v, ..] = sampler.get4(sets::FIRST);
+        let at = vec2(x as f32 + 0.5, y as f32 + 0.5) + world.scene.filter.sample([u, v]);
+        let lens = camera.aperture().map_or([0.0; 2], |_| {
+            let [u, v, ..] = sampler.get4(sets::LENS);
+            [u, v]
+        });
+        let (origin, direction) = camera.ray(at, lens);
         let seen = integrator.li(world, &Ray::new(origin, direction), spread, &sampler);
         sum.add(seen.radiance);
         if let Some(first) = seen.first {

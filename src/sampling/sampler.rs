@@ -9,20 +9,29 @@ use super::rng::mix;
 
 /// What each set of four dimensions is for.
 pub mod sets {
-    /// Place in the pixel, place on the lens.
-    pub const CAMERA: u32 = 0;
-    /// The filter's blur.
-    pub const BLUR: u32 = 1;
+    /// Place in the pixel, and the direction in which its surface scatters first: what a pixel's error depends on most,
+    /// stratified together.
+    pub const FIRST: u32 = 0;
+    /// Place on the lens.
+    pub const LENS: u32 = (1 << 24) - 1;
 
-    /// Which light, where on it, roulette: at the surface number `depth`.
-    pub const fn light(depth: u32) -> u32 {
-        2 + 2 * depth
+    /// Which lobe, which direction, and, at the first surface, how many: at surface number `depth` of a path's `branch`.
+    pub const fn scatter(branch: u32, depth: u32) -> u32 {
+        branch * BRANCH + 1 + 2 * depth
     }
 
-    /// Which lobe, which direction.
-    pub const fn scatter(depth: u32) -> u32 {
-        3 + 2 * depth
+    /// Which light, where on it, roulette: the same surface.
+    pub const fn light(branch: u32, depth: u32) -> u32 {
+        branch * BRANCH + 2 + 2 * depth
     }
+
+    /// Where on light number `light`, and whether to ask it: at the first surface.
+    pub const fn first_light(light: u32) -> u32 {
+        (1 << 24) + light
+    }
+
+    /// Sets of one branch: twice the surfaces of any path.
+    const BRANCH: u32 = 1 << 12;
 }
 
 /// Which numbers the samples of a pixel draw.

@@ -158,7 +158,7 @@ impl<'a> Builder<'a> {
         if lights.is_empty() {
             warnings.push("no light in the scene: the image will be black".into());
         }
-        let scene = Scene { parts: Vec::new(), materials: Vec::new(), lights, camera, filter: desc.filter };
+        let scene = Scene { parts: Vec::new(), materials: Vec::new(), lights, camera, filter: desc.filter.footprint() };
         Ok(Self { page, desc, library, seed, index, scene, warnings })
     }
 

@@ -6,7 +6,7 @@ mod library;
 pub mod tag;
 
 use crate::accel::Surface;
-use crate::film::Filter;
+use crate::film::Footprint;
 use crate::geometry::{AlphaMask, Mesh};
 use crate::light::Light;
 use crate::material::Material;
@@ -68,7 +68,7 @@ pub struct Scene {
     /// Who looks.
     pub camera: Camera,
     /// How its pixels gather light.
-    pub filter: Filter,
+    pub filter: Footprint,
 }
 
 impl Scene {

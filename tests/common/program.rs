@@ -70,7 +70,7 @@ pub fn shoot(field: &Field, spp: u32, threads: usize) -> (Film, LabelMap) {
     pool.install(|| {
         let geometry = EmbreeAccel::build(&scene.surfaces(), threads as u32).expect("an accelerator");
         let window = Window::full(scene.camera.width(), scene.camera.height());
-        let settings = Settings { spp, seed: field.sample_seed(), window, filter: scene.filter, points: Points::Sobol };
+        let settings = Settings { spp, seed: field.sample_seed(), window, points: Points::Sobol };
         let stop = AtomicBool::new(false);
         let watch = Watch { done: &|_| (), stop: &stop };
         let world = World { scene, geometry: &geometry };

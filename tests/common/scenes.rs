@@ -59,7 +59,7 @@ pub fn scene(parts: Vec<(Mesh, Bsdf)>, lights: Vec<Light>, camera: Camera) -> Sc
     let part =
         |(i, (mesh, _)): (usize, (Mesh, Bsdf))| Part { mesh, mask: None, material: i as u32, tag: Tag::default() };
     let parts = parts.into_iter().enumerate().map(part).collect();
-    Scene { parts, materials, lights, camera, filter: Filter::Box }
+    Scene { parts, materials, lights, camera, filter: Filter::Box.footprint() }
 }
 
 /// Renders all of a scene on two threads.
@@ -71,7 +71,7 @@ pub fn shoot(scene: &Scene, integrator: &dyn Integrator, spp: u32, seed: u64) ->
 pub fn shoot_with(scene: &Scene, integrator: &dyn Integrator, points: Points, spp: u32, seed: u64) -> Film {
     with_world(scene, 2, |world, watch| {
         let window = Window::full(scene.camera.width(), scene.camera.height());
-        let settings = Settings { spp, seed, window, filter: scene.filter, points };
+        let settings = Settings { spp, seed, window, points };
         render::render(world, integrator, &settings, watch).expect("a film")
     })
 }

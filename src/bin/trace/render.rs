@@ -129,13 +129,8 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
 
     let world = World { scene, geometry: &geometry };
     let integrator = args.integrator.integrator(&args.technique);
-    let settings = Settings {
-        spp: args.quality.most(),
-        seed: field.sample_seed(),
-        window,
-        filter: scene.filter,
-        points: args.technique.points(),
-    };
+    let settings =
+        Settings { spp: args.quality.most(), seed: field.sample_seed(), window, points: args.technique.points() };
     if let Some((x, y)) = args.pixel {
         let words = pool.install(|| render::explain(&world, &field.plants, integrator.as_ref(), &settings, x, y));
         // The words are the result; a closed pipe is no failure.

@@ -1,8 +1,12 @@
 //! Where samples become pixels: mean and variance of each band, and the first surface's channels.
 
+mod filter;
+
 use crate::geometry::Window;
-use crate::math::{Spectrum, Vec2, Vec3};
+use crate::math::{Spectrum, Vec3};
 use glam::{DVec4, Vec4};
+
+pub use filter::{Filter, Footprint};
 
 /// What is known of one pixel after all its samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -75,31 +79,6 @@ impl Accumulator {
             normal: self.normal / n as f32,
             depth: if self.hits == 0 { f32::INFINITY } else { (self.depth / f64::from(self.hits)) as f32 },
             samples: self.count,
-        }
-    }
-}
-
-/// How a pixel gathers light over its surroundings. Samples are drawn from the filter's shape, so pixels stay independent.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub enum Filter {
-    /// The pixel's own square, as a sensor with full fill factor and a perfect lens.
-    Box,
-    /// A normal blur of this standard deviation in pixels on top of the square: the lens's point spread.
-    Gaussian(f32),
-}
-
-impl Filter {
-    /// An offset from the pixel's centre, pixels, from four numbers in [0, 1).
-    #[inline]
-    pub fn sample(self, u: [f32; 2], v: [f32; 2]) -> Vec2 {
-        let square = Vec2::from(u) - 0.5;
-        match self {
-            Self::Box => square,
-            Self::Gaussian(sigma) => {
-                let r = sigma * (-2.0 * (1.0 - v[0]).ln()).sqrt();
-                let (sin, cos) = (std::f32::consts::TAU * v[1]).sin_cos();
-                square + Vec2::new(r * cos, r * sin)
-            }
         }
     }
 }

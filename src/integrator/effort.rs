@@ -1,0 +1,74 @@
+//! How often the rest of a path is followed: by what it can bring beside what the path has brought.
+//!
+//! An eye, a network and a relative error ask about each pixel's noise beside its own brightness. In the sun a bounce adds a
+//! tenth of what is there and may be followed now and then; in a shadow it is nearly all, and worth several rays. So roulette
+//! and splitting follow `expected contribution / light found so far`, a small share of the scene's usual radiance standing in
+//! for the light of what is nearly black. Both numbers are known before the contribution is drawn, so paying back by the
+//! chance keeps the estimate unbiased. After Arvo & Kirk 1990, "Particle transport and image synthesis", with the weight
+//! relative to the pixel as in Vorba & Křivánek 2016, "Adjoint-driven Russian roulette and splitting".
+
+use super::World;
+use crate::math::Spectrum;
+use std::f32::consts::FRAC_1_PI;
+
+/// Reflectance of what most light in a field comes back from.
+const USUAL_ALBEDO: f32 = 0.2;
+/// Radiance, as a share of the usual one, below which noise matters no more than it does there.
+const DARK: f32 = 0.1;
+/// The least chance of anything: weights stay below its inverse.
+const LEAST: f32 = 0.1;
+/// The most scattered rays that leave the first surface.
+const MOST: f32 = 4.0;
+
+/// What is usual in a scene.
+#[derive(Clone, Copy)]
+pub(super) struct Effort {
+    /// Radiance of a level plane of [`USUAL_ALBEDO`] in the open.
+    usual: Spectrum,
+    /// Whether choices are made at all.
+    on: bool,
+}
+
+impl Effort {
+    /// For a scene; with `on` false everything is followed once.
+    #[inline]
+    pub(super) fn new(world: &World<'_>, on: bool) -> Self {
+        let open = world.scene.lights.iter().fold(Spectrum::ZERO, |sum, light| sum + light.horizontal_irradiance());
+        Self { usual: open * (USUAL_ALBEDO * FRAC_1_PI), on }
+    }
+
+    /// What `radiance` is worth beside the light `found` so far, by the band that gains most.
+    #[inline]
+    fn worth(&self, radiance: Spectrum, found: Spectrum) -> f32 {
+        let beside = found + self.usual * DARK;
+        // A scene whose lights shine elsewhere has no usual radiance; then everything is worth following.
+        (radiance.0 / beside.0.max(glam::Vec4::splat(f32::MIN_POSITIVE))).max_element()
+    }
+
+    /// Chance of asking a light that can give the first surface an irradiance of about `irradiance` (mean of the bands).
+    #[inline]
+    pub(super) fn light(&self, irradiance: f32, albedo: Spectrum, found: Spectrum) -> f32 {
+        if !self.on {
+            return 1.0;
+        }
+        self.worth(albedo * (irradiance * FRAC_1_PI), found).clamp(LEAST, 1.0)
+    }
+
+    /// Mean number of rays to scatter from the first surface, which returns about `albedo` of what it receives.
+    #[inline]
+    pub(super) fn split(&self, albedo: Spectrum, found: Spectrum) -> f32 {
+        if !self.on {
+            return 1.0;
+        }
+        self.worth(albedo * self.usual, found).clamp(LEAST, MOST)
+    }
+
+    /// Chance of following a path on whose next light arrives with `throughput`.
+    #[inline]
+    pub(super) fn survive(&self, throughput: Spectrum, found: Spectrum) -> f32 {
+        if !self.on {
+            return 1.0;
+        }
+        self.worth(throughput * self.usual, found).min(1.0)
+    }
+}
