@@ -44,6 +44,8 @@ pub struct Lamp {
     area: f32,
     /// Radius of the sphere around it.
     reach: f32,
+    /// Form factor at the world's origin, level: an integral that integrators ask for at every sample.
+    level: f32,
 }
 
 impl Lamp {
@@ -53,7 +55,8 @@ impl Lamp {
             Outline::Rectangle(half) => (4.0 * half.x * half.y, half.length()),
             Outline::Disc(radius) => (PI * radius * radius, radius),
         };
-        Self { outline, centre, frame, radiance, area, reach }
+        let lamp = Self { outline, centre, frame, radiance, area, reach, level: 0.0 };
+        Self { level: lamp.form_factor(Vec3::ZERO, Vec3::Z), ..lamp }
     }
 
     /// A point of the area.
@@ -158,7 +161,7 @@ impl Emitter for Lamp {
     }
 
     fn horizontal_irradiance(&self) -> Spectrum {
-        self.radiance * self.form_factor(Vec3::ZERO, Vec3::Z)
+        self.radiance * self.level
     }
 }
 
