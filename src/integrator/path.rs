@@ -60,6 +60,9 @@ struct Origin {
     asked_all: bool,
 }
 
+/// The first surfaces of a packet, with the numbers of their samples.
+type Seen = [Option<(Vertex, Sampler)>; PACKET];
+
 /// A scattered ray on its way.
 struct Flight {
     ray: Ray,
@@ -137,7 +140,7 @@ impl Path {
 
     /// Light from `light`, asked with the probability `chance`, that scatters to the eye if nothing stands in the way, and the
     /// ray that tells.
-    #[inline]
+    #[inline(always)]
     fn ask(&self, vertex: &Vertex, light: &Light, chance: f32, u: [f32; 2]) -> Option<(Spectrum, Ray)> {
         let s = light.sample_li(vertex.at.p, u)?;
         let (f, bsdf_pdf) = vertex.eval_pdf(s.wi);
@@ -151,35 +154,35 @@ impl Path {
     }
 
     /// Direct light at the first surfaces of a packet: every light, in order, as often as it matters beside those before it.
-    fn ask_all(
-        &self,
-        world: &World<'_>,
-        seen: &[Option<(Vertex, Sampler)>; PACKET],
-        effort: &Effort,
-    ) -> [Spectrum; PACKET] {
+    fn ask_all(&self, world: &World<'_>, seen: &Seen, effort: &Effort) -> [Spectrum; PACKET] {
         let mut found = [Spectrum::ZERO; PACKET];
         for (k, light) in world.scene.lights.iter().enumerate() {
-            let asked: [Option<(Spectrum, Ray)>; PACKET] = std::array::from_fn(|i| {
-                let (vertex, sampler) = seen[i].as_ref()?;
+            let mut rays = [None; PACKET];
+            let mut brings = [Spectrum::ZERO; PACKET];
+            for (i, (vertex, sampler)) in seen.iter().enumerate().filter_map(|(i, seen)| Some((i, seen.as_ref()?))) {
                 let importance = light.importance(vertex.at.p, vertex.normal(), vertex.bsdf.transmits());
                 if importance <= 0.0 {
-                    return None;
+                    continue;
                 }
                 let chance = effort.light(importance, vertex.albedo(), found[i]);
                 let u = sampler.get4(sets::first_light(k as u32));
+                if u[2] >= chance {
+                    continue;
+                }
                 // The weight of the other technique knows nothing of this chance, so it is paid back outside.
-                let (light, ray) = (u[2] < chance).then(|| self.ask(vertex, light, 1.0, [u[0], u[1]]))??;
-                Some((light * (1.0 / chance), ray))
-            });
-            let rays = asked.each_ref().map(|asked| asked.as_ref().map(|(_, ray)| *ray));
+                if let Some((light, ray)) = self.ask(vertex, light, 1.0, [u[0], u[1]]) {
+                    brings[i] = light * (1.0 / chance);
+                    rays[i] = Some(ray);
+                }
+            }
             let dark = if light.is_narrow() {
                 world.geometry.occluded_packet(&rays)
             } else {
                 rays.map(|ray| ray.is_some_and(|ray| world.geometry.occluded(&ray)))
             };
-            for ((found, asked), dark) in found.iter_mut().zip(asked).zip(dark) {
-                if let (Some((light, _)), false) = (asked, dark) {
-                    *found += light;
+            for i in 0..PACKET {
+                if !dark[i] {
+                    found[i] += brings[i];
                 }
             }
         }
@@ -296,15 +299,18 @@ impl Integrator for Path {
 
     fn li_packet(&self, world: &World<'_>, samples: &[Option<Sample>; PACKET], spread: f32) -> [Sighting; PACKET] {
         let hits = world.geometry.closest_packet(&samples.map(|sample| sample.map(|s| s.ray)));
-        let seen: [Option<(Vertex, Sampler)>; PACKET] = std::array::from_fn(|i| {
-            let (sample, hit) = (samples[i].as_ref()?, hits[i].as_ref()?);
-            Some((Vertex::new(world, &sample.ray, hit, world.at(hit, spread * hit.t)), sample.sampler))
-        });
+        let mut seen: Seen = [None; PACKET];
+        for i in 0..PACKET {
+            if let (Some(Sample { ray, sampler }), Some(hit)) = (&samples[i], &hits[i]) {
+                seen[i] = Some((Vertex::new(world, ray, hit, world.at(hit, spread * hit.t)), *sampler));
+            }
+        }
         let effort = Effort::new(world, self.technique.roulette);
         let direct =
             if self.technique.light_sampling { self.ask_all(world, &seen, &effort) } else { [Spectrum::ZERO; PACKET] };
-        std::array::from_fn(|i| {
-            let Some(sample) = &samples[i] else { return Sighting::default() };
+        let mut sightings = [Sighting::default(); PACKET];
+        for i in 0..PACKET {
+            let Some(sample) = &samples[i] else { continue };
             let (radiance, first) = match (&seen[i], &hits[i]) {
                 (Some((vertex, sampler)), Some(hit)) => {
                     let indirect = self.indirect(world, vertex, &effort, *sampler, direct[i]);
@@ -312,7 +318,8 @@ impl Integrator for Path {
                 }
                 _ => (self.escaped(world, &sample.ray, None), None),
             };
-            Sighting { radiance: Spectrum(radiance.0.min(Spectrum::splat(self.clamp).0)), first }
-        })
+            sightings[i] = Sighting { radiance: Spectrum(radiance.0.min(Spectrum::splat(self.clamp).0)), first };
+        }
+        sightings
     }
 }

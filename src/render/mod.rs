@@ -100,10 +100,12 @@ fn gather(
 ) {
     let spread = world.scene.camera.pixel_angle();
     for packet in samples.start / PACKET as u32..samples.end.div_ceil(PACKET as u32) {
-        let wanted = std::array::from_fn(|i| {
-            let index = packet * PACKET as u32 + i as u32;
-            samples.contains(&index).then(|| sample(world, settings, at, index))
-        });
+        let mut wanted = [None; PACKET];
+        for (index, wanted) in (packet * PACKET as u32..).zip(&mut wanted) {
+            if samples.contains(&index) {
+                *wanted = Some(sample(world, settings, at, index));
+            }
+        }
         for (seen, _) in integrator.li_packet(world, &wanted, spread).iter().zip(&wanted).filter(|(_, s)| s.is_some()) {
             sum.add(seen.radiance);
             if let Some(first) = seen.first {
