@@ -85,7 +85,13 @@ impl<'a> Progressive<'a> {
             self.advance_each(|i| (share(goals[i]) * PACKET as u32).min(goals[i]), watch)?;
             let each = begin.elapsed().as_secs_f64() / f64::from(next - done);
             done = next;
-            step = next_step(done, each, deadline.saturating_duration_since(Instant::now()).as_secs_f64());
+            let left = deadline.saturating_duration_since(Instant::now()).as_secs_f64();
+            step = next_step(done, each, left);
+            if step == 0 && done < most {
+                // What is left of the time takes a part of a packet; nothing follows it, so the bits are those of one go.
+                let part = (0.75 * left / each * PACKET as f64) as u32;
+                self.advance_each(|i| (share(goals[i]) * PACKET as u32 + part).min(goals[i]), watch)?;
+            }
         }
         Ok(done >= most)
     }
@@ -111,7 +117,7 @@ fn next_step(done: u32, each: f64, left: f64) -> u32 {
 }
 
 /// Renders a window in passes until the deadline, or until every pixel has `settings.spp` samples. Every pixel has the same
-/// number of samples then, at least one, and the film is that of [`super::render`] with that number. Call it inside a pool.
+/// number of samples then, at least a packet of them, and the film is that of [`super::render`] with that number. Call it inside a pool.
 pub fn timed(
     world: &World<'_>,
     integrator: &dyn Integrator,
