@@ -10,11 +10,11 @@ use common::layers::read_layers;
 use common::program::{FILES, bits, field, names, run, scratch, small_text, trace};
 use common::scenes::with_world;
 use furrow::film::Film;
-use furrow::geometry::{Ray, Window};
-use furrow::integrator::{Integrator, Path as PathTracer, Sighting, World};
+use furrow::geometry::Window;
+use furrow::integrator::{Integrator, Path as PathTracer, Sample, Sighting, World};
 use furrow::math::Spectrum;
 use furrow::render::{self, Progressive, Settings};
-use furrow::sampling::{Points, Sampler};
+use furrow::sampling::Points;
 use furrow::scene::Field;
 use furrow::scene::build::Options;
 use std::io::{BufRead, BufReader};
@@ -36,7 +36,8 @@ fn passes_make_the_bits_of_one_go() {
         let path = PathTracer::default();
         let whole = render::render(world, &path, &settings, watch).unwrap();
         let mut growing = Progressive::new(world, &path, &settings);
-        for spp in [1, 4, 3, 16] {
+        // Whole packets, and again what is there already.
+        for spp in [8, 8, 3, 16] {
             growing.advance(spp, watch).unwrap();
         }
         assert!(bits(&growing.film()) == bits(&whole));
@@ -138,7 +139,8 @@ fn the_error_told_covers_the_error_made() {
 struct Flashes;
 
 impl Integrator for Flashes {
-    fn li(&self, _: &World<'_>, _: &Ray, _: f32, sampler: &Sampler) -> Sighting {
+    fn li(&self, _: &World<'_>, sample: &Sample, _: f32) -> Sighting {
+        let sampler = &sample.sampler;
         let flash = sampler.get4(9)[0] < 0.05;
         Sighting { radiance: Spectrum::splat(if flash { 20.0 } else { 0.0 }), first: None }
     }

@@ -47,13 +47,18 @@ impl Ggx {
     /// [`Ggx::eval`] and [`Ggx::pdf`] at once: they share the distribution and the masking.
     #[inline]
     pub fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (f32, f32) {
-        let m = (wo + wi).normalize_or_zero();
-        if wo.z <= 0.0 || wi.z <= 0.0 || m.z <= 0.0 {
+        if wo.z <= 0.0 || wi.z <= 0.0 {
             return (0.0, 0.0);
         }
+        // With h = wo + wi, m = h / |h| and |h|² = 2 (1 + wo·wi) = 2 (wo·m) |h|, so D needs no normalised m.
+        let h = wo + wi;
+        let length_sq = h.length_squared();
+        let [ax, ay] = self.alpha;
+        let (x, y) = (h.x / ax, h.y / ay);
+        let s = x * x + y * y + h.z * h.z;
+        let d = length_sq * length_sq / (std::f32::consts::PI * ax * ay * s * s * 4.0 * wo.z);
         let lambda = self.lambda(wo);
-        let d = self.d(m) / (4.0 * wo.z);
-        let f = fresnel::dielectric(wo.dot(m), self.ior);
+        let f = fresnel::dielectric(0.5 * length_sq.sqrt(), self.ior);
         (f * d / (1.0 + lambda + self.lambda(wi)), d / (1.0 + lambda))
     }
 

@@ -53,27 +53,28 @@ impl Wet {
         self.film
     }
 
-    /// What the film lets through, mixed with the bare part.
+    /// What the film lets through where it reflects `fresnel`, mixed with the bare part.
     #[inline]
-    fn through(&self, cos: f32) -> f32 {
-        1.0 + self.film * ((1.0 - fresnel::dielectric(cos, WATER)) / NORM - 1.0)
+    fn through(&self, fresnel: f32) -> f32 {
+        1.0 + self.film * ((1.0 - fresnel) * (1.0 / NORM) - 1.0)
     }
 
+    /// How likely the film is sampled where it reflects `fresnel` to the eye.
     #[inline]
-    fn chance(&self, cos_o: f32) -> f32 {
+    fn chance(&self, fresnel: f32) -> f32 {
         // The base reflects ten times as much as the film at normal incidence; at grazing angles they meet.
-        let coat = self.film * fresnel::dielectric(cos_o, WATER);
+        let coat = self.film * fresnel;
         coat / (coat + 0.15)
     }
 }
 
 impl Wet {
-    /// Value and density for directions that both lie above.
+    /// Value and density for directions that both lie above; the film reflects `fresnel` towards `wo`.
     #[inline]
-    fn upper(&self, wo: Vec3, wi: Vec3) -> (Spectrum, f32) {
+    fn upper(&self, wo: Vec3, wi: Vec3, fresnel: f32) -> (Spectrum, f32) {
         let (coat, coat_pdf) = self.coat.eval_pdf(wo, wi);
-        let base = self.base.upper(wo, wi) * (self.through(wo.z) * self.through(wi.z));
-        let p = self.chance(wo.z);
+        let base = self.base.upper(wo, wi) * (self.through(fresnel) * self.through(fresnel::dielectric(wi.z, WATER)));
+        let p = self.chance(fresnel);
         (base + Spectrum::splat(self.film * coat), p * coat_pdf + (1.0 - p) * wi.z * FRAC_1_PI)
     }
 }
@@ -85,7 +86,7 @@ impl Scatter for Wet {
             return (Spectrum::ZERO, 0.0);
         }
         let s = wo.z.signum();
-        self.upper(facing(wo, s), facing(wi, s))
+        self.upper(facing(wo, s), facing(wi, s), fresnel::dielectric(wo.z.abs(), WATER))
     }
 
     #[inline]
@@ -95,11 +96,12 @@ impl Scatter for Wet {
         if up.z == 0.0 {
             return None;
         }
-        let wi = if u[0] < self.chance(up.z) { self.coat.sample(up, u[1], u[2]) } else { cosine(u[1], u[2]) };
+        let fresnel = fresnel::dielectric(up.z, WATER);
+        let wi = if u[0] < self.chance(fresnel) { self.coat.sample(up, u[1], u[2]) } else { cosine(u[1], u[2]) };
         if wi.z <= 0.0 {
             return None;
         }
-        let (value, pdf) = self.upper(up, wi);
+        let (value, pdf) = self.upper(up, wi, fresnel);
         (pdf > 0.0).then(|| BsdfSample { wi: facing(wi, s), weight: value / pdf, pdf })
     }
 }

@@ -14,10 +14,8 @@ pub struct Interaction {
     pub ns: Vec3,
     /// Texture coordinates.
     pub uv: Vec2,
-    /// ∂p/∂u, metres; zero where the texture coordinates are degenerate.
-    pub dp_du: Vec3,
-    /// ∂p/∂v, metres.
-    pub dp_dv: Vec3,
+    /// Edges from the triangle's first corner to its second and third, metres and texture coordinates.
+    edges: [(Vec3, Vec2); 2],
     /// Index of the part.
     pub part: u32,
     /// Index of the triangle.
@@ -28,6 +26,7 @@ pub struct Interaction {
 
 impl Interaction {
     /// Works out a hit on `mesh`; `footprint` in metres.
+    #[inline]
     pub fn new(mesh: &Mesh, hit: &Hit, footprint: f32) -> Self {
         let corners = mesh.triangles[hit.triangle as usize].map(|i| i as usize);
         let [a, b, c] = corners.map(|i| mesh.positions[i]);
@@ -37,25 +36,28 @@ impl Interaction {
         let (e1, e2) = (b - a, c - a);
         let ng = e1.cross(e2).normalize_or(Vec3::Z);
         let ns = (na * w + nb * hit.u + nc * hit.v).normalize_or(ng);
-        let (t1, t2) = (tb - ta, tc - ta);
-        let determinant = t1.perp_dot(t2);
-        let (dp_du, dp_dv) = if determinant.abs() > 1e-20 {
-            let inverse = 1.0 / determinant;
-            ((e1 * t2.y - e2 * t1.y) * inverse, (e2 * t1.x - e1 * t2.x) * inverse)
-        } else {
-            (Vec3::ZERO, Vec3::ZERO)
-        };
         Self {
             p: a * w + b * hit.u + c * hit.v,
             ng,
             ns: if ns.dot(ng) < 0.0 { -ns } else { ns },
             uv: ta * w + tb * hit.u + tc * hit.v,
-            dp_du,
-            dp_dv,
+            edges: [(e1, tb - ta), (e2, tc - ta)],
             part: hit.part,
             triangle: hit.triangle,
             footprint,
         }
+    }
+
+    /// ∂p/∂u and ∂p/∂v, metres; zero where the texture coordinates are degenerate.
+    #[inline]
+    pub fn tangents(&self) -> (Vec3, Vec3) {
+        let [(e1, t1), (e2, t2)] = self.edges;
+        let determinant = t1.perp_dot(t2);
+        if determinant.abs() <= 1e-20 {
+            return (Vec3::ZERO, Vec3::ZERO);
+        }
+        let inverse = 1.0 / determinant;
+        ((e1 * t2.y - e2 * t1.y) * inverse, (e2 * t1.x - e1 * t2.x) * inverse)
     }
 
     /// A start for a ray that leaves along `direction`, off the surface by a few units in the last place of the coordinates.

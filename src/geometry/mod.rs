@@ -10,5 +10,5 @@ mod window;
 pub use alpha::AlphaMask;
 pub use interaction::Interaction;
 pub use mesh::Mesh;
-pub use ray::{Hit, Intersect, Ray};
+pub use ray::{Hit, Intersect, PACKET, Ray};
 pub use window::Window;

@@ -46,4 +46,17 @@ pub trait Intersect: Sync {
     fn closest(&self, ray: &Ray) -> Option<Hit>;
     /// Whether anything is hit at all.
     fn occluded(&self, ray: &Ray) -> bool;
+
+    /// [`Self::closest`] of rays that go nearly the same way, asked together; none where there is no ray.
+    fn closest_packet(&self, rays: &[Option<Ray>; PACKET]) -> [Option<Hit>; PACKET] {
+        rays.map(|ray| self.closest(&ray?))
+    }
+
+    /// [`Self::occluded`] of rays that go nearly the same way, asked together; false where there is no ray.
+    fn occluded_packet(&self, rays: &[Option<Ray>; PACKET]) -> [bool; PACKET] {
+        rays.map(|ray| ray.is_some_and(|ray| self.occluded(&ray)))
+    }
 }
+
+/// Rays asked together at most.
+pub const PACKET: usize = 8;

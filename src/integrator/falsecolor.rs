@@ -1,9 +1,9 @@
 //! Pictures for finding faults: what the first surface is, in false colours.
 
-use super::{FirstHit, Integrator, Sighting, World};
-use crate::geometry::Ray;
+use super::{FirstHit, Integrator, Sample, Sighting, World};
+
 use crate::math::{Spectrum, Vec3};
-use crate::sampling::Sampler;
+
 use crate::sampling::rng::mix;
 
 /// What is shown of the first surface.
@@ -22,7 +22,8 @@ pub enum FalseColor {
 }
 
 impl Integrator for FalseColor {
-    fn li(&self, world: &World<'_>, ray: &Ray, spread: f32, _sampler: &Sampler) -> Sighting {
+    fn li(&self, world: &World<'_>, sample: &Sample, spread: f32) -> Sighting {
+        let ray = &sample.ray;
         let Some((hit, at)) = world.interact(ray, 0.0, spread) else { return Sighting::default() };
         let wo = -ray.direction;
         let part = &world.scene.parts[hit.part as usize];

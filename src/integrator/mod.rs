@@ -5,7 +5,7 @@ mod falsecolor;
 mod path;
 mod vertex;
 
-use crate::geometry::{Hit, Interaction, Intersect, Ray};
+use crate::geometry::{Hit, Interaction, Intersect, PACKET, Ray};
 use crate::math::Spectrum;
 use crate::sampling::Sampler;
 use crate::scene::Scene;
@@ -27,8 +27,13 @@ impl World<'_> {
     #[inline]
     pub fn interact(&self, ray: &Ray, width: f32, spread: f32) -> Option<(Hit, Interaction)> {
         let hit = self.geometry.closest(ray)?;
-        let mesh = &self.scene.parts[hit.part as usize].mesh;
-        Some((hit, Interaction::new(mesh, &hit, width + spread * hit.t)))
+        Some((hit, self.at(&hit, width + spread * hit.t)))
+    }
+
+    /// A hit, worked out; `footprint` in metres.
+    #[inline]
+    fn at(&self, hit: &Hit, footprint: f32) -> Interaction {
+        Interaction::new(&self.scene.parts[hit.part as usize].mesh, hit, footprint)
     }
 }
 
@@ -52,8 +57,23 @@ pub struct FirstHit {
     pub albedo: Spectrum,
 }
 
-/// Answers camera rays. `spread` is the growth of the ray's width, metres a metre.
+/// One sample of a pixel: its ray, and the numbers that decide what becomes of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Sample {
+    /// From the camera.
+    pub ray: Ray,
+    /// Its numbers.
+    pub sampler: Sampler,
+}
+
+/// Answers camera rays. `spread` is the growth of a ray's width, metres a metre.
 pub trait Integrator: Sync {
-    /// What comes back along `ray`.
-    fn li(&self, world: &World<'_>, ray: &Ray, spread: f32, sampler: &Sampler) -> Sighting;
+    /// What comes back along a ray.
+    fn li(&self, world: &World<'_>, sample: &Sample, spread: f32) -> Sighting;
+
+    /// The same for samples of one pixel: their rays go nearly the same way and are cheaper asked together. Nothing is seen
+    /// where there is no sample.
+    fn li_packet(&self, world: &World<'_>, samples: &[Option<Sample>; PACKET], spread: f32) -> [Sighting; PACKET] {
+        samples.map(|sample| sample.map_or_else(Sighting::default, |sample| self.li(world, &sample, spread)))
+    }
 }

@@ -7,8 +7,8 @@
 
 use super::effort::Effort;
 use super::vertex::Vertex;
-use super::{Integrator, Sighting, World};
-use crate::geometry::Ray;
+use super::{Integrator, Sample, Sighting, World};
+use crate::geometry::{PACKET, Ray};
 use crate::light::Light;
 use crate::math::{Spectrum, Vec3};
 use crate::sampling::{Sampler, sets};
@@ -59,6 +59,9 @@ struct Origin {
     /// Whether every light was asked there, not one of them.
     asked_all: bool,
 }
+
+/// The first surfaces of a packet, with the numbers of their samples.
+type Seen = [Option<(Vertex, Sampler)>; PACKET];
 
 /// A scattered ray on its way.
 struct Flight {
@@ -135,38 +138,52 @@ impl Path {
         }
     }
 
-    /// Light from `light`, asked with the probability `chance`, that reaches the surface unhindered and scatters to the eye.
-    #[inline]
-    fn ask(&self, world: &World<'_>, vertex: &Vertex, light: &Light, chance: f32, u: [f32; 2]) -> Spectrum {
-        let Some(s) = light.sample_li(vertex.at.p, u) else { return Spectrum::ZERO };
+    /// Light from `light`, asked with the probability `chance`, that scatters to the eye if nothing stands in the way, and the
+    /// ray that tells.
+    #[inline(always)]
+    fn ask(&self, vertex: &Vertex, light: &Light, chance: f32, u: [f32; 2]) -> Option<(Spectrum, Ray)> {
+        let s = light.sample_li(vertex.at.p, u)?;
         let (f, bsdf_pdf) = vertex.eval_pdf(s.wi);
         if f.is_black() || s.pdf <= 0.0 {
-            return Spectrum::ZERO;
-        }
-        // A lamp stands at a finite distance; the ray stops just short of it.
-        if world.geometry.occluded(&vertex.at.ray(s.wi, s.distance * (1.0 - 1e-5))) {
-            return Spectrum::ZERO;
+            return None;
         }
         let light_pdf = chance * s.pdf;
         let weight = if self.technique.mis { light_pdf / (light_pdf + bsdf_pdf) } else { 1.0 };
-        f * s.radiance * (weight / light_pdf)
+        // A lamp stands at a finite distance; the ray stops just short of it.
+        Some((f * s.radiance * (weight / light_pdf), vertex.at.ray(s.wi, s.distance * (1.0 - 1e-5))))
     }
 
-    /// Direct light at the first surface: every light, in order, as often as it matters beside those before it.
-    #[inline]
-    fn ask_all(&self, world: &World<'_>, vertex: &Vertex, effort: &Effort, sampler: Sampler) -> Spectrum {
-        let (normal, two_sided, albedo) = (vertex.normal(), vertex.bsdf.transmits(), vertex.albedo());
-        let mut found = Spectrum::ZERO;
+    /// Direct light at the first surfaces of a packet: every light, in order, as often as it matters beside those before it.
+    fn ask_all(&self, world: &World<'_>, seen: &Seen, effort: &Effort) -> [Spectrum; PACKET] {
+        let mut found = [Spectrum::ZERO; PACKET];
         for (k, light) in world.scene.lights.iter().enumerate() {
-            let importance = light.importance(vertex.at.p, normal, two_sided);
-            if importance <= 0.0 {
-                continue;
-            }
-            let chance = effort.light(importance, albedo, found);
-            let u = sampler.get4(sets::first_light(k as u32));
-            if u[2] < chance {
+            let mut rays = [None; PACKET];
+            let mut brings = [Spectrum::ZERO; PACKET];
+            for (i, (vertex, sampler)) in seen.iter().enumerate().filter_map(|(i, seen)| Some((i, seen.as_ref()?))) {
+                let importance = light.importance(vertex.at.p, vertex.normal(), vertex.bsdf.transmits());
+                if importance <= 0.0 {
+                    continue;
+                }
+                let chance = effort.light(importance, vertex.albedo(), found[i]);
+                let u = sampler.get4(sets::first_light(k as u32));
+                if u[2] >= chance {
+                    continue;
+                }
                 // The weight of the other technique knows nothing of this chance, so it is paid back outside.
-                found += self.ask(world, vertex, light, 1.0, [u[0], u[1]]) * (1.0 / chance);
+                if let Some((light, ray)) = self.ask(vertex, light, 1.0, [u[0], u[1]]) {
+                    brings[i] = light * (1.0 / chance);
+                    rays[i] = Some(ray);
+                }
+            }
+            let dark = if light.is_narrow() {
+                world.geometry.occluded_packet(&rays)
+            } else {
+                rays.map(|ray| ray.is_some_and(|ray| world.geometry.occluded(&ray)))
+            };
+            for i in 0..PACKET {
+                if !dark[i] {
+                    found[i] += brings[i];
+                }
             }
         }
         found
@@ -192,7 +209,10 @@ impl Path {
                 }
             }
         }
-        chosen.map_or(Spectrum::ZERO, |(light, chance)| self.ask(world, vertex, light, chance, [u[1], u[2]]))
+        match chosen.and_then(|(light, chance)| self.ask(vertex, light, chance, [u[1], u[2]])) {
+            Some((light, ray)) if !world.geometry.occluded(&ray) => light,
+            _ => Spectrum::ZERO,
+        }
     }
 
     /// What comes back along a scattered ray that may meet surfaces number `depth` and on; `branch` names its numbers, `found`
@@ -235,27 +255,31 @@ impl Path {
         radiance
     }
 
-    /// What the first surface sends to the eye.
-    fn shade(&self, world: &World<'_>, vertex: &Vertex, sampler: Sampler) -> Spectrum {
-        let effort = Effort::new(world, self.technique.roulette);
-        let direct =
-            if self.technique.light_sampling { self.ask_all(world, vertex, &effort, sampler) } else { Spectrum::ZERO };
-        let mut radiance = direct;
+    /// What the first surface sends to the eye of the light that did not come straight from a light, of which it sends `direct`.
+    fn indirect(
+        &self,
+        world: &World<'_>,
+        vertex: &Vertex,
+        effort: &Effort,
+        sampler: Sampler,
+        direct: Spectrum,
+    ) -> Spectrum {
         // What a leaf lets through counts as what it reflects.
         let returned = if vertex.bsdf.transmits() { vertex.albedo() * 2.0 } else { vertex.albedo() };
         let mean = effort.split(returned, direct);
-        let [_, _, u, v] = sampler.get4(sets::FIRST);
         let [lobe, _, _, extra] = sampler.get4(sets::scatter(0, 0));
         let count = (mean + extra) as u32;
+        let mut radiance = Spectrum::ZERO;
         for branch in 0..count {
             let u = if branch == 0 {
+                let [_, _, u, v] = sampler.get4(sets::FIRST);
                 [lobe, u, v]
             } else {
                 let [lobe, u, v, _] = sampler.get4(sets::scatter(branch, 0));
                 [lobe, u, v]
             };
             let Some(flight) = Flight::leave(vertex, u, Spectrum::splat(1.0 / mean), true) else { continue };
-            radiance += self.follow(world, flight, &effort, sampler, branch, direct);
+            radiance += self.follow(world, flight, effort, sampler, branch, direct + radiance);
         }
         radiance
     }
@@ -267,14 +291,35 @@ fn total_importance(world: &World<'_>, p: Vec3, normal: Vec3, two_sided: bool) -
 }
 
 impl Integrator for Path {
-    fn li(&self, world: &World<'_>, ray: &Ray, spread: f32, sampler: &Sampler) -> Sighting {
-        let (radiance, first) = match world.interact(ray, 0.0, spread) {
-            None => (self.escaped(world, ray, None), None),
-            Some((hit, at)) => {
-                let vertex = Vertex::new(world, ray, &hit, at);
-                (self.shade(world, &vertex, *sampler), Some(vertex.describe(hit.t)))
+    fn li(&self, world: &World<'_>, sample: &Sample, spread: f32) -> Sighting {
+        let mut alone = [None; PACKET];
+        alone[0] = Some(*sample);
+        self.li_packet(world, &alone, spread)[0]
+    }
+
+    fn li_packet(&self, world: &World<'_>, samples: &[Option<Sample>; PACKET], spread: f32) -> [Sighting; PACKET] {
+        let hits = world.geometry.closest_packet(&samples.map(|sample| sample.map(|s| s.ray)));
+        let mut seen: Seen = [None; PACKET];
+        for i in 0..PACKET {
+            if let (Some(Sample { ray, sampler }), Some(hit)) = (&samples[i], &hits[i]) {
+                seen[i] = Some((Vertex::new(world, ray, hit, world.at(hit, spread * hit.t)), *sampler));
             }
-        };
-        Sighting { radiance: Spectrum(radiance.0.min(Spectrum::splat(self.clamp).0)), first }
+        }
+        let effort = Effort::new(world, self.technique.roulette);
+        let direct =
+            if self.technique.light_sampling { self.ask_all(world, &seen, &effort) } else { [Spectrum::ZERO; PACKET] };
+        let mut sightings = [Sighting::default(); PACKET];
+        for i in 0..PACKET {
+            let Some(sample) = &samples[i] else { continue };
+            let (radiance, first) = match (&seen[i], &hits[i]) {
+                (Some((vertex, sampler)), Some(hit)) => {
+                    let indirect = self.indirect(world, vertex, &effort, *sampler, direct[i]);
+                    (direct[i] + indirect, Some(vertex.describe(hit.t)))
+                }
+                _ => (self.escaped(world, &sample.ray, None), None),
+            };
+            sightings[i] = Sighting { radiance: Spectrum(radiance.0.min(Spectrum::splat(self.clamp).0)), first };
+        }
+        sightings
     }
 }

@@ -89,6 +89,12 @@ impl Light {
         of!(self, light => light.horizontal_irradiance())
     }
 
+    /// Whether neighbouring points see all of it in nearly the same direction, so that rays to it are best asked together.
+    #[inline]
+    pub fn is_narrow(&self) -> bool {
+        matches!(self, Self::Sun(_) | Self::Lamp(_))
+    }
+
     /// Whether rays that leave the scene see it.
     pub fn is_infinite(&self) -> bool {
         !matches!(self, Self::Lamp(_))

@@ -1,7 +1,7 @@
 //! Blades, petioles, stems: pigments and a picture → coat, reflection of either side, transmission.
 
 use super::Varies;
-use super::shading::{bump, frame};
+use super::shading::{bump, grained_frame};
 use crate::bsdf::{self, Bsdf, Side};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec3};
@@ -126,6 +126,7 @@ impl LeafMaterial {
     }
 
     pub(super) fn scatter(&self, at: &Interaction, wo: Vec3) -> (Bsdf, Frame) {
+        let tangents = at.tangents();
         let (leaf, normal) = match &self.picture {
             None => {
                 let [r, g, b, _] = self.optics.plain().reflectance.to_array();
@@ -133,11 +134,11 @@ impl LeafMaterial {
             }
             Some(picture) => {
                 // The footprint as an extent of the image, by the larger side of a texel on the surface.
-                let metres = at.dp_dv.length().max(1e-6);
+                let metres = tangents.1.length().max(1e-6);
                 let lod = picture.color.lod(at.footprint / metres);
                 let [r, g, b, _] = picture.color.sample(at.uv, lod);
                 let slope = picture.maps.normal.sample(at.uv, lod) * self.relief;
-                (self.optics.at((Vec3::new(r, g, b) * self.tint).to_array()), bump(at, slope))
+                (self.optics.at((Vec3::new(r, g, b) * self.tint).to_array()), bump(at, tangents, slope))
             }
         };
         let upper = leaf.reflectance;
@@ -147,6 +148,6 @@ impl LeafMaterial {
         let paler = Spectrum::new(r * self.back_paleness, g * self.back_paleness, b * self.back_paleness, nir);
         let lower = Spectrum(paler.0.min(room.0));
         let bsdf = bsdf::Leaf::new(self.upper.with(upper), self.lower.with(lower), leaf.transmittance);
-        (Bsdf::Leaf(bsdf), frame(at, normal, wo))
+        (Bsdf::Leaf(bsdf), grained_frame(at, normal, tangents.0, wo))
     }
 }

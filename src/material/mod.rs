@@ -58,7 +58,7 @@ impl Material {
             Self::Leaf(m) => m.scatter(at, wo),
             Self::Ground(m) => m.scatter(at, wo),
             Self::Solid(m) => m.scatter(at, wo),
-            Self::Plain(bsdf) => (*bsdf, shading::frame(at, at.ns, wo)),
+            Self::Plain(bsdf) => (*bsdf, shading::grained_frame(at, at.ns, at.tangents().0, wo)),
         }
     }
 }

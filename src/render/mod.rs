@@ -8,8 +8,8 @@ mod tiles;
 
 use crate::accel::prepare_thread;
 use crate::film::{Accumulator, Film, Pixel};
-use crate::geometry::{Ray, Window};
-use crate::integrator::{Integrator, World};
+use crate::geometry::{PACKET, Ray, Window};
+use crate::integrator::{Integrator, Sample, World};
 use crate::math::vec2;
 use crate::sampling::{Points, Sampler, sets};
 use crate::{Error, Result};
@@ -88,30 +88,44 @@ pub fn pixel(world: &World<'_>, integrator: &dyn Integrator, settings: &Settings
     sum.finish()
 }
 
-/// Adds samples of one pixel to its sum, in order.
+/// Adds samples of one pixel to its sum, in order, in packets that begin at multiples of [`PACKET`]: a pass over part of the
+/// samples makes the bits of a pass over all if it begins and ends at such multiples.
 fn gather(
     world: &World<'_>,
     integrator: &dyn Integrator,
     settings: &Settings,
-    (x, y): (u32, u32),
+    at: (u32, u32),
     samples: Range<u32>,
     sum: &mut Accumulator,
 ) {
-    let camera = &world.scene.camera;
-    let spread = camera.pixel_angle();
-    for index in samples {
-        let sampler = Sampler::of(settings.points, settings.seed, x, y, index);
-        let [u, v, ..] = sampler.get4(sets::FIRST);
-        let at = vec2(x as f32 + 0.5, y as f32 + 0.5) + world.scene.filter.sample([u, v]);
-        let lens = camera.aperture().map_or([0.0; 2], |_| {
-            let [u, v, ..] = sampler.get4(sets::LENS);
-            [u, v]
-        });
-        let (origin, direction) = camera.ray(at, lens);
-        let seen = integrator.li(world, &Ray::new(origin, direction), spread, &sampler);
-        sum.add(seen.radiance);
-        if let Some(first) = seen.first {
-            sum.add_first(first.albedo, first.normal, first.distance);
+    let spread = world.scene.camera.pixel_angle();
+    for packet in samples.start / PACKET as u32..samples.end.div_ceil(PACKET as u32) {
+        let mut wanted = [None; PACKET];
+        for (index, wanted) in (packet * PACKET as u32..).zip(&mut wanted) {
+            if samples.contains(&index) {
+                *wanted = Some(sample(world, settings, at, index));
+            }
+        }
+        for (seen, _) in integrator.li_packet(world, &wanted, spread).iter().zip(&wanted).filter(|(_, s)| s.is_some()) {
+            sum.add(seen.radiance);
+            if let Some(first) = seen.first {
+                sum.add_first(first.albedo, first.normal, first.distance);
+            }
         }
     }
+}
+
+/// Sample number `index` of a pixel.
+#[inline]
+fn sample(world: &World<'_>, settings: &Settings, (x, y): (u32, u32), index: u32) -> Sample {
+    let (camera, filter) = (&world.scene.camera, &world.scene.filter);
+    let sampler = Sampler::of(settings.points, settings.seed, x, y, index);
+    let [u, v, ..] = sampler.get4(sets::FIRST);
+    let at = vec2(x as f32 + 0.5, y as f32 + 0.5) + filter.sample([u, v]);
+    let lens = camera.aperture().map_or([0.0; 2], |_| {
+        let [u, v, ..] = sampler.get4(sets::LENS);
+        [u, v]
+    });
+    let (origin, direction) = camera.ray(at, lens);
+    Sample { ray: Ray::new(origin, direction), sampler }
 }

@@ -3,7 +3,7 @@
 
 use super::{Settings, Watch, gather, tiles};
 use crate::film::{Accumulator, Film, Pixel};
-use crate::geometry::Window;
+use crate::geometry::{PACKET, Window};
 use crate::integrator::{Integrator, World};
 use crate::{Error, Result};
 use rayon::prelude::*;
@@ -42,7 +42,8 @@ impl<'a> Progressive<'a> {
         Self { world, integrator, settings, tiles: tiles::tiles(settings.window).into_iter().map(empty).collect() }
     }
 
-    /// Adds samples until every pixel has `spp` of them. Call it inside a pool's `install`.
+    /// Adds samples until every pixel has `spp` of them: a multiple of [`PACKET`] if more are to come. Call it inside a pool's
+    /// `install`.
     pub fn advance(&mut self, spp: u32, watch: &Watch<'_>) -> Result<()> {
         self.advance_each(|_| spp, watch)
     }
@@ -66,21 +67,22 @@ impl<'a> Progressive<'a> {
     }
 
     /// Adds passes until each tile has its goal or the time is up, and tells whether the goals are met. At least one pass is
-    /// made. Each pass brings all tiles to the same share of their goals.
+    /// made. Each pass brings all tiles to the same share of their goals, in whole packets.
     pub(super) fn approach(&mut self, goals: &[u32], deadline: Option<Instant>, watch: &Watch<'_>) -> Result<bool> {
-        let most = goals.iter().copied().max().unwrap_or(0);
+        let packets = |samples: u32| samples.div_ceil(PACKET as u32);
+        let most = packets(goals.iter().copied().max().unwrap_or(0));
         let Some(deadline) = deadline else {
             self.advance_each(|i| goals[i], watch)?;
             return Ok(true);
         };
-        // The share of the goals that is done, in parts of `most`.
+        // The share of the goals that is done, in packets of `most`.
         let mut done = 0;
         let mut step = 1;
         while done < most && step > 0 {
             let begin = Instant::now();
             let next = done.saturating_add(step).min(most);
-            let share = |goal: u32| (u64::from(goal) * u64::from(next)).div_ceil(u64::from(most)) as u32;
-            self.advance_each(|i| share(goals[i]), watch)?;
+            let share = |goal: u32| (u64::from(packets(goal)) * u64::from(next)).div_ceil(u64::from(most)) as u32;
+            self.advance_each(|i| (share(goals[i]) * PACKET as u32).min(goals[i]), watch)?;
             let each = begin.elapsed().as_secs_f64() / f64::from(next - done);
             done = next;
             step = next_step(done, each, deadline.saturating_duration_since(Instant::now()).as_secs_f64());

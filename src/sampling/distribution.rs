@@ -10,15 +10,17 @@ pub struct Distribution1D {
     density: Vec<f32>,
     /// Cumulated probability at the cells' ends, from 0 to 1: one longer than `density`.
     cdf: Vec<f32>,
+    /// Where the search begins.
+    guide: Vec<u16>,
     /// Mean of the weights as given.
     mean: f64,
 }
 
 impl Distribution1D {
-    /// From weights ≥ 0; `None` where none is above zero or one is not a finite number ≥ 0.
+    /// From weights ≥ 0, at most 65 536; `None` where none is above zero or one is not a finite number ≥ 0.
     pub fn new(weights: &[f32]) -> Option<Self> {
         let sum: f64 = weights.iter().map(|&w| f64::from(w)).sum();
-        if !(sum.is_finite() && sum > 0.0 && weights.iter().all(|&w| w >= 0.0)) {
+        if !(sum.is_finite() && sum > 0.0 && weights.iter().all(|&w| w >= 0.0)) || weights.len() > 1 << 16 {
             return None;
         }
         let mean = sum / weights.len() as f64;
@@ -30,7 +32,8 @@ impl Distribution1D {
             cdf.push((below / sum) as f32);
         }
         let density = weights.iter().map(|&w| (f64::from(w) / mean) as f32).collect();
-        Some(Self { density, cdf, mean })
+        let guide = guide(&cdf[1..]);
+        Some(Self { density, cdf, guide, mean })
     }
 
     /// Number of cells.
@@ -51,7 +54,7 @@ impl Distribution1D {
     /// A cell and a place in [0, 1) within it. A cell of weight zero is never drawn.
     #[inline]
     pub fn sample_cell(&self, u: f32) -> (usize, f32) {
-        find(&self.cdf[1..], &self.density, u)
+        find(&self.cdf[1..], &self.guide, u)
     }
 
     /// A number in [0, 1) and its density.
@@ -83,6 +86,8 @@ pub struct Distribution2D {
     density: Vec<f32>,
     /// Cumulated probability at the upper ends of the cells of each row.
     cdf: Vec<f32>,
+    /// Of each row, where the search for k / width begins.
+    guide: Vec<u16>,
 }
 
 impl Distribution2D {
@@ -98,16 +103,19 @@ impl Distribution2D {
         let rows = Distribution1D::new(&means)?;
         let mut density = Vec::with_capacity(weights.len());
         let mut cdf = Vec::with_capacity(weights.len());
+        let mut guide = Vec::with_capacity(weights.len());
         for (row, cells) in cells.iter().enumerate() {
             if let Some(cells) = cells {
                 density.extend(cells.density.iter().map(|d| d * rows.density[row]));
                 cdf.extend(&cells.cdf[1..]);
+                guide.extend(&cells.guide);
             } else {
                 density.resize(density.len() + width, 0.0);
                 cdf.resize(cdf.len() + width, 1.0);
+                guide.resize(guide.len() + width, 0);
             }
         }
-        Some(Self { width, rows, density, cdf })
+        Some(Self { width, rows, density, cdf, guide })
     }
 
     /// A point (x, y) and its density per unit of area.
@@ -116,9 +124,9 @@ impl Distribution2D {
         let (row, within) = self.rows.sample_cell(u[1]);
         let y = place(row, within, self.rows.len());
         let start = row * self.width;
-        let (cdf, density) = (&self.cdf[start..start + self.width], &self.density[start..start + self.width]);
-        let (column, within) = find(cdf, density, u[0]);
-        ([place(column, within, self.width), y], density[column])
+        let end = start + self.width;
+        let (column, within) = find(&self.cdf[start..end], &self.guide[start..end], u[0]);
+        ([place(column, within, self.width), y], self.density[start + column])
     }
 
     /// Density at (x, y) per unit of area; zero outside the unit square.
@@ -132,16 +140,36 @@ impl Distribution2D {
     }
 }
 
-/// The cell of positive density that holds `u`, given the cumulated probabilities at the cells' upper ends, and the place of u
-/// in it, [0, 1).
+/// For each k the first of n cells whose upper end lies above k / n: where a search for a number in [k / n, (k + 1) / n) may
+/// begin. Source: Chen & Asau 1974, "On generating random variates from an empirical distribution".
+fn guide(ends: &[f32]) -> Vec<u16> {
+    let n = ends.len();
+    let mut cell = 0;
+    let first = |k: usize| {
+        // A hair less, for a number below k / n that rounding lifts into k.
+        let u = k as f32 / n as f32 * (1.0 - 4.0 * f32::EPSILON);
+        while cell + 1 < n && ends[cell] <= u {
+            cell += 1;
+        }
+        cell as u16
+    };
+    (0..n).map(first).collect()
+}
+
+/// The cell of positive density that holds `u`, given the cumulated probabilities at the cells' upper ends and their [`guide`],
+/// and the place of u in it, [0, 1).
 #[inline]
-fn find(ends: &[f32], density: &[f32], u: f32) -> (usize, f32) {
+fn find(ends: &[f32], guide: &[u16], u: f32) -> (usize, f32) {
     // The first end above u; cells of no width are passed over. The last end, 1, is left out, for a u that rounding made 1.
-    let mut cell = ends[..ends.len() - 1].partition_point(|&end| end <= u);
-    while density[cell] == 0.0 && cell > 0 {
+    let mut cell = usize::from(guide[cell_of(u, guide.len())]);
+    while cell + 1 < ends.len() && ends[cell] <= u {
+        cell += 1;
+    }
+    let below = |cell: usize| if cell == 0 { 0.0 } else { ends[cell - 1] };
+    while cell > 0 && ends[cell] <= below(cell) {
         cell -= 1;
     }
-    let lo = if cell == 0 { 0.0 } else { ends[cell - 1] };
+    let lo = below(cell);
     (cell, ((u - lo) / (ends[cell] - lo).max(f32::MIN_POSITIVE)).clamp(0.0, ONE_BELOW))
 }
 
