@@ -48,12 +48,6 @@ impl Interaction {
         }
     }
 
-    /// A point of a level patch on which the texture lies with these tangents, metres.
-    pub fn level(p: Vec3, uv: Vec2, dp_du: Vec3, dp_dv: Vec3, footprint: f32) -> Self {
-        let edges = [(dp_du, Vec2::X), (dp_dv, Vec2::Y)];
-        Self { p, ng: Vec3::Z, ns: Vec3::Z, uv, edges, part: 0, triangle: 0, footprint }
-    }
-
     /// ∂p/∂u and ∂p/∂v, metres; zero where the texture coordinates are degenerate.
     #[inline]
     pub fn tangents(&self) -> (Vec3, Vec3) {

@@ -6,7 +6,7 @@
 
 use crate::bsdf::Bsdf;
 use crate::bsdf::microfacet::Ggx;
-use crate::geometry::{Interaction, Mesh};
+use crate::geometry::{Hit, Interaction, Mesh};
 use crate::material::{Material, Varies};
 use crate::math::{Spectrum, Vec2, Vec3, vec2};
 
@@ -60,12 +60,13 @@ impl Look {
         };
         let (width, height) = ((w >> level.min(31)).max(1), (h >> level.min(31)).max(1));
         let footprint = metres * 2.0_f32.powi(level as i32) / w.max(h) as f32;
+        let flat = patch(Vec3::ZERO, metres);
         let mut kind = None;
         let mut texels = Vec::with_capacity((width * height) as usize);
         for y in 0..height {
             for x in 0..width {
                 let uv = vec2((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
-                let (of, texel) = at(material, Vec3::ZERO, uv, metres, footprint);
+                let (of, texel) = at(material, &flat, uv, footprint);
                 kind = Some(kind.map_or(of, |known: Kind| known.and(of)));
                 texels.push(texel);
             }
@@ -93,13 +94,23 @@ impl Kind {
 
 /// Reflectances of a material that varies over the world, at each corner of a mesh.
 pub(super) fn colors(material: &Material, mesh: &Mesh) -> Vec<Spectrum> {
-    let corner = |p: &Vec3| at(material, *p, Vec2::ZERO, 1.0, 0.0).1.reflect[0];
+    let corner = |p: &Vec3| at(material, &patch(*p, 1.0), Vec2::ZERO, 0.0).1.reflect[0];
     mesh.positions.iter().map(corner).collect()
 }
 
-/// The scattering at one point of a flat patch on which an image is `metres` high.
-fn at(material: &Material, p: Vec3, uv: Vec2, metres: f32, footprint: f32) -> (Kind, Texel) {
-    let point = Interaction::level(p, uv, Vec3::X * metres, Vec3::NEG_Y * metres, footprint);
+/// A triangle at `p` whose barycentrics are the texture coordinates, on which an image is `metres` high.
+fn patch(p: Vec3, metres: f32) -> Mesh {
+    Mesh {
+        positions: vec![p, p - Vec3::Y * metres, p + Vec3::X * metres],
+        normals: vec![Vec3::Z; 3],
+        uvs: vec![Vec2::ZERO, Vec2::Y, Vec2::X],
+        triangles: vec![[0, 1, 2]],
+    }
+}
+
+/// The scattering at one point of a patch, seen from above.
+fn at(material: &Material, patch: &Mesh, uv: Vec2, footprint: f32) -> (Kind, Texel) {
+    let point = Interaction::new(patch, &Hit { part: 0, triangle: 0, u: uv.y, v: uv.x, t: 0.0 }, footprint);
     let (bsdf, frame) = material.scatter(&point, Vec3::Z);
     let opaque =
         |albedo: Spectrum, film: f32| Texel { reflect: [albedo; 2], transmit: Spectrum::ZERO, film, normal: frame.z };
