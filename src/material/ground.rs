@@ -8,6 +8,7 @@ use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec2, Vec3, vec2};
 use crate::optics::soil::{LOESS, at as four_bands, wet};
 use crate::soil::Skin;
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Slope angle of the facets below a millimetre, radians. With explicit relief down to 1 mm Irons et al. 1992 leave 0.26–0.52.
@@ -54,7 +55,7 @@ impl GroundSkin {
         Self {
             width: skin.width,
             height: skin.height,
-            texels: (0..skin.width * skin.height).map(texel).collect(),
+            texels: (0..skin.width * skin.height).into_par_iter().map(texel).collect(),
             decode: std::array::from_fn(|i| (i as f32 / 255.0).powi(2)),
         }
     }

@@ -1,7 +1,7 @@
 //! Exact labels: one ray through each pixel's centre, through the same lens, against the same geometry and alpha masks as
 //! the colour pass. No film, no sampler, no lights, no materials: a label cannot be filtered, noisy or lit.
 
-use crate::geometry::{Intersect, Ray, Window};
+use crate::geometry::{Intersect, PACKET, Ray, Window};
 use crate::scene::tag::Tag;
 use crate::sensor::Camera;
 use rayon::prelude::*;
@@ -22,15 +22,20 @@ pub struct LabelMap {
 
 /// Labels a window. `tags` holds one row a part.
 pub fn label(geometry: &dyn Intersect, tags: &[Tag], camera: &Camera, window: Window) -> LabelMap {
-    let parts: Vec<u32> = (0..window.width() * window.height())
-        .into_par_iter()
-        .with_min_len(256)
-        .map(|i| {
-            let (x, y) = (window.x0 + i % window.width(), window.y0 + i / window.width());
-            let (origin, direction) = camera.centre_ray(x, y);
-            geometry.closest(&Ray::new(origin, direction)).map_or(NONE, |hit| hit.part)
-        })
-        .collect();
+    let mut parts = vec![NONE; (window.width() * window.height()) as usize];
+    parts.par_chunks_mut(window.width() as usize).zip(window.y0..window.y1).for_each(|(row, y)| {
+        // Neighbours' rays go nearly the same way and are asked together.
+        for (parts, x0) in row.chunks_mut(PACKET).zip((window.x0..).step_by(PACKET)) {
+            let mut rays = [None; PACKET];
+            for (x, ray) in (x0..).zip(&mut rays[..parts.len()]) {
+                let (origin, direction) = camera.centre_ray(x, y);
+                *ray = Some(Ray::new(origin, direction));
+            }
+            for (part, hit) in parts.iter_mut().zip(geometry.closest_packet(&rays)) {
+                *part = hit.map_or(NONE, |hit| hit.part);
+            }
+        }
+    });
     let tags = parts.iter().map(|p| tags.get(*p as usize).copied().unwrap_or_default()).collect();
     LabelMap { window, parts, tags }
 }

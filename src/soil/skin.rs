@@ -4,6 +4,7 @@ use super::crumb::Raster;
 use super::ground::blur;
 use super::{Ground, LayerMaps, MAX_LAYERS};
 use crate::math::{Vec2, vec2};
+use rayon::prelude::*;
 
 /// A texture over [`Ground::area`], row 0 in the south, so that [`Ground::uv`] reads it with v growing down its rows.
 /// All vectors hold `width · height` texels.
@@ -54,7 +55,7 @@ const PIT_WETTING: f32 = 0.2;
 
 impl Ground {
     /// Bakes the texture with texels of at most `texel_m`; `maps` are those the ground was made with.
-    pub fn skin<L: LayerMaps>(&self, maps: &[L], texel_m: f32) -> Skin {
+    pub fn skin<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32) -> Skin {
         let area = self.area();
         // Texels that split the grid's steps evenly: the area then holds whole texels, and each knows its cell.
         let split = ((self.step / texel_m.max(2e-5) - 1e-3).ceil() as usize).max(1);
@@ -67,17 +68,22 @@ impl Ground {
             height,
             origin: area.corners()[0],
             texel_m: texel,
-            albedo: Vec::with_capacity(n),
-            weights: Vec::with_capacity(n),
-            moisture: Vec::with_capacity(n),
-            slope: Vec::with_capacity(n),
-            ao: Vec::with_capacity(n),
+            albedo: vec![[0; 3]; n],
+            weights: vec![[0; MAX_LAYERS]; n],
+            moisture: Vec::new(),
+            slope: Vec::new(),
+            ao: Vec::new(),
         };
         let crumbs = self.crumbs(raster);
         let mut detail = crumbs.height;
-        for j in 0..height {
+        let rows = (
+            detail.par_chunks_mut(width),
+            skin.albedo.par_chunks_mut(width),
+            skin.weights.par_chunks_mut(width),
+            crumbs.tint.par_chunks(width),
+        );
+        rows.into_par_iter().enumerate().for_each(|(j, (detail, albedo, weights, tints))| {
             for i in 0..width {
-                let k = j * width + i;
                 let p = raster.origin + vec2(i as f32, j as f32) * texel;
                 let cell = self.texel_cell(i, j, split);
                 let mut noise = [0.0; MAX_LAYERS];
@@ -85,17 +91,17 @@ impl Ground {
                     *n = cell.mix(|v| self.fine.noise[v][i]);
                 }
                 let heights = self.blend.heights(maps, p);
-                let weights = self.blend.weights(noise, heights);
-                detail[k] += self.blend.displacement(weights, heights);
-                let tint = match crumbs.tint[k] {
+                let share = self.blend.weights(noise, heights);
+                detail[i] += self.blend.displacement(share, heights);
+                let tint = match tints[i] {
                     0 => 1.0,
                     t => f32::from(t) / 128.0,
                 };
                 let tone = tint * cell.mix(|v| self.fine.tone[v]);
-                skin.albedo.push(Skin::encode(self.blend.albedo(maps, weights, p).map(|a| a * tone)));
-                skin.weights.push(weights.map(|w| (w * 255.0 + 0.5) as u8));
+                albedo[i] = Skin::encode(self.blend.albedo(maps, share, p).map(|a| a * tone));
+                weights[i] = share.map(|w| (w * 255.0 + 0.5) as u8);
             }
-        }
+        });
         self.bake_slopes(raster, split, &detail, &mut skin);
         self.bake_pits(raster, split, detail, &crumbs.tint, &mut skin);
         skin
@@ -104,45 +110,43 @@ impl Ground {
     /// Slopes of the detail, less those that the mesh's normals already have.
     fn bake_slopes(&self, raster: Raster, split: usize, detail: &[f32], skin: &mut Skin) {
         let coarse = differences(&self.fine.detail, self.raster());
-        for (k, fine) in differences(detail, raster).into_iter().enumerate() {
+        let slope = |(k, fine): (usize, Vec2)| {
             let cell = self.texel_cell(k % raster.width, k / raster.width, split);
             let mesh = vec2(cell.mix(|v| coarse[v].x), cell.mix(|v| coarse[v].y));
             let rest = (fine - mesh).clamp_length_max(2.0) * Skin::SLOPE_STEPS;
-            skin.slope.push([rest.x as i8, rest.y as i8]);
-        }
+            [rest.x as i8, rest.y as i8]
+        };
+        skin.slope = differences(detail, raster).into_par_iter().enumerate().map(slope).collect();
     }
 
     /// What lies in pits of the detail sees less of the sky and dries later; crumbs dry first.
     fn bake_pits(&self, raster: Raster, split: usize, mut detail: Vec<f32>, crumbs: &[u8], skin: &mut Skin) {
         let cell = |k: usize| self.texel_cell(k % raster.width, k / raster.width, split);
-        for (k, d) in detail.iter_mut().enumerate() {
-            *d -= cell(k).mix(|v| self.fine.detail[v]);
-        }
+        detail.par_iter_mut().enumerate().for_each(|(k, d)| *d -= cell(k).mix(|v| self.fine.detail[v]));
         let around = blur(&detail, raster.width, (0.0008 / raster.step).ceil() as usize);
-        for (k, (d, around)) in detail.iter().zip(&around).enumerate() {
-            let pit = (around - d).max(0.0) / HALF_SKY_M;
-            skin.ao.push((255.0 / (1.0 + pit) + 0.5) as u8);
+        let pit = |k: usize| (around[k] - detail[k]).max(0.0) / HALF_SKY_M;
+        let open = |k: usize| (255.0 / (1.0 + pit(k)) + 0.5) as u8;
+        let moisture = |k: usize| {
             let drier = if crumbs[k] > 0 { CRUMB_DRYING } else { 0.0 };
-            let wet = cell(k).mix(|v| self.fine.moisture[v]) - drier + PIT_WETTING * pit.min(1.0);
-            skin.moisture.push((wet.clamp(0.0, 1.0) * 255.0 + 0.5) as u8);
-        }
+            let wet = cell(k).mix(|v| self.fine.moisture[v]) - drier + PIT_WETTING * pit(k).min(1.0);
+            (wet.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
+        };
+        (skin.ao, skin.moisture) = (0..detail.len()).into_par_iter().map(|k| (open(k), moisture(k))).unzip();
     }
 }
 
 fn differences(values: &[f32], raster: Raster) -> Vec<Vec2> {
     let (w, h) = (raster.width, raster.height);
-    let mut out = Vec::with_capacity(values.len());
-    for j in 0..h {
+    let difference = |k: usize| {
+        let (i, j) = (k % w, k / w);
         let (south, north) = (j.saturating_sub(1), (j + 1).min(h - 1));
-        for i in 0..w {
-            let (west, east) = (i.saturating_sub(1), (i + 1).min(w - 1));
-            let v = |i: usize, j: usize| values[j * w + i];
-            let d = vec2(
-                (v(east, j) - v(west, j)) / (east - west).max(1) as f32,
-                (v(i, north) - v(i, south)) / (north - south).max(1) as f32,
-            );
-            out.push(d / raster.step);
-        }
-    }
-    out
+        let (west, east) = (i.saturating_sub(1), (i + 1).min(w - 1));
+        let v = |i: usize, j: usize| values[j * w + i];
+        let d = vec2(
+            (v(east, j) - v(west, j)) / (east - west).max(1) as f32,
+            (v(i, north) - v(i, south)) / (north - south).max(1) as f32,
+        );
+        d / raster.step
+    };
+    (0..values.len()).into_par_iter().map(difference).collect()
 }
