@@ -27,6 +27,14 @@ pub enum Error {
         /// What is wrong, and what would be right.
         what: String,
     },
+    /// A file that is not the model it should be.
+    #[error("{path}: {what}", path = path.display())]
+    Model {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and what would be right.
+        what: String,
+    },
     /// Values that cannot make a scene, found while it is built.
     #[error("{0}")]
     Scene(String),
@@ -51,7 +59,7 @@ impl Error {
     /// The process exit code: 2 where the user's input must change, 75 after a clean stop, 1 for the rest.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Page(_) | Self::Image { .. } | Self::Scene(_) => 2,
+            Self::Page(_) | Self::Image { .. } | Self::Model { .. } | Self::Scene(_) => 2,
             Self::Interrupted => 75,
             Self::Io { source, .. } if source.kind() == std::io::ErrorKind::NotFound => 2,
             Self::Io { .. } | Self::Embree(_) | Self::Denoise(_) => 1,

@@ -11,7 +11,7 @@
 //! | 8 | [`integrator`] |
 //! | 7 | [`scene`] |
 //! | 6 | [`material`], [`scatter`] |
-//! | 5 | [`bsdf`], [`light`], [`sensor`], [`plant`], [`soil`], [`accel`] |
+//! | 5 | [`bsdf`], [`light`], [`sensor`], [`plant`], [`soil`], [`accel`], [`model`] |
 //! | 4 | [`texture`] |
 //! | 3 | [`optics`], [`film`], [`page`], [`cli`] |
 //! | 2 | [`sampling`], [`geometry`] |
@@ -29,6 +29,7 @@ pub mod integrator;
 pub mod light;
 pub mod material;
 pub mod math;
+pub mod model;
 pub mod optics;
 pub mod output;
 pub mod page;

@@ -25,6 +25,8 @@ const NEVER: &[(&str, &str)] = &[
     ("light", "material"),
     // Meshes and their masks; the rest holds a `&dyn Intersect`.
     ("accel", "material light scene sensor"),
+    // Files → meshes and what they look like; what light does there is the materials' business.
+    ("model", "material bsdf light scene optics accel integrator"),
     // A label cannot be filtered, noisy or lit.
     ("render/label.rs", "film sampling bsdf material light integrator"),
     ("integrator", "accel film output plant soil scatter texture"),
@@ -35,12 +37,14 @@ const NEVER: &[(&str, &str)] = &[
 
 /// Foreign crates and the only files (or folders, or rooms) that may name them. `*` is anywhere.
 const DOORS: &[(&str, &str)] = &[
+    // Bytes written as text inside a model's document.
+    ("base64", "model/uri.rs"),
     ("clap", "bin/"),
     ("ctrlc", "bin/"),
     ("embree3", "accel/embree.rs"),
     ("exr", "output/exr.rs"),
     // Vectors are re-exported by `math`; two files sum in double precision.
-    ("glam", "math/ film.rs accel/brute.rs"),
+    ("glam", "math/ film/ accel/brute.rs"),
     ("humantime", "bin/"),
     ("hw_skymodel", "light/hosek.rs"),
     ("image", "texture/"),
@@ -55,12 +59,15 @@ const DOORS: &[(&str, &str)] = &[
     // One reader for all pages; faults inside a value are found where they lie.
     ("ron", "page.rs sampling/fault.rs"),
     ("serde", "*"),
+    // glTF documents, read and written.
+    ("serde_json", "model/document.rs model/gltf.rs output/gltf/"),
     ("sha2", "scene/library.rs"),
     ("sobol_burley", "sampling/sampler.rs"),
     ("solar_positioning", "light/position.rs"),
     // Files appear whole or not at all: images of fields, and drawn textures below them. The denoiser's go through a folder.
     ("tempfile", "output/mod.rs output/denoise.rs texture/draw/write.rs"),
     ("thiserror", "error.rs"),
+    ("tobj", "model/obj.rs"),
 ];
 
 /// A source file without its comments, strings and tests.

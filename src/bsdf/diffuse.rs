@@ -28,6 +28,11 @@ impl OrenNayar {
         self.albedo
     }
 
+    /// A and B: `f = ρ/π (A + B max(0, cos Δφ) sin α tan β)`; 1 and 0 for Lambert.
+    pub fn shape(&self) -> [f32; 2] {
+        [self.a, self.b]
+    }
+
     /// f · cos θi for directions that both lie above.
     #[inline]
     pub(super) fn upper(&self, wo: Vec3, wi: Vec3) -> Spectrum {

@@ -45,6 +45,16 @@ impl Side {
         self
     }
 
+    /// The coat; `None` for a bare side.
+    pub fn coat(&self) -> Option<Ggx> {
+        self.coat
+    }
+
+    /// What the tissue under the coat reflects, R − E.
+    pub fn diffuse(&self) -> Spectrum {
+        self.diffuse
+    }
+
     /// c(θ).
     #[inline]
     fn through(&self, cos: f32) -> f32 {
@@ -82,6 +92,16 @@ impl Leaf {
     pub fn reflectance(&self, cos: f32) -> Spectrum {
         let side = if cos > 0.0 { &self.upper } else { &self.lower };
         side.diffuse + Spectrum::splat(side.albedo)
+    }
+
+    /// The upper side and the lower.
+    pub fn both_sides(&self) -> [&Side; 2] {
+        [&self.upper, &self.lower]
+    }
+
+    /// Transmittance at normal incidence.
+    pub fn transmittance(&self) -> Spectrum {
+        self.transmittance
     }
 
     /// The side that faces `w`, and the other.

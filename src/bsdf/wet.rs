@@ -38,6 +38,21 @@ impl Wet {
         self.base.albedo() + Spectrum::splat(self.film * F0)
     }
 
+    /// The soil below the film.
+    pub fn base(&self) -> &OrenNayar {
+        &self.base
+    }
+
+    /// The film's surface.
+    pub fn coat(&self) -> Ggx {
+        self.coat
+    }
+
+    /// Share that the film covers, 0–1.
+    pub fn film(&self) -> f32 {
+        self.film
+    }
+
     /// What the film lets through where it reflects `fresnel`, mixed with the bare part.
     #[inline]
     fn through(&self, fresnel: f32) -> f32 {

@@ -57,8 +57,7 @@ impl Footprint {
     }
 }
 
-/// Quantiles of the sum of a uniform number in [−½, ½) and a normal one of standard deviation `sigma`, cut where less than
-/// 10⁻⁶ lies beyond: the density Φ((x + ½)/σ) − Φ((x − ½)/σ), summed in steps.
+/// Quantiles of the sum of a uniform number in [−½, ½) and a normal one of standard deviation `sigma`: the density Φ((x + ½)/σ) − Φ((x − ½)/σ), summed in steps.
 fn blurred_square(sigma: f64) -> Box<[f32]> {
     const STEPS: usize = 1 << 14;
     let end = 0.5 + 5.0 * sigma;
@@ -91,6 +90,15 @@ fn blurred_square(sigma: f64) -> Box<[f32]> {
         let within = if i < STEPS { (goal - mass) / density[i].max(f64::MIN_POSITIVE) } else { 0.0 };
         quantiles.push(((i as f64 + within.clamp(0.0, 1.0)) * step - end) as f32);
     }
+    // The outermost cells reach as far as keeps their means: to the ends of the tails they would be far too wide.
+    let (inner, mut tail, mut weight) = (f64::from(quantiles[1]), 0.0, 0.0);
+    for (i, density) in density.iter().enumerate().take_while(|(i, _)| at(*i) < inner) {
+        tail += density * at(i);
+        weight += density;
+    }
+    let outer = (2.0 * tail / weight - inner) as f32;
+    quantiles[0] = outer;
+    quantiles[CELLS] = -outer;
     quantiles.into()
 }
 

@@ -42,7 +42,7 @@ impl Effort {
     fn worth(&self, radiance: Spectrum, found: Spectrum) -> f32 {
         let beside = found + self.usual * DARK;
         // A scene whose lights shine elsewhere has no usual radiance; then everything is worth following.
-        (radiance.0 / beside.0.max(glam::Vec4::splat(f32::MIN_POSITIVE))).max_element()
+        (radiance / (beside + Spectrum::splat(f32::MIN_POSITIVE))).max()
     }
 
     /// Chance of asking a light that can give the first surface an irradiance of about `irradiance` (mean of the bands).

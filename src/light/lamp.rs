@@ -44,8 +44,8 @@ pub struct Lamp {
     area: f32,
     /// Radius of the sphere around it.
     reach: f32,
-    /// Form factor at the world's origin, level: an integral that integrators ask for at every sample.
-    level: f32,
+    /// Irradiance per radiance of a horizontal plane at the world's origin: asked often, thousands of terms long.
+    below: f32,
 }
 
 impl Lamp {
@@ -55,8 +55,33 @@ impl Lamp {
             Outline::Rectangle(half) => (4.0 * half.x * half.y, half.length()),
             Outline::Disc(radius) => (PI * radius * radius, radius),
         };
-        let lamp = Self { outline, centre, frame, radiance, area, reach, level: 0.0 };
-        Self { level: lamp.form_factor(Vec3::ZERO, Vec3::Z), ..lamp }
+        let lamp = Self { outline, centre, frame, radiance, area, reach, below: 0.0 };
+        Self { below: lamp.form_factor(Vec3::ZERO, Vec3::Z), ..lamp }
+    }
+
+    /// Its outline.
+    pub fn outline(&self) -> Outline {
+        self.outline
+    }
+
+    /// Its centre, metres.
+    pub fn centre(&self) -> Vec3 {
+        self.centre
+    }
+
+    /// Its frame: it shines along z; a rectangle's width lies along x.
+    pub fn frame(&self) -> Frame {
+        self.frame
+    }
+
+    /// Its radiance, W·m⁻²·sr⁻¹·nm⁻¹ per band.
+    pub fn radiance(&self) -> Spectrum {
+        self.radiance
+    }
+
+    /// Its area, m².
+    pub fn area(&self) -> f32 {
+        self.area
     }
 
     /// A point of the area.
@@ -161,7 +186,7 @@ impl Emitter for Lamp {
     }
 
     fn horizontal_irradiance(&self) -> Spectrum {
-        self.radiance * self.level
+        self.radiance * self.below
     }
 }
 

@@ -1,6 +1,8 @@
 //! The ground and its clods: the baked skin of the soil, made moist, in four bands.
 
+use super::Varies;
 use super::shading::frame;
+use super::swatch::{Swatch, Tone};
 use crate::bsdf::{Bsdf, OrenNayar, Wet};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec2, Vec3, vec2};
@@ -98,6 +100,31 @@ impl Ground {
     /// Clods of it, brighter by `tint`: they have relief of their own.
     pub fn clods(skin: Arc<GroundSkin>, tint: f32) -> Self {
         Self { skin, tint, relief: false }
+    }
+
+    pub(super) fn swatch(&self) -> Swatch<'_> {
+        let skin = &self.skin;
+        let decode = |t: &Texel| Spectrum::from(t.reflectance.map(|r| skin.decode[r as usize]));
+        let tone = |reflectance| Tone { reflectance, transmittance: Spectrum::ZERO };
+        let texel = move |x: u32, y: u32| tone(decode(&skin.texels[y as usize * skin.width + x as usize]));
+        // One texel in a thousand or so tells the mean.
+        let some = skin.texels.iter().step_by(997);
+        let (sum, count) = some.fold((Spectrum::ZERO, 0.0), |(s, n), t| (s + decode(t), n + 1.0));
+        let mean = tone(sum / count * self.tint);
+        let key = [Arc::as_ptr(skin) as usize, 0];
+        let size = (skin.width as u32, skin.height as u32);
+        // The skin's rows run north, the picture's down: up the picture is south.
+        let slope = move |x: u32, y: u32| {
+            let [east, north] = skin.texels[y as usize * skin.width + x as usize].slope.map(f32::from);
+            vec2(east, -north) / Skin::SLOPE_STEPS
+        };
+        Swatch::pictured(key, size, texel, mean, 1.0)
+            .tinted(Vec3::splat(self.tint), Vec3::ONE)
+            .raised(slope, f32::from(u8::from(self.relief)))
+    }
+
+    pub(super) fn varies(&self) -> Varies {
+        Varies::Raster(self.skin.width as u32, self.skin.height as u32)
     }
 
     #[inline]

@@ -1,9 +1,11 @@
 //! Blades, petioles, stems: pigments and a picture → coat, reflection of either side, transmission.
 
+use super::Varies;
 use super::shading::{bump, grained_frame};
+use super::swatch::{Swatch, Tone, centre};
 use crate::bsdf::{self, Bsdf, Side};
 use crate::geometry::Interaction;
-use crate::math::{Frame, Spectrum, Vec3};
+use crate::math::{Frame, Spectrum, Vec2, Vec3};
 use crate::optics::{LeafOptics, Pigments};
 use crate::sampling::vary::{Bound, Fraction, NonNegative, Num, Pick};
 use crate::texture::{Maps, Texture};
@@ -115,6 +117,37 @@ impl LeafMaterial {
     pub fn with_chlorophyll(&self, base: f32, factor: f32) -> Self {
         let rgb = |c: f32| self.optics.with_chlorophyll(c).reflectance.0.truncate().max(Vec3::splat(1e-3));
         Self { tint: rgb(base * factor) / rgb(base), ..self.clone() }
+    }
+
+    pub(super) fn swatch(&self) -> Swatch<'_> {
+        let read = |color: Vec3| {
+            let leaf = self.optics.at(color.to_array());
+            Tone { reflectance: leaf.reflectance, transmittance: leaf.transmittance }
+        };
+        let roughness = self.upper.coat().map_or(1.0, |coat| (coat.alpha[0] * coat.alpha[1]).sqrt());
+        let Some(picture) = &self.picture else {
+            let plain = self.optics.plain().reflectance.0.truncate();
+            return Swatch::plain(read(plain * self.tint), roughness);
+        };
+        let color = |[r, g, b, _]: [f32; 4]| Vec3::new(r, g, b);
+        let texel = move |x, y| read(color(picture.color.texel(x, y)));
+        // The picture's coarsest level is its mean over what is opaque.
+        let middle = color(picture.color.sample(Vec2::splat(0.5), 32.0));
+        let (bare, tinted) = (read(middle), read(middle * self.tint));
+        let passed = |tone: Tone| tone.transmittance.0.truncate().max(Vec3::splat(1e-4));
+        let key = [Arc::as_ptr(picture) as usize, Arc::as_ptr(&self.optics) as usize];
+        let size = (picture.color.width(), picture.color.height());
+        let slope = move |x, y| picture.maps.normal.sample(centre(size, x, y), 0.0);
+        Swatch::pictured(key, size, texel, tinted, roughness)
+            .tinted(self.tint, passed(tinted) / passed(bare))
+            .raised(slope, self.relief)
+    }
+
+    pub(super) fn varies(&self) -> Varies {
+        match &self.picture {
+            Some(picture) => Varies::Picture(picture.color.width(), picture.color.height()),
+            None => Varies::Nowhere,
+        }
     }
 
     pub(super) fn scatter(&self, at: &Interaction, wo: Vec3) -> (Bsdf, Frame) {

@@ -1,6 +1,8 @@
 //! Stone, wood, straw: one colour, rough, opaque.
 
+use super::Varies;
 use super::shading::frame;
+use super::swatch::{Swatch, Tone};
 use crate::bsdf::{Bsdf, OrenNayar};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec3};
@@ -32,6 +34,15 @@ impl Solid {
     #[must_use]
     pub fn with_grain(self, seed: u32, size: f32, depth: f32) -> Self {
         Self { grain: Some(Grain { noise: Perlin::new(seed), size, depth }), ..self }
+    }
+
+    /// Without the grain.
+    pub(super) fn swatch(&self) -> Swatch<'_> {
+        Swatch::plain(Tone { reflectance: self.albedo, transmittance: Spectrum::ZERO }, 1.0)
+    }
+
+    pub(super) fn varies(&self) -> Varies {
+        if self.grain.is_some() { Varies::Place } else { Varies::Nowhere }
     }
 
     pub(super) fn scatter(&self, at: &Interaction, wo: Vec3) -> (Bsdf, Frame) {

@@ -16,6 +16,12 @@ fn channel(name: &str, samples: FlatSamples) -> AnyChannel<FlatSamples> {
     AnyChannel { name: name.into(), sample_data: samples, quantize_linearly: false, sampling: Vec2(1, 1) }
 }
 
+/// Encodes numbers as they are: one vector a channel, row by row from the top.
+pub(super) fn encode_map(width: u32, height: u32, channels: &[(&str, Vec<f32>)]) -> Result<Vec<u8>> {
+    let of = |(name, values): &(&str, Vec<f32>)| channel(name, FlatSamples::F32(values.clone()));
+    write(Window::full(width, height), channels.iter().map(of).collect(), "")
+}
+
 /// Encodes a film and its labels, which must share a window; `with_spp` adds each pixel's number of samples.
 pub(super) fn encode(film: &Film, labels: &LabelMap, with_spp: bool, text: &str) -> Result<Vec<u8>> {
     let mut channels = SmallVec::new();

@@ -3,6 +3,8 @@
 
 mod denoise;
 mod exr;
+pub mod gltf;
+pub mod mitsuba;
 mod overlay;
 mod png;
 
@@ -40,6 +42,15 @@ impl std::fmt::Display for Spp {
             }
         }
     }
+}
+
+/// A field written as a scene of another program.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Export {
+    /// The files, the one that names the others last.
+    pub paths: Vec<PathBuf>,
+    /// What the other program cannot hold, one sentence each.
+    pub warnings: Vec<String>,
 }
 
 /// Where an image came from: what its files say about themselves.

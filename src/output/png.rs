@@ -1,4 +1,4 @@
-//! PNG in the four shapes that labels and pictures need, through the `png` crate: indexed and 16-bit images keep their bits.
+//! PNG in the shapes that labels and pictures need, through the `png` crate: indexed and 16-bit images keep their bits.
 
 use crate::{Error, Result};
 use png::{BitDepth, ColorType};
@@ -8,6 +8,10 @@ use std::path::Path;
 pub enum Picture<'a> {
     /// 8-bit sRGB.
     Rgb(&'a [[u8; 3]]),
+    /// 8-bit numbers, three a pixel: no colours.
+    Linear(&'a [[u8; 3]]),
+    /// 8-bit sRGB with opacity.
+    Rgba(&'a [[u8; 4]]),
     /// 8-bit gray.
     Gray(&'a [u8]),
     /// 16-bit gray: numbers, not brightness.
@@ -27,6 +31,15 @@ pub(super) fn encode(width: u32, height: u32, picture: &Picture<'_>, text: &str)
     let data = match picture {
         Picture::Rgb(pixels) => {
             encoder.set_color(ColorType::Rgb);
+            encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+            pixels.as_flattened().to_vec()
+        }
+        Picture::Linear(pixels) => {
+            encoder.set_color(ColorType::Rgb);
+            pixels.as_flattened().to_vec()
+        }
+        Picture::Rgba(pixels) => {
+            encoder.set_color(ColorType::Rgba);
             encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
             pixels.as_flattened().to_vec()
         }

@@ -21,11 +21,11 @@ pub fn explain(
     let tag = label(world.geometry, &scene.tags(), &scene.camera, window).tags[0];
     let mut text = format!("pixel {x},{y}\n  label: {} plant {} leaf {}", tag.class.name(), tag.plant, tag.leaf);
     if let Some(plant) = plants.iter().find(|p| p.number == tag.plant) {
-        let _ = write!(
-            text,
-            "\n  plant: {} ({}), BBCH {}, {:.0} days",
-            plant.species, plant.eppo, plant.bbch, plant.age_days
-        );
+        let _ = write!(text, "\n  plant: {}", plant.species);
+        // A model from disk has neither code nor age.
+        if !plant.eppo.is_empty() {
+            let _ = write!(text, " ({}), BBCH {}, {:.0} days", plant.eppo, plant.bbch, plant.age_days);
+        }
         let p = plant.position;
         let _ = write!(text, ", {} leaves, stands at {:.3}, {:.3}, {:.3} m", plant.leaves, p.x, p.y, p.z);
     }

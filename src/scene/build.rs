@@ -1,10 +1,13 @@
 //! Page + seed + index → one field.
 
+mod models;
+
 use super::desc::{FieldDesc, Growth, SpeciesDesc};
 use super::library::{Layer, Library, Species};
 use super::tag::Tag;
 use super::{Part, PlantRecord, Scene};
 use crate::film::Film;
+use crate::geometry::Mesh;
 use crate::material::{Ground as GroundMaterial, GroundSkin, Material, Solid};
 use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3, vec2};
 use crate::page::Page;
@@ -25,6 +28,12 @@ impl Field {
     /// Seed of the samples: a field of its own noise for every image.
     pub fn sample_seed(&self) -> u64 {
         mix(mix(self.seed) ^ self.index)
+    }
+
+    /// Where the field came from, one `key: value` a line: program, pages, seed, index.
+    pub fn provenance(&self) -> String {
+        let Self { hash, seed, index, .. } = self;
+        format!("program: furrow {}\nscene: sha256 {hash}\nseed: {seed}\nindex: {index}", env!("CARGO_PKG_VERSION"))
     }
 
     /// Takes the photograph of a film of this field.
@@ -112,7 +121,7 @@ struct Seedling {
 /// The ground while it is being covered.
 struct Earth {
     ground: Ground,
-    skin: Arc<GroundSkin>,
+    maps: Vec<Layer>,
     pile: Pile,
     stones: Vec<Debris>,
 }
@@ -205,23 +214,37 @@ impl<'a> Builder<'a> {
         self.scene.materials.len() as u32 - 1
     }
 
-    fn part(&mut self, mesh: crate::geometry::Mesh, material: u32) {
+    fn part(&mut self, mesh: Mesh, material: u32) {
         self.scene.parts.push(Part { mesh, mask: None, material, tag: Tag::default() });
     }
 
     fn build(mut self) -> Result<Field> {
         let wanted = self.desc.soil.is_some() || !self.desc.crops.is_empty() || !self.desc.weeds.is_empty();
         let view = if wanted { self.view()? } else { Rect::new(-0.5, -0.5, 0.5, 0.5) };
-        let mut earth = match &self.desc.soil {
-            Some(soil) => Some(self.break_ground(soil, view)?),
-            None => None,
+        let (sown, shown) = (view.grown(PLANT_MARGIN), wanted.then_some(view));
+        let plants = match &self.desc.soil {
+            None => {
+                let seedlings = self.seedlings(sown, &[])?;
+                self.populate(&seedlings, None, shown)?
+            }
+            Some(soil) => {
+                let Earth { ground, maps, mut pile, mut stones } = self.break_ground(soil, view)?;
+                let texel = (0.9 * self.ground_pixel()).clamp(2e-4, 2e-3);
+                // The skin takes as long as everything else, and neither needs the other.
+                let (skin, rest) = rayon::join(
+                    || GroundSkin::bake(&ground.skin(&maps, texel)),
+                    || {
+                        let taken: Vec<Disc> = stones.iter().map(|s| (s.centre.truncate(), s.radius)).collect();
+                        let seedlings = self.seedlings(sown, &taken)?;
+                        let clods = self.cover(soil, &ground, &mut pile, &seedlings, &mut stones);
+                        Ok::<_, Error>((clods, self.populate(&seedlings, Some(&ground), shown)?))
+                    },
+                );
+                let (clods, plants) = rest?;
+                self.lay(&ground, clods, stones, &Arc::new(skin));
+                plants
+            }
         };
-        let stones: Vec<Disc> = earth.iter().flat_map(|e| &e.stones).map(|s| (s.centre.truncate(), s.radius)).collect();
-        let seedlings = self.seedlings(view.grown(PLANT_MARGIN), &stones)?;
-        if let (Some(earth), Some(soil)) = (&mut earth, &self.desc.soil) {
-            self.cover(soil, earth, &seedlings);
-        }
-        let plants = self.plant(&seedlings, earth.as_ref().map(|e| &e.ground), wanted.then_some(view))?;
         Ok(Field {
             scene: self.scene,
             plants,
@@ -252,29 +275,54 @@ impl<'a> Builder<'a> {
         };
         let ground = Ground::new(desc, &maps, &site, &self.stream(Purpose::Soil, 0))
             .map_err(|e| self.page.blame(&[Step::Field("soil")], e))?;
-        let skin = Arc::new(GroundSkin::bake(&ground.skin(&maps, (0.9 * pixel).clamp(2e-4, 2e-3))));
         let mut pile = Pile::new(&ground);
         let stones = soil::stones(&desc.stones, &ground, &mut pile, &self.stream(Purpose::Debris, 0));
-        Ok(Earth { ground, skin, pile, stones })
+        Ok(Earth { ground, maps, pile, stones })
     }
 
-    /// Clods and litter around the stems, and everything of the ground becomes parts.
-    fn cover(&mut self, desc: &SoilDesc, earth: &mut Earth, seedlings: &[Seedling]) {
+    /// Clods around the stems, and litter, which joins the `debris`.
+    fn cover(
+        &self,
+        desc: &SoilDesc,
+        ground: &Ground,
+        pile: &mut Pile,
+        seedlings: &[Seedling],
+        debris: &mut Vec<Debris>,
+    ) -> Vec<(f32, Mesh)> {
         let stems: Vec<(Vec2, f32)> = seedlings.iter().map(|s| (s.position, STEM_ROOM)).collect();
-        let clods = soil::clods(&earth.ground, &mut earth.pile, &stems);
-        let litter = soil::litter(&desc.litter, &earth.ground, &mut earth.pile, &self.stream(Purpose::Debris, 1));
-        let material = self.material(Material::Ground(GroundMaterial::new(earth.skin.clone())));
-        self.part(earth.ground.mesh(), material);
+        let clods = soil::clods(ground, pile, &stems);
+        debris.extend(soil::litter(&desc.litter, ground, pile, &self.stream(Purpose::Debris, 1)));
+        clods
+    }
+
+    /// Makes parts of everything of the ground; they come before those of the plants.
+    fn lay(&mut self, ground: &Ground, clods: Vec<(f32, Mesh)>, debris: Vec<Debris>, skin: &Arc<GroundSkin>) {
+        let plants = std::mem::take(&mut self.scene.parts);
+        let material = self.material(Material::Ground(GroundMaterial::new(skin.clone())));
+        self.part(ground.mesh(), material);
         for (tint, mesh) in clods {
-            let material = self.material(Material::Ground(GroundMaterial::clods(earth.skin.clone(), tint)));
+            let material = self.material(Material::Ground(GroundMaterial::clods(skin.clone(), tint)));
             self.part(mesh, material);
         }
-        for (i, thing) in std::mem::take(&mut earth.stones).into_iter().chain(litter).enumerate() {
+        for (i, thing) in debris.into_iter().enumerate() {
             let solid = Solid::new(thing.albedo * thing.tint, DEBRIS_SIGMA);
             let solid = solid.with_grain(mix(i as u64) as u32, thing.radius.max(1e-3) * 0.5, 0.35);
             let material = self.material(Material::Solid(solid));
             self.part(thing.mesh, material);
         }
+        self.scene.parts.extend(plants);
+    }
+
+    /// Plants and models.
+    fn populate(
+        &mut self,
+        seedlings: &[Seedling],
+        ground: Option<&Ground>,
+        shown: Option<Rect>,
+    ) -> Result<Vec<PlantRecord>> {
+        let mut plants = self.plant(seedlings, ground, shown)?;
+        plants.extend(self.models(seedlings.len(), ground)?);
+        Ok(plants)
     }
 
     /// Where plants stand, in an order that adding a species at the end does not change.

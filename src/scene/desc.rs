@@ -3,8 +3,9 @@
 use crate::film::Filter;
 use crate::light::LightDesc;
 use crate::material::LeafDesc;
+use crate::model::Up;
 use crate::plant::PlantDesc;
-use crate::sampling::vary::{Finite, Fraction, NonNegative, Num, Pick, PositiveCount, Vary};
+use crate::sampling::vary::{Finite, Fraction, NonNegative, Num, Pick, Positive, PositiveCount, Vary};
 use crate::scatter::{RowsDesc, WeedsDesc};
 use crate::scene::tag::Class;
 use crate::sensor::{CameraDesc, SensorDesc};
@@ -53,6 +54,9 @@ pub struct FieldDesc {
     /// Single plants in their places.
     #[serde(default)]
     pub plants: Vec<PlacedDesc>,
+    /// Models from disk in their places.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub models: Vec<ModelDesc>,
 }
 
 /// A good lens on small pixels: about half a pixel of blur.
@@ -117,6 +121,55 @@ pub struct PlacedDesc {
     /// Only this leaf of it, counted from 1 with the seed leaves; the whole plant unless given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub only_leaf: Option<Num<PositiveCount>>,
+}
+
+/// A model from disk in its place: a scanned plant, a stone, a tool. Each is one plant, or one thing, in the labels.
+///
+/// ```
+/// use furrow::{page::Page, scene::desc::ModelDesc};
+/// let page = Page::of(r#"Model(file: "thistle.glb", class: Weed, position_m: (0.1, Uniform(-0.1, 0.1)), scale: 0.01)"#);
+/// let model: ModelDesc = page.parse().unwrap();
+/// assert!(Page::of(r#"Model(file: "thistle.glb", clas: Weed)"#).parse::<ModelDesc>().is_err());
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename = "Model")]
+pub struct ModelDesc {
+    /// glTF (`.glb`, `.gltf`) or Wavefront OBJ with its materials; lengths in metres.
+    pub file: String,
+    /// What its pixels are. Not needed where the file carries labels, as those that `trace export` writes do.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub class: Option<Class>,
+    /// Where its origin stands, metres east and north.
+    #[serde(default = "origin")]
+    pub position_m: (Vary<Finite>, Vary<Finite>),
+    /// Height of its origin over the ground there, metres; below 0 sinks it in.
+    #[serde(default = "no_turn")]
+    pub lift_m: Vary<Finite>,
+    /// Turns it about the upright, degrees clockwise from above.
+    #[serde(default = "no_turn")]
+    pub turn_deg: Vary<Finite>,
+    /// Factor on its size: 0.001 for a file in millimetres.
+    #[serde(default = "as_it_is")]
+    pub scale: Vary<Positive>,
+    /// Which of the file's axes points up: Y, as glTF has it and most OBJ files, or Z.
+    #[serde(default)]
+    pub up: Up,
+    /// GGX roughness α, instead of the file's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub roughness: Option<Num<Fraction>>,
+    /// Share of light that passes in R, G, B, NIR, instead of the file's: (0.05, 0.12, 0.03, 0.45) for a green leaf.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub transmission: Option<Shares>,
+    /// Reflectance in near infrared. Unless given: 0.45 for what lets light through, as much as in red for what does not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nir: Option<Num<Fraction>>,
+}
+
+/// A fraction in each of R, G, B, NIR.
+pub type Shares = (Num<Fraction>, Num<Fraction>, Num<Fraction>, Num<Fraction>);
+
+fn as_it_is() -> Vary<Positive> {
+    Vary::fixed(1.0)
 }
 
 fn origin() -> (Vary<Finite>, Vary<Finite>) {

@@ -4,6 +4,7 @@ use super::desc::SpeciesDesc;
 use crate::geometry::AlphaMask;
 use crate::material::{LeafMaterial, Picture};
 use crate::math::Vec2;
+use crate::model::{Model, Up};
 use crate::page::Page;
 use crate::sampling::fault::choose;
 use crate::sampling::place::Step;
@@ -35,6 +36,7 @@ pub(super) struct Library {
     files: BTreeMap<PathBuf, [u8; 32]>,
     pictures: BTreeMap<PathBuf, Cut>,
     species: BTreeMap<PathBuf, Arc<Species>>,
+    models: BTreeMap<(PathBuf, bool), Arc<Model>>,
 }
 
 impl Library {
@@ -123,6 +125,21 @@ impl Library {
         Ok(cut)
     }
 
+    /// The model that `page` names, with the files that it needs.
+    pub(super) fn model(&mut self, page: &Page, path: &str, up: Up) -> Result<Arc<Model>> {
+        let full = page.need_file(path)?;
+        let key = (full.clone(), up == Up::Z);
+        if let Some(known) = self.models.get(&key) {
+            return Ok(known.clone());
+        }
+        let model = Arc::new(Model::load(&full, up).map_err(|e| at_its_place(page, path, e))?);
+        for file in &model.files {
+            self.note(file)?;
+        }
+        self.models.insert(key, model.clone());
+        Ok(model)
+    }
+
     /// A soil layer's textures.
     pub(super) fn layer(&mut self, page: &Page, desc: &LayerDesc) -> Result<Layer> {
         let mut need = |path: &Path| -> Result<(PathBuf, String)> {
@@ -158,7 +175,7 @@ fn read_off(albedo: &Texture) -> Height {
     Height::from_values(columns, rows, height.values().iter().map(unit).collect())
 }
 
-/// A file that cannot be read as an image is the page's fault: shown where the page names it.
+/// A file that cannot be read as an image or a model is the page's fault: shown where the page names it.
 fn at_its_place(page: &Page, literal: &str, error: Error) -> Error {
     match error {
         Error::Image { path, what } => {
@@ -168,6 +185,12 @@ fn at_its_place(page: &Page, literal: &str, error: Error) -> Error {
                 format!("`{name}` cannot be used: {what}"),
                 "name a PNG or JPEG image, or draw it: trace texture RECIPE.ron",
             )
+        }
+        Error::Model { path, what } => {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let (what, help) =
+                what.split_once("\n help: ").unwrap_or((&what, "export it again from the program that made it"));
+            page.about(literal, format!("`{name}` cannot be used: {what}"), help)
         }
         other => other,
     }

@@ -26,6 +26,11 @@ impl Class {
         }
     }
 
+    /// The class of this lower-case name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|c| c.name() == name)
+    }
+
     /// sRGB colour in label images: Di Cicco et al. 2017 paint crop green, weed red and soil black.
     pub fn color(self) -> [u8; 3] {
         match self {

@@ -106,6 +106,26 @@ impl NormalMap {
         Self { pyramid: build(plane), wrap }
     }
 
+    /// From a picture of normals in the tangent frame, read as [`ColorSpace::Linear`](super::ColorSpace): R right, G up the
+    /// image, B out of the surface, each 0..1 for −1..1. Slopes are held to 10.
+    pub fn from_picture(picture: &Texture) -> Self {
+        let (width, height) = (picture.width(), picture.height());
+        let slope = |x, y| {
+            let [r, g, b, _] = picture.texel(x, y).map(|c| 2.0 * c - 1.0);
+            let z = b.max(0.1);
+            [(-r / z).clamp(-10.0, 10.0), (-g / z).clamp(-10.0, 10.0)]
+        };
+        let values = (0..height).flat_map(|y| (0..width).map(move |x| slope(x, y))).collect();
+        Self { pyramid: build(Plane { width, height, values }), wrap: picture.wrap() }
+    }
+
+    /// Level of detail of a footprint that spans `extent` of uv; see [`Texture::lod`].
+    #[inline]
+    pub fn lod(&self, extent: f32) -> f32 {
+        let finest = &self.pyramid.levels[0];
+        (extent * finest.width.max(finest.height) as f32).max(1.0).log2()
+    }
+
     /// Slope (∂h/∂x, ∂h/∂y) at `uv`, x along +u (right), y along −v (up the image, to a leaf's tip), bilinear on the level
     /// nearest to `lod`. In the tangent frame the normal is (−∂h/∂x, −∂h/∂y, 1), normalised.
     #[inline]

@@ -21,7 +21,7 @@ use crate::error::{Error, Result};
 use crate::geometry::AlphaMask;
 use crate::math::Vec2;
 use pyramid::{Level, Plane, Pyramid, halve};
-use std::io::{BufReader, ErrorKind};
+use std::io::{BufRead, BufReader, Cursor, ErrorKind, Seek};
 use std::path::Path;
 
 /// The largest width and height of an image.
@@ -40,6 +40,13 @@ impl Texture {
     /// Reads a PNG or JPEG file. Outside uv ∈ [0, 1]² its edge is repeated; see [`Texture::wrapped`].
     pub fn load(path: &Path, space: ColorSpace) -> Result<Self> {
         let pixels = decode(path)?.into_rgba8();
+        let (width, height) = pixels.dimensions();
+        Ok(Self::from_rgba8(width, height, pixels.as_raw(), space))
+    }
+
+    /// From the bytes of a PNG or JPEG file, as models hold them inside; in words what is wrong with them.
+    pub fn decode(bytes: &[u8], space: ColorSpace) -> Result<Self, String> {
+        let pixels = read(Cursor::new(bytes)).map_err(Fault::words)?.into_rgba8();
         let (width, height) = pixels.dimensions();
         Ok(Self::from_rgba8(width, height, pixels.as_raw(), space))
     }
@@ -131,10 +138,23 @@ impl Texture {
         [self.decode[r as usize], self.decode[g as usize], self.decode[b as usize], f32::from(a) / 255.0]
     }
 
+    /// Rows of R, G, B, A bytes of the finest level, top first. Where opacity is 0 the colours are those of what lies near.
+    pub fn to_rgba8(&self) -> Vec<[u8; 4]> {
+        let finest = &self.pyramid.levels[0];
+        (0..self.height()).flat_map(|y| (0..self.width()).map(move |x| finest.get(x, y))).collect()
+    }
+
     /// Where the texture is opaque (at least half); `None` when it is opaque all over.
     pub fn alpha_mask(&self) -> Option<AlphaMask> {
+        if self.opaque { None } else { self.alpha_mask_from(128) }
+    }
+
+    /// Where its opacity is at least `least` of 255; `None` when that is so all over.
+    pub fn alpha_mask_from(&self, least: u8) -> Option<AlphaMask> {
         let finest = &self.pyramid.levels[0];
-        (!self.opaque).then(|| AlphaMask::new(self.width(), self.height(), |x, y| finest.get(x, y)[3] >= 128))
+        let there = |x, y| finest.get(x, y)[3] >= least;
+        let all = (0..self.height()).all(|y| (0..self.width()).all(|x| there(x, y)));
+        (!all).then(|| AlphaMask::new(self.width(), self.height(), there))
     }
 }
 
@@ -161,6 +181,23 @@ fn bleed(planes: &mut [Plane<4>]) {
     }
 }
 
+/// Why an image cannot be had.
+enum Fault {
+    /// The system refused.
+    Io(std::io::Error),
+    /// It is not what it should be, in words.
+    Image(String),
+}
+
+impl Fault {
+    fn words(self) -> String {
+        match self {
+            Self::Io(e) => e.to_string(),
+            Self::Image(what) => what,
+        }
+    }
+}
+
 /// Opens and decodes an image file, with errors that say what to do.
 fn decode(path: &Path) -> Result<image::DynamicImage> {
     let wrong = |what: String| Error::Image { path: path.to_path_buf(), what };
@@ -168,9 +205,18 @@ fn decode(path: &Path) -> Result<image::DynamicImage> {
         ErrorKind::NotFound => wrong("there is no such image; a path in a page counts from the page's folder".into()),
         _ => Error::io(path)(e),
     })?;
-    let mut reader = image::ImageReader::new(BufReader::new(file)).with_guessed_format().map_err(Error::io(path))?;
+    read(BufReader::new(file)).map_err(|fault| match fault {
+        Fault::Io(e) => Error::io(path)(e),
+        Fault::Image(what) => wrong(what),
+    })
+}
+
+/// Decodes an image within the limits.
+fn read(source: impl BufRead + Seek) -> Result<image::DynamicImage, Fault> {
+    let wrong = |what: &str| Fault::Image(what.to_owned());
+    let mut reader = image::ImageReader::new(source).with_guessed_format().map_err(Fault::Io)?;
     if reader.format().is_none() {
-        return Err(wrong("this is not an image; PNG and JPEG can be read".into()));
+        return Err(wrong("this is not an image; PNG and JPEG can be read"));
     }
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(MAX_SIZE);
@@ -179,11 +225,11 @@ fn decode(path: &Path) -> Result<image::DynamicImage> {
     reader.limits(limits);
     reader.decode().map_err(|e| match e {
         image::ImageError::Limits(_) => {
-            wrong(format!("the image is larger than {MAX_SIZE} × {MAX_SIZE}; scale it down"))
+            Fault::Image(format!("the image is larger than {MAX_SIZE} × {MAX_SIZE}; scale it down"))
         }
-        image::ImageError::IoError(e) if e.kind() != ErrorKind::UnexpectedEof => Error::io(path)(e),
-        image::ImageError::IoError(_) => wrong("the image ends too early; the file is damaged".into()),
-        e => wrong(format!("the image cannot be read: {e}; PNG and JPEG can")),
+        image::ImageError::IoError(e) if e.kind() != ErrorKind::UnexpectedEof => Fault::Io(e),
+        image::ImageError::IoError(_) => wrong("the image ends too early; the file is damaged"),
+        e => Fault::Image(format!("the image cannot be read: {e}; PNG and JPEG can")),
     })
 }
 

@@ -5,5 +5,6 @@ pub mod chi2;
 pub mod layers;
 pub mod pictures;
 pub mod program;
+pub mod python;
 pub mod scenes;
 pub mod stats;

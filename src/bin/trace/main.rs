@@ -1,5 +1,6 @@
 //! `trace`: grows a field, path traces it, labels it, writes it.
 
+mod export;
 mod field;
 mod quality;
 mod render;
@@ -34,6 +35,7 @@ Examples:
   trace --scene scenes/field.ron --crop 500,400,200,150 only a part of it, at full size
   trace --scene scenes/field.ron --integrator ids       which part each pixel belongs to, in false colours
   trace --scene scenes/field.ron --pixel 648,483        what that pixel shows, in words
+  trace export --scene scenes/field.ron --format gltf   the same field for another program
   trace texture textures/leaf/sugar_beet.ron            draw a texture from its recipe
 
 Files of an image:
@@ -46,12 +48,14 @@ Files of an image:
   *_denoised.png, denoised.exr   with --denoise
 
 More samples make less noise: twice the --spp takes twice the time and leaves 0.7 of it.
-The pages scenes/01-one-leaf.ron to 06 teach how a scene is written.
+The pages scenes/01-one-leaf.ron to 07 teach how a scene is written.
 Paths go to stdout, everything else to stderr.
 Exit codes: 0 done, 1 failed, 2 wrong input, 75 stopped cleanly (Ctrl-C).";
 
 #[derive(Subcommand)]
 enum Verb {
+    /// Write a field as a scene of another program.
+    Export(export::Args),
     /// Draw textures from their recipes; images are written beside them.
     Texture(texture::Args),
 }
@@ -59,6 +63,7 @@ enum Verb {
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let done = match cli.verb {
+        Some(Verb::Export(args)) => export::run(&args),
         Some(Verb::Texture(args)) => texture::run(&args),
         None => render::run(&cli.render),
     };

@@ -1,0 +1,66 @@
+//! `trace export`: writes one field as a scene of another program.
+
+use crate::field::FieldArgs;
+use clap::ValueEnum;
+use furrow::output::{self, Export};
+use furrow::scene::Field;
+use furrow::{Result, cli, render};
+use std::path::{Path, PathBuf};
+
+/// What to write, and how.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    field: FieldArgs,
+    /// The other program's format.
+    #[arg(long, value_enum)]
+    format: Format,
+    /// Folder for the files; `out/`, the page's name and the format's unless given.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print nothing but errors and the paths of the files.
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// The formats. A further one is a file in `src/output/`, a name here and a line in [`Format::write`].
+#[derive(Clone, Copy, ValueEnum)]
+enum Format {
+    /// glTF 2.0: scene.glb with meshes, textures, labels, sun, lamps and camera; for Blender and others.
+    Gltf,
+    /// Mitsuba 3: scene.xml with meshes, textures, lights and camera.
+    Mitsuba,
+}
+
+impl Format {
+    fn write(self, folder: &Path, field: &Field) -> Result<Export> {
+        match self {
+            Self::Gltf => output::gltf::write(folder, &field.scene, &field.provenance()),
+            Self::Mitsuba => output::mitsuba::write(folder, &field.scene, &field.provenance()),
+        }
+    }
+
+    fn name(self) -> String {
+        self.to_possible_value().map(|v| v.get_name().to_owned()).unwrap_or_default()
+    }
+}
+
+/// Grows a field and writes it down; returns the paths of the files.
+pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
+    args.field.check()?;
+    let out = args.out.clone().unwrap_or_else(|| args.field.default_folder().join(args.format.name()));
+    cli::check_folder(&out)?;
+    let pool = render::pool(0)?;
+    let (field, export) = pool.install(|| {
+        let field = args.field.grow()?;
+        let export = args.format.write(&out, &field)?;
+        Ok::<_, furrow::Error>((field, export))
+    })?;
+    if !args.quiet {
+        for warning in field.warnings.iter().chain(&export.warnings) {
+            eprintln!("warning: {warning}");
+        }
+        eprintln!("{}: {} files in {}", args.field.page().display(), export.paths.len(), out.display());
+    }
+    Ok(export.paths)
+}

@@ -1,0 +1,210 @@
+//! What models from disk wear: a base colour and picture under a smooth or rough coat, opaque or a sheet that lets light through.
+//!
+//! A file knows three bands. Near infrared is the page's, or what the program wrote into the file, or an estimate: a sheet that
+//! lets light through is taken for a leaf, which returns and passes 0.45 each (the plateau of PROSPECT-D's green leaves);
+//! what is opaque returns as much as in red, as dry soil, stone and paint roughly do. Where the near infrared
+//! of something opaque is known, it is that of the picture's mean and follows the picture's red.
+
+use super::Varies;
+use super::shading::{bump, frame};
+use super::swatch::{Swatch, Tone, centre};
+use crate::bsdf::{self, Bsdf, OrenNayar, Side};
+use crate::geometry::Interaction;
+use crate::math::{Frame, Spectrum, Vec2, Vec3};
+use crate::model::{Relief, Surface, Transmission};
+use crate::texture::Texture;
+use std::sync::Arc;
+
+/// Index of refraction of the coat: glTF's.
+const IOR: f32 = 1.5;
+/// Roughness from which a coat is not told from none.
+const MATTE: f32 = 0.8;
+/// Slope angle of a matte surface's facets, radians.
+const SIGMA: f32 = 0.3;
+/// Reflectance and transmittance of a leaf in near infrared.
+const LEAF_NIR: f32 = 0.45;
+
+/// What a page says about a model's surfaces in place of the file.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Repaint {
+    /// GGX roughness α, 0–1.
+    pub roughness: Option<f32>,
+    /// Transmittance per band, 0–1.
+    pub transmission: Option<Spectrum>,
+    /// Reflectance in near infrared, 0–1.
+    pub nir: Option<f32>,
+}
+
+/// A surface of a model, ready to shade.
+#[derive(Clone, Debug)]
+pub struct Painted {
+    color: Vec3,
+    picture: Option<Arc<Texture>>,
+    nir: Nir,
+    relief: Option<Relief>,
+    transmission: Option<Sheet>,
+    coat: Option<Side>,
+}
+
+/// Near infrared reflectance.
+#[derive(Clone, Copy, Debug)]
+enum Nir {
+    /// The same everywhere.
+    Even(f32),
+    /// So much of the red.
+    OfRed(f32),
+}
+
+/// What passes.
+#[derive(Clone, Debug)]
+struct Sheet {
+    transmittance: Spectrum,
+    picture: Option<Arc<Texture>>,
+}
+
+impl Painted {
+    /// From a file's surface, as the page changes it.
+    pub fn new(surface: &Surface, page: &Repaint) -> Self {
+        let own = |t: &Transmission| Sheet {
+            transmittance: Spectrum(Vec3::from(t.color).extend(surface.nir_transmission.unwrap_or(LEAF_NIR))),
+            picture: t.picture.clone(),
+        };
+        let transmission = match page.transmission {
+            Some(t) => (!t.is_black()).then_some(Sheet { transmittance: t, picture: None }),
+            None => surface.transmission.as_ref().map(own),
+        };
+        let roughness = page.roughness.or(surface.roughness).unwrap_or(1.0).max(0.02);
+        let known = page.nir.or(surface.nir);
+        let nir = match (&transmission, known) {
+            (Some(_), nir) => Nir::Even(nir.unwrap_or(LEAF_NIR)),
+            (None, None) => Nir::OfRed(1.0),
+            (None, Some(nir)) => {
+                let red = surface.color[0] * surface.picture.as_ref().map_or(1.0, |p| mean(p).x);
+                // Black paint has no red to follow.
+                if red > 0.01 { Nir::OfRed(nir / red) } else { Nir::Even(nir) }
+            }
+        };
+        Self {
+            color: Vec3::from(surface.color),
+            picture: surface.picture.clone(),
+            nir,
+            relief: surface.relief.clone(),
+            coat: (roughness < MATTE).then(|| Side::new(IOR, [roughness; 2], Spectrum::ZERO)),
+            transmission,
+        }
+    }
+
+    /// What a place does to light, `of` the pictures there.
+    fn tone(&self, of: impl Fn(&Texture) -> Vec3) -> Tone {
+        let seen = |picture: &Option<Arc<Texture>>| picture.as_ref().map_or(Vec3::ONE, |p| of(p));
+        let color = self.color * seen(&self.picture);
+        let nir = match self.nir {
+            Nir::Even(nir) => nir,
+            Nir::OfRed(share) => share * color.x,
+        };
+        let reflectance = Spectrum(color.extend(nir)).clamp(0.0, 0.95);
+        let transmittance = self.transmission.as_ref().map_or(Spectrum::ZERO, |sheet| {
+            let passed = sheet.transmittance * Spectrum(seen(&sheet.picture).extend(1.0));
+            // Never more than the surface has left.
+            Spectrum(passed.0.min((Spectrum::splat(0.99) - reflectance).0))
+        });
+        Tone { reflectance, transmittance }
+    }
+
+    pub(super) fn swatch(&self) -> Swatch<'_> {
+        let mean = self.tone(mean);
+        let roughness = self.coat.and_then(|side| side.coat()).map_or(1.0, |coat| coat.alpha[0]);
+        let passed = self.transmission.as_ref().and_then(|sheet| sheet.picture.as_ref());
+        let Some(picture) = self.picture.as_ref().or(passed) else {
+            return Swatch::plain(mean, roughness);
+        };
+        let size = (picture.width(), picture.height());
+        let texel = move |x, y| self.tone(|picture| rgb(picture.sample(centre(size, x, y), 0.0)));
+        // What a page repaints does not share the file's picture.
+        let swatch = Swatch::pictured([std::ptr::from_ref(self) as usize, 1], size, texel, mean, roughness);
+        match &self.relief {
+            Some(Relief { normals, strength }) => {
+                swatch.raised(move |x, y| normals.sample(centre(size, x, y), 0.0), *strength)
+            }
+            None => swatch,
+        }
+    }
+
+    pub(super) fn varies(&self) -> Varies {
+        let passed = self.transmission.as_ref().and_then(|sheet| sheet.picture.as_ref());
+        self.picture.as_ref().or(passed).map_or(Varies::Nowhere, |p| Varies::Picture(p.width(), p.height()))
+    }
+
+    pub(super) fn scatter(&self, at: &Interaction, wo: Vec3) -> (Bsdf, Frame) {
+        let Tone { reflectance, transmittance } = self.tone(|picture| read(picture, at));
+        let bsdf = match (&self.coat, &self.transmission) {
+            (None, None) => Bsdf::OrenNayar(OrenNayar::new(reflectance, SIGMA)),
+            (coat, _) => {
+                let side = coat.map_or(Side::bare(reflectance), |side| side.with(reflectance));
+                Bsdf::Leaf(bsdf::Leaf::new(side, side, transmittance))
+            }
+        };
+        let normal = self.relief.as_ref().map_or(at.ns, |Relief { normals, strength }| {
+            bump(at, at.tangents(), normals.sample(at.uv, normals.lod(extent(at))) * *strength)
+        });
+        (bsdf, frame(at, normal, wo))
+    }
+}
+
+/// Linear colour of a picture, averaged over what the ray sees.
+fn read(picture: &Texture, at: &Interaction) -> Vec3 {
+    rgb(picture.sample(at.uv, picture.lod(extent(at))))
+}
+
+/// What the ray sees of the surface, as an extent of texture coordinates.
+fn extent(at: &Interaction) -> f32 {
+    let (along_u, along_v) = at.tangents();
+    at.footprint / along_u.length().max(along_v.length()).max(1e-6)
+}
+
+/// Mean colour of what is opaque of a picture: its coarsest level.
+fn mean(picture: &Texture) -> Vec3 {
+    rgb(picture.sample(Vec2::splat(0.5), 32.0))
+}
+
+fn rgb([r, g, b, _]: [f32; 4]) -> Vec3 {
+    Vec3::new(r, g, b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Rationale: files and pages say reflectance and transmittance apart, and nothing keeps them from more than one together.
+        #[test]
+        fn no_surface_returns_and_passes_more_than_it_receives(
+            color in prop::array::uniform3(0f32..=1.0),
+            passed in prop::array::uniform3(0f32..=1.0),
+            nir in prop::option::of(0f32..=1.0),
+            page in prop::option::of(prop::array::uniform4(0f32..=1.0)),
+        ) {
+            let transmission = Some(Transmission { color: passed, picture: None });
+            let surface = Surface { color, transmission, ..Surface::default() };
+            let repaint = Repaint { nir, transmission: page.map(Spectrum::from), ..Repaint::default() };
+            let tone = Painted::new(&surface, &repaint).tone(|_| Vec3::ONE);
+            let sum = (tone.reflectance + tone.transmittance).max();
+            prop_assert!(sum <= 0.9901 && tone.transmittance.0.min_element() >= 0.0, "{tone:?}");
+        }
+    }
+
+    #[test]
+    fn near_infrared_follows_red_where_nothing_passes_and_stands_where_something_does() {
+        let picture = Texture::from_rgba8(2, 1, &[255, 0, 0, 255, 128, 0, 0, 255], crate::texture::ColorSpace::Srgb);
+        let surface = Surface { picture: Some(Arc::new(picture)), ..Surface::default() };
+        let nir =
+            |page: Repaint, red: f32| Painted::new(&surface, &page).tone(|_| Vec3::new(red, 0.0, 0.0)).reflectance.0.w;
+        assert_eq!(nir(Repaint::default(), 0.3), 0.3);
+        let mean = mean(surface.picture.as_ref().unwrap()).x;
+        assert!((nir(Repaint { nir: Some(0.2), ..Repaint::default() }, mean) - 0.2).abs() < 1e-6);
+        assert!((nir(Repaint { nir: Some(0.2), ..Repaint::default() }, 0.5 * mean) - 0.1).abs() < 1e-6);
+        let leaf = Repaint { transmission: Some(Spectrum::splat(0.1)), ..Repaint::default() };
+        assert_eq!(nir(leaf, 0.3), LEAF_NIR);
+    }
+}

@@ -1,0 +1,110 @@
+//! What a document of another program can hold of a material: reflectance and transmittance at normal incidence over a
+//! picture, a tint, a gloss.
+//!
+//! Specimens that differ only in their tint share one picture, as they do here: [`Swatch::key`] tells.
+
+use super::Material;
+use crate::math::{Spectrum, Vec2, Vec3};
+
+/// Reflectance and transmittance of one place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tone {
+    /// Reflected, per band.
+    pub reflectance: Spectrum,
+    /// Transmitted, per band.
+    pub transmittance: Spectrum,
+}
+
+/// A material as others can hold it. A place's reflectance in R, G, B is that of [`Swatch::texel`] times `tint`, its
+/// transmittance times `tint_transmitted`.
+pub struct Swatch<'a> {
+    /// The same for materials that share a picture.
+    pub key: [usize; 2],
+    /// Width and height of the picture; `None` where the material is the same everywhere.
+    pub size: Option<(u32, u32)>,
+    texel: Box<dyn Fn(u32, u32) -> Tone + 'a>,
+    slope: Box<dyn Fn(u32, u32) -> Vec2 + 'a>,
+    /// Strength of the relief, a factor on [`Swatch::slope`]; 0 for none.
+    pub relief: f32,
+    /// Factor on reflected R, G, B.
+    pub tint: Vec3,
+    /// Factor on transmitted R, G, B.
+    pub tint_transmitted: Vec3,
+    /// GGX roughness α of the coat; 1 where there is none.
+    pub roughness: f32,
+    /// The mean place, tint included.
+    pub mean: Tone,
+}
+
+impl<'a> Swatch<'a> {
+    /// Of one tone everywhere.
+    pub(super) fn plain(tone: Tone, roughness: f32) -> Self {
+        Self {
+            key: [0; 2],
+            size: None,
+            texel: Box::new(move |_, _| tone),
+            slope: Box::new(|_, _| Vec2::ZERO),
+            relief: 0.0,
+            tint: Vec3::ONE,
+            tint_transmitted: Vec3::ONE,
+            roughness,
+            mean: tone,
+        }
+    }
+
+    /// Of a picture of `size` texels.
+    pub(super) fn pictured(
+        key: [usize; 2],
+        size: (u32, u32),
+        texel: impl Fn(u32, u32) -> Tone + 'a,
+        mean: Tone,
+        roughness: f32,
+    ) -> Self {
+        let plain = Self::plain(mean, roughness);
+        Self { key, size: Some(size), texel: Box::new(texel), ..plain }
+    }
+
+    /// The same picture in another tint.
+    pub(super) fn tinted(self, reflected: Vec3, transmitted: Vec3) -> Self {
+        Self { tint: reflected, tint_transmitted: transmitted, ..self }
+    }
+
+    /// The same picture with a relief of `strength`.
+    pub(super) fn raised(self, slope: impl Fn(u32, u32) -> Vec2 + 'a, strength: f32) -> Self {
+        Self { slope: Box::new(slope), relief: strength, ..self }
+    }
+
+    /// Slope of the relief at texel (x, y): ∂h/∂x to the picture's right, ∂h/∂y up the picture.
+    pub fn slope(&self, x: u32, y: u32) -> Vec2 {
+        (self.slope)(x, y)
+    }
+
+    /// Texel (x, y) of the picture, top left first; the one tone of a material without a picture.
+    pub fn texel(&self, x: u32, y: u32) -> Tone {
+        (self.texel)(x, y)
+    }
+}
+
+/// The middle of texel (x, y) of a picture of this size, as texture coordinates.
+pub(super) fn centre(size: (u32, u32), x: u32, y: u32) -> Vec2 {
+    Vec2::new((x as f32 + 0.5) / size.0 as f32, (y as f32 + 0.5) / size.1 as f32)
+}
+
+impl Material {
+    /// The material as documents of other programs can hold it.
+    pub fn swatch(&self) -> Swatch<'_> {
+        match self {
+            Self::Leaf(m) => m.swatch(),
+            Self::Ground(m) => m.swatch(),
+            Self::Solid(m) => m.swatch(),
+            Self::Painted(m) => m.swatch(),
+            Self::Plain(bsdf) => {
+                let transmittance = match bsdf {
+                    crate::bsdf::Bsdf::Leaf(leaf) => leaf.transmittance(),
+                    _ => Spectrum::ZERO,
+                };
+                Swatch::plain(Tone { reflectance: bsdf.reflectance(1.0), transmittance }, 1.0)
+            }
+        }
+    }
+}

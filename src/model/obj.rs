@@ -1,0 +1,156 @@
+//! Wavefront OBJ with its MTL → a model. `tobj` knows the syntax.
+//!
+//! Of materials: `Kd`, `map_Kd`, `d`, `map_d`, `Ns`. A picture's own opacity cuts the surface as `map_d` does; `map_d` counts
+//! by its opacity where it has one, else by its brightness. v runs up in OBJ and down here.
+
+use super::{MOST_TRIANGLES, Model, Part, Surface, Up, bytes, faceted, fraction, into_one_tile, settle};
+use crate::geometry::{AlphaMask, Mesh};
+use crate::math::{Vec3, vec2};
+use crate::texture::{ColorSpace, Texture, Wrap};
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// One corner has one position, normal and texture coordinate; polygons become fans.
+const OPTIONS: tobj::LoadOptions =
+    tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
+
+/// Reads a file; in words what is wrong with it.
+pub(super) fn read(path: &Path, up: Up) -> Result<Model, String> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut files = Vec::new();
+    let text = bytes(path, &mut files)?;
+    // The loader of materials is asked in the middle of reading: it leaves its files and its fault here.
+    let asked: RefCell<(Vec<PathBuf>, Option<String>)> = RefCell::default();
+    let materials = |name: &Path| {
+        let mut asked = asked.borrow_mut();
+        let (files, fault) = &mut *asked;
+        let read = bytes(&folder.join(name), files);
+        let read = read.and_then(|t| {
+            tobj::load_mtl_buf(&mut t.as_slice()).map_err(|e| format!("its materials {}: {e}", name.display()))
+        });
+        read.map_err(|e| {
+            *fault = Some(e);
+            tobj::LoadError::ReadError
+        })
+    };
+    let read = tobj::load_obj_buf(&mut text.as_slice(), &OPTIONS, materials);
+    let (more, fault) = asked.into_inner();
+    files.extend(more);
+    if let Some(fault) = fault {
+        return Err(fault);
+    }
+    let (objects, materials) = read.map_err(|e| format!("it cannot be read: {e}"))?;
+    let materials = materials.map_err(|e| format!("its materials cannot be read: {e}"))?;
+
+    let mut pictures = Pictures { folder, files, known: BTreeMap::new() };
+    let mut model = Model::default();
+    for material in &materials {
+        model.surfaces.push(pictures.surface(material)?);
+    }
+    // For pieces without a material.
+    model.surfaces.push(Surface::default());
+    let mut triangles = 0;
+    for object in objects {
+        let surface = object.mesh.material_id.unwrap_or(materials.len());
+        let Some(look) = model.surfaces.get(surface) else {
+            return Err(format!("`{}` has no such material", object.name));
+        };
+        if materials.get(surface).and_then(|m| m.dissolve).is_some_and(|d| d < 0.5) || object.mesh.indices.is_empty() {
+            continue;
+        }
+        let name = object.name;
+        let mut mesh = mesh(&object.mesh, &name)?;
+        triangles += mesh.triangles.len();
+        if triangles > MOST_TRIANGLES {
+            return Err(format!("it has more than {MOST_TRIANGLES} triangles\n help: reduce it in your program"));
+        }
+        if look.mask.is_some() {
+            into_one_tile(&mut mesh.uvs, &name)?;
+        }
+        settle(&mut mesh, &up.rotation(), &name)?;
+        model.parts.push(Part { name, mesh, surface, label: None });
+    }
+    model.files = pictures.files;
+    Ok(model)
+}
+
+fn mesh(of: &tobj::Mesh, name: &str) -> Result<Mesh, String> {
+    let positions: Vec<Vec3> = of.positions.as_chunks::<3>().0.iter().map(|p| Vec3::from(*p)).collect();
+    let corners = positions.len();
+    if let Some(i) = of.indices.iter().find(|i| **i as usize >= corners) {
+        return Err(format!("`{name}` names corner {i}, but it has {corners}"));
+    }
+    let uvs = of.texcoords.as_chunks::<2>().0;
+    let normals = of.normals.as_chunks::<3>().0;
+    let mut mesh = Mesh {
+        uvs: if uvs.len() == corners {
+            uvs.iter().map(|[u, v]| vec2(*u, 1.0 - v)).collect()
+        } else {
+            vec![vec2(0.0, 0.0); corners]
+        },
+        normals: normals.iter().map(|n| Vec3::from(*n)).collect(),
+        positions,
+        triangles: of.indices.as_chunks::<3>().0.to_vec(),
+    };
+    if mesh.normals.len() != corners {
+        faceted(&mut mesh);
+    }
+    Ok(mesh)
+}
+
+/// Pictures beside the file, each decoded once.
+struct Pictures<'a> {
+    folder: &'a Path,
+    files: Vec<PathBuf>,
+    known: BTreeMap<String, Arc<Texture>>,
+}
+
+impl Pictures<'_> {
+    fn surface(&mut self, material: &tobj::Material) -> Result<Surface, String> {
+        let picture = material.diffuse_texture.as_deref().map(|name| self.picture(name)).transpose()?;
+        let cut = material.dissolve_texture.as_deref().map(|name| self.picture(name)).transpose()?;
+        let mask = match (&cut, &picture) {
+            (Some(cut), _) => cut.alpha_mask().or_else(|| bright(cut)),
+            (None, Some(picture)) => picture.alpha_mask(),
+            (None, None) => None,
+        };
+        // A picture takes the colour's place where writers leave it black.
+        let color = match material.diffuse.unwrap_or([1.0; 3]).map(fraction) {
+            [0.0, 0.0, 0.0] if picture.is_some() => [1.0; 3],
+            color => color,
+        };
+        Ok(Surface {
+            name: material.name.clone(),
+            color,
+            picture,
+            mask: mask.map(Arc::new),
+            // Blinn and Phong's exponent n is GGX α = √(2 / (n + 2)). Source: Walter et al. 2007.
+            roughness: material.shininess.filter(|n| *n >= 0.0).map(|n| (2.0 / (n + 2.0)).sqrt()),
+            ..Surface::default()
+        })
+    }
+
+    fn picture(&mut self, name: &str) -> Result<Arc<Texture>, String> {
+        if let Some(known) = self.known.get(name) {
+            return Ok(known.clone());
+        }
+        // Some writers use the other kind of slash.
+        let data = bytes(&self.folder.join(name.replace('\\', "/")), &mut self.files)?;
+        let picture =
+            Texture::decode(&data, ColorSpace::Srgb).map_err(|what| format!("its picture `{name}`: {what}"))?;
+        let picture = Arc::new(picture.wrapped(Wrap::Repeat));
+        self.known.insert(name.to_owned(), picture.clone());
+        Ok(picture)
+    }
+}
+
+/// Where a grey picture is brighter than half; `None` where it is so all over.
+fn bright(picture: &Texture) -> Option<AlphaMask> {
+    // Half of the byte's range, in linear light.
+    let half = ColorSpace::Srgb.table()[127];
+    let there = |x, y| picture.texel(x, y)[0] > half;
+    let all = (0..picture.height()).all(|y| (0..picture.width()).all(|x| there(x, y)));
+    (!all).then(|| AlphaMask::new(picture.width(), picture.height(), there))
+}

@@ -1,0 +1,68 @@
+//! Where a model's other files lie: beside it, or inside it as text.
+
+use base64::Engine;
+use base64::alphabet;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
+
+/// Base64 with or without its closing signs: writers differ.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &alphabet::STANDARD,
+    GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
+);
+
+/// What a URI leads to.
+#[derive(Debug, PartialEq)]
+pub(super) enum Target {
+    /// Bytes that it holds itself.
+    Bytes(Vec<u8>),
+    /// A path from the model's folder.
+    File(String),
+}
+
+/// Reads a URI (RFC 3986, RFC 2397); in words what is wrong with it.
+pub(super) fn follow(uri: &str) -> Result<Target, String> {
+    if let Some(data) = uri.strip_prefix("data:") {
+        let Some((_, text)) = data.split_once(";base64,") else {
+            return Err("it holds data that is not base64".into());
+        };
+        return BASE64.decode(text).map(Target::Bytes).map_err(|e| format!("its base64 data is damaged: {e}"));
+    }
+    if uri.contains("://") || uri.starts_with('/') {
+        let short: String = uri.chars().take(60).collect();
+        return Err(format!("it names `{short}`; only files beside it can be read"));
+    }
+    Ok(Target::File(decoded(uri)))
+}
+
+/// `%20` → space; what is no code stays.
+fn decoded(text: &str) -> String {
+    let mut bytes = Vec::with_capacity(text.len());
+    let mut rest = text.as_bytes();
+    while let Some((first, after)) = rest.split_first() {
+        let code = after.get(..2).filter(|_| *first == b'%').and_then(|hex| std::str::from_utf8(hex).ok());
+        if let Some(byte) = code.and_then(|hex| u8::from_str_radix(hex, 16).ok()) {
+            bytes.push(byte);
+            rest = &after[2..];
+        } else {
+            bytes.push(*first);
+            rest = after;
+        }
+    }
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn uris_lead_to_files_or_bytes() {
+        assert_eq!(follow("a%20leaf%C3%A9.png"), Ok(Target::File("a leafé.png".into())));
+        assert_eq!(follow("100%.png"), Ok(Target::File("100%.png".into())));
+        assert_eq!(follow("data:application/octet-stream;base64,AAEC"), Ok(Target::Bytes(vec![0, 1, 2])));
+        assert_eq!(follow("data:;base64,AAE"), Ok(Target::Bytes(vec![0, 1])));
+        for bad in ["https://a.b/c.png", "/etc/passwd", "data:text/plain,abc", "data:;base64,!!"] {
+            assert!(follow(bad).is_err(), "{bad}");
+        }
+    }
+}

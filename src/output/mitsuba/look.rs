@@ -1,0 +1,146 @@
+//! A material written down: its scattering sampled over its texture, or at the corners of a mesh.
+//!
+//! What a [`Material`] is made of is its own affair; here it is asked, point by point on a flat patch, how it scatters. The
+//! patch is as large as the part's texture lies on the part, and the ray as wide as a texel, so a texture is read on the
+//! level that the camera sees.
+
+use crate::bsdf::Bsdf;
+use crate::bsdf::microfacet::Ggx;
+use crate::geometry::{Hit, Interaction, Mesh};
+use crate::material::{Material, Varies};
+use crate::math::{Spectrum, Vec2, Vec3, vec2};
+
+/// What does not vary over a material.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Kind {
+    /// Opaque and rough, part of it perhaps under a film of water.
+    Soil {
+        /// A and B of Oren and Nayar.
+        shape: [f32; 2],
+        /// The film's surface.
+        film: Option<Ggx>,
+    },
+    /// A thin sheet with a coat on its upper and lower side, or none.
+    Sheet {
+        /// The coats.
+        coats: [Option<Ggx>; 2],
+    },
+}
+
+/// What may vary.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Texel {
+    /// Diffuse reflectance of the upper and lower side, without the coat's own.
+    pub(super) reflect: [Spectrum; 2],
+    /// Transmittance.
+    pub(super) transmit: Spectrum,
+    /// Share under water.
+    pub(super) film: f32,
+    /// Shading normal in the frame of ∂p/∂u, its normal to the side, and the surface's normal.
+    pub(super) normal: Vec3,
+}
+
+/// A material's scattering over an image of `width` × `height` texels; one texel where it varies nowhere.
+#[derive(Clone, Debug)]
+pub(super) struct Look {
+    pub(super) kind: Kind,
+    pub(super) width: u32,
+    pub(super) height: u32,
+    pub(super) texels: Vec<Texel>,
+}
+
+impl Look {
+    /// Samples `material` as it lies on `mesh`, whose texture the camera sees `footprint` metres to a pixel.
+    pub(super) fn of(material: &Material, mesh: &Mesh, footprint: f32) -> Self {
+        let metres = image_length(mesh);
+        let (w, h, level) = match material.varies() {
+            Varies::Picture(w, h) => (w, h, (footprint / metres * w.max(h) as f32).max(1.0).log2().round() as u32),
+            Varies::Raster(w, h) => (w, h, 0),
+            Varies::Nowhere | Varies::Place => (1, 1, 0),
+        };
+        let (width, height) = ((w >> level.min(31)).max(1), (h >> level.min(31)).max(1));
+        let footprint = metres * 2.0_f32.powi(level as i32) / w.max(h) as f32;
+        let flat = patch(Vec3::ZERO, metres);
+        let mut kind = None;
+        let mut texels = Vec::with_capacity((width * height) as usize);
+        for y in 0..height {
+            for x in 0..width {
+                let uv = vec2((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
+                let (of, texel) = at(material, &flat, uv, footprint);
+                kind = Some(kind.map_or(of, |known: Kind| known.and(of)));
+                texels.push(texel);
+            }
+        }
+        let kind = kind.unwrap_or(Kind::Sheet { coats: [None; 2] });
+        Self { kind, width, height, texels }
+    }
+
+    /// The one value of `what` where it is the same in all texels.
+    pub(super) fn constant<T: PartialEq>(&self, what: impl Fn(&Texel) -> T) -> Option<T> {
+        let first = what(self.texels.first()?);
+        self.texels.iter().all(|t| what(t) == first).then_some(first)
+    }
+}
+
+impl Kind {
+    /// What holds for texels of both kinds: some of a ground may lie under water.
+    fn and(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::Soil { shape, film: None }, Self::Soil { film, .. }) => Self::Soil { shape, film },
+            (known, _) => known,
+        }
+    }
+}
+
+/// Reflectances of a material that varies over the world, at each corner of a mesh.
+pub(super) fn colors(material: &Material, mesh: &Mesh) -> Vec<Spectrum> {
+    let corner = |p: &Vec3| at(material, &patch(*p, 1.0), Vec2::ZERO, 0.0).1.reflect[0];
+    mesh.positions.iter().map(corner).collect()
+}
+
+/// A triangle at `p` whose barycentrics are the texture coordinates, on which an image is `metres` high.
+fn patch(p: Vec3, metres: f32) -> Mesh {
+    Mesh {
+        positions: vec![p, p - Vec3::Y * metres, p + Vec3::X * metres],
+        normals: vec![Vec3::Z; 3],
+        uvs: vec![Vec2::ZERO, Vec2::Y, Vec2::X],
+        triangles: vec![[0, 1, 2]],
+    }
+}
+
+/// The scattering at one point of a patch, seen from above.
+fn at(material: &Material, patch: &Mesh, uv: Vec2, footprint: f32) -> (Kind, Texel) {
+    let point = Interaction::new(patch, &Hit { part: 0, triangle: 0, u: uv.y, v: uv.x, t: 0.0 }, footprint);
+    let (bsdf, frame) = material.scatter(&point, Vec3::Z);
+    let opaque =
+        |albedo: Spectrum, film: f32| Texel { reflect: [albedo; 2], transmit: Spectrum::ZERO, film, normal: frame.z };
+    match bsdf {
+        Bsdf::OrenNayar(b) => (Kind::Soil { shape: b.shape(), film: None }, opaque(b.albedo(), 0.0)),
+        Bsdf::Wet(b) => {
+            let kind = Kind::Soil { shape: b.base().shape(), film: Some(b.coat()) };
+            (kind, opaque(b.base().albedo(), b.film()))
+        }
+        Bsdf::Leaf(b) => {
+            let [upper, lower] = b.both_sides();
+            let reflect = [upper.diffuse(), lower.diffuse()];
+            let texel = Texel { reflect, transmit: b.transmittance(), film: 0.0, normal: frame.z };
+            (Kind::Sheet { coats: [upper.coat(), lower.coat()] }, texel)
+        }
+    }
+}
+
+/// Mean height of the texture's image on a mesh, metres; 1 where the texture coordinates are degenerate.
+fn image_length(mesh: &Mesh) -> f32 {
+    let (mut sum, mut count) = (0.0_f64, 0.0_f64);
+    for t in &mesh.triangles {
+        let [a, b, c] = t.map(|i| i as usize);
+        let (e1, e2) = (mesh.positions[b] - mesh.positions[a], mesh.positions[c] - mesh.positions[a]);
+        let (t1, t2) = (mesh.uvs[b] - mesh.uvs[a], mesh.uvs[c] - mesh.uvs[a]);
+        let determinant = t1.perp_dot(t2);
+        if determinant.abs() > 1e-20 {
+            sum += f64::from(((e2 * t1.x - e1 * t2.x) / determinant).length());
+            count += 1.0;
+        }
+    }
+    if count > 0.0 { (sum / count) as f32 } else { 1.0 }
+}

@@ -1,0 +1,352 @@
+//! A field as a scene of Mitsuba 3 (Jakob et al. 2022, <https://mitsuba-renderer.org>): to check this renderer by another one, to
+//! measure the two against each other, and to take fields there.
+//!
+//! The folder holds
+//!
+//! | file | holds |
+//! |---|---|
+//! | `scene.xml` | the field in R, G, B with Mitsuba's own plugins alone; `scene.xml -D spp=256` sets the samples |
+//! | `scene-nir.xml` | the same in near infrared, as grey |
+//! | `scene-exact.xml` | as `scene.xml`, but scattering as ours to the last term; needs the plugins of `tests/mitsuba/bsdfs.py` |
+//! | `meshes/*.ply` | surfaces of one material and plant each, their shape's id `CLASS-PLANT-NUMBER` |
+//! | `textures/*` | opacity (PNG), reflectance, transmittance, relief, sun and sky (OpenEXR, plain numbers) |
+//!
+//! Lengths are centimetres: Mitsuba keeps rays off surfaces by 9·10⁻⁵ of (1 + the largest coordinate), a tenth of a millimetre
+//! and more if lengths were metres, 30 µm in this unit. Ours is 0.25 µm: contacts finer than 30 µm are lost there.
+//!
+//! `volpath` alone lets masked surfaces cast their own shadows; for `path` they are solid. Our paths end at 12 surfaces, which
+//! is its `max_depth` 13. Textures are written on the level that the camera sees, and read by every ray.
+//! What is exact and what is about equal among materials stands in the table of `surface.rs`; what a scene has of the second kind
+//! is returned as warnings and stands in the files. The filter of the camera is exact for `Box`; `Gaussian`, a
+//! square blurred, is written as the Gaussian of the same variance. Mitsuba has no lens distortion, and square pixels only.
+
+mod light;
+mod look;
+mod ply;
+mod surface;
+mod xml;
+
+use super::png::{self, Picture};
+use super::{Export, exr, write_atomically};
+use crate::Result;
+use crate::film::Filter;
+use crate::geometry::{AlphaMask, Mesh};
+use crate::integrator::Path as PathTracer;
+use crate::material::Varies;
+use crate::math::{Spectrum, Vec3};
+use crate::scene::{Part, Scene};
+use crate::sensor::Camera;
+use light::Lights;
+use look::Look;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use surface::Surface;
+use xml::Element;
+
+/// Units of length to a metre.
+const SCALE: f32 = 100.0;
+
+/// Which bands a scene shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Band {
+    /// R, G, B.
+    Color,
+    /// Near infrared, as grey.
+    Nir,
+}
+
+impl Band {
+    /// A spectrum as an element.
+    fn rgb(self, name: &str, s: Spectrum) -> Element {
+        let [r, g, b, nir] = s.to_array();
+        let value = match self {
+            Self::Color => format!("{r} {g} {b}"),
+            Self::Nir => format!("{nir} {nir} {nir}"),
+        };
+        Element::property("rgb", name, value)
+    }
+
+    /// The picture of these bands.
+    fn path(self, stem: &str) -> String {
+        match self {
+            Self::Color => format!("{stem}.exr"),
+            Self::Nir => format!("{stem}-nir.exr"),
+        }
+    }
+}
+
+/// Whose scattering plugins a scene names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Plugins {
+    /// Mitsuba's.
+    BuiltIn,
+    /// Ours.
+    Own,
+}
+
+/// The files of the folder as they are written.
+struct Files<'a> {
+    folder: &'a Path,
+    paths: Vec<PathBuf>,
+}
+
+impl Files<'_> {
+    fn write(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
+        let path = self.folder.join(name);
+        write_atomically(&path, bytes)?;
+        self.paths.push(path);
+        Ok(())
+    }
+
+    /// Plain numbers, one vector a channel.
+    fn numbers(&mut self, name: &str, width: u32, height: u32, channels: &[(&str, Vec<f32>)]) -> Result<()> {
+        self.write(name, &exr::encode_map(width, height, channels)?)
+    }
+
+    /// `STEM.exr` with R, G, B and `STEM-nir.exr`.
+    fn spectra(&mut self, stem: &str, width: u32, height: u32, pixels: &[Spectrum]) -> Result<()> {
+        let band = |i: usize| pixels.iter().map(|p| p.to_array()[i]).collect::<Vec<f32>>();
+        self.numbers(&Band::Color.path(stem), width, height, &[("R", band(0)), ("G", band(1)), ("B", band(2))])?;
+        self.numbers(&Band::Nir.path(stem), width, height, &[("Y", band(3))])
+    }
+}
+
+/// Parts of one material, mask and plant: one shape there.
+struct Group {
+    name: String,
+    key: Key,
+    material: u32,
+    mask: Option<Arc<AlphaMask>>,
+    mesh: Mesh,
+    colors: Option<Vec<Spectrum>>,
+}
+
+/// What parts of one shape share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Key {
+    class: &'static str,
+    plant: u16,
+    /// The material, or its roughness where the corners hold the colour.
+    look: Result<u32, [u32; 2]>,
+    /// Address of the mask.
+    mask: usize,
+}
+
+/// Writes `scene` into `folder`; `text` goes into the files as their provenance. `scene.xml` is written last: where it is,
+/// everything is.
+pub fn write(folder: &Path, scene: &Scene, text: &str) -> Result<Export> {
+    let mut files = Files { folder, paths: Vec::new() };
+    let mut warnings = camera_warnings(scene);
+    let groups = groups(scene)?;
+    let lights = Lights::write(&scene.lights, &mut files)?;
+    if lights.has_lamps() && lights.has_sky() {
+        warnings.push("with lamps in the scene the camera does not see the sky".into());
+    }
+    let mut masks: Vec<(usize, String)> = Vec::new();
+    let mut lost = BTreeSet::new();
+    let mut surfaces = Vec::with_capacity(groups.len());
+    for group in &groups {
+        let mask = group.mask.as_ref().map(|m| mask_file(m, text, &mut masks, &mut files)).transpose()?;
+        let material = &scene.materials[group.material as usize];
+        let look = Look::of(material, &group.mesh, footprint(&scene.camera, &group.mesh));
+        let factor = Surface::corner_factor(look.kind);
+        let colors: Option<Vec<Spectrum>> = group.colors.as_ref().map(|c| c.iter().map(|s| *s * factor).collect());
+        let surface = match colors {
+            Some(_) => Surface::of_corners(look.kind),
+            None => Surface::write(&look, &group.name, mask, &mut files)?,
+        };
+        surface.warnings(&group.name, &mut lost);
+        files.write(&mesh_file(&group.name), &ply::encode(&group.mesh, colors.as_deref()))?;
+        surfaces.push(surface);
+    }
+    warnings.extend(summary(&lost));
+    let notes = if warnings.is_empty() { String::new() } else { format!("\n\n{}", warnings.join("\n")) };
+    let whole = Whole { scene, groups: &groups, surfaces: &surfaces, lights: &lights, notes: format!("{text}{notes}") };
+    files.write("scene-exact.xml", whole.document(Band::Color, Plugins::Own).as_bytes())?;
+    files.write("scene-nir.xml", whole.document(Band::Nir, Plugins::BuiltIn).as_bytes())?;
+    files.write("scene.xml", whole.document(Band::Color, Plugins::BuiltIn).as_bytes())?;
+    Ok(Export { paths: files.paths, warnings })
+}
+
+/// One warning for each thing that is lost, with one surface's name and the number of others.
+fn summary(lost: &BTreeSet<(&'static str, String)>) -> Vec<String> {
+    let kinds: BTreeSet<&str> = lost.iter().map(|(what, _)| *what).collect();
+    let line = |what: &str| {
+        let names: Vec<&String> = lost.iter().filter(|(w, _)| *w == what).map(|(_, name)| name).collect();
+        let others = if names.len() > 1 { format!(" and {} more", names.len() - 1) } else { String::new() };
+        format!("{}{others}: {what}", names[0])
+    };
+    kinds.into_iter().map(line).collect()
+}
+
+/// Parts that share material, mask and plant, in the order of their first.
+fn groups(scene: &Scene) -> Result<Vec<Group>> {
+    let mut groups: Vec<Group> = Vec::new();
+    for part in scene.parts.iter().filter(|p| !p.mesh.triangles.is_empty()) {
+        let material = &scene.materials[part.material as usize];
+        let colors = (material.varies() == Varies::Place).then(|| look::colors(material, &part.mesh));
+        let look = match &colors {
+            None => Ok(part.material),
+            Some(_) => Err(surface::rough(Look::of(material, &part.mesh, 0.0).kind)?.map(f32::to_bits)),
+        };
+        let key = Key { class: part.tag.class.name(), plant: part.tag.plant, look, mask: address(part) };
+        match groups.iter_mut().find(|g| g.key == key) {
+            Some(group) => {
+                group.mesh.append(&part.mesh);
+                if let (Some(all), Some(more)) = (&mut group.colors, colors) {
+                    all.extend(more);
+                }
+            }
+            None => groups.push(Group {
+                name: format!("{}-{}-{}", key.class, key.plant, groups.len()),
+                key,
+                material: part.material,
+                mask: part.mask.clone(),
+                mesh: part.mesh.clone(),
+                colors,
+            }),
+        }
+    }
+    Ok(groups)
+}
+
+/// Masks are shared: one address, one mask.
+fn address(part: &Part) -> usize {
+    part.mask.as_ref().map_or(0, |m| Arc::as_ptr(m) as usize)
+}
+
+fn mesh_file(name: &str) -> String {
+    format!("meshes/{name}.ply")
+}
+
+/// The picture of a mask, written once.
+fn mask_file(
+    mask: &Arc<AlphaMask>,
+    text: &str,
+    known: &mut Vec<(usize, String)>,
+    files: &mut Files<'_>,
+) -> Result<String> {
+    let address = Arc::as_ptr(mask) as usize;
+    if let Some((_, name)) = known.iter().find(|(a, _)| *a == address) {
+        return Ok(name.clone());
+    }
+    let name = format!("textures/mask-{}.png", known.len());
+    let (w, h) = mask.size();
+    let opaque = |i: u32| if mask.texel((i % w) as i32, (i / w) as i32) { 255 } else { 0 };
+    let pixels: Vec<u8> = (0..w * h).map(opaque).collect();
+    files.write(&name, &png::encode(w, h, &Picture::Gray(&pixels), text)?)?;
+    known.push((address, name.clone()));
+    Ok(name)
+}
+
+/// What a pixel sees of a mesh, metres: at its middle's distance.
+fn footprint(camera: &Camera, mesh: &Mesh) -> f32 {
+    let middle = mesh.bounds().map_or(Vec3::ZERO, |(lo, hi)| (lo + hi) * 0.5);
+    camera.pixel_angle() * camera.pose().position.distance(middle)
+}
+
+fn camera_warnings(scene: &Scene) -> Vec<String> {
+    let camera = &scene.camera;
+    let [fx, fy, cx, cy] = camera.intrinsics();
+    let mut warnings = Vec::new();
+    if !camera.distortion().is_none() {
+        warnings.push("the lens distortion is left out: Mitsuba's cameras have none".into());
+    }
+    if (fx / fy - 1.0).abs() > 1e-6 {
+        warnings.push(format!("pixels {:.4} times as high as wide are written as square", fx / fy));
+    }
+    let (w, h) = (f64::from(camera.width()), f64::from(camera.height()));
+    if camera.aperture().is_some() && (cx != 0.5 * w || cy != 0.5 * h) {
+        warnings
+            .push("the optical axis is written through the image's middle: Mitsuba's thin lens has no other".into());
+    }
+    if scene.filter.filter() != Filter::Box {
+        warnings.push("the point spread is written as a Gaussian of the same variance".into());
+    }
+    warnings
+}
+
+/// `<transform name="to_world">` from its columns.
+fn matrix([x, y, z]: [Vec3; 3], origin: Vec3) -> Element {
+    let row = |i: usize| format!("{} {} {} {}", x[i], y[i], z[i], origin[i]);
+    let value = format!("{}  {}  {}  0 0 0 1", row(0), row(1), row(2));
+    Element::new("transform").with("name", "to_world").inside([Element::new("matrix").with("value", value)])
+}
+
+/// Everything that the documents say.
+struct Whole<'a> {
+    scene: &'a Scene,
+    groups: &'a [Group],
+    surfaces: &'a [Surface],
+    lights: &'a Lights,
+    notes: String,
+}
+
+impl Whole<'_> {
+    fn document(&self, band: Band, plugins: Plugins) -> String {
+        let default = |name: &'static str, value: &str| Element::new("default").with("name", name).with("value", value);
+        let mut root = Element::new("scene").with("version", "3.0.0").comment(&self.notes).inside([
+            default("spp", "64"),
+            default("rr_depth", "5"),
+            default("sun_weight", "16"),
+            self.integrator(),
+            self.sensor(band),
+        ]);
+        root = root.inside(self.lights.elements(band));
+        for (group, surface) in self.groups.iter().zip(self.surfaces) {
+            root = root.inside([
+                surface.element(&format!("material-{}", group.name), band, plugins),
+                Element::plugin("shape", "ply")
+                    .with("id", &group.name)
+                    .string("filename", mesh_file(&group.name))
+                    .inside([Element::new("ref").with("id", format!("material-{}", group.name))]),
+            ]);
+        }
+        root.document()
+    }
+
+    fn integrator(&self) -> Element {
+        Element::plugin("integrator", "volpath")
+            // Counts edges of a path: one more than its surfaces.
+            .integer("max_depth", PathTracer::default().max_depth + 1)
+            .integer("rr_depth", "$rr_depth")
+            .boolean("hide_emitters", self.lights.has_lamps())
+    }
+
+    fn sensor(&self, band: Band) -> Element {
+        let camera = &self.scene.camera;
+        let [fx, _, cx, cy] = camera.intrinsics();
+        let (w, h) = (f64::from(camera.width()), f64::from(camera.height()));
+        let axes = camera.pose().axes;
+        // Their x is to the left, their y up.
+        let to_world = matrix([-axes.x_axis, -axes.y_axis, axes.z_axis], camera.pose().position * SCALE);
+        let lens = match camera.aperture() {
+            Some(lens) => Element::plugin("sensor", "thinlens")
+                .float("aperture_radius", lens.radius * SCALE)
+                .float("focus_distance", lens.focus * SCALE),
+            // Their offset is added to a pixel before its ray is made: that of the image's middle from the axis.
+            None => Element::plugin("sensor", "perspective")
+                .float("principal_point_offset_x", 0.5 - cx / w)
+                .float("principal_point_offset_y", 0.5 - cy / h),
+        };
+        let filter = match self.scene.filter.filter() {
+            Filter::Box => Element::plugin("rfilter", "box"),
+            // The square's own variance is 1/12.
+            Filter::Gaussian(sigma) => {
+                Element::plugin("rfilter", "gaussian").float("stddev", (sigma * sigma + 1.0 / 12.0).sqrt())
+            }
+        };
+        let film = Element::plugin("film", "hdrfilm")
+            .integer("width", camera.width())
+            .integer("height", camera.height())
+            .string("pixel_format", if band == Band::Color { "rgb" } else { "luminance" })
+            .string("component_format", "float32")
+            .inside([filter]);
+        lens.string("fov_axis", "x")
+            .float("fov", 2.0 * (0.5 * w / fx).atan().to_degrees())
+            .float("near_clip", 0.01)
+            .float("far_clip", 1e9)
+            .inside([to_world, film, Element::plugin("sampler", "independent").integer("sample_count", "$spp")])
+    }
+}

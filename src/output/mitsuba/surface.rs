@@ -1,0 +1,305 @@
+//! How a material's scattering is written: with Mitsuba's own plugins, or with ours.
+//!
+//! | ours | Mitsuba's own | agreement |
+//! |---|---|---|
+//! | Lambert | `diffuse` | exact |
+//! | sheet without coats | blend of `diffuse` on either side and `principledthin` that only transmits | exact |
+//! | Oren–Nayar | `diffuse` of A times the albedo | exact seen along the normal, no retroreflection elsewhere |
+//! | coats, films of water | blend with `roughplastic` that has no base | Smith's masking is uncorrelated there |
+//! | what lies under a coat | Lambert | exact along the normal, not darker towards the horizon |
+//! | coats rougher across than along | `roughplastic` of the geometric mean | as bright, of another shape |
+//! | relief | `normalmap` | in the frame of the mesh's normal, not added to its slope |
+//!
+//! (`roughplastic` with a base would darken it towards the horizon, but its account of inner reflections loses 30 %.)
+//!
+//! A blend weighs its halves by constants that sum to one, which are also the chances that it samples them by; every
+//! half is divided by its weight, so the pictures hold more than the reflectance. With our own plugins (`furrow_soil`,
+//! `furrow_leaf`, see `tests/mitsuba/bsdfs.py`) all of this is exact; they read the same pictures and are told the factors.
+
+use super::look::{Kind, Look};
+use super::xml::Element;
+use super::{Band, Files, Plugins};
+use crate::bsdf::fresnel;
+use crate::bsdf::microfacet::Ggx;
+use crate::math::{Spectrum, Vec3};
+use crate::{Error, Result};
+use std::collections::BTreeSet;
+
+/// Weight of transmission in a sheet's blend.
+const THROUGH: f32 = 0.4;
+/// Weight of a coat within a side's reflection.
+const COAT: f32 = 0.2;
+/// Weight of a film of water over soil.
+const FILM: f32 = 0.1;
+
+/// A quantity over a surface: one value, or the stem of the pictures that hold it.
+#[derive(Clone, Debug, PartialEq)]
+enum Paint {
+    /// The same everywhere.
+    Plain(Spectrum),
+    /// `STEM.exr` holds R, G, B and `STEM-nir.exr` the near infrared.
+    Picture(String),
+    /// The mesh's corners hold it.
+    Corners,
+}
+
+/// A surface's scattering, its pictures written.
+#[derive(Clone, Debug)]
+pub(super) struct Surface {
+    kind: Kind,
+    /// Diffuse reflectance, upper and lower, times `factor`.
+    reflect: [Paint; 2],
+    factor: [f32; 2],
+    /// Transmittance times `through`.
+    transmit: Option<Paint>,
+    through: f32,
+    /// Share under water over its weight, a picture's stem.
+    film: Option<String>,
+    /// Shading normals, a picture's stem.
+    normal: Option<String>,
+    /// Opacity, a picture's path.
+    mask: Option<String>,
+}
+
+impl Surface {
+    /// Writes the pictures of a look, their names beginning with `stem`.
+    pub(super) fn write(look: &Look, stem: &str, mask: Option<String>, files: &mut Files<'_>) -> Result<Self> {
+        let (factor, through) = match look.kind {
+            Kind::Soil { shape: [a, _], film } => ([a / film.map_or(1.0, |_| 1.0 - FILM); 2], 0.0),
+            Kind::Sheet { coats } => {
+                let side = |c: Option<Ggx>| under(c).powi(2) / ((1.0 - THROUGH) * c.map_or(1.0, |_| 1.0 - COAT));
+                (coats.map(side), under(coats[0]) * under(coats[1]) / THROUGH)
+            }
+        };
+        let mut paint = |what: &str, scale: f32, of: &dyn Fn(usize) -> Spectrum| -> Result<Paint> {
+            let all: Vec<Spectrum> = (0..look.texels.len()).map(|i| of(i) * scale).collect();
+            match all.first() {
+                // Numbers above 1 are refused as colours, but not in pictures.
+                Some(first) if first.max() <= 1.0 && all.iter().all(|s| s == first) => Ok(Paint::Plain(*first)),
+                _ => {
+                    let stem = format!("textures/{stem}-{what}");
+                    files.spectra(&stem, look.width, look.height, &all)?;
+                    Ok(Paint::Picture(stem))
+                }
+            }
+        };
+        let upper = paint("upper", factor[0], &|i| look.texels[i].reflect[0])?;
+        let same = factor[0] == factor[1] && look.texels.iter().all(|t| t.reflect[0] == t.reflect[1]);
+        let lower = if same { upper.clone() } else { paint("lower", factor[1], &|i| look.texels[i].reflect[1])? };
+        let transmit = match look.kind {
+            Kind::Soil { .. } => None,
+            Kind::Sheet { .. } => Some(paint("through", through, &|i| look.texels[i].transmit)?),
+        };
+        let film = match look.constant(|t| t.film) {
+            Some(0.0) => None,
+            _ => Some(format!("textures/{stem}-film")),
+        };
+        if let Some(film) = &film {
+            let values = look.texels.iter().map(|t| t.film / FILM).collect();
+            files.numbers(&format!("{film}.exr"), look.width, look.height, &[("Y", values)])?;
+        }
+        let flat = look.texels.iter().all(|t| t.normal.x == 0.0 && t.normal.y == 0.0);
+        let normal = (!flat).then(|| format!("textures/{stem}-normal"));
+        if let Some(normal) = &normal {
+            // Not of unit length: slopes, not directions, are what lies evenly between two texels.
+            let slope = |n: Vec3, k: usize| 0.5 * n[k] / n.z.max(0.02) + 0.5;
+            let axis = |k: usize| look.texels.iter().map(|t| slope(t.normal, k)).collect::<Vec<f32>>();
+            let channels = [("R", axis(0)), ("G", axis(1)), ("B", axis(2))];
+            files.numbers(&format!("{normal}.exr"), look.width, look.height, &channels)?;
+        }
+        Ok(Self { kind: look.kind, reflect: [upper, lower], factor, transmit, through, film, normal, mask })
+    }
+
+    /// A rough surface whose reflectance the mesh's corners hold, times [`Surface::corner_factor`].
+    pub(super) fn of_corners(kind: Kind) -> Self {
+        Self {
+            kind,
+            reflect: [Paint::Corners, Paint::Corners],
+            factor: [Self::corner_factor(kind); 2],
+            transmit: None,
+            through: 0.0,
+            film: None,
+            normal: None,
+            mask: None,
+        }
+    }
+
+    /// What reflectances at a mesh's corners are multiplied by.
+    pub(super) fn corner_factor(kind: Kind) -> f32 {
+        match kind {
+            Kind::Soil { shape: [a, _], .. } => a,
+            Kind::Sheet { .. } => 1.0,
+        }
+    }
+
+    /// What Mitsuba's own plugins cannot hold of it.
+    pub(super) fn warnings(&self, name: &str, warnings: &mut BTreeSet<(&'static str, String)>) {
+        let mut warn = |what| {
+            warnings.insert((what, name.to_owned()));
+        };
+        match self.kind {
+            Kind::Soil { shape: [_, b], film } => {
+                if b > 0.0 {
+                    warn("Oren–Nayar is written as Lambert, equal seen along the normal");
+                }
+                if film.is_some() {
+                    warn("the film of water is about equal");
+                }
+            }
+            Kind::Sheet { coats } => {
+                if coats.iter().flatten().count() > 0 {
+                    warn("leaf coats are about equal");
+                }
+                if coats.iter().flatten().any(|c| c.alpha[0] != c.alpha[1]) {
+                    warn("coats rougher across than along are written with one roughness");
+                }
+            }
+        }
+        if self.reflect[0] == Paint::Corners {
+            warn("the grain of stones, straw and wood is sampled at the corners of their meshes");
+        }
+        if self.normal.is_some() {
+            warn("relief is about equal");
+        }
+    }
+
+    /// The `<bsdf>` element of this name.
+    pub(super) fn element(&self, name: &str, band: Band, plugins: Plugins) -> Element {
+        let bare = match plugins {
+            Plugins::BuiltIn => {
+                let inner = match self.kind {
+                    Kind::Soil { film, .. } => self.soil(film, band),
+                    Kind::Sheet { coats } => self.sheet(coats, band),
+                };
+                match &self.normal {
+                    Some(normal) => Element::plugin("bsdf", "normalmap")
+                        .inside([picture("normalmap", &format!("{normal}.exr"), "bilinear"), inner]),
+                    None => inner,
+                }
+            }
+            Plugins::Own => self.own(band),
+        };
+        let whole = match &self.mask {
+            Some(mask) => Element::plugin("bsdf", "mask").inside([picture("opacity", mask, "nearest"), bare]),
+            None => bare,
+        };
+        whole.with("id", name)
+    }
+
+    fn soil(&self, film: Option<Ggx>, band: Band) -> Element {
+        let diffuse = Element::plugin("bsdf", "diffuse").inside([paint("reflectance", &self.reflect[0], band)]);
+        let inner = match (&self.film, film) {
+            (Some(share), Some(coat)) => Element::plugin("bsdf", "blendbsdf")
+                .float("weight", FILM)
+                .inside([diffuse, gloss(coat, picture("specular_reflectance", &format!("{share}.exr"), "bilinear"))]),
+            _ => diffuse,
+        };
+        Element::plugin("bsdf", "twosided").inside([inner])
+    }
+
+    fn sheet(&self, coats: [Option<Ggx>; 2], band: Band) -> Element {
+        let side = |i: usize| {
+            let base = Element::plugin("bsdf", "diffuse").inside([paint("reflectance", &self.reflect[i], band)]);
+            let Some(coat) = coats[i] else { return base };
+            let weight = Element::property("float", "specular_reflectance", 1.0 / ((1.0 - THROUGH) * COAT));
+            Element::plugin("bsdf", "blendbsdf").float("weight", COAT).inside([base, gloss(coat, weight)])
+        };
+        let through = self.transmit.clone().unwrap_or(Paint::Plain(Spectrum::ZERO));
+        Element::plugin("bsdf", "blendbsdf").float("weight", THROUGH).inside([
+            Element::plugin("bsdf", "twosided").inside([side(0), side(1)]),
+            Element::plugin("bsdf", "principledthin").float("diff_trans", 2.0).inside([paint(
+                "base_color",
+                &through,
+                band,
+            )]),
+        ])
+    }
+
+    fn own(&self, band: Band) -> Element {
+        let mut own = match self.kind {
+            Kind::Soil { shape: [a, b], film } => {
+                let soil = Element::plugin("bsdf", "furrow_soil")
+                    .float("a", a)
+                    .float("b", b)
+                    .float("scale", 1.0 / self.factor[0])
+                    .inside([paint("reflectance", &self.reflect[0], band)]);
+                match (&self.film, film) {
+                    (Some(share), Some(coat)) => soil
+                        .float("film_alpha", coat.alpha[0])
+                        .float("film_ior", coat.ior)
+                        .float("film_scale", FILM)
+                        .inside([picture("film", &format!("{share}.exr"), "bilinear")]),
+                    _ => soil,
+                }
+            }
+            Kind::Sheet { coats } => {
+                let mut leaf = Element::plugin("bsdf", "furrow_leaf");
+                for (i, side) in ["upper", "lower"].into_iter().enumerate() {
+                    if let Some(coat) = coats[i] {
+                        leaf = leaf
+                            .float(&format!("{side}_alpha_u"), coat.alpha[0])
+                            .float(&format!("{side}_alpha_v"), coat.alpha[1])
+                            .float(&format!("{side}_ior"), coat.ior);
+                    }
+                    leaf = leaf.float(&format!("{side}_scale"), 1.0 / self.factor[i]).inside([paint(
+                        side,
+                        &self.reflect[i],
+                        band,
+                    )]);
+                }
+                let through = self.transmit.clone().unwrap_or(Paint::Plain(Spectrum::ZERO));
+                leaf.float("through_scale", 1.0 / self.through).inside([paint("through", &through, band)])
+            }
+        };
+        if let Some(normal) = &self.normal {
+            own = own.inside([picture("normal", &format!("{normal}.exr"), "bilinear")]);
+        }
+        own
+    }
+}
+
+/// What lies under a coat and is seen along the normal, over what it would be without.
+fn under(coat: Option<Ggx>) -> f32 {
+    coat.map_or(1.0, |c| ((1.0 - fresnel::dielectric(1.0, c.ior)) / (1.0 - fresnel::hemispherical(c.ior))).sqrt())
+}
+
+/// A coat alone, its reflectance multiplied by `weight`.
+fn gloss(coat: Ggx, weight: Element) -> Element {
+    Element::plugin("bsdf", "roughplastic")
+        .string("distribution", "ggx")
+        .float("alpha", (coat.alpha[0] * coat.alpha[1]).sqrt())
+        .float("int_ior", coat.ior)
+        .float("ext_ior", 1.0)
+        .float("diffuse_reflectance", 0.0)
+        .inside([weight])
+}
+
+fn paint(name: &str, paint: &Paint, band: Band) -> Element {
+    match (paint, band) {
+        (Paint::Plain(s), _) => band.rgb(name, *s),
+        (Paint::Picture(stem), Band::Color) => picture(name, &format!("{stem}.exr"), "bilinear"),
+        (Paint::Picture(stem), Band::Nir) => picture(name, &format!("{stem}-nir.exr"), "bilinear"),
+        (Paint::Corners, band) => {
+            let attribute = if band == Band::Color { "vertex_color" } else { "vertex_nir" };
+            Element::plugin("texture", "mesh_attribute").with("name", name).string("name", attribute)
+        }
+    }
+}
+
+/// A picture of plain numbers, clamped at its edges.
+fn picture(name: &str, path: &str, filter: &str) -> Element {
+    Element::plugin("texture", "bitmap")
+        .with("name", name)
+        .string("filename", path)
+        .string("filter_type", filter)
+        .string("wrap_mode", "clamp")
+        .boolean("raw", true)
+}
+
+/// The kind of surfaces whose corners hold their colour, or an error where a material varies over the world in another way.
+pub(super) fn rough(kind: Kind) -> Result<[f32; 2]> {
+    match kind {
+        Kind::Soil { shape, film: None } => Ok(shape),
+        _ => Err(Error::Scene("a sheet whose colour varies over the world cannot be exported".into())),
+    }
+}

@@ -1,0 +1,135 @@
+//! Models from disk, stood on the ground and labelled.
+
+use super::{Builder, MOST_PLANTS};
+use crate::geometry::Mesh;
+use crate::material::{Material, Painted, Repaint};
+use crate::math::{Mat3, Spectrum, Vec3};
+use crate::model::{Label, Model};
+use crate::sampling::Purpose;
+use crate::sampling::place::Step;
+use crate::sampling::vary::Num;
+use crate::scene::desc::ModelDesc;
+use crate::scene::tag::{Class, Tag};
+use crate::scene::{Part, PlantRecord};
+use crate::soil::Ground;
+use crate::{Error, Result};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Farthest that a model may reach from the world's origin along an axis, metres.
+const FARTHEST: f32 = 1000.0;
+
+impl Builder<'_> {
+    /// Places every model; `numbered` plants have their numbers already. Returns the plants among the models.
+    pub(super) fn models(&mut self, numbered: usize, ground: Option<&Ground>) -> Result<Vec<PlantRecord>> {
+        let mut records: Vec<PlantRecord> = Vec::new();
+        let mut last = numbered;
+        for (k, desc) in self.desc.models.iter().enumerate() {
+            let found = self.place(k, desc, last, ground)?;
+            last = found.iter().map(|r| usize::from(r.number)).max().unwrap_or(last);
+            records.extend(found);
+        }
+        Ok(records)
+    }
+
+    fn place(
+        &mut self,
+        k: usize,
+        desc: &ModelDesc,
+        numbered: usize,
+        ground: Option<&Ground>,
+    ) -> Result<Vec<PlantRecord>> {
+        let at = [Step::Field("models"), Step::Item(k)];
+        let model = self.library.model(self.page, &desc.file, desc.up)?;
+        if desc.class.is_none() && !model.parts.iter().any(|p| known(p.label.as_ref()).is_some()) {
+            let words = "this model's file says no class\n help: add class: Crop, class: Weed, or class: Soil for whatever is no plant";
+            return Err(self.page.blame(&at, Error::Scene(words.into())));
+        }
+        let mut stream = self.stream(Purpose::Scatter, 3000 + k as u64);
+        let (x, y) = (desc.position_m.0.draw32(&mut stream), desc.position_m.1.draw32(&mut stream));
+        let turn = desc.turn_deg.draw32(&mut stream).to_radians();
+        let scale = desc.scale.draw32(&mut stream);
+        let foot = Vec3::new(x, y, ground.map_or(0.0, |g| g.height(x, y)) + desc.lift_m.draw32(&mut stream));
+        let repaint = Repaint {
+            roughness: desc.roughness.map(Num::f32),
+            transmission: desc.transmission.map(|(r, g, b, nir)| Spectrum::new(r.f32(), g.f32(), b.f32(), nir.f32())),
+            nir: desc.nir.map(Num::f32),
+        };
+        let materials: Vec<u32> =
+            model.surfaces.iter().map(|s| self.material(Material::Painted(Painted::new(s, &repaint)))).collect();
+        let mut plants: BTreeMap<u16, Vec<usize>> = BTreeMap::new();
+        for part in &model.parts {
+            let tag = tag(desc.class, part.label.as_ref(), numbered).ok_or_else(|| {
+                let words =
+                    format!("labels can number {MOST_PLANTS} plants, and this model has more\n help: place fewer");
+                self.page.blame(&at, Error::Scene(words))
+            })?;
+            let mut mesh = part.mesh.clone();
+            // A model at the origin as it is keeps its bits.
+            if turn != 0.0 || scale != 1.0 || foot != Vec3::ZERO {
+                mesh.transform(Mat3::from_rotation_z(-turn) * scale, foot);
+            }
+            let (lo, hi) = mesh.bounds().unwrap_or_default();
+            let reach = lo.abs().max(hi.abs()).max_element();
+            if !reach.is_finite() || reach > FARTHEST {
+                let size = (hi - lo).max_element();
+                let words = format!(
+                    "`{}` of this model is {size:.0} m large or lies that far away\n help: lengths are metres; a file in millimetres takes scale: 0.001",
+                    part.name
+                );
+                return Err(self.page.blame(&at, Error::Scene(words)));
+            }
+            if tag.plant > 0 {
+                plants.entry(tag.plant).or_default().push(self.scene.parts.len());
+            }
+            let mask = model.surfaces[part.surface].mask.clone();
+            self.scene.parts.push(Part { mesh, mask, material: materials[part.surface], tag });
+        }
+        Ok(plants.into_iter().map(|(number, parts)| self.record(number, &parts, &desc.file, foot, &model)).collect())
+    }
+
+    /// What is known of a plant that is a model, or a part of one.
+    fn record(&self, number: u16, parts: &[usize], file: &str, foot: Vec3, model: &Model) -> PlantRecord {
+        let parts: Vec<&Part> = parts.iter().map(|i| &self.scene.parts[*i]).collect();
+        let mut all = Mesh::default();
+        for part in &parts {
+            all.positions.extend_from_slice(&part.mesh.positions);
+        }
+        let (lo, hi) = all.bounds().unwrap_or((foot, foot));
+        // A plant alone stands where the page says; of several, each stands in the middle of itself.
+        let position = if parts.len() == model.parts.len() { foot } else { ((lo + hi) * 0.5).with_z(lo.z) };
+        let across = all.positions.iter().map(|p| (p - position).truncate().length()).fold(0.0, f32::max);
+        PlantRecord {
+            number,
+            species: Path::new(file).file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+            eppo: String::new(),
+            class: parts[0].tag.class,
+            position,
+            axis: Vec3::Z,
+            bbch: 0,
+            age_days: 0.0,
+            height: hi.z - position.z,
+            radius: across,
+            leaves: parts.iter().map(|p| p.tag.leaf).max().unwrap_or(0),
+        }
+    }
+}
+
+/// A label whose class is one of ours.
+fn known(label: Option<&Label>) -> Option<(Class, &Label)> {
+    label.and_then(|l| Class::named(&l.class).map(|class| (class, l)))
+}
+
+/// The tag of a part: the page's class, else the file's; `None` where plants run out of numbers.
+fn tag(class: Option<Class>, label: Option<&Label>, numbered: usize) -> Option<Tag> {
+    let number = |n: usize| u16::try_from(numbered + n).ok();
+    let label = known(label);
+    match (class, label) {
+        (Some(Class::Soil), _) | (None, None) => Some(Tag::default()),
+        (Some(class), label) => Some(Tag { class, plant: number(1)?, leaf: label.map_or(0, |(_, l)| l.leaf) }),
+        (None, Some((class, l))) if l.plant > 0 => {
+            Some(Tag { class, plant: number(usize::from(l.plant))?, leaf: l.leaf })
+        }
+        (None, Some((class, l))) => Some(Tag { class, plant: 0, leaf: l.leaf }),
+    }
+}

@@ -1,0 +1,29 @@
+//! Python programs that tests ask for a second opinion.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// A Python that runs `probe` (a line of Python) without fault: `target/venv/bin/python`, then `$FURROW_PYTHON`, then `python3`.
+///
+/// `None`, and a word about it, where there is none; with `FURROW_REQUIRE_PEERS=1` that is a failure instead.
+pub fn python(probe: &str) -> Option<PathBuf> {
+    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/venv/bin/python");
+    let named = std::env::var_os("FURROW_PYTHON").map(PathBuf::from);
+    let candidates = [Some(own), named, Some("python3".into())];
+    let mut said = Vec::new();
+    for candidate in candidates.into_iter().flatten() {
+        match Command::new(&candidate).args(["-c", probe]).output() {
+            Ok(output) if output.status.success() => return Some(candidate),
+            Ok(output) => {
+                let words = String::from_utf8_lossy(&output.stderr);
+                let last = words.lines().last().map_or_else(|| output.status.to_string(), str::to_owned);
+                said.push(format!("{}: {last}", candidate.display()));
+            }
+            Err(e) => said.push(format!("{}: {e}", candidate.display())),
+        }
+    }
+    let words = format!("no Python runs `{probe}`:\n{}", said.join("\n"));
+    assert!(std::env::var_os("FURROW_REQUIRE_PEERS").is_none_or(|v| v != "1"), "{words}");
+    eprintln!("skipped: {words}");
+    None
+}

@@ -1,0 +1,204 @@
+"""Furrow's scattering as plugins of Mitsuba 3, written from the formulas and not from the renderer's code.
+
+`scene-exact.xml`, as `trace export --format mitsuba` writes it, names them:
+
+    import mitsuba as mi
+    mi.set_variant("llvm_ad_rgb")        # any vectorised variant
+    import bsdfs                         # registers furrow_soil and furrow_leaf
+    mi.render(mi.load_file("scene-exact.xml"))
+
+Sources of the formulas: Oren & Nayar 1994; Walter et al. 2007 (GGX) with the height-correlated masking of Heitz 2014;
+Fresnel's equations. Directions are drawn by the cosine alone: unlike the renderer's way, but with the same mean.
+"""
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+# Cosine at which a shading normal that turns away from the eye is left.
+GRAZE = 0.02
+
+
+def _mean_fresnel(ior):
+    """2 ∫ F(μ) μ dμ from outside, midpoint rule."""
+    mu = (np.arange(4096) + 0.5) / 4096
+    transmitted = np.sqrt(1 - (1 - mu**2) / ior**2)
+    s = (mu - ior * transmitted) / (mu + ior * transmitted)
+    p = (ior * mu - transmitted) / (ior * mu + transmitted)
+    return float(np.mean((s**2 + p**2) * mu))
+
+
+def _texture(props, name):
+    """A texture by its name; colours are textures too."""
+    value = props[name]
+    return value if isinstance(value, mi.Texture) else mi.load_dict({"type": "rgb", "value": list(value)})
+
+
+class _Coat:
+    """A rough dielectric interface seen from outside, and what it lets through to a base."""
+
+    def __init__(self, alpha_u, alpha_v, ior):
+        self.alpha, self.ior = (alpha_u, alpha_v), ior
+        normal = ((ior - 1) / (ior + 1)) ** 2
+        self.norm = float(np.sqrt((1 - normal) * (1 - _mean_fresnel(ior))))
+
+    def eval(self, a, b):
+        """F D G / (4 cos a), both directions above."""
+        m = dr.normalize(a + b)
+        surface = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, self.alpha[0], self.alpha[1])
+        shadow = lambda w: dr.rcp(surface.smith_g1(w, m)) - 1
+        masking = dr.rcp(1 + shadow(a) + shadow(b))
+        value = mi.fresnel(dr.dot(a, m), self.ior)[0] * surface.eval(m) * masking / (4 * a.z)
+        return dr.select((a.z > 0) & (b.z > 0) & (m.z > 0), value, 0)
+
+    def through(self, cos):
+        return (1 - mi.fresnel(dr.abs(cos), self.ior)[0]) / self.norm
+
+
+class _Surface(mi.BSDF):
+    """The frame of a point, with its relief; what does not agree about the sides scatters nothing."""
+
+    # Whether slopes add to those over the ground plane, or act along the texture.
+    OVER_PLANE = False
+
+    def __init__(self, props):
+        mi.BSDF.__init__(self, props)
+        self.normal = props.get("normal")
+        sides = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
+        kinds = [mi.BSDFFlags.DiffuseReflection] + ([mi.BSDFFlags.DiffuseTransmission] if self.TRANSMITS else [])
+        self.m_components = [kind | sides for kind in kinds]
+        self.m_flags = self.m_components[0]
+        for kind in self.m_components:
+            self.m_flags = self.m_flags | kind
+
+    def local(self, si, active):
+        """Our frame, the geometric normal in world coordinates, and the eye in both."""
+        eye = si.to_world(si.wi)
+        n = si.sh_frame.n
+        n = dr.select(dr.dot(n, si.n) < 0, -n, n)
+        if self.normal is not None:
+            m = 2 * mi.Vector3f(self.normal.eval_3(si, active)) - 1
+            slope = (-m.x / m.z, -m.y / m.z)
+            if self.OVER_PLANE:
+                up = n / dr.maximum(n.z, 0.05)
+                n = dr.normalize(mi.Vector3f(up.x - slope[0], up.y - slope[1], up.z))
+            else:
+                n = dr.normalize(n - slope[0] * dr.normalize(si.dp_du) + slope[1] * dr.normalize(si.dp_dv))
+        side = dr.select(dr.dot(si.n, eye) < 0, -1.0, 1.0)
+        seen = dr.dot(n, eye)
+        n = dr.select(seen * side < GRAZE, dr.normalize(n + eye * (GRAZE * side - seen)), n)
+        s = si.dp_du - n * dr.dot(n, si.dp_du)
+        frame = mi.Frame3f(n)
+        s = dr.select(dr.squared_norm(s) > 1e-16, dr.normalize(s), frame.s)
+        frame = mi.Frame3f(s, dr.cross(n, s), n)
+        return frame, eye, frame.to_local(eye)
+
+    def evaluate(self, si, wo, active):
+        """f |cos θo| and the density of `sample`."""
+        frame, eye, a = self.local(si, active)
+        light = si.to_world(wo)
+        b = frame.to_local(light)
+        agree = (dr.dot(si.n, eye) * dr.dot(si.n, light) > 0) == (a.z * b.z > 0)
+        lambert = dr.abs(b.z) * dr.inv_pi
+        pdf = 0.5 * lambert if self.TRANSMITS else dr.select(a.z * b.z > 0, lambert, 0)
+        active = active & agree
+        return dr.select(active, self.value(si, a, b, active), 0), dr.select(active, pdf, 0)
+
+    def eval(self, ctx, si, wo, active=True):
+        return self.evaluate(si, wo, active)[0]
+
+    def pdf(self, ctx, si, wo, active=True):
+        return self.evaluate(si, wo, active)[1]
+
+    def eval_pdf(self, ctx, si, wo, active=True):
+        return self.evaluate(si, wo, active)
+
+    def sample(self, ctx, si, sample1, sample2, active=True):
+        frame, _, a = self.local(si, active)
+        b = mi.warp.square_to_cosine_hemisphere(sample2)
+        side = dr.select(a.z < 0, -1.0, 1.0)
+        if self.TRANSMITS:
+            side = dr.select(sample1 < 0.5, side, -side)
+        b.z *= side
+        bs = dr.zeros(mi.BSDFSample3f)
+        bs.wo = si.to_local(frame.to_world(b))
+        value, bs.pdf = self.evaluate(si, bs.wo, active)
+        bs.eta = 1.0
+        bs.sampled_type = mi.UInt32(+mi.BSDFFlags.DiffuseReflection)
+        if self.TRANSMITS:
+            through = a.z * b.z < 0
+            bs.sampled_type = dr.select(through, +mi.BSDFFlags.DiffuseTransmission, +mi.BSDFFlags.DiffuseReflection)
+            bs.sampled_component = dr.select(through, mi.UInt32(1), mi.UInt32(0))
+        active = active & (bs.pdf > 0)
+        return bs, dr.select(active, value / bs.pdf, 0)
+
+    def to_string(self):
+        return type(self).__name__
+
+
+class Soil(_Surface):
+    """Oren & Nayar's rough surface, a share of it under a film of water."""
+
+    TRANSMITS = False
+    OVER_PLANE = True
+
+    def __init__(self, props):
+        super().__init__(props)
+        self.a, self.b, self.scale = props["a"], props["b"], props["scale"]
+        self.reflectance = _texture(props, "reflectance")
+        self.film = props.get("film")
+        if self.film is not None:
+            alpha = props["film_alpha"]
+            self.coat, self.film_scale = _Coat(alpha, alpha, props["film_ior"]), props["film_scale"]
+
+    def value(self, si, a, b, active):
+        flip = dr.select(a.z < 0, -1.0, 1.0)
+        above = a.z * b.z > 0
+        a, b = mi.Vector3f(a.x, a.y, a.z * flip), mi.Vector3f(b.x, b.y, b.z * flip)
+        # cos Δφ sin α tan β with α the larger of the two angles and β the smaller.
+        sin_a, sin_b = dr.safe_sqrt(1 - a.z**2), dr.safe_sqrt(1 - b.z**2)
+        across = sin_a * sin_b
+        cos_phi = dr.select(across > 1e-7, (a.x * b.x + a.y * b.y) / across, 0)
+        larger, smaller = dr.maximum(sin_a, sin_b), dr.minimum(sin_a, sin_b)
+        shape = self.a + self.b * dr.maximum(cos_phi, 0) * larger * smaller / dr.safe_sqrt(1 - smaller**2)
+        value = self.reflectance.eval(si, active) * (self.scale * shape * dr.inv_pi * b.z)
+        if self.film is not None:
+            film = self.film.eval_1(si, active) * self.film_scale
+            let = lambda cos: 1 + film * (self.coat.through(cos) - 1)
+            value = value * (let(a.z) * let(b.z)) + film * self.coat.eval(a, b)
+        return dr.select(above, value, 0)
+
+
+class Leaf(_Surface):
+    """A sheet that reflects and transmits evenly, each side under a coat."""
+
+    TRANSMITS = True
+
+    def __init__(self, props):
+        super().__init__(props)
+        self.sides = []
+        for side in ("upper", "lower"):
+            coat = None
+            if props.has_property(side + "_ior"):
+                coat = _Coat(props[side + "_alpha_u"], props[side + "_alpha_v"], props[side + "_ior"])
+            self.sides.append((coat, _texture(props, side), props[side + "_scale"]))
+        self.transmittance, self.scale = _texture(props, "through"), props["through_scale"]
+
+    def value(self, si, a, b, active):
+        let = lambda coat, cos: mi.Float(1) if coat is None else coat.through(cos)
+        lambert = dr.abs(b.z) * dr.inv_pi
+        above = a.z > 0
+        values = []
+        for (coat, paint, scale), flip in zip(self.sides, (1, -1)):
+            value = paint.eval(si, active) * (scale * lambert * let(coat, a.z) * let(coat, b.z))
+            if coat is not None:
+                value += coat.eval(mi.Vector3f(a.x, a.y, flip * a.z), mi.Vector3f(b.x, b.y, flip * b.z))
+            values.append(value)
+        through = self.transmittance.eval(si, active) * (
+            self.scale * lambert * let(self.sides[0][0], dr.select(above, a.z, b.z)) * let(self.sides[1][0], dr.select(above, b.z, a.z))
+        )
+        return dr.select(a.z * b.z > 0, dr.select(above, values[0], values[1]), through)
+
+
+mi.register_bsdf("furrow_soil", Soil)
+mi.register_bsdf("furrow_leaf", Leaf)

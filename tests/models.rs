@@ -1,0 +1,537 @@
+//! Models: what is exported as glTF comes back, what others wrote is read, what is broken is refused.
+//!
+//! Rationale: labels and geometry that change on their way through a file are worse than none, and files from the wild hold
+//! anything. Expected: corners, normals, texture coordinates, triangles, masks and labels of an exported field are equal bit for
+//! bit after reading, and so is its label map; colours are within the steps of eight bits; no bytes make the reader panic.
+//! Source: glTF 2.0 specification; Wavefront OBJ as its writers write it. The `gltf` crate, which shares no code with the
+//! program, checks what is written.
+
+mod common;
+
+use common::pictures;
+use common::program::{self, hash, scratch, shoot, small_text, trace};
+use furrow::Error;
+use furrow::geometry::Mesh;
+use furrow::light::Light;
+use furrow::math::{Spectrum, Vec2, Vec3, vec2, vec3};
+use furrow::model::{Model, Up, glb};
+use furrow::output;
+use furrow::render::LabelMap;
+use furrow::scene::build::{self, Options};
+use furrow::scene::tag::Class;
+use furrow::scene::{Field, Part};
+use proptest::prelude::*;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+const CAMERA: &str = "Pinhole(size: (96, 72), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.45, yaw_deg: 12, pitch_deg: 6))";
+
+/// The small page's field, and its file.
+fn small() -> &'static (Field, Vec<u8>) {
+    static SMALL: OnceLock<(Field, Vec<u8>)> = OnceLock::new();
+    SMALL.get_or_init(|| {
+        let field = program::field(&small_text(), &Options::default());
+        let (bytes, _) = output::gltf::encode(&field.scene, &field.provenance()).unwrap();
+        (field, bytes)
+    })
+}
+
+/// A field of nothing but what `models` says, on a page in `folder`.
+fn placed(folder: &Path, models: &str) -> furrow::Result<Field> {
+    let page = folder.join("page.ron");
+    let text =
+        format!("Field(seed: 3, camera: {CAMERA}, lights: [Constant(radiance: (1, 1, 1, 1))], models: [{models}])");
+    std::fs::write(&page, text).unwrap();
+    build::field(&page, &Options::default())
+}
+
+fn bits(mesh: &Mesh) -> Vec<u32> {
+    let vectors = mesh.positions.iter().chain(&mesh.normals).flat_map(Vec3::to_array);
+    let numbers = vectors.chain(mesh.uvs.iter().flat_map(Vec2::to_array)).map(f32::to_bits);
+    numbers.chain(mesh.triangles.iter().flatten().copied()).collect()
+}
+
+fn numbers(map: &LabelMap) -> Vec<u32> {
+    map.tags.iter().map(|t| u32::from(t.plant) << 16 | u32::from(t.leaf) << 2 | t.class as u32).collect()
+}
+
+#[test]
+fn an_exported_field_reads_back_bit_for_bit_with_the_same_label_map() {
+    let (field, bytes) = small();
+    let (_keep, folder) = scratch();
+    std::fs::create_dir_all(&folder).unwrap();
+    std::fs::write(folder.join("scene.glb"), bytes).unwrap();
+    let again = placed(&folder, "(file: \"scene.glb\")").unwrap_or_else(|e| panic!("{e}"));
+    let there: Vec<&Part> = field.scene.parts.iter().filter(|p| !p.mesh.triangles.is_empty()).collect();
+    assert_eq!(there.len(), again.scene.parts.len());
+    assert!(there.iter().any(|p| p.mask.is_some()), "a field with masks tests more");
+    for (i, (a, b)) in there.iter().zip(&again.scene.parts).enumerate() {
+        assert!(bits(&a.mesh) == bits(&b.mesh), "the mesh of part {i} has changed");
+        assert_eq!(a.tag, b.tag, "part {i}");
+        assert!(a.mask == b.mask, "the mask of part {i} has changed");
+    }
+    let (before, after) = (shoot(field, 1, 2).1, shoot(&again, 1, 2).1);
+    pictures::same("gltf-labels", before.window.width(), &numbers(&after), &numbers(&before));
+    assert_eq!(hash(numbers(&before)), hash(numbers(&after)));
+    assert!(numbers(&after).iter().any(|n| *n > 0), "nothing was labelled");
+    // Its plants are known by the numbers that they had.
+    let seen: Vec<u16> = again.plants.iter().map(|p| p.number).collect();
+    assert_eq!(seen, field.plants.iter().map(|p| p.number).collect::<Vec<_>>());
+}
+
+/// Expected: reflectance and transmittance of every texel that is there within 2 % and a step of eight bits; near infrared exactly.
+#[test]
+fn colours_and_transmission_survive_the_way_through_the_file() {
+    let (field, bytes) = small();
+    let (_keep, folder) = scratch();
+    std::fs::create_dir_all(&folder).unwrap();
+    std::fs::write(folder.join("scene.glb"), bytes).unwrap();
+    let again = placed(&folder, "(file: \"scene.glb\")").unwrap();
+    let close = |a: Vec3, b: Vec3| (0..3).all(|i| (a[i] - b[i]).abs() < 0.004 + 0.02 * a[i]);
+    let rgb = |s: Spectrum| s.0.truncate();
+    let (mut texels, mut passed) = (0, 0);
+    let there = field.scene.parts.iter().filter(|p| !p.mesh.triangles.is_empty());
+    for (part, other) in there.zip(&again.scene.parts) {
+        let material = &field.scene.materials[part.material as usize];
+        let (a, b) = (material.swatch(), again.scene.materials[other.material as usize].swatch());
+        assert_eq!(a.size, b.size);
+        let (w, h) = a.size.unwrap_or((1, 1));
+        let tint = |tint: Vec3| if a.size.is_some() { tint } else { Vec3::ONE };
+        for (x, y) in (0..64).map(|i| (w * (i % 8) / 8, h * (i / 8) / 8)) {
+            if part.mask.as_ref().is_some_and(|m| !m.texel(x as i32, y as i32)) {
+                continue;
+            }
+            let (before, after) = (a.texel(x, y), b.texel(x, y));
+            let (reflected, transmitted) =
+                (rgb(before.reflectance) * tint(a.tint), rgb(before.transmittance) * tint(a.tint_transmitted));
+            assert!(close(reflected, rgb(after.reflectance)), "{reflected} became {after:?}");
+            assert!(close(transmitted, rgb(after.transmittance)), "{transmitted} became {after:?}");
+            texels += 1;
+            passed += usize::from(transmitted.max_element() > 0.05);
+        }
+        let nir = |m: furrow::material::swatch::Tone| vec2(m.reflectance.0.w, m.transmittance.0.w);
+        assert!((nir(a.mean) - nir(b.mean)).length() < 0.01, "{:?} became {:?}", a.mean, b.mean);
+    }
+    assert!(texels > 1000 && passed > 300, "{texels} {passed}");
+}
+
+#[test]
+fn the_exported_file_is_the_same_bytes_every_time() {
+    let again = program::field(&small_text(), &Options::default());
+    let (bytes, _) = output::gltf::encode(&again.scene, &again.provenance()).unwrap();
+    assert!(bytes == small().1, "addresses or hash maps have found their way into the file");
+}
+
+/// Expected: another reader finds it valid, and in it our camera, sun, labels and cut-out materials.
+#[test]
+fn another_reader_finds_camera_sun_labels_and_masks() {
+    let (field, bytes) = small();
+    let file = gltf::Gltf::from_slice(bytes).unwrap_or_else(|e| panic!("{e}"));
+    let camera = file.cameras().next().unwrap();
+    let gltf::camera::Projection::Perspective(lens) = camera.projection() else { panic!("a perspective camera") };
+    let [fx, fy, ..] = field.scene.camera.intrinsics();
+    let (w, h) = (96.0, 72.0);
+    assert!((f64::from(lens.yfov()) - 2.0 * (h / 2.0 / fy).atan()).abs() < 1e-6);
+    assert!((f64::from(lens.aspect_ratio().unwrap()) - w * fy / (h * fx)).abs() < 1e-6);
+    // In the file y is up: the camera hangs at (x, height, −y), looking down along its own −z.
+    let root = file.default_scene().unwrap().nodes().next().unwrap();
+    let up = |v: Vec3| vec3(v.x, v.z, -v.y);
+    let to = |m: [[f32; 4]; 4], v: [f32; 4]| {
+        let sum = |i: usize| (0..4).map(|k| m[k][i] * v[k]).sum::<f32>();
+        vec3(sum(0), sum(1), sum(2))
+    };
+    let node = root.children().find(|n| n.camera().is_some()).unwrap();
+    let at = to(node.transform().matrix(), [0.0, 0.0, 0.0, 1.0]);
+    let forward = to(node.transform().matrix(), [0.0, 0.0, -1.0, 0.0]);
+    let pose = field.scene.camera.pose();
+    assert!((at - pose.position).length() < 1e-6 && (forward - pose.axes.z_axis).length() < 1e-6);
+    let world = to(root.transform().matrix(), at.extend(1.0).to_array());
+    assert!((world - up(pose.position)).length() < 1e-6, "{world}");
+    let Some(Light::Sun(sun)) = field.scene.lights.iter().find(|l| matches!(l, Light::Sun(_))) else { panic!("a sun") };
+    let node = root.children().find(|n| n.light().is_some()).unwrap();
+    let shines = to(node.transform().matrix(), [0.0, 0.0, -1.0, 0.0]);
+    assert!((shines + sun.direction()).length() < 1e-6);
+    let lux = node.light().unwrap().intensity();
+    assert!((30_000.0..120_000.0).contains(&lux), "{lux} lx is no sun");
+    // Labels and masks.
+    let extras: Value = serde_json::from_str(root.children().next().unwrap().extras().as_ref().unwrap().get()).unwrap();
+    assert_eq!(extras, json!({ "class": "soil", "plant": 0, "leaf": 0 }));
+    let cut = file.materials().filter(|m| m.alpha_mode() == gltf::material::AlphaMode::Mask);
+    for material in cut {
+        assert!(material.double_sided() && material.alpha_cutoff() == Some(0.5));
+        assert!(material.extension_value("KHR_materials_diffuse_transmission").is_some(), "leaves let light through");
+        let texture = material.pbr_metallic_roughness().base_color_texture().unwrap().texture();
+        assert_eq!(texture.sampler().mag_filter(), Some(gltf::texture::MagFilter::Nearest));
+    }
+    assert_eq!(root.children().filter(|n| n.mesh().is_some()).count(), file.meshes().count());
+}
+
+#[test]
+fn the_program_exports_a_scene_and_says_what_is_missing() {
+    let (_keep, out) = scratch();
+    let done = trace(&["export", "--scene", program::SMALL, "--width", "32", "--format", "gltf", "--out"])
+        .arg(&out)
+        .output()
+        .unwrap();
+    let said = String::from_utf8(done.stderr).unwrap();
+    assert!(done.status.success(), "{said}");
+    assert_eq!(program::names(&out), ["scene.glb"]);
+    assert_eq!(String::from_utf8(done.stdout).unwrap().trim(), out.join("scene.glb").display().to_string());
+    assert!(said.contains("no sky"), "{said}");
+}
+
+/// A square of two triangles in OBJ: corners at y = 0 and 1, so that what is up shows.
+const SQUARE: &str = "mtllib square.mtl\no square\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n\
+    usemtl leaf\nf 1/1 2/2 3/3 4/4\n";
+
+fn write(folder: &Path, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
+    std::fs::create_dir_all(folder).unwrap();
+    let path = folder.join(name);
+    std::fs::write(&path, bytes).unwrap();
+    path
+}
+
+/// A grey picture of 2 × 2, white in the top row only.
+fn picture(folder: &Path, name: &str) {
+    output::write_png(&folder.join(name), 2, 2, &output::Picture::Gray(&[255, 255, 0, 0]), "").unwrap();
+}
+
+#[test]
+fn an_obj_file_is_read_with_its_materials_and_masks() {
+    let (_keep, folder) = scratch();
+    let path = write(&folder, "square.obj", SQUARE);
+    write(&folder, "square.mtl", "newmtl leaf\nKd 0.1 0.3 0.05\nNs 30\nmap_d mask.png\n");
+    picture(&folder, "mask.png");
+    let model = Model::load(&path, Up::Y).unwrap();
+    assert_eq!(model.files.len(), 3, "{:?}", model.files);
+    let part = &model.parts[0];
+    // v runs up in the file: the corner at its (0, 1) is our (0, 0), the picture's top left.
+    let corner = |uv: Vec2| part.mesh.uvs.iter().position(|t| *t == uv).map(|i| part.mesh.positions[i]);
+    assert_eq!(corner(vec2(0.0, 0.0)), Some(vec3(0.0, 0.0, 1.0)));
+    assert_eq!(corner(vec2(1.0, 1.0)), Some(vec3(1.0, 0.0, 0.0)));
+    // Without normals of its own it faces as its triangles do: +z of the file is south.
+    assert!(part.mesh.normals.iter().all(|n| (*n - vec3(0.0, -1.0, 0.0)).length() < 1e-6));
+    let look = &model.surfaces[part.surface];
+    assert_eq!(look.color, [0.1, 0.3, 0.05]);
+    assert!((look.roughness.unwrap() - 0.25).abs() < 1e-6, "α = √(2 / 32)");
+    let mask = look.mask.as_ref().unwrap();
+    assert!(mask.texel(0, 0) && mask.texel(1, 0) && !mask.texel(0, 1) && !mask.texel(1, 1));
+    let as_it_is = Model::load(&path, Up::Z).unwrap();
+    assert!(as_it_is.parts[0].mesh.positions.contains(&vec3(1.0, 1.0, 0.0)));
+}
+
+/// A document with one triangle in a buffer beside it: positions, coordinates as normalised bytes, indices as bytes.
+fn triangle(extra: impl FnOnce(&mut Value)) -> (Value, Vec<u8>) {
+    let mut bytes: Vec<u8> =
+        [0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, -1.0].iter().flat_map(|f| f.to_le_bytes()).collect();
+    bytes.extend([0, 0, 255, 0, 0, 255, 0, 0]);
+    bytes.extend([0_u8, 1, 2, 0]);
+    let mut document = json!({
+        "asset": { "version": "2.0" },
+        "scenes": [{ "nodes": [0] }],
+        "nodes": [{ "mesh": 0, "name": "stone" }],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0, "TEXCOORD_0": 1 }, "indices": 2 }] }],
+        "accessors": [
+            { "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3" },
+            { "bufferView": 1, "componentType": 5121, "normalized": true, "count": 3, "type": "VEC2" },
+            { "bufferView": 2, "componentType": 5121, "count": 3, "type": "SCALAR" },
+        ],
+        "bufferViews": [
+            { "buffer": 0, "byteOffset": 0, "byteLength": 36 },
+            { "buffer": 0, "byteOffset": 36, "byteLength": 6 },
+            { "buffer": 0, "byteOffset": 44, "byteLength": 3 },
+        ],
+        "buffers": [{ "byteLength": 48, "uri": "the%20bytes.bin" }],
+    });
+    extra(&mut document);
+    (document, bytes)
+}
+
+fn load(folder: &Path, (document, bytes): (Value, Vec<u8>)) -> furrow::Result<Model> {
+    write(folder, "the bytes.bin", bytes);
+    Model::load(&write(folder, "model.gltf", document.to_string()), Up::Y)
+}
+
+#[test]
+fn a_gltf_file_with_a_buffer_beside_it_is_read() {
+    let (_keep, folder) = scratch();
+    let model = load(&folder, triangle(|_| ())).unwrap_or_else(|e| panic!("{e}"));
+    let mesh = &model.parts[0].mesh;
+    // y up becomes z up: the file's −z is north.
+    assert_eq!(mesh.positions, [vec3(0.0, 0.0, 0.0), vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0)]);
+    assert_eq!(mesh.uvs, [vec2(0.0, 0.0), vec2(1.0, 0.0), vec2(0.0, 1.0)]);
+    assert!(mesh.normals.iter().all(|n| (*n - Vec3::Z).length() < 1e-6), "faceted: {:?}", mesh.normals);
+    assert_eq!(model.files.len(), 2);
+}
+
+#[test]
+fn nodes_turn_scale_and_mirror_what_hangs_on_them() {
+    let (_keep, folder) = scratch();
+    let model = load(
+        &folder,
+        triangle(|d| {
+            d["nodes"] = json!([
+                { "children": [1], "translation": [0, 2, 0], "rotation": [0, std::f64::consts::FRAC_1_SQRT_2, 0, std::f64::consts::FRAC_1_SQRT_2] },
+                { "mesh": 0, "scale": [-2, 1, 1] },
+            ]);
+        }),
+    )
+    .unwrap();
+    let mesh = &model.parts[0].mesh;
+    // A quarter turn about the upright takes x to −z (north) and −z to −x (west); 2 m up.
+    let corners = [vec3(0.0, 0.0, 2.0), vec3(0.0, -2.0, 2.0), vec3(-1.0, 0.0, 2.0)];
+    for (is, should) in mesh.positions.iter().zip(corners) {
+        assert!((*is - should).length() < 1e-6, "{is} {should}");
+    }
+    let [a, b, c] = mesh.triangles[0].map(|i| mesh.positions[i as usize]);
+    assert!((b - a).cross(c - a).z > 0.0, "a mirrored surface still faces outwards");
+    assert!(mesh.normals.iter().all(|n| (*n - Vec3::Z).length() < 1e-6));
+}
+
+#[test]
+fn opacity_is_cut_where_the_file_says() {
+    let (_keep, folder) = scratch();
+    std::fs::create_dir_all(&folder).unwrap();
+    let texels = [[255, 0, 0, 255], [255, 0, 0, 200], [255, 0, 0, 100], [255, 0, 0, 0]];
+    output::write_png(&folder.join("cut.png"), 2, 2, &output::Picture::Rgba(&texels), "").unwrap();
+    let there = |mode: &str, cutoff: f32| {
+        let document = triangle(|d| {
+            d["meshes"][0]["primitives"][0]["material"] = json!(0);
+            d["materials"] = json!([{ "alphaMode": mode, "alphaCutoff": cutoff, "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }]);
+            d["textures"] = json!([{ "source": 0 }]);
+            d["images"] = json!([{ "uri": "cut.png" }]);
+        });
+        let model = load(&folder, document).unwrap_or_else(|e| panic!("{e}"));
+        let mask = model.surfaces[model.parts[0].surface].mask.clone();
+        mask.map_or(4, |m| [(0, 0), (1, 0), (0, 1), (1, 1)].into_iter().filter(|(x, y)| m.texel(*x, *y)).count())
+    };
+    assert_eq!(there("OPAQUE", 0.5), 4);
+    assert_eq!(there("MASK", 0.9), 1);
+    assert_eq!(there("MASK", 0.5), 2);
+    assert_eq!(there("MASK", 0.3), 3);
+    assert_eq!(there("BLEND", 0.9), 2);
+}
+
+#[test]
+fn a_page_gives_class_place_size_and_number() {
+    let (_keep, folder) = scratch();
+    write(&folder, "square.obj", SQUARE);
+    write(&folder, "square.mtl", "newmtl leaf\nKd 0.1 0.3 0.05\n");
+    let field = placed(
+        &folder,
+        "(file: \"square.obj\", up: Z, class: Weed, position_m: (0.5, 1), lift_m: 0.25, turn_deg: 90, scale: 0.1, \
+         transmission: (0.05, 0.1, 0.02, 0.4), nir: 0.5, roughness: 0.4), \
+         (file: \"square.obj\", class: Soil), (file: \"square.obj\", class: Crop)",
+    )
+    .unwrap_or_else(|e| panic!("{e}"));
+    let [weed, thing, crop] = &field.scene.parts[..] else { panic!("three parts") };
+    assert_eq!((weed.tag.class, weed.tag.plant), (Class::Weed, 1));
+    assert_eq!((thing.tag.class, thing.tag.plant), (Class::Soil, 0));
+    assert_eq!((crop.tag.class, crop.tag.plant), (Class::Crop, 2));
+    // Clockwise from above: east becomes south, north becomes east.
+    let (lo, hi) = weed.mesh.bounds().unwrap();
+    assert!((lo - vec3(0.5, 0.9, 0.25)).length() < 1e-6 && (hi - vec3(0.6, 1.0, 0.25)).length() < 1e-6, "{lo} {hi}");
+    assert_eq!(field.plants.len(), 2);
+    assert!((field.plants[0].position - vec3(0.5, 1.0, 0.25)).length() < 1e-6);
+    let tone = field.scene.materials[weed.material as usize].swatch().mean;
+    assert!((tone.transmittance.0 - Spectrum::new(0.05, 0.1, 0.02, 0.4).0).abs().max_element() < 1e-6);
+    assert!((tone.reflectance.0 - Spectrum::new(0.1, 0.3, 0.05, 0.5).0).abs().max_element() < 1e-6);
+    assert!(placed(&folder, "(file: \"square.obj\", class: Crop, scale: 1e9)").is_err(), "no field is that large");
+}
+
+#[test]
+fn a_model_stands_on_the_ground_and_counts_after_the_plants() {
+    let (_keep, folder) = scratch();
+    write(&folder, "square.obj", SQUARE);
+    write(&folder, "square.mtl", "newmtl leaf\nKd 0.1 0.3 0.05\n");
+    let root = env!("CARGO_MANIFEST_DIR");
+    let text = small_text()
+        .replace("\"scenes/", &format!("\"{root}/scenes/"))
+        .replace("\"textures/", &format!("\"{root}/textures/"));
+    let text = text.trim_end().strip_suffix(')').unwrap().to_owned()
+        + "models: [(file: \"square.obj\", up: Z, class: Weed, position_m: (0.05, -0.03), scale: 0.01)])";
+    let page = write(&folder, "page.ron", text);
+    let field =
+        build::field(&page, &Options { width: Some(32), ..Options::default() }).unwrap_or_else(|e| panic!("{e}"));
+    let bare = program::field(&small_text(), &Options { width: Some(32), ..Options::default() });
+    assert_eq!(field.plants[..bare.plants.len()], bare.plants[..], "a model moves no plant");
+    let model = field.plants.last().unwrap();
+    assert!(model.number > bare.plants.last().unwrap().number);
+    let ground = field.scene.parts[0].mesh.positions.iter();
+    let near = ground.min_by(|a, b| {
+        let d = |p: &Vec3| (p.truncate() - vec2(0.05, -0.03)).length();
+        d(a).total_cmp(&d(b))
+    });
+    assert!((model.position.z - near.unwrap().z).abs() < 2e-3, "{} {}", model.position, near.unwrap());
+}
+
+#[test]
+fn what_a_model_needs_counts_into_the_scenes_hash() {
+    let (_keep, folder) = scratch();
+    write(&folder, "square.obj", SQUARE);
+    let hash = |color: &str| {
+        write(&folder, "square.mtl", format!("newmtl leaf\nKd {color}\n"));
+        placed(&folder, "(file: \"square.obj\", class: Crop)").unwrap().hash
+    };
+    let first = hash("0.1 0.3 0.05");
+    assert_eq!(first, hash("0.1 0.3 0.05"));
+    assert_ne!(first, hash("0.1 0.3 0.06"), "the materials beside the model are part of the scene");
+}
+
+/// A change to a document.
+type Edit = Box<dyn FnOnce(&mut Value)>;
+
+/// What a page is told whose model is broken.
+fn refused(folder: &Path, name: &str) -> String {
+    let Err(error) = placed(folder, &format!("(file: \"{name}\", class: Weed)")) else { panic!("{name} was read") };
+    assert_eq!(error.exit_code(), 2, "{error}");
+    assert!(matches!(error, Error::Page(_)), "{error}");
+    let words = error.to_string();
+    assert!(
+        words.contains("page.ron:1:") && words.contains(&"^".repeat(name.len())) && words.contains("help: "),
+        "{words}"
+    );
+    words
+}
+
+#[test]
+fn broken_models_get_one_clear_error_at_the_place_that_names_them() {
+    let (_keep, folder) = scratch();
+    let whole = {
+        let (mut document, bytes) = triangle(|_| ());
+        document["buffers"][0].as_object_mut().unwrap().remove("uri");
+        glb::join(document.to_string().into_bytes(), bytes).unwrap()
+    };
+    write(&folder, "whole.glb", &whole);
+    assert!(placed(&folder, "(file: \"whole.glb\", class: Weed)").is_ok());
+    for (name, bytes, word) in [
+        ("empty.glb", &[][..], "JSON"),
+        ("header.glb", &whole[..10], "header"),
+        ("short.glb", &whole[..whole.len() - 9], "ends too early"),
+        ("model.fbx", &whole[..], ".glb, .gltf or .obj"),
+    ] {
+        write(&folder, name, bytes);
+        let words = refused(&folder, name);
+        assert!(words.contains(word), "{name}: {words}");
+    }
+    let far = |at: &str, value: Value| {
+        let at = at.to_owned();
+        move |d: &mut Value| *d.pointer_mut(&at).unwrap() = value
+    };
+    let edits: Vec<(Edit, &str)> = vec![
+        (Box::new(far("/nodes/0/mesh", json!(7))), "mesh 7 is named"),
+        (Box::new(far("/meshes/0/primitives/0/indices", json!(9))), "accessor 9 is named"),
+        (Box::new(far("/accessors/0/count", json!(4))), "reaches past its bytes"),
+        (Box::new(far("/accessors/0/count", json!(u64::MAX))), "reaches past its bytes"),
+        (Box::new(far("/accessors/1/count", json!(2))), "2 texture coordinates"),
+        (Box::new(far("/bufferViews/0/byteLength", json!(u64::MAX))), "reaches past its bytes"),
+        (Box::new(far("/bufferViews/0/byteOffset", json!(u64::MAX))), "reaches past its bytes"),
+        (Box::new(far("/buffers/0/byteLength", json!(1_u64 << 50))), "has 48 of its"),
+        (Box::new(far("/buffers/0/uri", json!("gone.bin"))), "`gone.bin`, which is not there"),
+        (Box::new(far("/buffers/0/uri", json!("https://a.b/c.bin"))), "only files beside it"),
+        (Box::new(far("/asset/version", json!("1.0"))), "glTF 2.0 can be read"),
+        (Box::new(far("/accessors/0/type", json!("VEC4"))), "VEC3 is needed"),
+        (Box::new(far("/accessors/0/componentType", json!(1))), "unknown component type"),
+        (Box::new(|d| d["nodes"] = json!([{ "mesh": 0, "children": [0] }])), "two parents"),
+        (Box::new(|d| d["bufferViews"][2]["byteOffset"] = json!(33)), "names corner"),
+        (Box::new(|d| d["extensionsRequired"] = json!(["KHR_draco_mesh_compression"])), "KHR_draco_mesh_compression"),
+        (Box::new(|d| d["meshes"][0]["primitives"][0]["mode"] = json!(0)), "no triangles"),
+        (Box::new(|d| d["nodes"][0]["scale"] = json!([1e300, 1, 1])), "not a finite number"),
+        (
+            Box::new(|d| {
+                d["materials"] = json!([{ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }]);
+                d["textures"] = json!([{ "source": 0 }]);
+                d["images"] = json!([{ "uri": "no such.png" }]);
+            }),
+            "`no such.png`, which is not there",
+        ),
+    ];
+    for (edit, word) in edits {
+        let (document, bytes) = triangle(edit);
+        write(&folder, "the bytes.bin", bytes);
+        write(&folder, "model.gltf", document.to_string());
+        let words = refused(&folder, "model.gltf");
+        assert!(words.contains(word), "{word}: {words}");
+    }
+    let (document, mut bytes) = triangle(|_| ());
+    bytes[4..8].copy_from_slice(&f32::NAN.to_le_bytes());
+    write(&folder, "the bytes.bin", bytes);
+    write(&folder, "model.gltf", document.to_string());
+    assert!(refused(&folder, "model.gltf").contains("corner 0 of `stone` is not a finite number"));
+    for (text, word) in [
+        (SQUARE.replace("square.mtl", "gone.mtl"), "`gone.mtl`, which is not there"),
+        (SQUARE.replace("4/4", "5/4"), "out of bounds"),
+        (SQUARE.replace("v 1 1 0", "v 1 NaN 0"), "not a finite number"),
+        (SQUARE.replace("v 1 1 0", "v one 1 0"), "position parse error"),
+        ("# nothing".to_owned(), "no triangles"),
+    ] {
+        write(&folder, "square.mtl", "newmtl leaf\nKd 0.1 0.3 0.05\n");
+        write(&folder, "square.obj", text);
+        let words = refused(&folder, "square.obj");
+        assert!(words.contains(word), "{word}: {words}");
+    }
+}
+
+/// What reads a file of these bytes: a model, or an error that says something.
+fn read_as(name: &str, bytes: &[u8]) -> Result<(), TestCaseError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = write(folder.path(), name, bytes);
+    if let Err(e) = Model::load(&path, Up::Y) {
+        prop_assert!(matches!(e, Error::Model { .. }), "{e}");
+        prop_assert!(!e.to_string().is_empty());
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(300) })]
+
+    #[test]
+    fn random_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+        for name in ["a.glb", "a.gltf", "a.obj"] {
+            read_as(name, &bytes)?;
+            read_as(name, &[b"glTF\x02\0\0\0", &bytes[..]].concat())?;
+        }
+    }
+
+    #[test]
+    fn random_lines_of_obj_never_panic(lines in prop::collection::vec("(v|vt|vn|f|o|g|s|usemtl|mtllib|l|p)( [-0-9./einf]{1,6}){0,5}", 0..30)) {
+        read_as("a.obj", lines.join("\n").as_bytes())?;
+    }
+
+    #[test]
+    fn mutilated_files_never_panic(edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6), cut in any::<prop::sample::Index>()) {
+        let (mut document, bytes) = triangle(|d| {
+            d["materials"] = json!([{ "alphaMode": "MASK", "normalTexture": { "index": 0 }, "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }]);
+            d["textures"] = json!([{ "source": 0, "sampler": 0 }]);
+            d["samplers"] = json!([{ "wrapS": 33071 }]);
+            d["images"] = json!([{ "bufferView": 0 }]);
+        });
+        document["buffers"][0].as_object_mut().unwrap().remove("uri");
+        let mut whole = glb::join(document.to_string().into_bytes(), bytes).unwrap();
+        for (at, byte) in edits {
+            let at = at.index(whole.len());
+            whole[at] = byte;
+        }
+        read_as("a.glb", &whole)?;
+        read_as("a.glb", &whole[..cut.index(whole.len() + 1)])?;
+    }
+
+    #[test]
+    fn edited_numbers_never_panic(edits in prop::collection::vec((any::<prop::sample::Index>(), prop_oneof![Just("-1"), Just("0"), Just("3"), Just("18446744073709551615"), Just("4294967296"), Just("1e300"), Just("null"), Just("[]"), Just("\"\"")]), 1..4)) {
+        let (document, bytes) = triangle(|_| ());
+        let mut text = document.to_string();
+        for (at, with) in edits {
+            let digits: Vec<usize> = text.char_indices().filter(|(_, c)| c.is_ascii_digit()).map(|(i, _)| i).collect();
+            let at = digits[at.index(digits.len())];
+            text.replace_range(at..=at, with);
+        }
+        let folder = tempfile::tempdir().unwrap();
+        write(folder.path(), "the bytes.bin", &bytes);
+        let path = write(folder.path(), "a.gltf", &text);
+        if let Err(e) = Model::load(&path, Up::Y) {
+            prop_assert!(matches!(e, Error::Model { .. }), "{e}");
+        }
+    }
+}
