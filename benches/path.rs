@@ -7,7 +7,7 @@
 #![allow(clippy::print_stdout, reason = "its table is its result")]
 
 use furrow::accel::EmbreeAccel;
-use furrow::geometry::{Hit, Intersect, Ray, Window};
+use furrow::geometry::{Hit, Intersect, PACKET, Ray, Window};
 use furrow::integrator::{Path as PathTracer, World};
 use furrow::render::{self, Settings, Watch};
 use furrow::sampling::Points;
@@ -19,21 +19,37 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// Runs of which the median counts.
-const RUNS: usize = 1;
-/// Samples a pixel.
-const SPP: u32 = 2;
+const RUNS: usize = 5;
+/// Samples a pixel: one packet.
+const SPP: u32 = 8;
 /// Scenes: what it is, its page, and the width of its image.
 const SCENES: [(&str, &str, Option<u32>); 3] = [
     ("main scene", "scenes/field.ron", None),
-    ("one leaf close up", "scenes/01-one-leaf.ron", Some(640)),
-    ("closed canopy", "benches/canopy.ron", None),
+    ("one leaf close up", "scenes/01-one-leaf.ron", Some(480)),
+    ("closed canopy", "benches/canopy.ron", Some(324)),
 ];
 
+type Packet = [Option<Ray>; PACKET];
+
 /// A question as it was asked.
-#[derive(Clone, Copy)]
 enum Query {
     Closest(Ray),
     Occluded(Ray),
+    Closests(Box<Packet>),
+    Occludeds(Box<Packet>),
+}
+
+impl Query {
+    /// Rays to a nearest surface, and rays to a light.
+    fn rays(&self) -> [usize; 2] {
+        let some = |rays: &Packet| rays.iter().flatten().count();
+        match self {
+            Self::Closest(_) => [1, 0],
+            Self::Occluded(_) => [0, 1],
+            Self::Closests(rays) => [some(rays), 0],
+            Self::Occludeds(rays) => [0, some(rays)],
+        }
+    }
 }
 
 /// Answers by another, and writes every question down, each thread into a list of its own.
@@ -59,14 +75,27 @@ impl Intersect for Recorder<'_> {
         self.note(Query::Occluded(*ray));
         self.geometry.occluded(ray)
     }
+
+    fn closest_packet(&self, rays: &Packet) -> [Option<Hit>; PACKET] {
+        self.note(Query::Closests(Box::new(*rays)));
+        self.geometry.closest_packet(rays)
+    }
+
+    fn occluded_packet(&self, rays: &Packet) -> [bool; PACKET] {
+        self.note(Query::Occludeds(Box::new(*rays)));
+        self.geometry.occluded_packet(rays)
+    }
 }
 
-fn ask(geometry: &EmbreeAccel, queries: &[Query]) -> usize {
-    let hits = queries.iter().filter(|query| match black_box(query) {
-        Query::Closest(ray) => geometry.closest(ray).is_some(),
-        Query::Occluded(ray) => geometry.occluded(ray),
-    });
-    hits.count()
+fn ask(geometry: &EmbreeAccel, queries: &[Query]) {
+    for query in queries {
+        match query {
+            Query::Closest(ray) => drop(black_box(geometry.closest(ray))),
+            Query::Occluded(ray) => drop(black_box(geometry.occluded(ray))),
+            Query::Closests(rays) => drop(black_box(geometry.closest_packet(rays))),
+            Query::Occludeds(rays) => drop(black_box(geometry.occluded_packet(rays))),
+        }
+    }
 }
 
 fn seconds(run: impl FnOnce()) -> f64 {
@@ -85,9 +114,9 @@ fn main() {
     let threads = pool.current_num_threads();
     println!("{threads} threads, {SPP} samples a pixel, medians of {RUNS} runs\n");
     println!(
-        "| scene | triangles | grow, s | build, s | Msamples/s | rays a sample: nearest + shadow | Mray/s | share inside Embree |"
+        "| scene | triangles | grow, s | build, s | Msamples/s | rays a sample: nearest + shadow | Mray/s | share inside Embree | labels, s |"
     );
-    println!("|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|");
     for (name, page, width) in SCENES {
         let options = build::Options { width, ..build::Options::default() };
         let field = || pool.install(|| build::field(Path::new(page), &options)).expect(page);
@@ -113,13 +142,12 @@ fn main() {
             recorder.asked.into_iter().map(|list| list.into_inner().expect("a list")).collect();
         let replay = || {
             // Each thread its own list, all at once: the wall time of the longest, made even by their lengths.
-            let times = pool.broadcast(|thread| {
-                seconds(|| {
-                    black_box(ask(&geometry, &asked[thread.index()]));
-                })
-            });
+            let times = pool.broadcast(|thread| seconds(|| ask(&geometry, &asked[thread.index()])));
             times.iter().sum::<f64>() / threads as f64
         };
+        let tags = scene.tags();
+        let label = || pool.install(|| render::label(&geometry, &tags, &scene.camera, window));
+        let labels = median((0..RUNS).map(|_| seconds(|| drop(black_box(label())))).collect());
         let mut turns = (Vec::new(), Vec::new());
         for _ in 0..RUNS {
             turns.0.push(seconds(|| drop(black_box(render(&geometry)))));
@@ -128,15 +156,17 @@ fn main() {
         let share = median(turns.0.iter().zip(&turns.1).map(|(render, replay)| replay / render).collect());
         let (rendered, replayed) = (median(turns.0), median(turns.1));
         let samples = f64::from(window.width() * window.height() * SPP);
-        let rays = asked.iter().map(Vec::len).sum::<usize>() as f64;
-        let nearest = asked.iter().flatten().filter(|query| matches!(query, Query::Closest(_))).count() as f64;
+        let [nearest, shadow] = asked.iter().flatten().fold([0.0; 2], |[nearest, shadow], query| {
+            let rays = query.rays();
+            [nearest + rays[0] as f64, shadow + rays[1] as f64]
+        });
         println!(
-            "| {name} | {:.2} M | {grow:.2} | {build:.2} | {:.2} | {:.2} + {:.2} | {:.2} | {:.0} % |",
+            "| {name} | {:.2} M | {grow:.2} | {build:.2} | {:.2} | {:.2} + {:.2} | {:.2} | {:.0} % | {labels:.3} |",
             scene.triangles() as f64 / 1e6,
             samples / rendered / 1e6,
             nearest / samples,
-            (rays - nearest) / samples,
-            rays / replayed / 1e6,
+            shadow / samples,
+            (nearest + shadow) / replayed / 1e6,
             100.0 * share,
         );
     }
