@@ -87,7 +87,8 @@ class Furrow:
 
     @staticmethod
     def possible(spp):
-        return spp
+        """Stratified samples come in blocks of 16: a part of a block is less even than its number tells."""
+        return math.ceil(spp / 16) * 16
 
     def render(self, spp, take):
         """Radiance, seconds of rendering; `take` is not looked at: equal runs are equal."""
