@@ -136,6 +136,27 @@ fn a_disc_lamp_lights_what_lies_below_it() {
     expect("lamp", &s, true, 4096, RHO * radiance * (r * r / (r * r + h * h)));
 }
 
+/// An integrating sphere: what a lamp of flux Φ does not light itself sees the rest evenly, L = ρ² Φ / (π A (1 − ρ)). The lamp turns
+/// its back on the world's origin, so that nothing there tells what light is usual.
+#[test]
+fn an_integrating_sphere_glows_evenly_where_its_lamp_does_not_shine() {
+    let (radius, r, radiance) = (1.0_f32, 0.1_f32, Spectrum::splat(100.0));
+    let lamp = Lamp::new(Outline::Disc(r), vec3(0.0, 0.0, -0.3), Frame::about(-Vec3::Z), radiance);
+    let wall = sphere(Vec3::ZERO, radius, 64);
+    let area = wall.area();
+    let eye = camera((8, 8), vec3(0.0, 0.0, -0.5), vec3(0.0, 0.2, 1.0), 30.0);
+    let s = scene(vec![(wall, lambert(RHO))], vec![Light::Lamp(lamp)], eye);
+    let flux = radiance * (std::f32::consts::PI * std::f32::consts::PI * r * r);
+    let [a, b, c, d] = RHO.to_array().map(|rho| rho * rho / (1.0 - rho));
+    expect(
+        "integrating sphere",
+        &s,
+        false,
+        1024,
+        flux * Spectrum::new(a, b, c, d) * (1.0 / (std::f32::consts::PI * area)),
+    );
+}
+
 /// Oren–Nayar never returns more than Lambert, nor does a wet film; a closed view of both stays below the furnace.
 #[test]
 fn no_example_surface_shines_brighter_than_the_sky() {

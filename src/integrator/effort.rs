@@ -30,18 +30,18 @@ pub(super) struct Effort {
 }
 
 impl Effort {
-    /// For a scene; with `on` false everything is followed once.
+    /// For a scene; with `on` false everything is followed once, as in a scene whose lights shine elsewhere than up here, which
+    /// tell nothing of what is usual.
     #[inline]
     pub(super) fn new(world: &World<'_>, on: bool) -> Self {
         let open = world.scene.lights.iter().fold(Spectrum::ZERO, |sum, light| sum + light.horizontal_irradiance());
-        Self { usual: open * (USUAL_ALBEDO * FRAC_1_PI), on }
+        Self { usual: open * (USUAL_ALBEDO * FRAC_1_PI), on: on && !open.is_black() }
     }
 
     /// What `radiance` is worth beside the light `found` so far, by the band that gains most.
     #[inline]
     fn worth(&self, radiance: Spectrum, found: Spectrum) -> f32 {
         let beside = found + self.usual * DARK;
-        // A scene whose lights shine elsewhere has no usual radiance; then everything is worth following.
         (radiance / (beside + Spectrum::splat(f32::MIN_POSITIVE))).max()
     }
 
@@ -63,12 +63,35 @@ impl Effort {
         self.worth(albedo * self.usual, found).clamp(LEAST, MOST)
     }
 
-    /// Chance of following a path on whose next light arrives with `throughput`.
+    /// Chance of following a path on whose next light arrives with `throughput`: never so small that one path could outweigh
+    /// [`LEAST`]⁻¹ unhindered ones, for what it finds may be far brighter than usual.
     #[inline]
     pub(super) fn survive(&self, throughput: Spectrum, found: Spectrum) -> f32 {
         if !self.on {
             return 1.0;
         }
-        self.worth(throughput * self.usual, found).min(1.0)
+        self.worth(throughput * self.usual, found).max(LEAST * throughput.max()).min(1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rationale: a chance of zero loses light for good, a tiny one makes fireflies. Expected: every chance is above zero and pays
+    /// back at most ten times, however bright the pixel is and however little the scene's open ground receives.
+    #[test]
+    fn whatever_can_bring_light_has_a_chance() {
+        for usual in [Spectrum::splat(1e-20), Spectrum::new(0.0, 0.0, 0.0, 1.0), Spectrum::ONE] {
+            let effort = Effort { usual, on: true };
+            for found in [0.0, 1e-6, 1.0, 1e6].map(Spectrum::splat) {
+                for throughput in [Spectrum::splat(0.01), Spectrum::new(0.7, 0.0, 0.0, 0.0), Spectrum::splat(5.0)] {
+                    let chance = effort.survive(throughput, found);
+                    assert!(chance <= 1.0 && throughput.max() / chance <= 10.001, "{throughput:?} {found:?} {chance}");
+                    assert!((LEAST..=1.0).contains(&effort.light(1e-6, throughput, found)));
+                    assert!((LEAST..=MOST).contains(&effort.split(throughput, found)));
+                }
+            }
+        }
     }
 }
