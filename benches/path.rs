@@ -145,8 +145,7 @@ fn main() {
             let times = pool.broadcast(|thread| seconds(|| ask(&geometry, &asked[thread.index()])));
             times.iter().sum::<f64>() / threads as f64
         };
-        let tags = scene.tags();
-        let label = || pool.install(|| render::label(&geometry, &tags, &scene.camera, window));
+        let label = || pool.install(|| render::label(&geometry, &scene.parts, &scene.camera, window));
         let labels = median((0..RUNS).map(|_| seconds(|| drop(black_box(label())))).collect());
         let mut turns = (Vec::new(), Vec::new());
         for _ in 0..RUNS {

@@ -63,6 +63,8 @@ const DOORS: &[(&str, &str)] = &[
     // glTF documents, read and written.
     ("serde_json", "model/document.rs model/gltf.rs output/gltf/"),
     ("sha2", "scene/library.rs"),
+    // Parts that a pixel met: one or two, nearly always.
+    ("smallvec", "film/tally.rs"),
     ("sobol_burley", "sampling/sampler.rs"),
     ("solar_positioning", "light/position.rs"),
     // Files appear whole or not at all: images of fields, and drawn textures below them. The denoiser's go through a folder.

@@ -12,7 +12,7 @@ mod common;
 
 use common::pictures;
 use common::program::{self, SMALL};
-use common::scenes::square;
+use common::scenes::{sphere, square};
 use furrow::accel::{Brute, EmbreeAccel};
 use furrow::film::{Film, Filter, Pixel};
 use furrow::geometry::{AlphaMask, Intersect, Mesh, Ray, Window};
@@ -42,7 +42,7 @@ fn scene(parts: Vec<Part>, camera: Camera) -> Scene {
 
 fn labels_of(scene: &Scene) -> LabelMap {
     let geometry = EmbreeAccel::build(&scene.surfaces(), 1).expect("an accelerator");
-    label(&geometry, &scene.tags(), &scene.camera, Window::full(scene.camera.width(), scene.camera.height()))
+    label(&geometry, &scene.parts, &scene.camera, Window::full(scene.camera.width(), scene.camera.height()))
 }
 
 /// Part + 1 of each pixel, 0 for none.
@@ -368,7 +368,7 @@ fn a_crop_holds_the_labels_of_its_part_of_the_image() {
     let field = program::field(&program::small_text(), &Options::default());
     let scene = &field.scene;
     let geometry = EmbreeAccel::build(&scene.surfaces(), 1).unwrap();
-    let take = |window| label(&geometry, &scene.tags(), &scene.camera, window);
+    let take = |window| label(&geometry, &scene.parts, &scene.camera, window);
     let full = take(Window::full(96, 72));
     for window in [
         Window { x0: 0, y0: 0, x1: 1, y1: 1 },
@@ -430,4 +430,83 @@ fn label_files_read_back_as_the_label_map() {
     for tag in &map.tags {
         assert_eq!(*class_of.entry(tag.plant).or_insert(tag.class), tag.class, "plant {} has two classes", tag.plant);
     }
+}
+
+/// Expected: of a plane, the depth at which the ray through the pixel's centre meets it, worked out in double precision, and the
+/// plane's normal on the side that is seen; nothing where nothing is.
+#[test]
+fn depth_and_normals_are_those_of_a_plane_through_any_lens_and_from_both_sides() {
+    let mut s = Stream::of(9, 0, Purpose::Test, 0);
+    for lens in LENSES {
+        for height in [0.8_f32, -0.8] {
+            let camera = eye(lens, vec3(s.range32(-0.3, 0.3), -0.5, height), vec3(0.0, 0.1, 0.0));
+            let mut mesh = square(Vec3::ZERO, 0.6);
+            mesh.transform(Mat3::from_rotation_x(s.range32(-0.3, 0.3)), vec3(0.02, 0.0, 0.01));
+            let [a, b, c] = mesh.corners(0).map(Vec3::as_dvec3);
+            let upper = (b - a).cross(c - a).normalize();
+            let pose = *camera.pose();
+            let [right, down, forward] = [pose.axes.x_axis, pose.axes.y_axis, pose.axes.z_axis].map(Vec3::as_dvec3);
+            let map = labels_of(&scene(vec![part(mesh, None, Tag::default())], camera));
+            let mut hits = 0;
+            for i in 0..160 * 120 {
+                let (depth, normal) = (map.depth[i as usize], map.normals[i as usize]);
+                if map.parts[i as usize] == NONE {
+                    assert!(depth == f32::INFINITY && normal == Vec3::ZERO);
+                    continue;
+                }
+                hits += 1;
+                let [x, y] = centre(&camera, i % 160, i / 160);
+                // At unit depth the ray has this direction, so its length to the plane is the depth.
+                let through = right * x + down * y + forward;
+                let expected = upper.dot(a - pose.position.as_dvec3()) / upper.dot(through);
+                assert!((f64::from(depth) - expected).abs() < 1e-5, "{depth} for {expected}");
+                let seen = if upper.dot(through) < 0.0 { upper } else { -upper };
+                assert!((normal.as_dvec3() - seen).length() < 1e-5, "{normal} for {seen}");
+            }
+            assert!(hits > 3000, "{hits}");
+        }
+    }
+}
+
+/// Expected: on a sphere, smooth normals, exact but for the angle that a mesh of 60 bands leaves, up to its outline; in a field,
+/// unit normals that face the camera wherever there is something, and depths that agree with the distances of all triangles.
+#[test]
+fn normals_are_smooth_and_face_the_camera_everywhere() {
+    let camera = eye(Distortion::default(), vec3(0.2, -0.6, 0.9), Vec3::ZERO);
+    let ball = sphere(Vec3::ZERO, 0.25, 60);
+    let map = labels_of(&scene(vec![part(ball, None, Tag::default())], camera));
+    let mut seen = 0;
+    for i in (0..160 * 120).filter(|i| map.parts[*i as usize] != NONE) {
+        let (origin, direction) = camera.centre_ray(i % 160, i / 160);
+        let normal = map.normals[i as usize];
+        assert!(normal.dot(direction) <= 0.0 && (normal.length() - 1.0).abs() < 1e-5);
+        let p = origin
+            + direction
+                * (map.depth[i as usize] / camera.axis_cosine([f64::from(i % 160) + 0.5, f64::from(i / 160) + 0.5]));
+        // Where the outline is near, the triangle's own normal stands in.
+        let limit = if normal.dot(direction) < -0.1 { 0.005 } else { 0.06 };
+        assert!(normal.distance(p.normalize()) < limit, "{normal} at {p}");
+        seen += 1;
+    }
+    assert!(seen > 2000, "{seen}");
+
+    let field = program::field(&program::small_text(), &Options::default());
+    let map = labels_of(&field.scene);
+    let (parts, distances) = every_triangle(&field.scene);
+    let camera = &field.scene.camera;
+    let mut compared = 0;
+    for i in 0..parts.len() {
+        let (x, y) = (i as u32 % camera.width(), i as u32 / camera.width());
+        let (_, direction) = camera.centre_ray(x, y);
+        assert_eq!(map.parts[i] == NONE, map.depth[i] == f32::INFINITY);
+        if map.parts[i] != NONE {
+            assert!(map.normals[i].dot(direction) <= 0.0 && (map.normals[i].length() - 1.0).abs() < 1e-5);
+        }
+        if map.parts[i] == parts[i] && parts[i] != NONE {
+            let expected = distances[i] * camera.axis_cosine([f64::from(x) + 0.5, f64::from(y) + 0.5]);
+            // Within a thousandth of a pixel of an edge another layer of the same part may win.
+            compared += usize::from((map.depth[i] - expected).abs() < 2e-5);
+        }
+    }
+    assert!(compared * 1000 > parts.len() * 998, "only {compared} depths of {} agree", parts.len());
 }

@@ -119,12 +119,7 @@ fn prepare(name: &str, scene: &Scene, spp: u32) -> PathBuf {
     let pool = render::pool(2).expect("a pool");
     let labels = pool.install(|| {
         let geometry = EmbreeAccel::build(&scene.surfaces(), 2).expect("an accelerator");
-        render::label(
-            &geometry,
-            &scene.tags(),
-            &scene.camera,
-            Window::full(scene.camera.width(), scene.camera.height()),
-        )
+        render::label(&geometry, &scene.parts, &scene.camera, Window::full(scene.camera.width(), scene.camera.height()))
     });
     let mut bytes = Vec::new();
     for (pixel, tag) in film.pixels.iter().zip(&labels.tags) {

@@ -1,15 +1,17 @@
-//! Where samples become pixels: mean and variance of each band, and the first surface's channels.
+//! Where samples become pixels: mean and variance of each band, the first surface's channels, and which parts were met.
 
 mod filter;
+mod tally;
 
 use crate::geometry::Window;
 use crate::math::{Spectrum, Vec3};
 use glam::{DVec4, Vec4};
 
 pub use filter::{Filter, Footprint};
+pub use tally::Tally;
 
 /// What is known of one pixel after all its samples.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pixel {
     /// Mean radiance.
     pub mean: Spectrum,
@@ -23,6 +25,8 @@ pub struct Pixel {
     pub depth: f32,
     /// Number of samples.
     pub samples: u32,
+    /// How many of them met each part first; those that it lacks met nothing.
+    pub tally: Tally,
 }
 
 impl Pixel {
@@ -37,7 +41,7 @@ impl Pixel {
 
 /// Adds up one pixel. One thread sums a pixel in sample order, so any number of threads makes the same bits; where one call
 /// ends and the next goes on makes no difference either.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Accumulator {
     count: u32,
     mean: DVec4,
@@ -46,6 +50,7 @@ pub struct Accumulator {
     normal: Vec3,
     depth: f64,
     hits: u32,
+    tally: Tally,
 }
 
 impl Accumulator {
@@ -59,10 +64,11 @@ impl Accumulator {
         self.m2 += delta * (x - self.mean);
     }
 
-    /// Adds what that sample saw first.
+    /// Adds what that sample saw first: of the part with this index, its albedo, shading normal and distance.
     #[inline]
-    pub fn add_first(&mut self, albedo: Spectrum, normal: Vec3, depth: f32) {
+    pub fn add_first(&mut self, part: u32, albedo: Spectrum, normal: Vec3, depth: f32) {
         self.hits += 1;
+        self.tally.add(part);
         self.albedo += albedo.0;
         self.normal += normal;
         self.depth += f64::from(depth);
@@ -79,6 +85,7 @@ impl Accumulator {
             normal: self.normal / n as f32,
             depth: if self.hits == 0 { f32::INFINITY } else { (self.depth / f64::from(self.hits)) as f32 },
             samples: self.count,
+            tally: self.tally.clone(),
         }
     }
 }

@@ -41,6 +41,6 @@ impl Integrator for FalseColor {
             Self::Albedo => albedo,
             Self::Depth => Spectrum::splat(1.0 / (1.0 + hit.t)),
         };
-        Sighting { radiance, first: Some(FirstHit { distance: hit.t, normal, albedo }) }
+        Sighting { radiance, first: Some(FirstHit { part: hit.part, distance: hit.t, normal, albedo }) }
     }
 }

@@ -49,6 +49,8 @@ pub struct Sighting {
 /// The first surface that a camera ray meets: guides for denoising, channels for people.
 #[derive(Clone, Copy, Debug)]
 pub struct FirstHit {
+    /// Index of its part.
+    pub part: u32,
     /// Distance along the ray, metres.
     pub distance: f32,
     /// Unit shading normal, facing the camera, world.

@@ -42,7 +42,7 @@ impl Vertex {
     /// What denoisers and people are told of it.
     pub(super) fn describe(&self, distance: f32) -> FirstHit {
         let normal = if self.seen.z < 0.0 { -self.frame.z } else { self.frame.z };
-        FirstHit { distance, normal, albedo: self.albedo() }
+        FirstHit { part: self.at.part, distance, normal, albedo: self.albedo() }
     }
 
     /// Reflectance from the side it was met on, about.

@@ -55,7 +55,7 @@ impl Denoiser {
         let pixels = film.pixels.iter().zip(rgb.iter().zip(&nir)).map(|(pixel, ([r, g, b], [nir, ..]))| Pixel {
             mean: Spectrum::new(*r, *g, *b, *nir),
             variance: Spectrum::ZERO,
-            ..*pixel
+            ..pixel.clone()
         });
         Ok(Film { window: film.window, pixels: pixels.collect() })
     }

@@ -18,7 +18,7 @@ pub fn explain(
 ) -> String {
     let scene = world.scene;
     let window = Window { x0: x, y0: y, x1: x + 1, y1: y + 1 };
-    let tag = label(world.geometry, &scene.tags(), &scene.camera, window).tags[0];
+    let tag = label(world.geometry, &scene.parts, &scene.camera, window).tags[0];
     let mut text = format!("pixel {x},{y}\n  label: {} plant {} leaf {}", tag.class.name(), tag.plant, tag.leaf);
     if let Some(plant) = plants.iter().find(|p| p.number == tag.plant) {
         let _ = write!(text, "\n  plant: {}", plant.species);

@@ -1,7 +1,9 @@
 //! Exact labels: one ray through each pixel's centre, through the same lens, against the same geometry and alpha masks as
 //! the colour pass. No film, no sampler, no lights, no materials: a label cannot be filtered, noisy or lit.
 
-use crate::geometry::{Intersect, PACKET, Ray, Window};
+use crate::geometry::{Hit, Intersect, Mesh, PACKET, Ray, Window};
+use crate::math::Vec3;
+use crate::scene::Part;
 use crate::scene::tag::Tag;
 use crate::sensor::Camera;
 use rayon::prelude::*;
@@ -10,7 +12,7 @@ use rayon::prelude::*;
 pub const NONE: u32 = u32::MAX;
 
 /// What lies at each pixel's centre, row by row from the top.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct LabelMap {
     /// Which part of the camera's image it shows.
     pub window: Window,
@@ -18,24 +20,56 @@ pub struct LabelMap {
     pub parts: Vec<u32>,
     /// Who that is; the default tag (soil) where nothing is hit.
     pub tags: Vec<Tag>,
+    /// Distance along the optical axis, metres, as depth cameras tell it; infinite where nothing is hit.
+    pub depth: Vec<f32>,
+    /// Unit shading normal of the mesh, world, on the side that the camera sees; of normal maps it knows nothing. Zero
+    /// where nothing is hit.
+    pub normals: Vec<Vec3>,
 }
 
-/// Labels a window. `tags` holds one row a part.
-pub fn label(geometry: &dyn Intersect, tags: &[Tag], camera: &Camera, window: Window) -> LabelMap {
-    let mut parts = vec![NONE; (window.width() * window.height()) as usize];
-    parts.par_chunks_mut(window.width() as usize).zip(window.y0..window.y1).for_each(|(row, y)| {
+/// Labels a window of the camera's image of these parts.
+pub fn label(geometry: &dyn Intersect, parts: &[Part], camera: &Camera, window: Window) -> LabelMap {
+    let (width, count) = (window.width() as usize, (window.width() * window.height()) as usize);
+    let mut map = LabelMap {
+        window,
+        parts: vec![NONE; count],
+        tags: vec![Tag::default(); count],
+        depth: vec![f32::INFINITY; count],
+        normals: vec![Vec3::ZERO; count],
+    };
+    let rows = map.parts.par_chunks_mut(width).zip(map.tags.par_chunks_mut(width));
+    let rows = rows.zip(map.depth.par_chunks_mut(width)).zip(map.normals.par_chunks_mut(width));
+    rows.zip(window.y0..window.y1).for_each(|((((row, tags), depth), normals), y)| {
         // Neighbours' rays go nearly the same way and are asked together.
-        for (parts, x0) in row.chunks_mut(PACKET).zip((window.x0..).step_by(PACKET)) {
+        for first in (0..width).step_by(PACKET) {
             let mut rays = [None; PACKET];
-            for (x, ray) in (x0..).zip(&mut rays[..parts.len()]) {
-                let (origin, direction) = camera.centre_ray(x, y);
+            for (x, ray) in (first..width).zip(&mut rays) {
+                let (origin, direction) = camera.centre_ray(window.x0 + x as u32, y);
                 *ray = Some(Ray::new(origin, direction));
             }
-            for (part, hit) in parts.iter_mut().zip(geometry.closest_packet(&rays)) {
-                *part = hit.map_or(NONE, |hit| hit.part);
+            let hits = geometry.closest_packet(&rays);
+            for (x, (ray, hit)) in (first..).zip(rays.iter().zip(&hits)) {
+                let (Some(ray), Some(hit)) = (ray, hit) else { continue };
+                let part = &parts[hit.part as usize];
+                row[x] = hit.part;
+                tags[x] = part.tag;
+                depth[x] = hit.t * ray.direction.dot(camera.pose().axes.z_axis);
+                normals[x] = facing(&part.mesh, hit, ray.direction);
             }
         }
     });
-    let tags = parts.iter().map(|p| tags.get(*p as usize).copied().unwrap_or_default()).collect();
-    LabelMap { window, parts, tags }
+    map
+}
+
+/// The interpolated unit normal at a hit on the side that a ray along `direction` comes from. Near the outline of a curved
+/// surface it may point away from the eye, which the triangle's own normal never does.
+fn facing(mesh: &Mesh, hit: &Hit, direction: Vec3) -> Vec3 {
+    let corners = mesh.triangles[hit.triangle as usize].map(|i| i as usize);
+    let [a, b, c] = corners.map(|i| mesh.positions[i]);
+    let [na, nb, nc] = corners.map(|i| mesh.normals[i]);
+    let flat = (b - a).cross(c - a).normalize_or(-direction);
+    let smooth = (na * (1.0 - hit.u - hit.v) + nb * hit.u + nc * hit.v).normalize_or(flat);
+    let smooth = if smooth.dot(flat) < 0.0 { -smooth } else { smooth };
+    let side = if flat.dot(direction) > 0.0 { -1.0 } else { 1.0 };
+    side * if side * smooth.dot(direction) < 0.0 { smooth } else { flat }
 }

@@ -1,6 +1,7 @@
 //! Tiles in parallel → film. The same bits at any number of threads.
 
 mod adaptive;
+mod coverage;
 mod explain;
 pub mod label;
 mod progressive;
@@ -18,6 +19,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 pub use adaptive::adaptive;
+pub use coverage::coverage;
 pub use explain::explain;
 pub use label::{LabelMap, label};
 pub use progressive::{Progressive, timed};
@@ -109,7 +111,7 @@ fn gather(
         for (seen, _) in integrator.li_packet(world, &wanted, spread).iter().zip(&wanted).filter(|(_, s)| s.is_some()) {
             sum.add(seen.radiance);
             if let Some(first) = seen.first {
-                sum.add_first(first.albedo, first.normal, first.distance);
+                sum.add_first(first.part, first.albedo, first.normal, first.distance);
             }
         }
     }

@@ -75,7 +75,7 @@ pub fn shoot(field: &Field, spp: u32, threads: usize) -> (Film, LabelMap) {
         let watch = Watch { done: &|_| (), stop: &stop };
         let world = World { scene, geometry: &geometry };
         let film = render::render(&world, &PathTracer::default(), &settings, &watch).expect("a film");
-        (film, render::label(&geometry, &scene.tags(), &scene.camera, window))
+        (film, render::label(&geometry, &scene.parts, &scene.camera, window))
     })
 }
 
@@ -97,7 +97,10 @@ pub fn hash(numbers: impl IntoIterator<Item = u32>) -> String {
 pub fn bits(film: &Film) -> Vec<u32> {
     let pixels = film.pixels.iter().flat_map(|p| {
         let bands = [p.mean, p.variance, p.albedo].map(furrow::math::Spectrum::to_array);
-        bands.into_iter().flatten().chain(p.normal.to_array()).chain([p.depth])
+        let floats = bands.into_iter().flatten().chain(p.normal.to_array()).chain([p.depth]).map(f32::to_bits);
+        // Parts and their counts as one number.
+        let tally = p.tally.iter().flat_map(|(part, count)| [part, count]);
+        floats.chain([tally.fold(0u32, |sum, n| sum.wrapping_mul(0x0100_0193).wrapping_add(n))])
     });
-    pixels.map(f32::to_bits).collect()
+    pixels.collect()
 }

@@ -139,7 +139,7 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     }
 
     // First, so that the clock of `--time` need not guess how long they take.
-    let labels = pool.install(|| render::label(&geometry, &scene.tags(), &scene.camera, window));
+    let labels = pool.install(|| render::label(&geometry, &scene.parts, &scene.camera, window));
     let traced = AtomicU64::new(0);
     let bar = progress(args.quality.samples(window), args.quiet);
     let done = |n| {
