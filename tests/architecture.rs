@@ -40,7 +40,6 @@ const DOORS: &[(&str, &str)] = &[
     // Bytes written as text inside a model's document.
     ("base64", "model/uri.rs"),
     ("clap", "bin/"),
-    ("ctrlc", "bin/"),
     ("embree3", "accel/embree.rs"),
     ("exr", "output/exr.rs"),
     // Vectors are re-exported by `math`; two files sum in double precision.
@@ -63,6 +62,7 @@ const DOORS: &[(&str, &str)] = &[
     // glTF documents, read and written.
     ("serde_json", "model/document.rs model/gltf.rs output/gltf/"),
     ("sha2", "scene/library.rs"),
+    ("signal_hook", "bin/trace/signal.rs"),
     ("sobol_burley", "sampling/sampler.rs"),
     ("solar_positioning", "light/position.rs"),
     // Files appear whole or not at all: images of fields, and drawn textures below them. The denoiser's go through a folder.
