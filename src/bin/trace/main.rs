@@ -4,6 +4,7 @@ mod export;
 mod field;
 mod quality;
 mod render;
+mod signal;
 mod technique;
 mod texture;
 
@@ -50,7 +51,7 @@ Files of an image:
 More samples make less noise: twice the --spp takes twice the time and leaves 0.7 of it.
 The pages scenes/01-one-leaf.ron to 07 teach how a scene is written.
 Paths go to stdout, everything else to stderr.
-Exit codes: 0 done, 1 failed, 2 wrong input, 75 stopped cleanly (Ctrl-C).";
+Exit codes: 0 done, 1 failed, 2 wrong input, 75 stopped cleanly (Ctrl-C, TERM, HUP, USR1).";
 
 #[derive(Subcommand)]
 enum Verb {
@@ -61,11 +62,12 @@ enum Verb {
 }
 
 fn main() -> ExitCode {
+    let signals = signal::Signals::watch();
     let cli = Cli::parse();
     let done = match cli.verb {
         Some(Verb::Export(args)) => export::run(&args),
         Some(Verb::Texture(args)) => texture::run(&args),
-        None => render::run(&cli.render),
+        None => render::run(&cli.render, &signals),
     };
     match done {
         Ok(paths) => print_paths(&paths),
