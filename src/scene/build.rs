@@ -11,7 +11,7 @@ use crate::geometry::Mesh;
 use crate::material::{Ground as GroundMaterial, GroundSkin, Material, Solid};
 use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3, vec2};
 use crate::page::Page;
-use crate::plant::{self, OrganKind, Stage};
+use crate::plant::{self, LeafAxis, OrganKind, Stage};
 use crate::sampling::place::Step;
 use crate::sampling::rng::mix;
 use crate::sampling::{Purpose, Stream};
@@ -461,7 +461,13 @@ fn grow(s: &Seedling, number: u16, ground: Option<&Ground>) -> (PlantRecord, Vec
     let frame = Frame::with_tangent(axis, ahead.cross(axis));
     let rotation = Mat3::from_cols(frame.x, frame.y, frame.z);
     let class = desc.role.class();
-    let organs = plant.organs.into_iter().filter(|o| s.only_leaf.is_none_or(|l| o.leaf == l)).map(|organ| {
+    let kept = |leaf: u16| s.only_leaf.is_none_or(|l| leaf == l);
+    let to_world = |p: Vec3| rotation * p + foot;
+    let axes = plant.leaf_axes().filter(|a| kept(a.leaf));
+    let mut leaf_axes: Vec<LeafAxis> =
+        axes.map(|a| LeafAxis { base: to_world(a.base), tip: to_world(a.tip), ..a }).collect();
+    leaf_axes.sort_by_key(|a| a.leaf);
+    let organs = plant.organs.into_iter().filter(|o| kept(o.leaf)).map(|organ| {
         let mut mesh = organ.mesh;
         mesh.transform(rotation, foot);
         let choices = &s.species.skins[&organ.skin];
@@ -494,6 +500,7 @@ fn grow(s: &Seedling, number: u16, ground: Option<&Ground>) -> (PlantRecord, Vec
         height: plant.height,
         radius: plant.radius,
         leaves: organs.iter().map(|o| o.part.tag.leaf).max().unwrap_or(0),
+        leaf_axes,
     };
     (record, organs)
 }
