@@ -92,7 +92,13 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
         dome(&mut rings, nodes[0].1, radius, crown);
     }
     let mesh = tube::rigid(&rings, 10);
-    organs.push(Organ { kind: OrganKind::Hypocotyl, leaf: 0, skin: skin(&growth.desc.hypocotyl_skin), mesh });
+    organs.push(Organ {
+        kind: OrganKind::Hypocotyl,
+        leaf: 0,
+        skin: skin(&growth.desc.hypocotyl_skin),
+        mesh,
+        midrib: None,
+    });
     if !stemless {
         let mut rings: Vec<Ring> = Vec::with_capacity(2 * nodes.len() + 4);
         for (i, ((p, d), r)) in nodes.iter().zip(&radii).enumerate() {
@@ -108,7 +114,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
             dome(&mut rings, *d, *r, 1.0);
         }
         let mesh = tube::rigid(&rings, 12);
-        organs.push(Organ { kind: OrganKind::Stem, leaf: 0, skin: skin(&growth.desc.stem_skin), mesh });
+        organs.push(Organ { kind: OrganKind::Stem, leaf: 0, skin: skin(&growth.desc.stem_skin), mesh, midrib: None });
     }
     Axis { nodes, radii, section, crown }
 }

@@ -32,7 +32,7 @@ mod tuft;
 mod whorl;
 
 pub use kind::{LeafKind, Shape};
-pub use organ::{Organ, OrganKind};
+pub use organ::{LeafAxis, Organ, OrganKind};
 pub use stage::{BUD, LayerDesc, StageDesc};
 
 use crate::sampling::Stream;
@@ -270,6 +270,14 @@ pub struct Plant {
     pub height: f32,
     /// Radius of the upright cylinder about the origin that holds it, metres.
     pub radius: f32,
+}
+
+impl Plant {
+    /// The keypoints of its leaves, in plant coordinates, in the order of its organs.
+    pub fn leaf_axes(&self) -> impl Iterator<Item = LeafAxis> + '_ {
+        let axis = |o: &Organ| o.midrib.map(|[base, tip]| LeafAxis { leaf: o.leaf, base, tip });
+        self.organs.iter().filter_map(axis)
+    }
 }
 
 /// Grows one plant.

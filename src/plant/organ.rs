@@ -1,6 +1,7 @@
 //! The words of botany: what a plant is made of. One organ is one geometry of the scene, so it is also the finest label.
 
 use crate::geometry::Mesh;
+use crate::math::Vec3;
 
 /// What an organ is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
@@ -19,6 +20,17 @@ pub enum OrganKind {
     Sheath,
 }
 
+/// Where a leaf's blade begins and ends: the keypoints of a leaf.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LeafAxis {
+    /// The leaf, counted as in [`Organ::leaf`].
+    pub leaf: u16,
+    /// The base of the blade's midrib, where the stalk ends, metres.
+    pub base: Vec3,
+    /// The midrib's tip, metres.
+    pub tip: Vec3,
+}
+
 /// One organ of one plant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Organ {
@@ -30,4 +42,6 @@ pub struct Organ {
     pub skin: String,
     /// Its shape in plant coordinates: metres, growth axis +z, origin where the stem meets the soil.
     pub mesh: Mesh,
+    /// Of a blade, and of nothing else: the ends of its midrib in the same coordinates, base (joint B) and tip (joint PK).
+    pub midrib: Option<[Vec3; 2]>,
 }

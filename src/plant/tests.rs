@@ -1,8 +1,8 @@
 //! System tests of the species pages: they find every page of `scenes/species` unasked.
 
 use super::*;
-use crate::geometry::Mesh;
-use crate::math::Vec3;
+use crate::geometry::{Mesh, outline};
+use crate::math::{Vec2, Vec3};
 use crate::sampling::Purpose;
 use serde::de::IgnoredAny;
 use std::f32::consts::{PI, TAU};
@@ -405,4 +405,57 @@ fn a_written_page_reads_back_the_same() {
         let text = ron::to_string(&page.plant).unwrap();
         assert_eq!(ron::from_str::<PlantDesc>(&text).unwrap(), page.plant);
     }
+}
+
+/// The point of a mesh at these texture coordinates.
+fn point_at(mesh: &Mesh, uv: Vec2) -> Option<Vec3> {
+    mesh.triangles.iter().find_map(|t| {
+        let [a, b, c] = t.map(|i| mesh.uvs[i as usize]);
+        let whole = (b - a).perp_dot(c - a);
+        let weights = [(c - b).perp_dot(uv - b), (a - c).perp_dot(uv - c), (b - a).perp_dot(uv - a)].map(|w| w / whole);
+        let inside = weights.iter().all(|w| *w >= -1e-5);
+        inside.then(|| t.iter().zip(weights).map(|(i, w)| mesh.positions[*i as usize] * w).sum())
+    })
+}
+
+/// Rationale: keypoints come from the skeleton, pictures from the mesh that it bends. Expected: every leaf has one axis; both of
+/// its ends lie on the leaf's mesh, on a sheet where the image's midrib begins and ends; the tip is farther from the stem than
+/// the base, which is where the stalk ends.
+#[test]
+fn the_keypoints_of_a_leaf_lie_on_its_blade_and_point_outward() {
+    everywhere(|page, stage, plant| {
+        let mut stem = Mesh::default();
+        for organ in plant.organs.iter().filter(|o| o.leaf == 0) {
+            stem.append(&organ.mesh);
+        }
+        let leaves: std::collections::BTreeSet<u16> = plant.organs.iter().map(|o| o.leaf).filter(|l| *l > 0).collect();
+        let axes: Vec<LeafAxis> = plant.leaf_axes().collect();
+        assert_eq!(axes.iter().map(|a| a.leaf).collect::<std::collections::BTreeSet<_>>(), leaves);
+        assert_eq!(axes.len(), leaves.len(), "one axis a leaf");
+        for LeafAxis { leaf, base, tip } in axes {
+            let at = format!("{} {} leaf {leaf}", page.eppo, stage.bbch);
+            let of = |flat: bool| {
+                let is =
+                    |o: &&Organ| o.leaf == leaf && matches!(o.kind, OrganKind::Blade | OrganKind::Cotyledon) == flat;
+                plant.organs.iter().find(is)
+            };
+            let blade = &of(true).expect("a blade").mesh;
+            let gap = [base, tip].map(|p| distance(&[p], blade));
+            assert!(gap[0] < 2e-3 && gap[1] < 2e-3, "{at}: {gap:?}");
+            // A grass has no stem but its sheaths.
+            let stem = if stem.triangles.is_empty() { &of(false).expect("a sheath").mesh } else { &stem };
+            let away = [base, tip].map(|p| distance(&[p], stem));
+            assert!(away[1] > away[0], "{at}: {away:?}");
+            if let Some(stalk) = of(false) {
+                assert!(distance(&[base], &stalk.mesh) < 2e-3, "{at}: the stalk ends elsewhere");
+            }
+            // Divided leaves have texture coordinates of their own.
+            if page.plant.form != Form::Dissected {
+                for (p, t) in [(base, 0.0), (tip, 1.0)] {
+                    let there = point_at(blade, outline::uv(0.0, t)).expect("a point of the midrib");
+                    assert!(p.distance(there) < 5e-4, "{at}: the midrib's {t} is {} m away", p.distance(there));
+                }
+            }
+        }
+    });
 }

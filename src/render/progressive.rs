@@ -23,7 +23,7 @@ impl Tile {
     }
 }
 
-/// An image under way. The sums of all pixels are kept: about 160 bytes a pixel.
+/// An image under way. The sums of all pixels are kept: about 150 bytes a pixel.
 pub struct Progressive<'a> {
     world: &'a World<'a>,
     integrator: &'a dyn Integrator,

@@ -1,6 +1,7 @@
 //! Page + seed + index → one field.
 
 mod models;
+mod season;
 
 use super::desc::{FieldDesc, Growth, SpeciesDesc};
 use super::library::{Layer, Library, Species};
@@ -11,7 +12,7 @@ use crate::geometry::Mesh;
 use crate::material::{Ground as GroundMaterial, GroundSkin, Material, Solid};
 use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3, vec2};
 use crate::page::Page;
-use crate::plant::{self, OrganKind, Stage};
+use crate::plant::{self, LeafAxis, OrganKind};
 use crate::sampling::place::Step;
 use crate::sampling::rng::mix;
 use crate::sampling::{Purpose, Stream};
@@ -21,6 +22,7 @@ use crate::sensor::{Photograph, SensorDesc};
 use crate::soil::{self, Debris, Ground, Pile, Rect, SeedRows, Site, SoilDesc};
 use crate::{Error, Result};
 use rayon::prelude::*;
+pub use season::Season;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -88,6 +90,8 @@ const GROUND_REACH: f32 = 2.5;
 const SHADOW: f32 = 2.75;
 /// Radius around a stem that clods leave free, metres.
 const STEM_ROOM: f32 = 0.004;
+/// Address of the season's stream, behind those of any number of lights.
+const SEASON: u64 = 1 << 32;
 /// Most pixels of an image.
 const MOST_PIXELS: u64 = 1 << 28;
 /// Most plants that a field can number.
@@ -112,6 +116,8 @@ pub fn field_of(text: &str, options: &Options) -> Result<Field> {
 struct Seedling {
     species: Arc<Species>,
     growth: Growth,
+    /// Place of the field's season in a list of growths.
+    season: usize,
     position: Vec2,
     turn: f32,
     only_leaf: Option<u16>,
@@ -132,6 +138,7 @@ struct Builder<'a> {
     library: Library,
     seed: u64,
     index: u64,
+    season: Season,
     scene: Scene,
     warnings: Vec<String>,
 }
@@ -168,7 +175,8 @@ impl<'a> Builder<'a> {
             warnings.push("no light in the scene: the image will be black".into());
         }
         let scene = Scene { parts: Vec::new(), materials: Vec::new(), lights, camera, filter: desc.filter.footprint() };
-        Ok(Self { page, desc, library, seed, index, scene, warnings })
+        let season = Season::draw(page, desc, &mut Stream::of(seed, index, Purpose::Page, SEASON))?;
+        Ok(Self { page, desc, library, seed, index, season, scene, warnings })
     }
 
     fn stream(&self, purpose: Purpose, index: u64) -> Stream {
@@ -353,6 +361,7 @@ impl<'a> Builder<'a> {
             all.push(Seedling {
                 species,
                 growth: placed.growth.clone(),
+                season: self.season.place(),
                 position,
                 turn: placed.turn_deg.draw32(&mut stream).to_radians(),
                 only_leaf: placed.only_leaf.map(|l| l.get() as u16),
@@ -382,6 +391,7 @@ impl<'a> Builder<'a> {
         Seedling {
             species: species.clone(),
             growth: growth.clone(),
+            season: self.season.place(),
             position: spot.at,
             turn: 0.0,
             only_leaf: None,
@@ -446,10 +456,7 @@ struct Grown {
 fn grow(s: &Seedling, number: u16, ground: Option<&Ground>) -> (PlantRecord, Vec<Grown>) {
     let desc: &SpeciesDesc = &s.species.desc;
     let mut stream = s.stream.clone();
-    let stage = match &s.growth {
-        Growth::AgeDays(days) => Stage::Age(days.draw32(&mut stream)),
-        Growth::Bbch(code) => Stage::Bbch(code.draw(&mut stream) as u32),
-    };
+    let stage = s.growth.draw(s.season, &mut stream);
     let green = (1.0 + desc.chlorophyll_sd.get() * stream.normal()).clamp(0.6, 1.5) as f32;
     let (x, y) = (s.position.x, s.position.y);
     let (z, normal) = ground.map_or((0.0, Vec3::Z), |g| (g.height(x, y), g.trend(x, y, STANCE)));
@@ -461,7 +468,13 @@ fn grow(s: &Seedling, number: u16, ground: Option<&Ground>) -> (PlantRecord, Vec
     let frame = Frame::with_tangent(axis, ahead.cross(axis));
     let rotation = Mat3::from_cols(frame.x, frame.y, frame.z);
     let class = desc.role.class();
-    let organs = plant.organs.into_iter().filter(|o| s.only_leaf.is_none_or(|l| o.leaf == l)).map(|organ| {
+    let kept = |leaf: u16| s.only_leaf.is_none_or(|l| leaf == l);
+    let to_world = |p: Vec3| rotation * p + foot;
+    let axes = plant.leaf_axes().filter(|a| kept(a.leaf));
+    let mut leaf_axes: Vec<LeafAxis> =
+        axes.map(|a| LeafAxis { base: to_world(a.base), tip: to_world(a.tip), ..a }).collect();
+    leaf_axes.sort_by_key(|a| a.leaf);
+    let organs = plant.organs.into_iter().filter(|o| kept(o.leaf)).map(|organ| {
         let mut mesh = organ.mesh;
         mesh.transform(rotation, foot);
         let choices = &s.species.skins[&organ.skin];
@@ -494,6 +507,7 @@ fn grow(s: &Seedling, number: u16, ground: Option<&Ground>) -> (PlantRecord, Vec
         height: plant.height,
         radius: plant.radius,
         leaves: organs.iter().map(|o| o.part.tag.leaf).max().unwrap_or(0),
+        leaf_axes,
     };
     (record, organs)
 }

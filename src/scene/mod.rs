@@ -11,6 +11,7 @@ use crate::geometry::{AlphaMask, Mesh};
 use crate::light::Light;
 use crate::material::Material;
 use crate::math::Vec3;
+use crate::plant::LeafAxis;
 use crate::sensor::Camera;
 use std::sync::Arc;
 use tag::{Class, Tag};
@@ -55,6 +56,8 @@ pub struct PlantRecord {
     pub radius: f32,
     /// Number of its leaves, seed leaves included.
     pub leaves: u16,
+    /// Base and tip of its leaves' blades, metres, world, by rising leaf; none of a model from disk, which has no midribs.
+    pub leaf_axes: Vec<LeafAxis>,
 }
 
 /// One field.

@@ -111,6 +111,7 @@ impl Builder<'_> {
             height: hi.z - position.z,
             radius: across,
             leaves: parts.iter().map(|p| p.tag.leaf).max().unwrap_or(0),
+            leaf_axes: Vec::new(),
         }
     }
 }
