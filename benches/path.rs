@@ -114,9 +114,9 @@ fn main() {
     let threads = pool.current_num_threads();
     println!("{threads} threads, {SPP} samples a pixel, medians of {RUNS} runs\n");
     println!(
-        "| scene | triangles | grow, s | build, s | Msamples/s | rays a sample: nearest + shadow | Mray/s | share inside Embree | labels, s |"
+        "| scene | triangles | grow, s | build, s | Msamples/s | rays a sample: nearest + shadow | Mray/s | share inside Embree | labels, s | extents, s |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|---|");
     for (name, page, width) in SCENES {
         let options = build::Options { width, ..build::Options::default() };
         let field = || pool.install(|| build::field(Path::new(page), &options)).expect(page);
@@ -146,6 +146,9 @@ fn main() {
             times.iter().sum::<f64>() / threads as f64
         };
         let label = || pool.install(|| render::label(&geometry, &scene.parts, &scene.camera, window));
+        let labelled = label();
+        let extents = || pool.install(|| render::extents(scene, &labelled));
+        let extents = median((0..RUNS).map(|_| seconds(|| drop(black_box(extents())))).collect());
         let labels = median((0..RUNS).map(|_| seconds(|| drop(black_box(label())))).collect());
         let mut turns = (Vec::new(), Vec::new());
         for _ in 0..RUNS {
@@ -160,7 +163,7 @@ fn main() {
             [nearest + rays[0] as f64, shadow + rays[1] as f64]
         });
         println!(
-            "| {name} | {:.2} M | {grow:.2} | {build:.2} | {:.2} | {:.2} + {:.2} | {:.2} | {:.0} % | {labels:.3} |",
+            "| {name} | {:.2} M | {grow:.2} | {build:.2} | {:.2} | {:.2} + {:.2} | {:.2} | {:.0} % | {labels:.3} | {extents:.3} |",
             scene.triangles() as f64 / 1e6,
             samples / rendered / 1e6,
             nearest / samples,

@@ -3,6 +3,7 @@
 mod adaptive;
 mod coverage;
 mod explain;
+mod extent;
 pub mod label;
 mod progressive;
 mod tiles;
@@ -21,6 +22,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub use adaptive::adaptive;
 pub use coverage::coverage;
 pub use explain::explain;
+pub use extent::{Extent, extents};
 pub use label::{LabelMap, label};
 pub use progressive::{Progressive, timed};
 

@@ -56,6 +56,22 @@ impl Distortion {
         a * d - b * b
     }
 
+    /// The most by which [`Self::distort`] stretches a length within this distance from the axis.
+    pub fn slope(&self, r: f64) -> f64 {
+        let Self { k1, k2, p1, p2, k3 } = *self;
+        let r2 = r * r;
+        // Of r²ⁿ (x, y) it is (2n + 1) r²ⁿ, along the radius.
+        1.0 + r2 * (3.0 * k1.abs() + r2 * (5.0 * k2.abs() + r2 * 7.0 * k3.abs())) + 8.0 * r * (p1.abs() + p2.abs())
+    }
+
+    /// The largest second derivative of [`Self::distort`] along any line within this distance from the axis.
+    pub fn curvature(&self, r: f64) -> f64 {
+        let Self { k1, k2, p1, p2, k3 } = *self;
+        let r2 = r * r;
+        // Of r²ⁿ (x, y) it is 2n (2n + 1) r²ⁿ⁻¹, along the radius.
+        r * (6.0 * k1.abs() + r2 * (20.0 * k2.abs() + r2 * 42.0 * k3.abs())) + 8.0 * (p1.abs() + p2.abs())
+    }
+
     /// The pinhole image point that the lens puts at `to`: Newton's method from `to` itself, to about 10⁻¹⁵.
     pub fn undistort(&self, to: [f64; 2]) -> [f64; 2] {
         if self.is_none() {

@@ -3,6 +3,7 @@
 //! OpenCV's conventions throughout: camera x right, y down, z forward; pixel (0, 0) covers 0 to 1 and has its centre at 0.5;
 //! intrinsics in pixels. Intrinsics are f64, rays f32.
 
+mod bounds;
 mod desc;
 mod exposure;
 mod lens;
@@ -12,6 +13,7 @@ mod response;
 mod tests;
 mod tone;
 
+pub use bounds::PixelBox;
 pub use desc::{ApertureDesc, CameraDesc, DistortionDesc, IntrinsicsDesc, PoseDesc};
 pub use exposure::{Exposure, ExposureDesc, Percent};
 pub use lens::Distortion;
@@ -139,7 +141,12 @@ impl Camera {
     /// The one ray through the centre of pixel (x, y) and the lens's centre: what labels are cast with.
     #[inline]
     pub fn centre_ray(&self, x: u32, y: u32) -> (Vec3, Vec3) {
-        let [x, y] = self.unproject([f64::from(x) + 0.5, f64::from(y) + 0.5]);
+        self.through(self.unproject([f64::from(x) + 0.5, f64::from(y) + 0.5]))
+    }
+
+    /// The ray through the lens's centre and a point of the plane at unit distance.
+    #[inline]
+    fn through(&self, [x, y]: [f64; 2]) -> (Vec3, Vec3) {
         (self.pose.position, self.pose.to_world(vec3(x as f32, y as f32, 1.0)).normalize())
     }
 

@@ -1,0 +1,263 @@
+//! How much of every plant and leaf is there to be seen: what others hide of it, and what the frame cuts off.
+//!
+//! Each leaf is looked at by itself, as if nothing else stood there: for each of its triangles, the few pixel centres in whose
+//! reach it lies are asked by the rays of the labels, in double precision, masks included. That is a raster by rays: no
+//! hierarchy to build, no layers to walk through, and what lies outside the image costs nothing but its own pixels. What the
+//! labels show of a leaf counts as met, so that rounding at an outline can never make more visible than there is.
+
+use super::LabelMap;
+use crate::accel::Brute;
+use crate::geometry::{Mesh, Ray, Window};
+use crate::math::vec3;
+use crate::scene::Scene;
+use crate::scene::tag::Tag;
+use crate::sensor::{Camera, PixelBox};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// Numbers of pixel centres at which a plant or a leaf lies: `visible` ≤ `unoccluded` ≤ `whole`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Extent {
+    /// In the labels.
+    pub visible: u32,
+    /// Within the labels' window, if nothing else stood before it: no other plant or leaf, no soil.
+    pub unoccluded: u32,
+    /// The same with the pixels outside the window, as if the image went on: for an image's size to each side, and as far
+    /// as the lens is defined.
+    pub whole: u32,
+}
+
+impl Extent {
+    /// Share of what lies in the window that is visible, 0 to 1.
+    pub fn visible_fraction(&self) -> f32 {
+        self.visible as f32 / self.unoccluded.max(1) as f32
+    }
+
+    /// Share of the whole that lies in the window, 0 to 1.
+    pub fn inside_fraction(&self) -> f32 {
+        self.unoccluded as f32 / self.whole.max(1) as f32
+    }
+}
+
+/// The extents of all plants that lie in the labels' window, by plant and leaf; leaf 0 stands for the plant with all its
+/// parts, leaves included. Plants that reach no pixel centre of the window even alone are left out, and so are leaves that
+/// reach none anywhere. Call it inside a pool.
+pub fn extents(scene: &Scene, labels: &LabelMap) -> BTreeMap<(u16, u16), Extent> {
+    let window = Area::of(labels.window);
+    let seen = visible(labels);
+    let reach = reach(&scene.camera);
+    let mut things: BTreeMap<(u16, u16), Thing> = BTreeMap::new();
+    for (i, part) in scene.parts.iter().enumerate().filter(|(_, p)| p.tag.plant > 0) {
+        let area = image_of(&part.mesh, &scene.camera).meet(reach);
+        things.entry((part.tag.plant, part.tag.leaf)).or_default().add(i as u32, area);
+    }
+    for (key, (_, area)) in &seen {
+        // Anything that is seen has a part.
+        if let Some(thing) = things.get_mut(key) {
+            thing.area = thing.area.join(*area);
+        }
+    }
+    let mut plants: BTreeMap<u16, Area> = BTreeMap::new();
+    for ((plant, _), thing) in &things {
+        let area = plants.entry(*plant).or_default();
+        *area = area.join(thing.area);
+    }
+    let near: Vec<_> = things.iter().filter(|((plant, _), _)| !plants[plant].meet(window).is_empty()).collect();
+    let surfaces = scene.surfaces();
+    let brute = Brute::new(&surfaces);
+    let masks: Vec<Mask> = near.par_iter().map(|(key, thing)| thing.mask(**key, scene, &brute, labels)).collect();
+
+    let visible = |key| seen.get(&key).map_or(0, |(count, _)| *count);
+    let mut extents = BTreeMap::new();
+    for group in near.iter().zip(&masks).collect::<Vec<_>>().chunk_by(|a, b| a.0.0.0 == b.0.0.0) {
+        let plant = group[0].0.0.0;
+        let mut all = Mask::new(plants[&plant]);
+        let mut leaves = Vec::new();
+        let mut shown = 0;
+        for ((key, _), mask) in group {
+            let extent = Extent { visible: visible(**key), ..mask.count(window) };
+            shown += extent.visible;
+            all.add(mask);
+            if key.1 > 0 && extent.whole > 0 {
+                leaves.push((**key, extent));
+            }
+        }
+        let extent = Extent { visible: shown, ..all.count(window) };
+        if extent.unoccluded > 0 {
+            extents.insert((plant, 0), extent);
+            extents.extend(leaves);
+        }
+    }
+    extents
+}
+
+/// Number of pixels of each plant's leaves, and of what is no leaf of it (0), and the area that holds them.
+fn visible(labels: &LabelMap) -> BTreeMap<(u16, u16), (u32, Area)> {
+    let mut seen: BTreeMap<(u16, u16), (u32, Area)> = BTreeMap::new();
+    let Window { x0, y0, .. } = labels.window;
+    for (row, y) in labels.tags.chunks(labels.window.width() as usize).zip(y0 as i32..) {
+        let mut x = x0 as i32;
+        for run in row.chunk_by(|a, b| a == b) {
+            let Tag { plant, leaf, .. } = run[0];
+            let end = x + run.len() as i32;
+            if plant > 0 {
+                let (count, area) = seen.entry((plant, leaf)).or_default();
+                *count += run.len() as u32;
+                *area = area.join(Area { x0: x, y0: y, x1: end, y1: y + 1 });
+            }
+            x = end;
+        }
+    }
+    seen
+}
+
+/// Pixels, of the image or outside it: columns `x0..x1`, rows `y0..y1`. Empty by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Area {
+    x0: i32,
+    y0: i32,
+    x1: i32,
+    y1: i32,
+}
+
+impl Area {
+    fn of(window: Window) -> Self {
+        let Window { x0, y0, x1, y1 } = window;
+        Self { x0: x0 as i32, y0: y0 as i32, x1: x1 as i32, y1: y1 as i32 }
+    }
+
+    /// The pixels whose centres lie in a box. A hundredth of a pixel covers the rounding of rays to single precision.
+    fn within([lo, hi]: PixelBox) -> Self {
+        let [x0, y0] = lo.map(|v| (v - 0.51).ceil() as i32);
+        let [x1, y1] = hi.map(|v| ((v - 0.49).floor() as i32).saturating_add(1));
+        Self { x0, y0, x1, y1 }
+    }
+
+    fn is_empty(self) -> bool {
+        self.x0 >= self.x1 || self.y0 >= self.y1
+    }
+
+    fn width(self) -> usize {
+        (self.x1 - self.x0).max(0) as usize
+    }
+
+    /// What both hold.
+    fn meet(self, o: Self) -> Self {
+        let (x0, y0, x1, y1) = (self.x0.max(o.x0), self.y0.max(o.y0), self.x1.min(o.x1), self.y1.min(o.y1));
+        Self { x0, y0, x1, y1 }
+    }
+
+    /// The smallest area that holds both.
+    fn join(self, o: Self) -> Self {
+        if self.is_empty() || o.is_empty() {
+            return if self.is_empty() { o } else { self };
+        }
+        let (x0, y0, x1, y1) = (self.x0.min(o.x0), self.y0.min(o.y0), self.x1.max(o.x1), self.y1.max(o.y1));
+        Self { x0, y0, x1, y1 }
+    }
+}
+
+/// How far an image is continued: by its own size to each side.
+fn reach(camera: &Camera) -> Area {
+    let (w, h) = (camera.width() as i32, camera.height() as i32);
+    Area { x0: -w, y0: -h, x1: 2 * w, y1: 2 * h }
+}
+
+/// The pixels about a mesh: those of the box that holds it.
+fn image_of(mesh: &Mesh, camera: &Camera) -> Area {
+    /// The corners of a box's faces, as numbers whose bits choose between its ends on x, y and z.
+    const FACES: [[u8; 4]; 6] = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
+    let Some((lo, hi)) = mesh.bounds() else { return Area::default() };
+    let corner = |bits: u8| {
+        let end = |axis: usize| if bits >> axis & 1 == 0 { lo[axis] } else { hi[axis] };
+        vec3(end(0), end(1), end(2))
+    };
+    let halves = FACES.iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
+    let boxes = halves.filter_map(|half| camera.triangle_bounds(half.map(|k| corner(*k))));
+    boxes.map(Area::within).fold(Area::default(), Area::join)
+}
+
+/// A leaf with its stalk, or what is no leaf of a plant.
+#[derive(Default)]
+struct Thing {
+    parts: Vec<u32>,
+    /// Where it may lie.
+    area: Area,
+}
+
+impl Thing {
+    fn add(&mut self, part: u32, area: Area) {
+        self.parts.push(part);
+        self.area = self.area.join(area);
+    }
+
+    /// The pixels at whose centres it lies.
+    fn mask(&self, key: (u16, u16), scene: &Scene, brute: &Brute<'_>, labels: &LabelMap) -> Mask {
+        let mut mask = Mask::new(self.area);
+        let window = Area::of(labels.window);
+        mask.fill(self.area.meet(window), |x, y| {
+            let tag = labels.tags[(y - window.y0) as usize * window.width() + (x - window.x0) as usize];
+            (tag.plant, tag.leaf) == key
+        });
+        for part in &self.parts {
+            let mesh = &scene.parts[*part as usize].mesh;
+            for triangle in 0..mesh.triangles.len() as u32 {
+                let Some(bounds) = scene.camera.triangle_bounds(mesh.corners(triangle)) else { continue };
+                mask.fill(Area::within(bounds).meet(self.area), |x, y| {
+                    let ray = scene.camera.ray_beyond(x, y);
+                    ray.is_some_and(|(o, d)| brute.triangle(&Ray::new(o, d), *part, triangle).is_some())
+                });
+            }
+        }
+        mask
+    }
+}
+
+/// A set of pixels within an area.
+struct Mask {
+    area: Area,
+    set: Vec<bool>,
+}
+
+impl Mask {
+    fn new(area: Area) -> Self {
+        let height = (area.y1 - area.y0).max(0) as usize;
+        Self { area, set: vec![false; area.width() * height] }
+    }
+
+    /// Adds the pixels of a part of the area that pass a test; those that it has are not tested.
+    fn fill(&mut self, part: Area, test: impl Fn(i32, i32) -> bool) {
+        for y in part.y0..part.y1 {
+            let row = (y - self.area.y0) as usize * self.area.width();
+            for x in part.x0..part.x1 {
+                let set = &mut self.set[row + (x - self.area.x0) as usize];
+                *set = *set || test(x, y);
+            }
+        }
+    }
+
+    /// Adds the pixels of another mask, whose area this one's holds.
+    fn add(&mut self, other: &Self) {
+        let area = other.area;
+        for (row, y) in other.set.chunks(area.width().max(1)).zip(area.y0..) {
+            let from = (y - self.area.y0) as usize * self.area.width() + (area.x0 - self.area.x0) as usize;
+            for (to, set) in self.set[from..].iter_mut().zip(row) {
+                *to |= *set;
+            }
+        }
+    }
+
+    /// How many pixels there are in the window and in all.
+    fn count(&self, window: Area) -> Extent {
+        let mut extent = Extent::default();
+        for (row, y) in self.set.chunks(self.area.width().max(1)).zip(self.area.y0..) {
+            let count = |row: &[bool]| row.iter().filter(|set| **set).count() as u32;
+            extent.whole += count(row);
+            if (window.y0..window.y1).contains(&y) {
+                let column = |x: i32| (x.clamp(self.area.x0, self.area.x1) - self.area.x0) as usize;
+                extent.unoccluded += count(&row[column(window.x0)..column(window.x1)]);
+            }
+        }
+        extent
+    }
+}

@@ -1,0 +1,271 @@
+//! How much of every plant and leaf could be seen: visible, hidden by others, cut by the frame.
+//!
+//! Rationale: the visible fraction is what tells a detector's test which plants it could have found. It must count the pixels of
+//! the labels, and rounding must never make more visible than there is.
+//! Expected: for every plant and leaf the numbers that Embree gives for that plant or leaf alone, pixel centre by pixel centre, in
+//! the image and beyond it, but for centres within a thousandth of a pixel of an outline; for plain shapes, the areas of geometry;
+//! visible ≤ unoccluded ≤ whole, always. The same numbers at any number of threads.
+//! Source: geometry.
+
+mod common;
+
+use common::program::{field, small_text};
+use common::scenes::{camera, square};
+use furrow::accel::{EmbreeAccel, Surface};
+use furrow::film::Filter;
+use furrow::geometry::{Intersect, Mesh, Ray, Window};
+use furrow::math::{Vec3, vec3};
+use furrow::render::{self, Extent, LabelMap, extents, label};
+use furrow::scene::build::{self, Options};
+use furrow::scene::tag::{Class, Tag};
+use furrow::scene::{Part, Scene};
+use furrow::sensor::{Camera, Distortion};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+type Extents = BTreeMap<(u16, u16), Extent>;
+
+fn labels_of(scene: &Scene, window: Window) -> LabelMap {
+    let geometry = EmbreeAccel::build(&scene.surfaces(), 1).expect("an accelerator");
+    label(&geometry, &scene.parts, &scene.camera, window)
+}
+
+fn full(scene: &Scene) -> Window {
+    Window::full(scene.camera.width(), scene.camera.height())
+}
+
+/// Pixel centres of a set of parts alone, by Embree: those in the window, and all of them.
+fn alone(scene: &Scene, window: Window, is: impl Fn(&Part) -> bool) -> [u32; 2] {
+    let surfaces: Vec<Surface<'_>> =
+        scene.parts.iter().filter(|p| is(p)).map(|p| Surface { mesh: &p.mesh, mask: p.mask.as_ref() }).collect();
+    let geometry = EmbreeAccel::build(&surfaces, 1).expect("an accelerator");
+    let (camera, mut counts) = (&scene.camera, [0; 2]);
+    let (w, h) = (camera.width() as i32, camera.height() as i32);
+    for y in -h..2 * h {
+        for x in -w..2 * w {
+            let Some((origin, direction)) = camera.ray_beyond(x, y) else { continue };
+            if geometry.closest(&Ray::new(origin, direction)).is_some() {
+                let inside =
+                    x >= window.x0 as i32 && x < window.x1 as i32 && y >= window.y0 as i32 && y < window.y1 as i32;
+                counts[0] += u32::from(inside);
+                counts[1] += 1;
+            }
+        }
+    }
+    counts
+}
+
+/// Whether numbers are ordered, leaves lie in plants, and the visible ones are those of the labels.
+fn check_order(found: &Extents, labels: &LabelMap) {
+    let mut pixels: BTreeMap<(u16, u16), u32> = BTreeMap::new();
+    for tag in labels.tags.iter().filter(|t| t.plant > 0) {
+        *pixels.entry((tag.plant, 0)).or_default() += 1;
+        if tag.leaf > 0 {
+            *pixels.entry((tag.plant, tag.leaf)).or_default() += 1;
+        }
+    }
+    for (key, Extent { visible, unoccluded, whole }) in found {
+        assert!(visible <= unoccluded && unoccluded <= whole && *whole > 0, "{key:?}: {visible} {unoccluded} {whole}");
+        let plant = found[&(key.0, 0)];
+        assert!(*visible <= plant.visible && *unoccluded <= plant.unoccluded && *whole <= plant.whole, "{key:?}");
+        assert_eq!(*visible, pixels.remove(key).unwrap_or(0), "{key:?}");
+    }
+    assert!(pixels.is_empty(), "visible, but without an extent: {pixels:?}");
+}
+
+/// Compares every plant and leaf with Embree's answers, which may differ by a few pixels in all.
+fn check(scene: &Scene, window: Window) -> Extents {
+    let labels = labels_of(scene, window);
+    let found = extents(scene, &labels);
+    check_order(&found, &labels);
+    let (mut compared, mut doubtful) = (0, 0);
+    let plants: BTreeSet<u16> = scene.parts.iter().map(|p| p.tag.plant).filter(|p| *p > 0).collect();
+    for plant in plants {
+        let leaves: BTreeSet<u16> = scene.parts.iter().filter(|p| p.tag.plant == plant).map(|p| p.tag.leaf).collect();
+        let whole = alone(scene, window, |p| p.tag.plant == plant);
+        if whole[0] == 0 {
+            let few = found.get(&(plant, 0)).map_or(0, |e| e.unoccluded);
+            assert!(few < 2, "plant {plant} is not in the window, but {few} pixels of it are");
+            continue;
+        }
+        for leaf in leaves.into_iter().chain([0]).collect::<BTreeSet<_>>() {
+            let expected =
+                if leaf == 0 { whole } else { alone(scene, window, |p| (p.tag.plant, p.tag.leaf) == (plant, leaf)) };
+            let is = found.get(&(plant, leaf)).copied().unwrap_or_default();
+            let off = is.unoccluded.abs_diff(expected[0]) + is.whole.abs_diff(expected[1]);
+            assert!(off * 100 <= 100 + expected[1], "plant {plant} leaf {leaf}: {is:?} for {expected:?}");
+            doubtful += off;
+            compared += expected[1];
+        }
+    }
+    eprintln!("{compared} pixels, {doubtful} in doubt");
+    assert!(doubtful * 2000 <= compared, "{doubtful} of {compared} pixels in doubt");
+    found
+}
+
+/// The small page with a lens of its own.
+fn small(lens: Distortion) -> Scene {
+    let mut scene = field(&small_text(), &Options::default()).scene;
+    let [fx, fy, cx, cy] = scene.camera.intrinsics();
+    let size = (scene.camera.width(), scene.camera.height());
+    scene.camera = Camera::new(size, [fx, fy], [cx, cy], lens, *scene.camera.pose()).expect("a camera");
+    scene
+}
+
+#[test]
+fn extents_are_those_of_each_plant_and_leaf_alone() {
+    let scene = small(Distortion::default());
+    let found = check(&scene, full(&scene));
+    let hidden = found.values().filter(|e| e.visible < e.unoccluded).count();
+    let cut = found.values().filter(|e| e.unoccluded < e.whole).count();
+    assert!(found.len() > 20 && hidden > 5 && cut > 2, "{} extents, {hidden} hidden, {cut} cut", found.len());
+}
+
+#[test]
+fn extents_hold_through_a_lens_that_distorts() {
+    for lens in [
+        Distortion { k1: -0.21, k2: 0.06, p1: 1.5e-3, p2: -1e-3, k3: -0.01 },
+        Distortion { k1: 0.12, k2: 0.02, p1: -2e-3, p2: 1e-3, k3: 0.0 },
+    ] {
+        let scene = small(lens);
+        check(&scene, full(&scene));
+    }
+}
+
+/// Expected: the window is the frame, so less is in it, and the whole is the same.
+#[test]
+fn a_crop_cuts_what_lies_outside_of_it() {
+    let scene = small(Distortion::default());
+    let whole = extents(&scene, &labels_of(&scene, full(&scene)));
+    let found = check(&scene, Window { x0: 20, y0: 11, x1: 61, y1: 50 });
+    let mut less = 0;
+    for (key, extent) in &found {
+        assert_eq!(extent.whole, whole[key].whole, "{key:?}");
+        assert!(extent.unoccluded <= whole[key].unoccluded && extent.visible <= whole[key].visible);
+        less += usize::from(extent.unoccluded < whole[key].unoccluded);
+    }
+    assert!(less > 3 && !found.is_empty() && found.len() < whole.len(), "{less} of {} are cut", found.len());
+}
+
+/// A scene of squares with tags, 0.5 m below a camera of 100 × 80 pixels that sees 2 mm a pixel there.
+fn squares(parts: &[(Vec3, f32, u16, u16)]) -> Scene {
+    let fov = 2.0 * (0.1_f64 / 0.5).atan().to_degrees();
+    let eye = camera((100, 80), vec3(0.0, 0.0, 0.5), Vec3::ZERO, fov);
+    let part = |&(centre, side, plant, leaf): &(Vec3, f32, u16, u16)| {
+        let class = if plant > 0 { Class::Crop } else { Class::Soil };
+        Part { mesh: square(centre, side), mask: None, material: 0, tag: Tag { class, plant, leaf } }
+    };
+    let parts = parts.iter().map(part).collect();
+    Scene { parts, materials: Vec::new(), lights: Vec::new(), camera: eye, filter: Filter::Box.footprint() }
+}
+
+/// Expected: a leaf of 20 × 20 pixels whose right half lies under another plant's leaf, a stem of 4 × 20 beside it, and soil over
+/// nothing of them; the numbers follow by counting.
+#[test]
+fn a_leaf_half_hidden_by_another_is_half_visible() {
+    // A pixel's side on the plane z = 0.
+    let p = 0.002;
+    let at = |x: f32, y: f32, z: f32| vec3(x * p, y * p, z);
+    // The upper leaf hangs half-way to the camera, where a pixel is half as large.
+    let scene = squares(&[
+        (at(0.0, 0.0, -0.001), 1.0, 0, 0),
+        (at(0.0, 0.0, 0.0), 20.0 * p, 1, 1),
+        (at(10.0, 0.0, 0.25), 20.0 * p, 2, 1),
+        (at(-20.0, 0.0, 0.0), 10.0 * p, 1, 0),
+    ]);
+    let labels = labels_of(&scene, full(&scene));
+    let found = extents(&scene, &labels);
+    check_order(&found, &labels);
+    // Seen on the plane, the upper leaf has its middle at 20 and sides of 40 pixels: it covers x from 0.
+    let expected = [
+        ((1, 0), Extent { visible: 200 + 100, unoccluded: 400 + 100, whole: 500 }),
+        ((1, 1), Extent { visible: 200, unoccluded: 400, whole: 400 }),
+        ((2, 0), Extent { visible: 1600, unoccluded: 1600, whole: 1600 }),
+        ((2, 1), Extent { visible: 1600, unoccluded: 1600, whole: 1600 }),
+    ];
+    assert_eq!(found, expected.into());
+    assert_eq!(found[&(1, 1)].visible_fraction(), 0.5);
+    // Soil hides as leaves do.
+    let mut buried = scene;
+    buried.parts[0].mesh = square(at(0.0, 0.0, 0.1), 1.0);
+    let labels = labels_of(&buried, full(&buried));
+    let found = extents(&buried, &labels);
+    assert_eq!(found[&(1, 1)], Extent { visible: 0, unoccluded: 400, whole: 400 });
+    assert_eq!((found[&(1, 1)].visible_fraction(), found[&(1, 1)].inside_fraction()), (0.0, 1.0));
+}
+
+/// Expected: a square plant with its middle on the frame's corner has a quarter in the image; its leaf outside is told with nothing
+/// in the image, a plant wholly outside is not told at all; the image goes on by its own size and no farther.
+#[test]
+fn a_plant_cut_by_the_frame_counts_beyond_it() {
+    let p = 0.002;
+    let corner = vec3(-50.0 * p, 40.0 * p, 0.0);
+    let scene = squares(&[
+        (corner, 20.0 * p, 1, 1),
+        (corner + vec3(-20.0 * p, 0.0, 0.0), 10.0 * p, 1, 2),
+        (corner + vec3(-60.0 * p, 0.0, 0.0), 20.0 * p, 2, 1),
+        (Vec3::ZERO, 2.0, 3, 1),
+    ]);
+    let labels = labels_of(&scene, full(&scene));
+    let found = extents(&scene, &labels);
+    check_order(&found, &labels);
+    // All lie in one plane: what is seen where they overlap is for the labels to say.
+    let hidden = |key: (u16, u16)| (found[&key].unoccluded, found[&key].whole);
+    assert_eq!(hidden((1, 1)), (100, 400));
+    assert_eq!(hidden((1, 2)), (0, 100));
+    assert_eq!(hidden((1, 0)), (100, 500));
+    assert_eq!(found[&(1, 0)].inside_fraction(), 0.2);
+    assert_eq!(hidden((3, 1)), (100 * 80, 300 * 240));
+    assert_eq!(found.keys().map(|k| k.0).collect::<BTreeSet<_>>(), [1, 3].into());
+}
+
+/// A plant that reaches past the lens must neither stop the count nor make it endless.
+#[test]
+fn a_leaf_that_reaches_behind_the_camera_is_counted_where_it_is_seen() {
+    let mut scene = squares(&[(Vec3::ZERO, 0.04, 1, 1)]);
+    // A long triangle from below the camera up past it.
+    scene.parts[0].mesh = Mesh::smooth(
+        vec![vec3(-0.02, 0.01, 0.0), vec3(0.02, 0.01, 0.0), vec3(0.0, 0.05, 0.9)],
+        vec![furrow::math::Vec2::ZERO; 3],
+        vec![[0, 1, 2]],
+    );
+    let found = check(&scene, full(&scene));
+    assert!(found[&(1, 1)].whole > found[&(1, 1)].unoccluded && found[&(1, 1)].visible > 100, "{found:?}");
+}
+
+#[test]
+fn extents_are_the_same_at_any_number_of_threads() {
+    let scene = small(Distortion::default());
+    let labels = labels_of(&scene, full(&scene));
+    let count = |threads| render::pool(threads).unwrap().install(|| extents(&scene, &labels));
+    let one = count(1);
+    assert!(!one.is_empty());
+    assert!(one == count(2) && one == count(7));
+}
+
+/// Rationale: keypoints are drawn over pictures. Expected: in the world each leaf of every plant has one axis whose ends lie on that
+/// leaf's mesh, no farther from its corners than these stand apart; a plant of which one leaf is grown tells that leaf's alone.
+#[test]
+fn keypoints_stand_in_the_world_where_the_leaves_do() {
+    let mut ends = 0;
+    for page in ["tests/ref/small.ron", "scenes/01-one-leaf.ron"] {
+        let options = Options { width: Some(32), ..Options::default() };
+        let grown = build::field(Path::new(page), &options).unwrap_or_else(|e| panic!("{e}"));
+        for plant in &grown.plants {
+            let parts = || grown.scene.parts.iter().filter(|p| p.tag.plant == plant.number && p.tag.leaf > 0);
+            let leaves: BTreeSet<u16> = parts().map(|p| p.tag.leaf).collect();
+            let told: Vec<u16> = plant.leaf_axes.iter().map(|a| a.leaf).collect();
+            assert!(!told.is_empty(), "plant {} has no leaves", plant.number);
+            assert_eq!(told, leaves.into_iter().collect::<Vec<_>>(), "plant {}", plant.number);
+            for axis in &plant.leaf_axes {
+                for end in [axis.base, axis.tip] {
+                    let corners = parts().filter(|p| p.tag.leaf == axis.leaf).flat_map(|p| &p.mesh.positions);
+                    let gap = corners.map(|p| p.distance(end)).fold(f32::MAX, f32::min);
+                    assert!(gap < 2e-3, "{page}: plant {} leaf {}: {gap}", plant.number, axis.leaf);
+                    ends += 1;
+                }
+            }
+        }
+    }
+    assert!(ends > 40, "{ends}");
+}
