@@ -57,7 +57,7 @@ const DOORS: &[(&str, &str)] = &[
     ("rand_pcg", "sampling/rng.rs"),
     // Parallel at the top only.
     // Images, plants, and the soil's skin: loops over what is many.
-    ("rayon", "render/ scene/build.rs soil/skin.rs material/ground.rs"),
+    ("rayon", "render/ dataset/ scene/build.rs soil/skin.rs material/ground.rs"),
     // One reader for all pages; faults inside a value are found where they lie.
     ("ron", "page.rs sampling/fault.rs"),
     ("serde", "*"),

@@ -1,28 +1,23 @@
 //! What a field knows of itself beside its meshes: who may grow in it, and under what conditions.
 
 use super::build::Season;
-use super::tag::Class;
+use super::tag::{Class, lowercase};
 use crate::light::LightRecord;
 use crate::scatter::{RowsRecord, WeedsRecord};
 use crate::sensor::CameraRecord;
 use crate::soil::SoilRecord;
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Serialize};
 
 /// One of the species that a page can draw, or a model from disk.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SpeciesRecord {
     /// Scientific name; of a model its file's name.
     pub name: String,
     /// EPPO code; empty for a model.
     pub eppo: String,
-    /// Crop or weed; written by its lower-case name.
-    #[serde(serialize_with = "by_name")]
+    /// Crop or weed.
+    #[serde(with = "lowercase")]
     pub class: Class,
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference to the field")]
-fn by_name<S: Serializer>(class: &Class, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(class.name())
 }
 
 /// What was drawn for one field. Every number is SI or carries its unit in its name; bands are R, G, B, NIR.

@@ -41,6 +41,23 @@ impl Class {
     }
 }
 
+/// Classes in records: by their lower-case names, where pages write `Crop`. For `#[serde(with = "lowercase")]`.
+pub mod lowercase {
+    use super::Class;
+    use serde::{Deserialize, Deserializer, Serializer, de};
+
+    /// Writes the name.
+    pub fn serialize<S: Serializer>(class: &Class, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(class.name())
+    }
+
+    /// Reads the name.
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Class, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        Class::named(&name).ok_or_else(|| de::Error::unknown_variant(&name, &["soil", "crop", "weed"]))
+    }
+}
+
 /// Who a part is. Zero means none: soil has no plant, a stem has no leaf.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tag {

@@ -1,5 +1,6 @@
 //! `trace`: grows a field, path traces it, labels it, writes it.
 
+mod dataset;
 mod export;
 mod field;
 mod quality;
@@ -36,6 +37,7 @@ Examples:
   trace --scene scenes/field.ron --crop 500,400,200,150 only a part of it, at full size
   trace --scene scenes/field.ron --integrator ids       which part each pixel belongs to, in false colours
   trace --scene scenes/field.ron --pixel 648,483        what that pixel shows, in words
+  trace dataset --scene scenes/field.ron --count 100 --out data   a hundred of them, labelled, resumable
   trace export --scene scenes/field.ron --format gltf   the same field for another program
   trace texture textures/leaf/sugar_beet.ron            draw a texture from its recipe
 
@@ -55,6 +57,8 @@ Exit codes: 0 done, 1 failed, 2 wrong input, 75 stopped cleanly (Ctrl-C, TERM, H
 
 #[derive(Subcommand)]
 enum Verb {
+    /// Make many fields with all their labels, in the formats of other tools.
+    Dataset(Box<dataset::Cli>),
     /// Write a field as a scene of another program.
     Export(export::Args),
     /// Draw textures from their recipes; images are written beside them.
@@ -65,6 +69,7 @@ fn main() -> ExitCode {
     let signals = signal::Signals::watch();
     let cli = Cli::parse();
     let done = match cli.verb {
+        Some(Verb::Dataset(args)) => dataset::run(&args, &signals),
         Some(Verb::Export(args)) => export::run(&args),
         Some(Verb::Texture(args)) => texture::run(&args),
         None => render::run(&cli.render, &signals),

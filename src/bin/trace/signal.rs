@@ -24,13 +24,14 @@ const PATIENT: [i32; 0] = [];
 /// What signals have asked for.
 pub(crate) struct Signals {
     stop: Arc<AtomicBool>,
+    urgent: Arc<AtomicBool>,
     unheeded: Arc<AtomicBool>,
 }
 
 impl Signals {
     /// Watches for INT, TERM, HUP and USR1. The first thing that the program does: a signal before that ends it its own way.
     pub(crate) fn watch() -> Self {
-        let signals = Self { stop: Arc::default(), unheeded: Arc::new(AtomicBool::new(true)) };
+        let signals = Self { stop: Arc::default(), urgent: Arc::default(), unheeded: Arc::new(AtomicBool::new(true)) };
         if let Err(e) = signals.install() {
             eprintln!("warning: cannot watch for signals: {e}");
         }
@@ -45,6 +46,9 @@ impl Signals {
             flag::register_conditional_shutdown(signal, STOPPED, asked.clone())?;
             flag::register(signal, asked.clone())?;
         }
+        for signal in URGENT {
+            flag::register(signal, self.urgent.clone())?;
+        }
         for signal in URGENT.into_iter().chain(PATIENT) {
             flag::register_conditional_shutdown(signal, STOPPED, self.unheeded.clone())?;
             flag::register(signal, self.stop.clone())?;
@@ -56,5 +60,11 @@ impl Signals {
     pub(crate) fn heed(&self) -> &AtomicBool {
         self.unheeded.store(false, Ordering::SeqCst);
         &self.stop
+    }
+
+    /// Two flags instead of the end of the process: the first is raised by every signal, the second by INT and TERM alone, which
+    /// do not wait for the work in hand.
+    pub(crate) fn heed_patiently(&self) -> (&AtomicBool, &AtomicBool) {
+        (self.heed(), &self.urgent)
     }
 }
