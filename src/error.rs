@@ -44,6 +44,12 @@ pub enum Error {
     /// The denoiser failed; the picture that it was to denoise is there.
     #[error("{0}")]
     Denoise(String),
+    /// A dataset that cannot be used as asked.
+    #[error("{0}")]
+    Dataset(String),
+    /// A dataset that is not whole or not what it says it is.
+    #[error("{0}")]
+    Damaged(String),
     /// The user asked to stop; nothing half-written is left.
     #[error("stopped before it was done; nothing was written")]
     Interrupted,
@@ -59,10 +65,10 @@ impl Error {
     /// The process exit code: 2 where the user's input must change, 75 after a clean stop, 1 for the rest.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Page(_) | Self::Image { .. } | Self::Model { .. } | Self::Scene(_) => 2,
+            Self::Page(_) | Self::Image { .. } | Self::Model { .. } | Self::Scene(_) | Self::Dataset(_) => 2,
             Self::Interrupted => 75,
             Self::Io { source, .. } if source.kind() == std::io::ErrorKind::NotFound => 2,
-            Self::Io { .. } | Self::Embree(_) | Self::Denoise(_) => 1,
+            Self::Io { .. } | Self::Embree(_) | Self::Denoise(_) | Self::Damaged(_) => 1,
         }
     }
 }

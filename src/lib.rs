@@ -6,6 +6,7 @@
 //!
 //! | floor | rooms |
 //! |---|---|
+//! | 11 | [`dataset`] |
 //! | 10 | [`output`] |
 //! | 9 | [`render`] |
 //! | 8 | [`integrator`] |
@@ -22,6 +23,7 @@
 pub mod accel;
 pub mod bsdf;
 pub mod cli;
+pub mod dataset;
 pub mod error;
 pub mod film;
 pub mod geometry;

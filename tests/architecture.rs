@@ -31,6 +31,8 @@ const NEVER: &[(&str, &str)] = &[
     ("render/label.rs", "film sampling bsdf material light integrator"),
     ("integrator", "accel film output plant soil scatter texture"),
     ("film", "scene sampling"),
+    // It asks `render` for an image and a label map.
+    ("dataset", "integrator bsdf"),
     // `cli` is what the programs share.
     ("*", "cli bin"),
 ];
@@ -40,7 +42,6 @@ const DOORS: &[(&str, &str)] = &[
     // Bytes written as text inside a model's document.
     ("base64", "model/uri.rs"),
     ("clap", "bin/"),
-    ("ctrlc", "bin/"),
     ("embree3", "accel/embree.rs"),
     ("exr", "output/exr.rs"),
     // Vectors are re-exported by `math`; two files sum in double precision.
@@ -56,13 +57,14 @@ const DOORS: &[(&str, &str)] = &[
     ("rand_pcg", "sampling/rng.rs"),
     // Parallel at the top only.
     // Images, plants, and the soil's skin: loops over what is many.
-    ("rayon", "render/ scene/build.rs soil/skin.rs material/ground.rs"),
+    ("rayon", "render/ dataset/ scene/build.rs soil/skin.rs material/ground.rs"),
     // One reader for all pages; faults inside a value are found where they lie.
     ("ron", "page.rs sampling/fault.rs"),
     ("serde", "*"),
-    // glTF documents, read and written.
-    ("serde_json", "model/document.rs model/gltf.rs output/gltf/"),
-    ("sha2", "scene/library.rs"),
+    // glTF documents, read and written; records and formats of datasets.
+    ("serde_json", "model/document.rs model/gltf.rs output/gltf/ dataset/"),
+    ("sha2", "scene/library.rs dataset/"),
+    ("signal_hook", "bin/trace/signal.rs"),
     // Parts that a pixel met: one or two, nearly always.
     ("smallvec", "film/tally.rs"),
     ("sobol_burley", "sampling/sampler.rs"),

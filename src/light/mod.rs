@@ -9,6 +9,7 @@ mod environment;
 pub mod hosek;
 mod lamp;
 mod position;
+mod record;
 mod sample;
 mod sky;
 mod sun;
@@ -17,6 +18,7 @@ pub use daylight::{AboveHorizon, Latitude, Longitude, SunDesc, Turbidity, daylig
 pub use environment::Environment;
 pub use lamp::{GlowDesc, Lamp, Outline, PointDesc, ShapeDesc};
 pub use position::{SunPosition, Utc, sun_position};
+pub use record::LightRecord;
 pub use sample::{Emitter, LampHit, LightSample};
 pub use sky::{Dome, Sky};
 pub use sun::{HALF_ANGLE_DEG, Sun};
@@ -200,23 +202,45 @@ pub enum LightDesc {
 impl LightDesc {
     /// Draws the lights: two for a day with sun and sky, one for the others, none for one that is black.
     pub fn build(&self, stream: &mut Stream) -> Result<Vec<Light>> {
+        Ok(self.draw(stream)?.1)
+    }
+
+    /// Draws the lights as [`LightDesc::build`] does, and tells what was drawn.
+    pub fn draw(&self, stream: &mut Stream) -> Result<(LightRecord, Vec<Light>)> {
         let sky = |sky: Option<Sky>| sky.map(|sky| Light::Sky(Box::new(sky)));
+        let given = |light: Option<&Light>| light.map_or(Spectrum::ZERO, Light::horizontal_irradiance);
         Ok(match self {
             Self::Daylight { sun, turbidity, cloud } => {
                 let at = sun.draw(stream)?;
                 let (turbidity, cloud) = (turbidity.draw(stream), cloud.draw32(stream));
                 let (sun, dome) = daylight(at.elevation_deg, at.azimuth_deg, turbidity, cloud);
-                sun.map(Light::Sun).into_iter().chain(sky(dome)).collect()
+                let (sun, sky) = (sun.map(Light::Sun), sky(dome));
+                let record = LightRecord::Daylight {
+                    sun_elevation_deg: at.elevation_deg,
+                    sun_azimuth_deg: at.azimuth_deg,
+                    turbidity,
+                    cloud,
+                    sun_irradiance_w_m2_nm: given(sun.as_ref()),
+                    sky_irradiance_w_m2_nm: given(sky.as_ref()),
+                };
+                (record, sun.into_iter().chain(sky).collect())
             }
             Self::Overcast { illuminance_klx } => {
-                sky(Sky::new(Dome::overcast(overcast_irradiance(illuminance_klx.draw32(stream))))).into_iter().collect()
+                let illuminance_klx = illuminance_klx.draw32(stream);
+                let sky = sky(Sky::new(Dome::overcast(overcast_irradiance(illuminance_klx))));
+                let record = LightRecord::Overcast { illuminance_klx, irradiance_w_m2_nm: given(sky.as_ref()) };
+                (record, sky.into_iter().collect())
             }
             Self::Constant { radiance: (r, g, b, nir) } => {
                 let radiance = Spectrum::from([r, g, b, nir].map(|band| band.draw32(stream)));
-                if radiance.is_black() { Vec::new() } else { vec![Light::Environment(Environment::new(radiance))] }
+                let light = (!radiance.is_black()).then(|| Light::Environment(Environment::new(radiance)));
+                let record =
+                    LightRecord::Constant { radiance_w_m2_sr_nm: radiance, irradiance_w_m2_nm: given(light.as_ref()) };
+                (record, light.into_iter().collect())
             }
             Self::Lamp { shape, position_m, look_at_m, glow } => {
-                vec![Light::Lamp(Lamp::draw(shape, position_m, look_at_m, glow, stream)?)]
+                let lamp = Lamp::draw(shape, position_m, look_at_m, glow, stream)?;
+                (LightRecord::lamp(&lamp), vec![Light::Lamp(lamp)])
             }
         })
     }

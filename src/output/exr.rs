@@ -11,6 +11,7 @@ use crate::math::Spectrum;
 use crate::render::{LabelMap, label::NONE};
 use crate::{Error, Result};
 use exr::prelude::*;
+use std::path::Path;
 
 fn channel(name: &str, samples: FlatSamples) -> AnyChannel<FlatSamples> {
     AnyChannel { name: name.into(), sample_data: samples, quantize_linearly: false, sampling: Vec2(1, 1) }
@@ -58,6 +59,41 @@ pub(super) fn encode_radiance(film: &Film, text: &str) -> Result<Vec<u8>> {
     let band = |i: usize| FlatSamples::F32(film.pixels.iter().map(|p| p.mean.to_array()[i]).collect());
     let channels = Spectrum::NAMES.iter().enumerate().map(|(i, name)| channel(name, band(i))).collect();
     write(film.window, channels, text)
+}
+
+/// The half-precision number next to this one.
+pub fn half(x: f32) -> f32 {
+    f16::from_f32(x).to_f32()
+}
+
+/// Encodes what lies at the pixels' centres: `depth.Z` (f32) and `normal.X/Y/Z` (f16).
+pub fn encode_geometry(width: u32, height: u32, depth: &[f32], normals: &[[f32; 3]]) -> Result<Vec<u8>> {
+    let axis = |i: usize| FlatSamples::F16(normals.iter().map(|n| f16::from_f32(n[i])).collect());
+    let mut channels = SmallVec::new();
+    channels.push(channel("depth.Z", FlatSamples::F32(depth.to_vec())));
+    channels.extend(["X", "Y", "Z"].iter().enumerate().map(|(i, name)| channel(&format!("normal.{name}"), axis(i))));
+    write(Window::full(width, height), channels, "")
+}
+
+/// Width, height, depths, normals.
+pub type Geometry = (u32, u32, Vec<f32>, Vec<[f32; 3]>);
+
+/// Reads what [`encode_geometry`] wrote.
+pub fn read_geometry(path: &Path) -> Result<Geometry> {
+    let wrong = |what: String| Error::Image { path: path.into(), what };
+    let bytes = std::fs::read(path).map_err(Error::io(path))?;
+    let reader = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
+    let image = reader.from_buffered(std::io::Cursor::new(bytes)).map_err(|e| wrong(e.to_string()))?;
+    let layer = image.layer_data;
+    let values = |name: &str| -> Result<Vec<f32>> {
+        let found = layer.channel_data.list.iter().find(|c| c.name.eq_case_insensitive(name));
+        let found = found.ok_or_else(|| wrong(format!("it has no channel {name}")))?;
+        Ok(found.sample_data.values_as_f32().collect())
+    };
+    let [depth, x, y, z] = ["depth.Z", "normal.X", "normal.Y", "normal.Z"].map(values);
+    let (x, y, z) = (x?, y?, z?);
+    let normals = x.into_iter().zip(y).zip(z).map(|((x, y), z)| [x, y, z]).collect();
+    Ok((layer.size.0 as u32, layer.size.1 as u32, depth?, normals))
 }
 
 fn write(w: Window, channels: SmallVec<[AnyChannel<FlatSamples>; 4]>, text: &str) -> Result<Vec<u8>> {

@@ -16,7 +16,8 @@ use crate::{Error, Result};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-pub use self::png::{Picture, read_gray16, read_indexed, write_png};
+pub use self::exr::{Geometry, encode_geometry, half, read_geometry};
+pub use self::png::{Picture, encode as encode_png, read_gray, read_gray16, read_indexed, read_rgb, write_png};
 pub use denoise::Denoiser;
 
 /// How many samples the pixels of an image have.
@@ -87,22 +88,37 @@ impl Provenance {
         );
         self.deviations.iter().fold(text, |text, deviation| text + "\n" + deviation)
     }
+
+    /// The same for a photograph, which may have been denoised.
+    pub fn photograph_text(&self, denoised: bool) -> String {
+        self.text() + if denoised { "\ndenoised: Open Image Denoise" } else { "" }
+    }
 }
+
+/// Prefix of the names that files have until they are whole.
+pub const UNFINISHED: &str = ".furrow-";
 
 /// Writes a file under a temporary name beside its target, flushes it, then renames: a reader never sees half a file.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
+    stream_atomically(path, |file| file.write_all(bytes).map_err(Error::io(path)))
+}
+
+/// The same for a file that is written piece by piece.
+pub fn stream_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".furrow-");
+    builder.prefix(UNFINISHED);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
         // As any other new file: the umask takes its part.
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    let mut file = builder.tempfile_in(folder).map_err(Error::io(path))?;
-    file.write_all(bytes).map_err(Error::io(path))?;
+    let file = builder.tempfile_in(folder).map_err(Error::io(path))?;
+    let mut buffer = std::io::BufWriter::with_capacity(1 << 16, file);
+    write(&mut buffer)?;
+    let file = buffer.into_inner().map_err(|e| Error::Io { path: path.into(), source: e.into_error() })?;
     file.as_file().sync_all().map_err(Error::io(path))?;
     file.persist(path).map_err(|e| Error::Io { path: path.into(), source: e.error })?;
     Ok(())
@@ -146,7 +162,7 @@ pub fn write_denoised(
     provenance: &Provenance,
 ) -> Result<Vec<PathBuf>> {
     let (w, h) = (film.window.width(), film.window.height());
-    let text = provenance.text() + "\ndenoised: Open Image Denoise";
+    let text = provenance.photograph_text(true);
     let rgb = photograph.rgb.as_chunks::<3>().0;
     write_all(
         folder,

@@ -25,7 +25,7 @@ fn failed(error: impl std::fmt::Display) -> Error {
 }
 
 /// Encodes a picture; `text` goes into its `Comment`.
-pub(super) fn encode(width: u32, height: u32, picture: &Picture<'_>, text: &str) -> Result<Vec<u8>> {
+pub fn encode(width: u32, height: u32, picture: &Picture<'_>, text: &str) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     let data = match picture {
@@ -89,6 +89,17 @@ fn read(path: &Path, depth: BitDepth, color: ColorType, what: &str) -> Result<(u
 /// Reads an 8-bit indexed PNG: width, height, indices.
 pub fn read_indexed(path: &Path) -> Result<(u32, u32, Vec<u8>)> {
     read(path, BitDepth::Eight, ColorType::Indexed, "an 8-bit indexed PNG")
+}
+
+/// Reads an 8-bit gray PNG: width, height, numbers.
+pub fn read_gray(path: &Path) -> Result<(u32, u32, Vec<u8>)> {
+    read(path, BitDepth::Eight, ColorType::Grayscale, "an 8-bit gray PNG")
+}
+
+/// Reads an 8-bit RGB PNG: width, height, three numbers a pixel.
+pub fn read_rgb(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
+    let (w, h, bytes) = read(path, BitDepth::Eight, ColorType::Rgb, "an 8-bit RGB PNG")?;
+    Ok((w, h, bytes.as_chunks::<3>().0.to_vec()))
 }
 
 /// Reads a 16-bit gray PNG: width, height, numbers.

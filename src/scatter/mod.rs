@@ -5,9 +5,11 @@
 //! moves nothing of another.
 
 mod field;
+mod record;
 mod rows;
 mod weeds;
 
+pub use record::{RowsRecord, WeedsRecord};
 pub use rows::{Rows, RowsDesc, rows, rows_looked_at};
 pub use weeds::{ClustersDesc, WeedsDesc, weeds, weeds_looked_at};
 

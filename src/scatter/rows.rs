@@ -65,9 +65,9 @@ pub struct Rows {
     pub offset_m: f32,
     /// From seed to seed, metres.
     pub in_row_m: f32,
-    jitter: Vec2,
-    emergence: f64,
-    doubles: f64,
+    pub(super) jitter: Vec2,
+    pub(super) emergence: f64,
+    pub(super) doubles: f64,
     stream: Stream,
 }
 

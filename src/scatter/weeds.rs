@@ -5,6 +5,7 @@
 //! same, while its range exceeds the quadrat. Part of the plants may stand in Thomas clusters instead.
 
 use super::field::Field;
+use super::record::WeedsRecord;
 use super::{Area, Disc, Spot, outside, within};
 use crate::math::{Vec2, vec2};
 use crate::sampling::vary::{Fraction, NonNegative, Positive, Vary};
@@ -70,28 +71,24 @@ const CELL_M: f32 = 0.1;
 
 /// About how many places [`weeds`] looks at: plants that are expected, and the cells that could hold them.
 pub fn weeds_looked_at(desc: &WeedsDesc, area: Area, stream: &Stream) -> f64 {
-    let child = |k| stream.child(Purpose::Page, k);
-    let share = desc.clusters.share.draw(&mut child(4));
-    let plants = desc.clusters.plants.draw(&mut child(5));
-    let reach = if share > 0.0 { 4.0 * desc.clusters.sd_m.draw(&mut child(6)) } else { 0.0 };
-    let beyond = 2.0 * (desc.min_distance_m.draw(&mut child(7)) + reach);
+    let drawn = WeedsRecord::draw(desc, stream);
+    let share = f64::from(drawn.clusters_share);
+    let reach = if share > 0.0 { 4.0 * drawn.clusters_sd_m } else { 0.0 };
+    let beyond = 2.0 * f64::from(drawn.min_distance_m + reach);
     let size = area[1] - area[0];
     let wide = (f64::from(size.x) + beyond) * (f64::from(size.y) + beyond);
     // A cluster's mother is looked at however few its children are.
-    let mothers = 1.0 + share / plants;
-    wide * (desc.per_m2.draw(&mut child(0)) * mothers + 1.0 / f64::from(CELL_M * CELL_M))
+    let mothers = 1.0 + share / f64::from(drawn.clusters_plants);
+    wide * (f64::from(drawn.per_m2) * mothers + 1.0 / f64::from(CELL_M * CELL_M))
 }
 
 /// Where the weeds of one species stand in `area`, none of them starting in `discs`.
 pub fn weeds(desc: &WeedsDesc, area: Area, discs: &[Disc], stream: &Stream) -> Vec<Spot> {
-    let child = |k| stream.child(Purpose::Page, k);
-    let per_m2 = desc.per_m2.draw32(&mut child(0));
-    let variance = (1.0 + 1.0 / desc.k.draw32(&mut child(1))).ln();
-    let field = Field::new(desc.range_m.draw32(&mut child(2)), &mut child(3));
-    let share = desc.clusters.share.draw32(&mut child(4));
-    let plants = desc.clusters.plants.draw32(&mut child(5));
-    let sd = desc.clusters.sd_m.draw32(&mut child(6));
-    let apart = desc.min_distance_m.draw32(&mut child(7));
+    let drawn = WeedsRecord::draw(desc, stream);
+    let (per_m2, share, plants) = (drawn.per_m2, drawn.clusters_share, drawn.clusters_plants);
+    let (sd, apart) = (drawn.clusters_sd_m, drawn.min_distance_m);
+    let variance = (1.0 + 1.0 / drawn.k).ln();
+    let field = Field::new(drawn.range_m, &mut stream.child(Purpose::Page, 3));
     let intensity = |p: Vec2| (variance.sqrt() * field.at(p) - 0.5 * variance).exp() * per_m2;
 
     // Neighbours beyond the border decide too who is too close.

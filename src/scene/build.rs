@@ -1,27 +1,32 @@
 //! Page + seed + index → one field.
 
+mod known;
 mod models;
+mod season;
 
 use super::desc::{FieldDesc, Growth, SpeciesDesc};
 use super::library::{Layer, Library, Species};
+use super::record::{Conditions, SpeciesRecord};
 use super::tag::Tag;
 use super::{Part, PlantRecord, Scene};
 use crate::film::Film;
 use crate::geometry::Mesh;
+use crate::light::LightRecord;
 use crate::material::{Ground as GroundMaterial, GroundSkin, Material, Solid};
 use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3, vec2};
 use crate::page::Page;
-use crate::plant::{self, LeafAxis, OrganKind, Stage};
+use crate::plant::{self, LeafAxis, OrganKind};
 use crate::sampling::place::Step;
 use crate::sampling::rng::mix;
 use crate::sampling::{Purpose, Stream};
 use crate::scatter::{self, Disc, Rows, Spot};
 use crate::sensor::Linear;
 use crate::sensor::{Photograph, SensorDesc};
-use crate::soil::{self, Debris, Ground, Pile, Rect, SeedRows, Site, SoilDesc};
+use crate::soil::{self, Debris, Ground, Pile, Rect, SeedRows, Site, SoilDesc, SoilRecord};
 use crate::{Error, Result};
 use rayon::prelude::*;
-use std::path::Path;
+pub use season::Season;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 impl Field {
@@ -74,6 +79,14 @@ pub struct Field {
     pub seed: u64,
     /// Which field of the distribution.
     pub index: u64,
+    /// Every species that its page can draw, in the page's order: the same for all indices.
+    pub species: Vec<SpeciesRecord>,
+    /// What was drawn for it.
+    pub conditions: Conditions,
+    /// Every file that was read for it, in order.
+    pub files: Vec<PathBuf>,
+    /// Its page.
+    pub text: String,
     /// What the user should know.
     pub warnings: Vec<String>,
 }
@@ -88,6 +101,11 @@ const GROUND_REACH: f32 = 2.5;
 const SHADOW: f32 = 2.75;
 /// Radius around a stem that clods leave free, metres.
 const STEM_ROOM: f32 = 0.004;
+/// Address of the season's stream, behind those of any number of lights.
+const SEASON: u64 = 1 << 32;
+/// Addresses of what lies on the ground.
+const STONES: u64 = 0;
+const LITTER: u64 = 1;
 /// Most pixels of an image.
 const MOST_PIXELS: u64 = 1 << 28;
 /// Most plants that a field can number.
@@ -112,6 +130,8 @@ pub fn field_of(text: &str, options: &Options) -> Result<Field> {
 struct Seedling {
     species: Arc<Species>,
     growth: Growth,
+    /// Place of the field's season in a list of growths.
+    season: usize,
     position: Vec2,
     turn: f32,
     only_leaf: Option<u16>,
@@ -132,6 +152,9 @@ struct Builder<'a> {
     library: Library,
     seed: u64,
     index: u64,
+    season: Season,
+    /// The lights as they were drawn.
+    lights: Vec<LightRecord>,
     scene: Scene,
     warnings: Vec<String>,
 }
@@ -158,17 +181,20 @@ impl<'a> Builder<'a> {
             );
             return Err(page.blame(&[Step::Field("camera"), Step::Field("size")], Error::Scene(words)));
         }
-        let mut lights = Vec::new();
+        let (mut lights, mut light_records) = (Vec::new(), Vec::new());
         for (i, light) in desc.lights.iter().enumerate() {
-            let light = light.build(&mut Stream::of(seed, index, Purpose::Page, 1 + i as u64));
-            lights.extend(light.map_err(|e| page.blame(&[Step::Field("lights"), Step::Item(i)], e))?);
+            let drawn = light.draw(&mut Stream::of(seed, index, Purpose::Page, 1 + i as u64));
+            let (record, drawn) = drawn.map_err(|e| page.blame(&[Step::Field("lights"), Step::Item(i)], e))?;
+            light_records.push(record);
+            lights.extend(drawn);
         }
         let mut warnings = Vec::new();
         if lights.is_empty() {
             warnings.push("no light in the scene: the image will be black".into());
         }
         let scene = Scene { parts: Vec::new(), materials: Vec::new(), lights, camera, filter: desc.filter.footprint() };
-        Ok(Self { page, desc, library, seed, index, scene, warnings })
+        let season = Season::draw(page, desc, &mut Stream::of(seed, index, Purpose::Page, SEASON))?;
+        Ok(Self { page, desc, library, seed, index, season, lights: light_records, scene, warnings })
     }
 
     fn stream(&self, purpose: Purpose, index: u64) -> Stream {
@@ -222,13 +248,15 @@ impl<'a> Builder<'a> {
         let wanted = self.desc.soil.is_some() || !self.desc.crops.is_empty() || !self.desc.weeds.is_empty();
         let view = if wanted { self.view()? } else { Rect::new(-0.5, -0.5, 0.5, 0.5) };
         let (sown, shown) = (view.grown(PLANT_MARGIN), wanted.then_some(view));
-        let plants = match &self.desc.soil {
+        let mut known = None;
+        let mut plants = match &self.desc.soil {
             None => {
                 let seedlings = self.seedlings(sown, &[])?;
                 self.populate(&seedlings, None, shown)?
             }
             Some(soil) => {
                 let Earth { ground, maps, mut pile, mut stones } = self.break_ground(soil, view)?;
+                known = Some(self.soil_record(soil, &ground));
                 let texel = (0.9 * self.ground_pixel()).clamp(2e-4, 2e-3);
                 // The skin takes as long as everything else, and neither needs the other.
                 let (skin, rest) = rayon::join(
@@ -245,9 +273,23 @@ impl<'a> Builder<'a> {
                 plants
             }
         };
+        let species = self.species()?;
+        known::number_kinds(&mut plants, &species);
+        let conditions = Conditions {
+            camera: self.scene.camera.record(),
+            lights: std::mem::take(&mut self.lights),
+            soil: known,
+            crops: self.crop_records()?,
+            weeds: self.weed_records()?,
+            season: self.season,
+        };
         Ok(Field {
             scene: self.scene,
             plants,
+            species,
+            conditions,
+            files: self.library.files(),
+            text: self.page.text.clone(),
             sensor: self.desc.sensor.clone(),
             hash: self.library.hash(),
             seed: self.seed,
@@ -276,8 +318,13 @@ impl<'a> Builder<'a> {
         let ground = Ground::new(desc, &maps, &site, &self.stream(Purpose::Soil, 0))
             .map_err(|e| self.page.blame(&[Step::Field("soil")], e))?;
         let mut pile = Pile::new(&ground);
-        let stones = soil::stones(&desc.stones, &ground, &mut pile, &self.stream(Purpose::Debris, 0));
+        let stones = soil::stones(&desc.stones, &ground, &mut pile, &self.stream(Purpose::Debris, STONES));
         Ok(Earth { ground, maps, pile, stones })
+    }
+
+    /// The ground as it was drawn.
+    fn soil_record(&self, desc: &SoilDesc, ground: &Ground) -> SoilRecord {
+        ground.record(desc, &self.stream(Purpose::Debris, STONES), &self.stream(Purpose::Debris, LITTER))
     }
 
     /// Clods around the stems, and litter, which joins the `debris`.
@@ -291,7 +338,7 @@ impl<'a> Builder<'a> {
     ) -> Vec<(f32, Mesh)> {
         let stems: Vec<(Vec2, f32)> = seedlings.iter().map(|s| (s.position, STEM_ROOM)).collect();
         let clods = soil::clods(ground, pile, &stems);
-        debris.extend(soil::litter(&desc.litter, ground, pile, &self.stream(Purpose::Debris, 1)));
+        debris.extend(soil::litter(&desc.litter, ground, pile, &self.stream(Purpose::Debris, LITTER)));
         clods
     }
 
@@ -353,6 +400,7 @@ impl<'a> Builder<'a> {
             all.push(Seedling {
                 species,
                 growth: placed.growth.clone(),
+                season: self.season.place(),
                 position,
                 turn: placed.turn_deg.draw32(&mut stream).to_radians(),
                 only_leaf: placed.only_leaf.map(|l| l.get() as u16),
@@ -382,6 +430,7 @@ impl<'a> Builder<'a> {
         Seedling {
             species: species.clone(),
             growth: growth.clone(),
+            season: self.season.place(),
             position: spot.at,
             turn: 0.0,
             only_leaf: None,
@@ -446,10 +495,7 @@ struct Grown {
 fn grow(s: &Seedling, number: u16, ground: Option<&Ground>) -> (PlantRecord, Vec<Grown>) {
     let desc: &SpeciesDesc = &s.species.desc;
     let mut stream = s.stream.clone();
-    let stage = match &s.growth {
-        Growth::AgeDays(days) => Stage::Age(days.draw32(&mut stream)),
-        Growth::Bbch(code) => Stage::Bbch(code.draw(&mut stream) as u32),
-    };
+    let stage = s.growth.draw(s.season, &mut stream);
     let green = (1.0 + desc.chlorophyll_sd.get() * stream.normal()).clamp(0.6, 1.5) as f32;
     let (x, y) = (s.position.x, s.position.y);
     let (z, normal) = ground.map_or((0.0, Vec3::Z), |g| (g.height(x, y), g.trend(x, y, STANCE)));
@@ -492,6 +538,7 @@ fn grow(s: &Seedling, number: u16, ground: Option<&Ground>) -> (PlantRecord, Vec
         number,
         species: desc.name.clone(),
         eppo: desc.eppo.clone(),
+        kind: 0,
         class,
         position: foot,
         axis,

@@ -4,7 +4,8 @@ use crate::film::Filter;
 use crate::light::LightDesc;
 use crate::material::LeafDesc;
 use crate::model::Up;
-use crate::plant::PlantDesc;
+use crate::plant::{PlantDesc, Stage};
+use crate::sampling::Stream;
 use crate::sampling::vary::{Finite, Fraction, NonNegative, Num, Pick, Positive, PositiveCount, Vary};
 use crate::scatter::{RowsDesc, WeedsDesc};
 use crate::scene::tag::Class;
@@ -70,6 +71,8 @@ fn point_spread() -> Filter {
 /// use furrow::scene::desc::Growth;
 /// let g: Growth = ron::from_str("AgeDays(Normal(mean: 24, sd: 2))").unwrap();
 /// let g: Growth = ron::from_str("Bbch(Choice([12, 14]))").unwrap();
+/// // A field that was photographed in its first weeks or a month later: this crop and its weeds are all young or all old.
+/// let g: Growth = ron::from_str("Either([AgeDays(Uniform(8, 14)), AgeDays(Uniform(30, 40))])").unwrap();
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Growth {
@@ -77,6 +80,22 @@ pub enum Growth {
     AgeDays(Vary<NonNegative>),
     /// Growth stage, BBCH scale (Meier 2001).
     Bbch(Vary<PositiveCount>),
+    /// One of these, drawn once a field: the same place in every such list of the page, so all of them have the same length.
+    Either(Vec<Growth>),
+}
+
+impl Growth {
+    /// Draws one plant's stage; `place` is the one that the field has drawn for every list.
+    ///
+    /// # Panics
+    /// Where a list is not that long, which [`super::build`] refuses before anything grows.
+    pub fn draw(&self, place: usize, stream: &mut Stream) -> Stage {
+        match self {
+            Self::AgeDays(days) => Stage::Age(days.draw32(stream)),
+            Self::Bbch(code) => Stage::Bbch(code.draw(stream) as u32),
+            Self::Either(of) => of[place].draw(place, stream),
+        }
+    }
 }
 
 /// A crop in rows.

@@ -47,6 +47,11 @@ impl Library {
         Ok(page)
     }
 
+    /// Everything that was read, in order.
+    pub(super) fn files(&self) -> Vec<PathBuf> {
+        self.files.keys().cloned().collect()
+    }
+
     /// SHA-256 over the contents of everything that was read, in hex: contents, not names, so a moved project keeps it.
     pub(super) fn hash(&self) -> String {
         let mut all = Sha256::new();

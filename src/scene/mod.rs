@@ -3,6 +3,7 @@
 pub mod build;
 pub mod desc;
 mod library;
+pub mod record;
 pub mod tag;
 
 use crate::accel::Surface;
@@ -40,6 +41,8 @@ pub struct PlantRecord {
     pub species: String,
     /// EPPO code.
     pub eppo: String,
+    /// Number of its species in [`Field::species`], from 1.
+    pub kind: u16,
     /// Crop or weed.
     pub class: Class,
     /// Where its stem meets the ground, metres.

@@ -1,7 +1,7 @@
 //! Who a part is: the table that turns a hit into a label.
 
 /// The classes of the label image, by their index in it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
 #[repr(u8)]
 pub enum Class {
     /// Ground, clods, stones, litter, and everything that is not a plant.
@@ -38,6 +38,23 @@ impl Class {
             Self::Crop => [0, 255, 0],
             Self::Weed => [255, 0, 0],
         }
+    }
+}
+
+/// Classes in records: by their lower-case names, where pages write `Crop`. For `#[serde(with = "lowercase")]`.
+pub mod lowercase {
+    use super::Class;
+    use serde::{Deserialize, Deserializer, Serializer, de};
+
+    /// Writes the name.
+    pub fn serialize<S: Serializer>(class: &Class, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(class.name())
+    }
+
+    /// Reads the name.
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Class, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        Class::named(&name).ok_or_else(|| de::Error::unknown_variant(&name, &["soil", "crop", "weed"]))
     }
 }
 

@@ -8,6 +8,7 @@ mod desc;
 mod exposure;
 mod lens;
 mod pose;
+mod record;
 mod response;
 #[cfg(test)]
 mod tests;
@@ -18,6 +19,7 @@ pub use desc::{ApertureDesc, CameraDesc, DistortionDesc, IntrinsicsDesc, PoseDes
 pub use exposure::{Exposure, ExposureDesc, Percent};
 pub use lens::Distortion;
 pub use pose::Pose;
+pub use record::{ApertureRecord, CameraRecord};
 pub use response::{Linear, Noise, NoiseDesc, Photograph, Sensor, SensorDesc, WhiteBalance, WhiteBalanceDesc};
 pub use tone::Tone;
 

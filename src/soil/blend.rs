@@ -129,6 +129,17 @@ impl Blend {
         self.tiles.iter().zip(weights).map(|(t, w)| t.clods * w).sum()
     }
 
+    /// What was drawn for each layer, sharing the ground before noise decides who lies where.
+    pub(super) fn shares(&self) -> Vec<f32> {
+        let sum: f32 = self.tiles.iter().map(|t| t.log_share.exp()).sum();
+        self.tiles.iter().map(|t| t.log_share.exp() / sum).collect()
+    }
+
+    /// Size of the largest patches, metres, and how hard their borders are.
+    pub(super) fn patches(&self) -> (f64, f32) {
+        (1.0 / self.frequency, self.sharpness)
+    }
+
     pub(super) fn layers(&self) -> usize {
         self.tiles.len()
     }

@@ -22,8 +22,8 @@ const CELL_M: f32 = 0.02;
 /// The law of the aggregates of one ground.
 #[derive(Clone, Debug)]
 pub(super) struct Law {
-    over_pivot: f32,
-    exponent: f32,
+    pub(super) over_pivot: f32,
+    pub(super) exponent: f32,
     clustering: f32,
     sorting: f32,
     frequency: f64,

@@ -3,6 +3,7 @@
 use super::blend::{Blend, Weights};
 use super::crumb::{Crumbs, Law, Raster};
 use super::grid::Grid;
+use super::record::{ClodsRecord, LayerRecord, LitterRecord, MoistureRecord, ReliefRecord, SoilRecord};
 use super::relief::Relief;
 use super::{LayerMaps, MAX_LAYERS, Rect, SoilDesc};
 use crate::error::{Error, Result};
@@ -10,6 +11,7 @@ use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3, vec2};
 use crate::sampling::{Purpose, Stream};
 use crate::texture::noise::Perlin;
+use std::path::Path;
 
 /// Standard deviation of [`Perlin::fbm2`] with four octaves and gain 0.6.
 const FBM4_SD: f32 = 0.245;
@@ -67,6 +69,8 @@ pub struct Ground {
     pub(super) crumbs_amount: f32,
     pub(super) stream: Stream,
     pub(super) step: f32,
+    relief: ReliefRecord,
+    moisture: MoistureRecord,
 }
 
 impl Ground {
@@ -90,6 +94,8 @@ impl Ground {
             crumbs_amount: desc.crumbs.amount.draw32(&mut stream.child(Purpose::Soil, 20)),
             stream: stream.clone(),
             step: site.grid_m,
+            relief: relief.record.clone(),
+            moisture: MoistureRecord::default(),
             grid,
         };
         ground.raise(maps, &relief);
@@ -153,7 +159,9 @@ impl Ground {
         let child = |k| self.stream.child(Purpose::Soil, k);
         let mean = desc.moisture.mean.draw32(&mut child(30));
         let spread = desc.moisture.spread.draw32(&mut child(31));
-        let frequency = 1.0 / desc.moisture.patch_m.draw(&mut child(32));
+        let patch_m = desc.moisture.patch_m.draw(&mut child(32));
+        self.moisture = MoistureRecord { mean, spread, patch_m };
+        let frequency = 1.0 / patch_m;
         let patches = Perlin::new(child(33).seed32());
         let tones = Perlin::new(child(34).seed32());
         let drying = desc.moisture.drying.f32();
@@ -177,6 +185,28 @@ impl Ground {
         self.fine.moisture = (patches.iter().zip(&out))
             .map(|(patch, out)| (mean + spread * patch - drying * (out / sd).clamp(-2.0, 2.0)).clamp(0.0, 1.0))
             .collect();
+    }
+
+    /// What was drawn for this ground; `debris` is the stream of the stones, `litter` that of the litter.
+    pub fn record(&self, desc: &SoilDesc, debris: &Stream, litter: &Stream) -> SoilRecord {
+        let (blend_scale_m, blend_sharpness) = self.blend.patches();
+        let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        SoilRecord {
+            moisture: self.moisture.clone(),
+            layers: (desc.layers.iter().zip(self.blend.shares()))
+                .map(|(layer, share)| LayerRecord { name: name(&layer.albedo), share })
+                .collect(),
+            blend_scale_m,
+            blend_sharpness,
+            relief: self.relief.clone(),
+            clods: ClodsRecord {
+                over_5mm_per_m2: self.law.over_pivot,
+                exponent: self.law.exponent,
+                crumbs_amount: self.crumbs_amount,
+            },
+            stones_cover: super::stone::covers(&desc.stones, debris),
+            litter: LitterRecord::draw(&desc.litter, litter),
+        }
     }
 
     /// Vertices between the samples of noises that change slowly: 4 mm.

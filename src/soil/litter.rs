@@ -4,6 +4,7 @@
 //! a tapered round with stubs; a bit a flat lens that curls. The path is fitted to the pile: stiff things bridge hollows,
 //! and lie where they touch.
 
+use super::record::LitterRecord;
 use super::{Debris, DebrisKind, Ground, LitterDesc, Pile, Rect, cell_stream, cells};
 use crate::geometry::Mesh;
 use crate::math::{Spectrum, Vec2, Vec3, vec2};
@@ -21,16 +22,17 @@ const CELL_M: f32 = 0.1;
 /// The litter of a page, laid onto the pile.
 pub fn litter(desc: &LitterDesc, ground: &Ground, pile: &mut Pile, stream: &Stream) -> Vec<Debris> {
     let mut all = Vec::new();
-    let child = |k: u64| stream.child(Purpose::Debris, 300 + k);
-    let sticks = desc.sticks_per_m2.draw32(&mut child(0));
+    let child = |k| own(stream, k);
+    let drawn = LitterRecord::draw(desc, stream);
     // Straws differ in length and width; the mean of both gives the number that covers what was asked for.
     let mut s = child(1);
     let one = (0..256).map(|_| desc.straw_mm.draw32(&mut s) * desc.straw_width_mm.draw32(&mut s)).sum::<f32>() / 256e6;
-    let straws = -(1.0 - desc.straw_cover.draw32(&mut child(2)).min(0.95)).ln() / one;
-    let bits = desc.bits_per_m2.draw32(&mut child(3));
-    for (kind, per_m2, k) in
-        [(DebrisKind::Stick, sticks, 4), (DebrisKind::Straw, straws, 5), (DebrisKind::Bit, bits, 6)]
-    {
+    let straws = -(1.0 - drawn.straw_cover.min(0.95)).ln() / one;
+    for (kind, per_m2, k) in [
+        (DebrisKind::Stick, drawn.sticks_per_m2, 4),
+        (DebrisKind::Straw, straws, 5),
+        (DebrisKind::Bit, drawn.bits_per_m2, 6),
+    ] {
         for (at, mut s) in places(ground.area(), per_m2, &child(k)) {
             all.push(match kind {
                 DebrisKind::Stick => stick(desc, pile, at, &mut s),
@@ -40,6 +42,22 @@ pub fn litter(desc: &LitterDesc, ground: &Ground, pile: &mut Pile, stream: &Stre
         }
     }
     all
+}
+
+/// The streams of the litter.
+fn own(stream: &Stream, k: u64) -> Stream {
+    stream.child(Purpose::Debris, 300 + k)
+}
+
+impl LitterRecord {
+    /// Draws how much lies on a field; `stream` is that of its litter.
+    pub(super) fn draw(desc: &LitterDesc, stream: &Stream) -> Self {
+        Self {
+            straw_cover: desc.straw_cover.draw32(&mut own(stream, 2)),
+            sticks_per_m2: desc.sticks_per_m2.draw32(&mut own(stream, 0)),
+            bits_per_m2: desc.bits_per_m2.draw32(&mut own(stream, 3)),
+        }
+    }
 }
 
 fn places(area: Rect, per_m2: f32, stream: &Stream) -> Vec<(Vec2, Stream)> {

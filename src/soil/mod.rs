@@ -17,6 +17,7 @@ mod grid;
 mod ground;
 mod litter;
 mod pile;
+mod record;
 mod relief;
 mod skin;
 mod stone;
@@ -31,6 +32,7 @@ pub use desc::{
 pub use ground::{Ground, SeedRows, Site};
 pub use litter::litter;
 pub use pile::Pile;
+pub use record::{ClodsRecord, LayerRecord, LitterRecord, MoistureRecord, ReliefRecord, RowReliefRecord, SoilRecord};
 pub use skin::Skin;
 pub use stone::stones;
 

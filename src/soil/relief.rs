@@ -3,6 +3,7 @@
 //! Tilled soil is a single-scale surface with self-affine roughness on top (Davidson et al. 2000); octaves of Perlin noise
 //! from the longest wavelength down, each 2^−H as high as the one before, give both.
 
+use super::record::{ReliefRecord, RowReliefRecord};
 use super::{ReliefDesc, SeedRows};
 use crate::math::{Vec2, smoothstep, vec2};
 use crate::sampling::{Purpose, Stream};
@@ -23,6 +24,8 @@ pub(super) struct Relief {
     longest: f32,
     tilt: Vec2,
     rows: Option<Rows>,
+    /// What was drawn.
+    pub(super) record: ReliefRecord,
 }
 
 #[derive(Clone, Debug)]
@@ -40,28 +43,44 @@ struct Rows {
 impl Relief {
     pub(super) fn new(desc: &ReliefDesc, rows: Option<SeedRows>, stream: &Stream) -> Self {
         let child = |k| stream.child(Purpose::Soil, k);
-        let gain = 2f32.powf(-desc.hurst.draw32(&mut child(1)));
+        let hurst = desc.hurst.draw32(&mut child(1));
+        let gain = 2f32.powf(-hurst);
         let longest = desc.longest_m.draw32(&mut child(2));
         let octaves = (longest / SHORTEST_M).log2().max(0.0) as i32 + 1;
         let energy: f32 = (0..octaves).map(|k| gain.powi(2 * k)).sum();
         let mut side = child(3);
-        let slope = desc.tilt_deg.draw32(&mut side).to_radians().tan();
-        let row = &desc.row;
+        let tilt_deg = desc.tilt_deg.draw32(&mut side);
+        let tilt = Vec2::from_angle(side.range32(0.0, std::f32::consts::TAU)) * tilt_deg.to_radians().tan();
+        let rms_mm = desc.rms_mm.draw32(&mut child(4));
+        let seeded = rows.filter(|r| r.spacing_m > 0.0);
+        let row = seeded.map(|_| RowReliefRecord {
+            depth_mm: desc.row.depth_mm.draw32(&mut child(5)),
+            width_mm: desc.row.width_mm.draw32(&mut child(6)),
+            ridge_mm: desc.row.ridge_mm.draw32(&mut child(7)),
+        });
         Self {
             noise: Perlin::new(child(0).seed32()),
-            amplitude: desc.rms_mm.draw32(&mut child(4)) * 1e-3 / (PERLIN_SD * energy.sqrt()),
+            amplitude: rms_mm * 1e-3 / (PERLIN_SD * energy.sqrt()),
             gain,
             longest,
-            tilt: Vec2::from_angle(side.range32(0.0, std::f32::consts::TAU)) * slope,
-            rows: rows.filter(|r| r.spacing_m > 0.0).map(|r| Rows {
+            tilt,
+            rows: seeded.zip(row.as_ref()).map(|(r, row)| Rows {
                 across: vec2(r.azimuth.cos(), -r.azimuth.sin()),
                 offset: r.offset_m,
                 spacing: r.spacing_m,
-                depth: row.depth_mm.draw32(&mut child(5)) * 1e-3,
-                half_width: row.width_mm.draw32(&mut child(6)) * 0.5e-3,
+                depth: row.depth_mm * 1e-3,
+                half_width: row.width_mm * 0.5e-3,
                 wander: 1.0,
-                ridge: row.ridge_mm.draw32(&mut child(7)) * 1e-3,
+                ridge: row.ridge_mm * 1e-3,
             }),
+            record: ReliefRecord {
+                rms_mm,
+                hurst,
+                longest_m: longest,
+                tilt_deg,
+                tilt_azimuth_deg: tilt.x.atan2(tilt.y).to_degrees().rem_euclid(360.0),
+                row,
+            },
         }
     }
 

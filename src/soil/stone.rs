@@ -19,12 +19,26 @@ const CELL_M: f32 = 0.1;
 pub fn stones(desc: &[StonesDesc], ground: &Ground, pile: &mut Pile, stream: &Stream) -> Vec<Debris> {
     let mut all = Vec::new();
     for (i, population) in desc.iter().enumerate() {
-        let stream = stream.child(Purpose::Debris, 200 + i as u64);
+        let stream = own(stream, i);
         for (at, mm, mut s) in sizes(population, ground.area(), &stream) {
             all.push(stone(population, ground, pile, at, mm, &mut s));
         }
     }
     all
+}
+
+/// Share of the ground under each population.
+pub(super) fn covers(desc: &[StonesDesc], stream: &Stream) -> Vec<f32> {
+    desc.iter().enumerate().map(|(i, population)| cover(population, &own(stream, i))).collect()
+}
+
+/// The stream of a population.
+fn own(stream: &Stream, i: usize) -> Stream {
+    stream.child(Purpose::Debris, 200 + i as u64)
+}
+
+fn cover(desc: &StonesDesc, stream: &Stream) -> f32 {
+    desc.cover.draw32(&mut stream.child(Purpose::Page, 0))
 }
 
 /// A length in mm: lognormal, cut.
@@ -41,7 +55,7 @@ fn length(desc: &StonesDesc, stream: &mut Stream) -> f32 {
 
 /// Places and lengths, largest first.
 fn sizes(desc: &StonesDesc, area: Rect, stream: &Stream) -> Vec<(Vec2, f32, Stream)> {
-    let cover = desc.cover.draw32(&mut stream.child(Purpose::Page, 0));
+    let cover = cover(desc, stream);
     // The mean disc of the law, from 512 stones: the cover asked for divides by it.
     let mut s = stream.child(Purpose::Page, 1);
     let disc = (0..512).map(|_| disc_m2(length(desc, &mut s))).sum::<f32>() / 512.0;

@@ -4,41 +4,60 @@ use furrow::scene::{Field, build};
 use furrow::{Result, cli};
 use std::path::{Path, PathBuf};
 
-/// One field of a scene's distribution, at one size.
+/// A scene's distribution over fields, at one size.
 #[derive(clap::Args)]
-pub(crate) struct FieldArgs {
+pub(crate) struct PageArgs {
     /// Scene page (RON): what grows, what shines, who looks.
     #[arg(long, value_name = "PAGE", required = true)]
     scene: Option<PathBuf>,
     /// Seed, instead of the page's.
     #[arg(long, allow_negative_numbers = true)]
-    seed: Option<u64>,
-    /// Which field of the distribution.
-    #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
-    index: u64,
+    pub(crate) seed: Option<u64>,
     /// Image width in pixels; the field of view stays, the height follows unless given.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=16384))]
-    width: Option<u32>,
+    pub(crate) width: Option<u32>,
     /// Image height in pixels.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=16384))]
-    height: Option<u32>,
+    pub(crate) height: Option<u32>,
 }
 
-impl FieldArgs {
+impl PageArgs {
     /// The page.
-    pub(crate) fn page(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         self.scene.as_deref().unwrap_or(Path::new(""))
     }
 
     /// Checks, before anything grows, that the page is there.
     pub(crate) fn check(&self) -> Result<()> {
-        cli::check_scene(self.page())
+        cli::check_scene(self.path())
+    }
+}
+
+/// One field of a page.
+#[derive(clap::Args)]
+pub(crate) struct FieldArgs {
+    #[command(flatten)]
+    page: PageArgs,
+    /// Which field of the distribution.
+    #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
+    index: u64,
+}
+
+impl FieldArgs {
+    /// The page.
+    pub(crate) fn page(&self) -> &Path {
+        self.page.path()
+    }
+
+    /// Checks, before anything grows, that the page is there.
+    pub(crate) fn check(&self) -> Result<()> {
+        self.page.check()
     }
 
     /// Grows the field. Call it inside a pool.
     pub(crate) fn grow(&self) -> Result<Field> {
-        let options = build::Options { seed: self.seed, index: self.index, width: self.width, height: self.height };
-        build::field(self.page(), &options)
+        let PageArgs { seed, width, height, .. } = self.page;
+        build::field(self.page(), &build::Options { seed, index: self.index, width, height })
     }
 
     /// `out/<name of the page>`.

@@ -1,9 +1,11 @@
 //! `trace`: grows a field, path traces it, labels it, writes it.
 
+mod dataset;
 mod export;
 mod field;
 mod quality;
 mod render;
+mod signal;
 mod technique;
 mod texture;
 
@@ -35,6 +37,7 @@ Examples:
   trace --scene scenes/field.ron --crop 500,400,200,150 only a part of it, at full size
   trace --scene scenes/field.ron --integrator ids       which part each pixel belongs to, in false colours
   trace --scene scenes/field.ron --pixel 648,483        what that pixel shows, in words
+  trace dataset --scene scenes/field.ron --count 100 --out data   a hundred of them, labelled, resumable
   trace export --scene scenes/field.ron --format gltf   the same field for another program
   trace texture textures/leaf/sugar_beet.ron            draw a texture from its recipe
 
@@ -50,10 +53,12 @@ Files of an image:
 More samples make less noise: twice the --spp takes twice the time and leaves 0.7 of it.
 The pages scenes/01-one-leaf.ron to 07 teach how a scene is written.
 Paths go to stdout, everything else to stderr.
-Exit codes: 0 done, 1 failed, 2 wrong input, 75 stopped cleanly (Ctrl-C).";
+Exit codes: 0 done, 1 failed, 2 wrong input, 75 stopped cleanly (Ctrl-C, TERM, HUP, USR1).";
 
 #[derive(Subcommand)]
 enum Verb {
+    /// Make many fields with all their labels, in the formats of other tools.
+    Dataset(Box<dataset::Cli>),
     /// Write a field as a scene of another program.
     Export(export::Args),
     /// Draw textures from their recipes; images are written beside them.
@@ -61,11 +66,13 @@ enum Verb {
 }
 
 fn main() -> ExitCode {
+    let signals = signal::Signals::watch();
     let cli = Cli::parse();
     let done = match cli.verb {
+        Some(Verb::Dataset(args)) => dataset::run(&args, &signals),
         Some(Verb::Export(args)) => export::run(&args),
         Some(Verb::Texture(args)) => texture::run(&args),
-        None => render::run(&cli.render),
+        None => render::run(&cli.render, &signals),
     };
     match done {
         Ok(paths) => print_paths(&paths),

@@ -2,6 +2,7 @@
 
 use crate::field::FieldArgs;
 use crate::quality::QualityArgs;
+use crate::signal::Signals;
 use crate::technique::TechniqueArgs;
 use clap::ValueEnum;
 use furrow::accel::{self, EmbreeAccel};
@@ -15,8 +16,7 @@ use furrow::{Result, cli};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 /// What to render, and how.
@@ -85,9 +85,8 @@ impl Draw {
 }
 
 /// Renders one field, or explains one pixel of it; returns the paths of the files.
-pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
+pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let begin = Instant::now();
-    let stop = stop_on_signal();
     let say = |text: String| {
         if !args.quiet {
             eprintln!("{text}");
@@ -146,7 +145,7 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
         traced.fetch_add(n, Ordering::Relaxed);
         bar.inc(n);
     };
-    let watch = Watch { done: &done, stop: &stop };
+    let watch = Watch { done: &done, stop: signals.heed() };
     let start = Instant::now();
     let deadline = args.quality.deadline(begin, window, args.denoise);
     let film: Film = pool.install(|| args.quality.render(&world, integrator.as_ref(), &settings, deadline, &watch))?;
@@ -186,23 +185,8 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
 }
 
 /// A number of threads that a machine may have.
-fn threads(text: &str) -> Result<usize, String> {
+pub(crate) fn threads(text: &str) -> Result<usize, String> {
     text.parse().ok().filter(|n| *n <= 1024).ok_or_else(|| "write a number from 0 (one for each core) to 1024".into())
-}
-
-/// A flag that Ctrl-C and SIGTERM raise; raised twice, the process ends at once.
-fn stop_on_signal() -> Arc<AtomicBool> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = stop.clone();
-    let asked = ctrlc::set_handler(move || {
-        if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(75);
-        }
-    });
-    if let Err(e) = asked {
-        eprintln!("warning: cannot watch for Ctrl-C: {e}");
-    }
-    stop
 }
 
 /// A bar where the number of samples is known, else a count of them.

@@ -6,7 +6,7 @@ use furrow::sampling::Points;
 use furrow::{Error, Result};
 
 /// How light is gathered; for `--integrator path`.
-#[derive(clap::Args)]
+#[derive(clap::Args, Clone, Default)]
 pub(crate) struct TechniqueArgs {
     /// Leave out a technique, to see what it does: the picture gets noisier, its mean stays.
     #[arg(long, value_enum, value_delimiter = ',', value_name = "TECHNIQUE")]
@@ -58,9 +58,7 @@ impl TechniqueArgs {
 
     /// Whatever differs from the defaults, for the files.
     pub(crate) fn deviations(&self) -> Vec<String> {
-        let name = |part: &Part| part.to_possible_value().map(|v| v.get_name().to_owned());
-        let without: Vec<String> =
-            Part::value_variants().iter().filter(|part| !self.has(**part)).filter_map(name).collect();
+        let without = self.without();
         let mut all = Vec::new();
         if !without.is_empty() {
             all.push(format!("without: {}", without.join(", ")));
@@ -68,6 +66,26 @@ impl TechniqueArgs {
         all.extend(self.max_depth.map(|n| format!("max depth: {n}")));
         all.extend(self.clamp.map(|c| format!("clamp: {c}")));
         all
+    }
+
+    /// The names of what is left out, in a fixed order.
+    pub(crate) fn without(&self) -> Vec<String> {
+        let name = |part: &Part| part.to_possible_value().map(|v| v.get_name().to_owned());
+        Part::value_variants().iter().filter(|part| !self.has(**part)).filter_map(name).collect()
+    }
+
+    /// The limits: most surfaces on a path, most radiance of one.
+    pub(crate) fn limits(&self) -> (Option<u32>, Option<f32>) {
+        (self.max_depth, self.clamp)
+    }
+
+    /// The technique that names and limits stand for.
+    pub(crate) fn of(without: &[String], max_depth: Option<u32>, clamp: Option<f32>) -> Result<Self> {
+        let part = |name: &String| {
+            Part::from_str(name, false)
+                .map_err(|_| Error::Dataset(format!("there is no technique `{name}` to leave out")))
+        };
+        Ok(Self { without: without.iter().map(part).collect::<Result<_>>()?, max_depth, clamp })
     }
 
     /// Refuses flags of the path tracer where another integrator draws.

@@ -1,5 +1,6 @@
 //! Models from disk, stood on the ground and labelled.
 
+use super::known::model_name;
 use super::{Builder, MOST_PLANTS};
 use crate::geometry::Mesh;
 use crate::material::{Material, Painted, Repaint};
@@ -13,8 +14,7 @@ use crate::scene::tag::{Class, Tag};
 use crate::scene::{Part, PlantRecord};
 use crate::soil::Ground;
 use crate::{Error, Result};
-use std::collections::BTreeMap;
-use std::path::Path;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Farthest that a model may reach from the world's origin along an axis, metres.
 const FARTHEST: f32 = 1000.0;
@@ -101,8 +101,9 @@ impl Builder<'_> {
         let across = all.positions.iter().map(|p| (p - position).truncate().length()).fold(0.0, f32::max);
         PlantRecord {
             number,
-            species: Path::new(file).file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+            species: model_name(file),
             eppo: String::new(),
+            kind: 0,
             class: parts[0].tag.class,
             position,
             axis: Vec3::Z,
@@ -114,6 +115,12 @@ impl Builder<'_> {
             leaf_axes: Vec::new(),
         }
     }
+}
+
+/// The classes of the plants among a model's parts, in the order of their indices.
+pub(super) fn classes(desc: &ModelDesc, model: &Model) -> BTreeSet<Class> {
+    let tags = model.parts.iter().filter_map(|part| tag(desc.class, part.label.as_ref(), 0));
+    tags.filter(|tag| tag.plant > 0).map(|tag| tag.class).collect()
 }
 
 /// A label whose class is one of ours.

@@ -1,0 +1,38 @@
+//! What belongs to all images: `trace dataset finish`.
+
+use super::order::formats;
+use super::render::{WorkArgs, generate};
+use crate::signal::Signals;
+use furrow::Result;
+use furrow::dataset::generate::Shard;
+use furrow::dataset::{Set, finish, plan};
+use std::path::PathBuf;
+
+/// Which dataset.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Folder of the dataset.
+    dir: PathBuf,
+    /// Further formats, separated by commas; made from the images that are there.
+    #[arg(long, value_delimiter = ',', value_name = "FORMAT", value_parser = formats())]
+    format: Vec<String>,
+    #[command(flatten)]
+    work: WorkArgs,
+}
+
+/// Adds formats, then writes what belongs to all.
+pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
+    let mut set = Set::open(&args.dir)?;
+    if !args.format.is_empty() {
+        for warning in plan::add_formats(&mut set, &args.format)? {
+            eprintln!("warning: {warning}");
+        }
+        generate(&set, &args.work, Shard::ALL, signals)?;
+    }
+    write(&set)
+}
+
+/// Writes what belongs to all images; returns the manifest and the formats' lists.
+pub(super) fn write(set: &Set) -> Result<Vec<PathBuf>> {
+    finish::finish(set)
+}

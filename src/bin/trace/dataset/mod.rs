@@ -1,0 +1,72 @@
+//! `trace dataset`: many fields, with all their labels, in the formats of other tools.
+
+mod engine;
+mod finish;
+mod order;
+mod progress;
+mod render;
+mod verify;
+
+use crate::signal::Signals;
+use clap::{Parser, Subcommand};
+use furrow::Result;
+use std::path::PathBuf;
+
+/// Makes a dataset from a page, or goes on with one: `plan`, `render` and `finish` in one go.
+///
+/// Image k is field k of the page and nothing else decides its bytes. Stopped, killed or damaged, the same command makes what is
+/// missing and ends with the same files.
+#[derive(Parser)]
+#[command(args_conflicts_with_subcommands = true, arg_required_else_help = true, after_help = AFTER)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    verb: Option<Verb>,
+    #[command(flatten)]
+    make: MakeArgs,
+}
+
+const AFTER: &str = "\
+Examples:
+  trace dataset --scene scenes/synthetic-d.ron --count 1300 --out data/d --width 480 --height 360 --spp 32 --format phenobench,coco
+  trace dataset verify data/d --rerender 5              hashes, invariants, and five images rendered again
+  trace dataset finish data/d --format yolo             a further format of the same images
+
+On several machines that share a folder:
+  trace dataset plan --scene scenes/synthetic-d.ron --count 100000 --out data/d --spp 32
+  trace dataset render data/d --shard 0/64              … to 63/64, each anywhere, in any order, as often as needed
+  trace dataset finish data/d";
+
+#[derive(Subcommand)]
+enum Verb {
+    /// Begin a dataset: check the page, take all that it reads into the folder, write the recipe.
+    Plan(order::Args),
+    /// Render the images of a shard that are missing.
+    Render(render::Args),
+    /// Write what belongs to all images: lists of the formats, manifest, report.
+    Finish(finish::Args),
+    /// Check every file and every label; render some images again.
+    Verify(verify::Args),
+}
+
+#[derive(clap::Args)]
+struct MakeArgs {
+    #[command(flatten)]
+    order: order::Args,
+    #[command(flatten)]
+    work: render::WorkArgs,
+}
+
+/// Runs a verb on datasets; returns the paths of the files that matter.
+pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
+    match &cli.verb {
+        Some(Verb::Plan(args)) => order::run(args).map(|set| vec![set.folder.join(furrow::dataset::recipe::FILE)]),
+        Some(Verb::Render(args)) => render::run(args, signals),
+        Some(Verb::Finish(args)) => finish::run(args, signals),
+        Some(Verb::Verify(args)) => verify::run(args, signals),
+        None => {
+            let set = order::run(&cli.make.order)?;
+            render::generate(&set, &cli.make.work, furrow::dataset::generate::Shard::ALL, signals)?;
+            finish::write(&set)
+        }
+    }
+}

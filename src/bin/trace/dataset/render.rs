@@ -1,0 +1,64 @@
+//! Making the images: `trace dataset render`.
+
+use super::engine::PathTracer;
+use super::progress::Progress;
+use crate::render::threads;
+use crate::signal::Signals;
+use furrow::Result;
+use furrow::dataset::Set;
+use furrow::dataset::generate::{self, Overseer, Shard, Work};
+use furrow::dataset::shoot::Engine;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Which images.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Folder of the dataset.
+    dir: PathBuf,
+    /// Render the images whose number leaves k when divided by N.
+    #[arg(long, value_name = "k/N", default_value = "0/1", value_parser = Shard::parse)]
+    shard: Shard,
+    #[command(flatten)]
+    work: WorkArgs,
+}
+
+/// How they are made; none of it changes a byte.
+#[derive(clap::Args)]
+pub(crate) struct WorkArgs {
+    /// Threads; 0 for one on each core.
+    #[arg(long, default_value_t = 0, value_parser = threads)]
+    threads: usize,
+    /// Images under way at once; each takes the memory of a field. 0 for as many as keep the threads busy.
+    #[arg(long, default_value_t = 0, value_parser = threads)]
+    at_once: usize,
+    /// Print nothing but errors and the paths of the files.
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// Makes the images of a shard.
+pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
+    let set = Set::open(&args.dir)?;
+    generate(&set, &args.work, args.shard, signals)?;
+    Ok(Vec::new())
+}
+
+/// Makes the images of a dataset that are missing.
+pub(super) fn generate(set: &Set, args: &WorkArgs, shard: Shard, signals: &Signals) -> Result<()> {
+    let begin = Instant::now();
+    let engine = PathTracer::of(set, args.threads)?;
+    let (soon, now) = signals.heed_patiently();
+    let progress = Progress::new(begin, args.quiet);
+    let total = |n: usize| progress.expect(n as u64);
+    let done = |_| progress.add();
+    let overseer = Overseer { begin: &total, done: &done, soon, now };
+    let work = Work { shard, threads: args.threads, at_once: args.at_once };
+    let made = generate::generate(set, &work, engine.as_ref().map(|e| e as &dyn Engine), &overseer);
+    let (images, rate) = progress.finish();
+    if !args.quiet {
+        let rate = if images > 0 { format!(": {rate:.0} images an hour") } else { String::new() };
+        eprintln!("{}: {images} images in {:.1} s{rate}", set.folder.display(), begin.elapsed().as_secs_f64());
+    }
+    made
+}

@@ -1,0 +1,52 @@
+//! Whether a dataset is whole: `trace dataset verify`.
+
+use super::engine::PathTracer;
+use super::progress::Progress;
+use crate::render::threads;
+use crate::signal::Signals;
+use furrow::dataset::shoot::Engine;
+use furrow::dataset::{Set, verify};
+use furrow::{Result, render};
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Which dataset.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Folder of the dataset.
+    dir: PathBuf,
+    /// Render so many images again and compare their bytes.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    rerender: u64,
+    /// Threads; 0 for one on each core.
+    #[arg(long, default_value_t = 0, value_parser = threads)]
+    threads: usize,
+    /// Print nothing but errors.
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// Checks; says what was found.
+pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
+    let set = Set::open(&args.dir)?;
+    let engine = if args.rerender > 0 { PathTracer::of(&set, args.threads)? } else { None };
+    let progress = Progress::new(Instant::now(), args.quiet);
+    progress.expect(set.recipe.count);
+    let done = |_| progress.add();
+    let engine = engine.as_ref().map(|e| e as &dyn Engine);
+    let pool = render::pool(args.threads)?;
+    let found = pool.install(|| verify::verify(&set, args.rerender, engine, &done, signals.heed()))?;
+    progress.finish();
+    if !args.quiet {
+        eprintln!(
+            "{}: {} of {} images checked, {} rendered again and the same; {} faults",
+            set.folder.display(),
+            found.checked,
+            set.recipe.count,
+            found.rendered,
+            found.faults.len()
+        );
+    }
+    found.verdict(&set)?;
+    Ok(Vec::new())
+}

@@ -1,0 +1,150 @@
+//! What belongs to all images together, written when all are there: the formats' lists, the manifest, the report.
+
+use super::format;
+use super::recipe::{FILE, Recipe, hex};
+use super::seal::{Print, Seal};
+use super::set::{Set, Stream, Whole};
+use crate::output::UNFINISHED;
+use crate::{Error, Result};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// The manifest's file.
+pub const MANIFEST: &str = "manifest.json";
+
+/// Writes everything that belongs to all images. An [`Error::Damaged`] names the images that are missing.
+pub fn finish(set: &Set) -> Result<Vec<PathBuf>> {
+    let Set { folder, recipe } = set;
+    let missing: Vec<u64> = (0..recipe.count).filter(|k| Seal::read(folder, *k).is_none()).collect();
+    if !missing.is_empty() {
+        return Err(Error::Damaged(lacks(set, &missing)));
+    }
+    sweep(folder)?;
+    let mut whole = Whole::new(folder);
+    for (_, format) in format::all(recipe)? {
+        format.whole(set, &mut whole)?;
+    }
+    let mut files = own_files(folder, recipe)?;
+    files.append(&mut whole.files.clone());
+    let mut paths: Vec<PathBuf> = whole.files.keys().map(|p| folder.join(p)).collect();
+    let mut last = Whole::new(folder);
+    last.file(MANIFEST, |out| manifest(set, &files, out))?;
+    paths.push(folder.join(MANIFEST));
+    Ok(paths)
+}
+
+/// Says which images are missing, for a person and for a scheduler.
+pub fn lacks(set: &Set, missing: &[u64]) -> String {
+    format!(
+        "{}: {} of {} images are missing\n help: run `trace dataset render` again; it makes what is missing: {}",
+        set.folder.display(),
+        missing.len(),
+        set.recipe.count,
+        ranges(missing)
+    )
+}
+
+/// Numbers in rising order as `1-3,7`: what Slurm's `--array` takes.
+pub fn ranges(numbers: &[u64]) -> String {
+    let mut parts: Vec<(u64, u64)> = Vec::new();
+    for n in numbers {
+        match parts.last_mut() {
+            Some((_, last)) if *last + 1 == *n => *last = *n,
+            _ => parts.push((*n, *n)),
+        }
+    }
+    let text = |(a, b): &(u64, u64)| if a == b { a.to_string() } else { format!("{a}-{b}") };
+    parts.iter().map(text).collect::<Vec<_>>().join(",")
+}
+
+/// The recipe and the scene, which belong to no image.
+fn own_files(folder: &Path, recipe: &Recipe) -> Result<BTreeMap<String, Print>> {
+    let mut todo = vec![folder.join(FILE)];
+    if recipe.rendering().is_ok() {
+        todo.push(folder.join("scene"));
+    }
+    let mut files = BTreeMap::new();
+    while let Some(path) = todo.pop() {
+        if path.is_dir() {
+            let entries = std::fs::read_dir(&path).map_err(Error::io(&path))?;
+            todo.extend(entries.filter_map(|e| Some(e.ok()?.path())));
+        } else {
+            let bytes = std::fs::read(&path).map_err(Error::io(&path))?;
+            let name = path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().replace('\\', "/");
+            files.insert(name, Print::of(&bytes));
+        }
+    }
+    Ok(files)
+}
+
+/// The manifest, image by image: it may be larger than memory.
+fn manifest(set: &Set, files: &BTreeMap<String, Print>, out: &mut Stream<'_>) -> Result<()> {
+    let Set { folder, recipe } = set;
+    let mut content = Sha256::new();
+    out.put("{\n\"recipe\": ")?;
+    out.json(recipe)?;
+    if let Ok(rendering) = recipe.rendering() {
+        let page = folder.join(&rendering.scene);
+        out.put(",\n\"scene_text\": ")?;
+        out.json(&std::fs::read_to_string(&page).map_err(Error::io(&page))?)?;
+    }
+    out.put(",\n\"times\": \"ledger/*.jsonl\",\n\"files\": {")?;
+    let mut first = true;
+    let mut add = |out: &mut Stream<'_>, path: &str, print: &Print| -> Result<()> {
+        content.update(format!("{} {path}\n", print.sha256));
+        out.put(if std::mem::take(&mut first) { "\n" } else { ",\n" })?;
+        out.json(&path)?;
+        out.put(": ")?;
+        out.json(print)
+    };
+    for (path, print) in files {
+        add(out, path, print)?;
+    }
+    let mut seals = Vec::new();
+    for index in 0..recipe.count {
+        let Some(seal) = Seal::read(folder, index) else { continue };
+        for (path, print) in &seal.files {
+            add(out, path, print)?;
+        }
+        seals.push((index, seal.hash()?));
+    }
+    out.put("\n},\n\"images\": [")?;
+    let image = |(index, hash): (u64, String)| {
+        let name = Set::name(index);
+        Ok(serde_json::json!({ "index": index, "name": name, "split": recipe.split.of(index), "seal": hash }))
+    };
+    out.items(seals.into_iter().map(image))?;
+    out.put("],\n\"content_sha256\": ")?;
+    out.json(&hex(&content.finalize()))?;
+    out.put("\n}\n")
+}
+
+/// Removes what a killed run has left half-written.
+fn sweep(folder: &Path) -> Result<()> {
+    let mut todo = vec![folder.to_path_buf()];
+    while let Some(path) = todo.pop() {
+        for entry in std::fs::read_dir(&path).map_err(Error::io(&path))? {
+            let entry = entry.map_err(Error::io(&path))?;
+            let kind = entry.file_type().map_err(Error::io(&path))?;
+            if kind.is_dir() {
+                todo.push(entry.path());
+            } else if entry.file_name().to_string_lossy().starts_with(UNFINISHED) {
+                std::fs::remove_file(entry.path()).map_err(Error::io(&entry.path()))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_are_what_a_scheduler_reads() {
+        assert_eq!(ranges(&[]), "");
+        assert_eq!(ranges(&[4]), "4");
+        assert_eq!(ranges(&[0, 1, 2, 5, 7, 8]), "0-2,5,7-8");
+    }
+}

@@ -1,0 +1,65 @@
+//! Formats of other people's tools: one file each, made of a [`Sample`] and of records.
+//!
+//! A format is a file here that implements [`Format`], and one line in `formats!`. The tests find it unasked.
+
+use super::File;
+use super::recipe::Recipe;
+use super::sample::Sample;
+use super::set::{Set, Whole};
+use crate::{Error, Result};
+
+/// A way to write a dataset down. Paths of files are relative to the dataset's folder and begin with the format's name.
+pub trait Format: Sync {
+    /// The files that belong to one image.
+    fn image(&self, recipe: &Recipe, sample: &Sample) -> Result<Vec<File>>;
+
+    /// The files that belong to all images together, for [`Whole::file`] to write. Called when every image is there.
+    fn whole(&self, _set: &Set, _out: &mut Whole<'_>) -> Result<()> {
+        Ok(())
+    }
+
+    /// Whether it is made of what only the renderer knows ([`Sample::film`]), so that adding it renders anew.
+    fn needs_film(&self) -> bool {
+        false
+    }
+
+    /// What it cannot hold, or what its readers expect otherwise: one sentence each, told once.
+    fn warnings(&self, _recipe: &Recipe) -> Vec<String> {
+        Vec::new()
+    }
+}
+
+macro_rules! formats {
+    ($($name:literal => $file:ident: $words:literal,)*) => {
+        $(pub mod $file;)*
+
+        /// Every format: its name and what it is, in the order of their names.
+        pub const NAMES: &[(&str, &str)] = &[$(($name, $words),)*];
+
+        /// The format of this name.
+        pub fn named(name: &str) -> Option<&'static dyn Format> {
+            match name {
+                $($name => Some(&$file::Writer),)*
+                _ => None,
+            }
+        }
+    };
+}
+
+formats! {
+    "imagefolder" => imagefolder: "Hugging Face ImageFolder: images, masks and metadata.jsonl for `datasets`",
+}
+
+/// The formats that a recipe names.
+pub fn all(recipe: &Recipe) -> Result<Vec<(&str, &'static dyn Format)>> {
+    let mut all = Vec::new();
+    for name in &recipe.formats {
+        let format = named(name).ok_or_else(|| {
+            let known: Vec<&str> = NAMES.iter().map(|(name, _)| *name).collect();
+            let help = crate::sampling::fault::choose("formats", &known, name);
+            Error::Dataset(format!("there is no format `{name}`\n help: {help}"))
+        })?;
+        all.push((name.as_str(), format));
+    }
+    Ok(all)
+}

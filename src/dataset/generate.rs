@@ -1,0 +1,221 @@
+//! Makes the images that are missing, several at once, until all are there or someone asks to stop.
+//!
+//! Growing a field and writing its files keep one core busy, drawing keeps all of them: so several images are under way at once,
+//! each driven by a thread of its own, and all share one pool of workers. Memory grows with the images at once, not with
+//! the dataset.
+
+use super::ledger::{Ledger, Row};
+use super::seal::{Seal, write_files};
+use super::set::Set;
+use super::shoot::{Engine, Times, shoot};
+use super::{File, format, native};
+use crate::render::{self, Watch};
+use crate::{Error, Result};
+use rayon::prelude::*;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Instant;
+
+/// Which of the images a run is for: those with index % of == number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// From 0.
+    pub number: u64,
+    /// How many shards there are.
+    pub of: u64,
+}
+
+impl Shard {
+    /// All images.
+    pub const ALL: Self = Self { number: 0, of: 1 };
+
+    /// Reads `k/N`, k from 0 to N − 1.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let pair = text.split_once('/').and_then(|(k, n)| Some((k.trim().parse().ok()?, n.trim().parse().ok()?)));
+        pair.filter(|(k, n)| k < n)
+            .map(|(number, of)| Self { number, of })
+            .ok_or_else(|| "write it as k/N with k from 0 to N - 1, such as 0/8".into())
+    }
+}
+
+/// How a run works; none of it changes a byte.
+#[derive(Clone, Copy, Debug)]
+pub struct Work {
+    /// Which images.
+    pub shard: Shard,
+    /// Workers; 0 for one on each core.
+    pub threads: usize,
+    /// Images under way at once; 0 for as many as keep the workers busy.
+    pub at_once: usize,
+}
+
+/// How a run is watched.
+pub struct Overseer<'a> {
+    /// Told how many images are to be made, before the first.
+    pub begin: &'a (dyn Fn(usize) + Sync),
+    /// Told of every image that is done, from any thread.
+    pub done: &'a (dyn Fn(u64) + Sync),
+    /// Set it to stop when the images under way are done.
+    pub soon: &'a AtomicBool,
+    /// Set it to stop at once.
+    pub now: &'a AtomicBool,
+}
+
+/// What remains to be done for an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Task {
+    /// Nothing.
+    Done,
+    /// Formats, from the native files.
+    Formats,
+    /// Everything.
+    All,
+}
+
+/// Makes what is missing of a shard. Stopped, it returns [`Error::Interrupted`], and the same call goes on later.
+pub fn generate(set: &Set, work: &Work, engine: Option<&dyn Engine>, overseer: &Overseer<'_>) -> Result<()> {
+    let pool = render::pool(work.threads)?;
+    let threads = pool.current_num_threads();
+    let shard = work.shard;
+    let wanted: Vec<u64> = (0..set.recipe.count).filter(|k| k % shard.of == shard.number).collect();
+    let tasks: Vec<(u64, Task)> =
+        pool.install(|| wanted.into_par_iter().map(|k| task(set, k).map(|t| (k, t))).collect::<Result<Vec<_>>>())?;
+    let tasks: Vec<(u64, Task)> = tasks.into_iter().filter(|(_, t)| *t != Task::Done).collect();
+    (overseer.begin)(tasks.len());
+    let at_once = if work.at_once == 0 { (threads / 2).clamp(2, 16) } else { work.at_once }.min(tasks.len().max(1));
+    let run = Run {
+        set,
+        engine,
+        overseer,
+        threads,
+        at_once,
+        ledger: Ledger::new(&set.folder, &format!("{}-of-{}", shard.number, shard.of)),
+    };
+    let next = AtomicUsize::new(0);
+    let failure: Mutex<Option<Error>> = Mutex::new(None);
+    let failed = AtomicBool::new(false);
+    let fail = |error: Error| {
+        failed.store(true, Ordering::Relaxed);
+        failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner).get_or_insert(error);
+    };
+    let stopped = || overseer.soon.load(Ordering::Relaxed) || overseer.now.load(Ordering::Relaxed);
+    std::thread::scope(|scope| {
+        for _ in 0..at_once {
+            scope.spawn(|| {
+                while !stopped() && !failed.load(Ordering::Relaxed) {
+                    let Some((index, task)) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
+                    match pool.install(|| run.image(*index, *task)) {
+                        Ok(()) => (overseer.done)(*index),
+                        Err(e) => fail(e),
+                    }
+                }
+            });
+        }
+    });
+    if let Some(error) = failure.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner) {
+        return Err(error);
+    }
+    // Stopped after the last image is done.
+    if next.load(Ordering::Relaxed) < tasks.len() { Err(Error::Interrupted) } else { Ok(()) }
+}
+
+/// What remains to be done for an image, from what lies on the disk.
+pub fn task(set: &Set, index: u64) -> Result<Task> {
+    let Some(seal) = Seal::read(&set.folder, index) else { return Ok(Task::All) };
+    if seal.recipe != set.recipe.fingerprint()? {
+        return Ok(Task::All);
+    }
+    let formats = format::all(&set.recipe)?;
+    let has = |name: &str| seal.files.keys().any(|path| in_format(path, name));
+    let mut task = Task::Done;
+    let mut need = |name: &str| {
+        let again = formats.iter().any(|(n, f)| *n == name && f.needs_film());
+        task = if again { Task::All } else { Task::Formats };
+        again
+    };
+    for (name, _) in formats.iter().filter(|(name, _)| !has(name)) {
+        if need(name) {
+            return Ok(Task::All);
+        }
+    }
+    for (path, _) in seal.faults(&set.folder) {
+        if path.starts_with("images/") {
+            return Ok(Task::All);
+        }
+        match set.recipe.formats.iter().find(|name| in_format(&path, name)) {
+            Some(name) if need(name) => return Ok(Task::All),
+            // A format that is no longer wanted may be damaged.
+            _ => {}
+        }
+    }
+    Ok(task)
+}
+
+/// Whether a path lies in the folder of a format.
+fn in_format(path: &str, format: &str) -> bool {
+    path.strip_prefix(format).is_some_and(|rest| rest.starts_with('/'))
+}
+
+/// A run of a shard.
+struct Run<'a> {
+    set: &'a Set,
+    engine: Option<&'a dyn Engine>,
+    overseer: &'a Overseer<'a>,
+    threads: usize,
+    at_once: usize,
+    ledger: Ledger,
+}
+
+impl Run<'_> {
+    /// Makes one image and seals it.
+    fn image(&self, index: u64, task: Task) -> Result<()> {
+        let begin = Instant::now();
+        let Set { folder, recipe } = self.set;
+        let (files, times) = if task == Task::Formats {
+            (derived(self.set, index)?, Times::default())
+        } else {
+            let engine = self.engine.ok_or_else(|| lost(self.set, index))?;
+            let watch = Watch { done: &|_| (), stop: self.overseer.now };
+            let shot = shoot(folder, recipe, index, engine, &watch)?;
+            super::invariants::check(recipe, &shot.sample)?;
+            let mut files = native::files(&shot.sample, &shot.text)?;
+            files.extend(formatted(self.set, &shot.sample)?);
+            (files, shot.times)
+        };
+        if self.overseer.now.load(Ordering::Relaxed) {
+            return Err(Error::Interrupted);
+        }
+        write_files(folder, &files)?;
+        let mut seal = Seal::of(index, recipe, &files)?;
+        if task == Task::Formats
+            && let Some(before) = Seal::read(folder, index)
+        {
+            seal.files.extend(before.files.into_iter().filter(|(path, _)| path.starts_with("images/")));
+        }
+        seal.write(folder)?;
+        let seconds = begin.elapsed().as_secs_f64();
+        self.ledger.add(&Row::new(index, seal.image_hash()?, seconds, &times, self.at_once, self.threads))
+    }
+}
+
+/// The files of all formats of an image.
+fn formatted(set: &Set, sample: &super::Sample) -> Result<Vec<File>> {
+    let mut files = Vec::new();
+    for (_, format) in format::all(&set.recipe)? {
+        files.extend(format.image(&set.recipe, sample)?);
+    }
+    Ok(files)
+}
+
+/// The same from the native files.
+fn derived(set: &Set, index: u64) -> Result<Vec<File>> {
+    formatted(set, &native::read(&set.folder, &Set::name(index))?)
+}
+
+/// An image that nothing can make again.
+fn lost(set: &Set, index: u64) -> Error {
+    Error::Damaged(format!(
+        "{}: image {index} is damaged, and nothing here can make it again\n help: import the images again",
+        set.folder.display()
+    ))
+}

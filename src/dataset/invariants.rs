@@ -1,0 +1,182 @@
+//! What must hold of every image: checked before one is written, and again by `verify` on what lies on the disk.
+
+use super::annotate;
+use super::recipe::{Made, Recipe};
+use super::record::{Leaf, Plant, Seen};
+use super::sample::{IGNORE, Sample};
+use crate::scene::tag::Class;
+use crate::{Error, Result};
+use std::collections::BTreeMap;
+
+/// Share of a pixel, of 255, from which on its class is decided: more than lens blur and a few samples can undo.
+const DECIDED: u8 = 243;
+
+/// Share of the decided pixels whose centre may show another class all the same. A leaf thinner than the pixels' footprint can
+/// lie on a row of centres.
+const THIN: f64 = 0.005;
+
+/// Checks a sample; the error names the image and everything that does not hold.
+pub fn check(recipe: &Recipe, sample: &Sample) -> Result<()> {
+    let faults = faults(recipe, sample);
+    if faults.is_empty() {
+        return Ok(());
+    }
+    Err(Error::Damaged(format!("image {}: {}", sample.record.name, faults.join("; "))))
+}
+
+/// What does not hold, in words.
+pub fn faults(recipe: &Recipe, sample: &Sample) -> Vec<String> {
+    let sizes = sizes(sample);
+    // Nothing else can be asked of maps that do not lie on each other.
+    if !sizes.is_empty() {
+        return sizes;
+    }
+    let rendered = matches!(recipe.made, Made::Rendered(_));
+    let mut all = Vec::new();
+    all.extend(nesting(sample, rendered));
+    all.extend(numbers(recipe, sample));
+    all.extend(counts(sample));
+    all.extend(shares(sample));
+    all.extend(geometry(sample));
+    all
+}
+
+/// Every map has the image's size.
+fn sizes(sample: &Sample) -> Vec<String> {
+    let n = sample.pixels();
+    let maps = [
+        ("rgb", sample.rgb.len(), false),
+        ("nir", sample.nir.len(), true),
+        ("semantics", sample.semantics.len(), false),
+        ("species", sample.species.len(), true),
+        ("plants", sample.plants.len(), false),
+        ("leaves", sample.leaves.len(), false),
+        ("coverage", sample.coverage.len(), true),
+        ("depth", sample.depth.len(), true),
+        ("normals", sample.normals.len(), true),
+    ];
+    let wrong = maps.into_iter().filter(|(_, len, optional)| *len != n && !(*optional && *len == 0));
+    wrong.map(|(name, len, _)| format!("{name} has {len} values for {n} pixels")).collect()
+}
+
+/// A leaf lies in its plant, a plant in its class and its species; without a plant nothing has either.
+fn nesting(sample: &Sample, rendered: bool) -> Vec<String> {
+    let mut of_plant: BTreeMap<u16, (u8, Option<u8>)> = BTreeMap::new();
+    let (mut loose, mut mixed, mut bare, mut unknown) = (0_u64, 0_u64, 0_u64, 0_u64);
+    for i in 0..sample.pixels() {
+        let (class, plant, leaf) = (sample.semantics[i], sample.plants[i], sample.leaves[i]);
+        let species = sample.species.get(i).copied();
+        let vegetation = class == Class::Crop as u8 || class == Class::Weed as u8;
+        unknown += u64::from(annotate::class_of(class).is_none() && (rendered || class != IGNORE));
+        if plant == 0 {
+            loose += u64::from(leaf != 0 || species.is_some_and(|s| s != 0));
+            bare += u64::from(rendered && vegetation);
+        } else {
+            mixed += u64::from(*of_plant.entry(plant).or_insert((class, species)) != (class, species) || !vegetation);
+        }
+    }
+    let told = [
+        (unknown, "have a class that there is none of"),
+        (loose, "have a leaf or a species but no plant"),
+        (bare, "are crop or weed but no plant"),
+        (mixed, "have another class or species than the rest of their plant, or are soil"),
+    ];
+    told.into_iter().filter(|(n, _)| *n > 0).map(|(n, words)| format!("{n} pixels {words}")).collect()
+}
+
+/// Species are in the recipe's table; the record belongs to this recipe; its numbers are numbers.
+fn numbers(recipe: &Recipe, sample: &Sample) -> Vec<String> {
+    let record = &sample.record;
+    let mut all = Vec::new();
+    let known = recipe.species.len();
+    if let Some(most) = sample.species.iter().max().filter(|m| usize::from(**m) > known) {
+        all.push(format!("species {most} is not among the {known} of the recipe"));
+    }
+    if record.split != recipe.split.of(record.index) {
+        all.push(format!("it is in the split {}, where it does not belong", record.split.name()));
+    }
+    let points = record
+        .plants
+        .iter()
+        .flat_map(|p| p.stem.iter().chain(p.leaves.iter().flat_map(|l| l.base.iter().chain(&l.tip))));
+    if points.into_iter().any(|k| !(k.x.is_finite() && k.y.is_finite())) {
+        all.push("a keypoint is not a number".into());
+    }
+    all
+}
+
+/// What the record says is what the maps show: pixels, boxes, masks; and nothing is seen of more than there is.
+fn counts(sample: &Sample) -> Vec<String> {
+    let record = &sample.record;
+    let mut all = Vec::new();
+    let (classes, ignored) = annotate::classes(sample);
+    if (&classes, ignored) != (&record.classes, record.ignored) {
+        all.push("the record's pixels of a class are not those of the map".into());
+    }
+    let shown = annotate::plants(sample);
+    let told: Vec<&Plant> = record.seen().collect();
+    let same_leaf = |(a, b): (&Leaf, &Leaf)| a.number == b.number && same(&a.seen, &b.seen);
+    let same_plant = |(a, b): (&Plant, &&Plant)| {
+        let leaves: Vec<&Leaf> = b.leaves.iter().filter(|l| l.seen.pixels > 0).collect();
+        let fits = (a.number, a.class, a.leaves.len()) == (b.number, b.class, leaves.len()) && same(&a.seen, &b.seen);
+        fits && a.leaves.iter().zip(leaves).all(same_leaf)
+    };
+    if shown.len() != told.len() || !shown.iter().zip(&told).all(same_plant) {
+        all.push("the record's plants, boxes or masks are not those of the maps".into());
+    }
+    for plant in &record.plants {
+        let leaves = plant.leaves.iter().map(|l| &l.seen);
+        if leaves.clone().chain([&plant.seen]).any(|s| !in_order(s)) {
+            all.push(format!("more is seen of plant {} than there is of it", plant.number));
+        }
+        if leaves.clone().any(|s| s.pixels > plant.seen.pixels || s.unoccluded > plant.seen.unoccluded) {
+            all.push(format!("a leaf of plant {} is larger than the plant", plant.number));
+        }
+    }
+    all
+}
+
+fn same(a: &Seen, b: &Seen) -> bool {
+    (a.pixels, a.bounds, &a.mask) == (b.pixels, b.bounds, &b.mask)
+}
+
+fn in_order(seen: &Seen) -> bool {
+    let unoccluded = seen.unoccluded.unwrap_or(seen.pixels);
+    seen.pixels <= unoccluded && unoccluded <= seen.whole.unwrap_or(unoccluded)
+}
+
+/// Shares of a pixel sum to one, and agree with the label where they leave no doubt.
+fn shares(sample: &Sample) -> Vec<String> {
+    let mut all = Vec::new();
+    let wrong = sample.coverage.iter().filter(|c| c.iter().map(|n| u32::from(*n)).sum::<u32>() != 255).count();
+    if wrong > 0 {
+        all.push(format!("the shares of {wrong} pixels do not sum to one"));
+    }
+    let decided = |c: &[u8; 3]| (0_u8..3).find(|k| c[usize::from(*k)] >= DECIDED);
+    let pairs = sample.coverage.iter().zip(&sample.semantics);
+    let (mut asked, mut other) = (0_u64, 0_u64);
+    for (share, label) in pairs.filter_map(|(c, l)| Some((decided(c)?, *l))) {
+        asked += 1;
+        other += u64::from(share != label);
+    }
+    if other as f64 > THIN * asked as f64 {
+        all.push(format!("{other} of {asked} pixels are of one class by their samples and of another by their centre"));
+    }
+    all
+}
+
+/// Depths lie before the camera, normals are unit vectors, and neither is "not a number".
+fn geometry(sample: &Sample) -> Vec<String> {
+    let mut all = Vec::new();
+    if sample.depth.iter().any(|d| d.is_nan() || *d <= 0.0) {
+        all.push("a depth is not a number or not before the camera".into());
+    }
+    let unit = |n: &[f32; 3]| {
+        let square: f32 = n.iter().map(|x| x * x).sum();
+        square == 0.0 || (square - 1.0).abs() < 5e-3
+    };
+    if !sample.normals.iter().all(unit) {
+        all.push("a normal is not a unit vector".into());
+    }
+    all
+}

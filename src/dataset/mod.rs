@@ -1,0 +1,56 @@
+//! Datasets: from one field to a hundred thousand, each with every label, in the formats people use.
+//!
+//! Image k is field k of the page: a function of page, seed and k, whichever process on whichever machine makes it, and in which
+//! order. So the work may be cut, killed, moved and gone on with anywhere.
+//!
+//! ```text
+//! dataset.json          the recipe: what decides every byte
+//! scene/                the page and everything that it reads, so that the folder stands alone
+//! images/000123/        one image: photographs, label maps, record.json
+//! coco/ phenobench/ …   the same for other people's tools
+//! seals/000123.json     SHA-256 of each of its files; written last
+//! ledger/               how long each image took, one file a run: the only place with clock times
+//! manifest.json         everything above in one list, written when all images are there
+//! report.html           what is in it, for people
+//! ```
+//!
+//! | file | idea |
+//! |---|---|
+//! | `recipe`, `split` | what makes a dataset; which image is for what |
+//! | `sample`, `record`, `annotate`, `rle` | one image and all that is known of it |
+//! | `native`, `format` | as files, ours and other people's |
+//! | `seal`, `set` | which files make an image; the dataset on disk |
+//! | `plan`, `generate`, `ledger`, `finish` | from a page to files; what remains to be done is found by looking at the disk |
+//! | `invariants`, `verify` | what must hold of every image, and whether it does |
+
+pub mod annotate;
+pub mod finish;
+pub mod format;
+pub mod generate;
+pub mod invariants;
+pub mod ledger;
+pub mod native;
+pub mod plan;
+pub mod recipe;
+pub mod record;
+pub mod rle;
+pub mod sample;
+pub mod seal;
+pub mod set;
+pub mod shoot;
+pub mod split;
+pub mod verify;
+
+pub use recipe::Recipe;
+pub use record::Record;
+pub use sample::Sample;
+pub use set::Set;
+
+/// A file of a dataset.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct File {
+    /// Below the dataset's folder, with `/`.
+    pub path: String,
+    /// What it holds.
+    pub bytes: Vec<u8>,
+}

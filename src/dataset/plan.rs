@@ -1,0 +1,172 @@
+//! Begins a dataset: checks the page by growing its first field, takes everything that it reads into the folder, writes the recipe.
+
+use super::recipe::{FILE, Made, Recipe, Rendering};
+use super::set::Set;
+use super::split::Shares;
+use super::{File, format, seal};
+use crate::scene::build::{self, Options};
+use crate::{Error, Result, accel};
+use std::path::{Component, Path, PathBuf};
+
+/// What the user asks for.
+#[derive(Clone, Debug)]
+pub struct Order {
+    /// The page.
+    pub scene: PathBuf,
+    /// Seed, instead of the page's.
+    pub seed: Option<u64>,
+    /// How many images.
+    pub count: u64,
+    /// Image width, instead of the page's.
+    pub width: Option<u32>,
+    /// Image height.
+    pub height: Option<u32>,
+    /// Formats beside the native one.
+    pub formats: Vec<String>,
+    /// How the images are split.
+    pub split: Shares,
+    /// What others may do with them.
+    pub licence: String,
+    /// What draws, by name.
+    pub engine: String,
+    /// Samples a pixel.
+    pub spp: u32,
+    /// Whether the photographs are denoised.
+    pub denoise: bool,
+    /// Techniques left out.
+    pub without: Vec<String>,
+    /// Most surfaces on a path.
+    pub max_depth: Option<u32>,
+    /// Most radiance of a path.
+    pub clamp: Option<f32>,
+}
+
+/// Most species that `species.png` numbers.
+const MOST_SPECIES: usize = u8::MAX as usize;
+
+/// Begins a dataset in `folder`, or goes on with the same one: it may get longer and get more formats. Returns it with what the user
+/// should know.
+pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
+    // Names are checked before anything is written.
+    let options = Options { seed: order.seed, index: 0, width: order.width, height: order.height };
+    let field = build::field(&order.scene, &options)?;
+    if field.species.len() > MOST_SPECIES {
+        return Err(Error::Dataset(format!(
+            "{}: {} species, more than the {MOST_SPECIES} that species.png numbers\n help: make two pages of it",
+            order.scene.display(),
+            field.species.len()
+        )));
+    }
+    let (files, scene) = gather(&field.files, &order.scene)?;
+    let camera = &field.scene.camera;
+    let mut recipe = Recipe {
+        furrow: env!("CARGO_PKG_VERSION").into(),
+        made: Made::Rendered(Rendering {
+            scene,
+            scene_sha256: field.hash.clone(),
+            seed: field.seed,
+            width: camera.width(),
+            height: camera.height(),
+            engine: order.engine.clone(),
+            spp: order.spp,
+            denoise: order.denoise,
+            without: order.without.clone(),
+            max_depth: order.max_depth,
+            clamp: order.clamp,
+            kernels: accel::version()?,
+        }),
+        count: order.count,
+        split: order.split,
+        formats: order.formats.clone(),
+        licence: order.licence.clone(),
+        species: field.species.clone(),
+    };
+    let mut told = field.warnings.clone();
+    told.extend(warnings(&recipe)?);
+    if folder.join(FILE).exists() {
+        let before = Recipe::read(folder)?;
+        before.check_goes_on(folder, &recipe)?;
+        // Formats that are there stay.
+        let more: Vec<String> = recipe.formats.iter().filter(|f| !before.formats.contains(f)).cloned().collect();
+        recipe.formats = before.formats.into_iter().chain(more).collect();
+    } else {
+        refuse_full(folder)?;
+    }
+    seal::write_files(folder, &files)?;
+    // Last: a folder with a recipe has its scene.
+    seal::write_files(folder, &[File { path: FILE.into(), bytes: recipe.text()? }])?;
+    Ok((Set { folder: folder.into(), recipe }, told))
+}
+
+/// What the formats of a recipe cannot hold or do otherwise.
+fn warnings(recipe: &Recipe) -> Result<Vec<String>> {
+    let mut all = Vec::new();
+    for (name, format) in format::all(recipe)? {
+        all.extend(format.warnings(recipe).into_iter().map(|words| format!("{name}: {words}")));
+    }
+    Ok(all)
+}
+
+/// Refuses a folder in which other things lie: nothing of the user's may be overwritten.
+fn refuse_full(folder: &Path) -> Result<()> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
+    // A dataset that was stopped while it began has left its scene and nothing else.
+    let other = entries.filter_map(|e| Some(e.ok()?.file_name())).find(|name| name != "scene");
+    match other {
+        None => Ok(()),
+        Some(name) => Err(Error::Dataset(format!(
+            "{}: other things lie in this folder, {} among them\n help: give --out a folder that is empty or not there yet",
+            folder.display(),
+            name.display()
+        ))),
+    }
+}
+
+/// The files of a page as files of the dataset, below `scene/` as they lie to each other, and the page's path there.
+fn gather(paths: &[PathBuf], page: &Path) -> Result<(Vec<File>, String)> {
+    let plain: Vec<PathBuf> = paths.iter().map(|p| absolute(p)).collect::<Result<_>>()?;
+    let mut root = absolute(page)?;
+    root.pop();
+    while !plain.iter().all(|p| p.starts_with(&root)) {
+        root.pop();
+    }
+    let below = |path: &Path| -> String {
+        let rest = path.strip_prefix(&root).unwrap_or(path);
+        let names: Vec<_> = rest.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect();
+        format!("scene/{}", names.join("/"))
+    };
+    let mut files = Vec::new();
+    for path in &plain {
+        let bytes = std::fs::read(path).map_err(Error::io(path))?;
+        files.push(File { path: below(path), bytes });
+    }
+    Ok((files, below(&absolute(page)?)))
+}
+
+/// An absolute path without `.` and `..`.
+fn absolute(path: &Path) -> Result<PathBuf> {
+    let full = std::path::absolute(path).map_err(Error::io(path))?;
+    let mut plain = PathBuf::new();
+    for part in full.components() {
+        match part {
+            Component::CurDir => {}
+            Component::ParentDir => drop(plain.pop()),
+            part => plain.push(part),
+        }
+    }
+    Ok(plain)
+}
+
+/// Adds formats to a dataset; their files are made by the next run. Returns what the user should know.
+pub fn add_formats(set: &mut Set, names: &[String]) -> Result<Vec<String>> {
+    let mut recipe = set.recipe.clone();
+    for name in names {
+        if !recipe.formats.contains(name) {
+            recipe.formats.push(name.clone());
+        }
+    }
+    let warnings = warnings(&recipe)?;
+    seal::write_files(&set.folder, &[File { path: FILE.into(), bytes: recipe.text()? }])?;
+    set.recipe = recipe;
+    Ok(warnings)
+}

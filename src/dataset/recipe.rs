@@ -1,0 +1,176 @@
+//! What makes a dataset: its `dataset.json`.
+//!
+//! Everything that decides a byte of an image stands here or in the `scene/` beside it, and nothing else does: no clock, no path
+//! of a machine, no number of threads. So any shard on any machine that has the folder can go on with it.
+
+use super::split::Shares;
+use crate::scene::record::SpeciesRecord;
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::path::Path;
+
+/// A dataset's recipe.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Recipe {
+    /// The program's version.
+    pub furrow: String,
+    /// Where the images come from.
+    pub made: Made,
+    /// How many there are.
+    pub count: u64,
+    /// How they are split.
+    pub split: Shares,
+    /// Formats beside the native one, by name.
+    pub formats: Vec<String>,
+    /// What others may do with it, in its owner's words.
+    pub licence: String,
+    /// The species that `species.png` numbers from 1.
+    pub species: Vec<SpeciesRecord>,
+}
+
+/// Where images come from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Made {
+    /// Rendered from a page.
+    Rendered(Rendering),
+    /// Brought from elsewhere.
+    Imported {
+        /// The format that they were in.
+        from: String,
+    },
+}
+
+/// How images are rendered.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Rendering {
+    /// The page, below the dataset's folder.
+    pub scene: String,
+    /// SHA-256 of the page and every page, texture and table that it names.
+    pub scene_sha256: String,
+    /// Seed; image k is field k of the page with this seed.
+    pub seed: u64,
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// What draws: `trace` for the path tracer.
+    pub engine: String,
+    /// Samples a pixel.
+    pub spp: u32,
+    /// Whether `rgb.png` and `nir.png` are without the noise of few samples.
+    pub denoise: bool,
+    /// Techniques left out.
+    pub without: Vec<String>,
+    /// Most surfaces on a path, where it is not the default.
+    pub max_depth: Option<u32>,
+    /// Most radiance of a path, where there is a limit.
+    pub clamp: Option<f32>,
+    /// The ray tracing kernels and their instruction set.
+    pub kernels: String,
+}
+
+/// The recipe's file, below the dataset's folder.
+pub const FILE: &str = "dataset.json";
+
+impl Recipe {
+    /// Reads a dataset's recipe.
+    pub fn read(folder: &Path) -> Result<Self> {
+        let path = folder.join(FILE);
+        let bytes = match std::fs::read(&path) {
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
+                return Err(Error::Dataset(format!(
+                    "{}: this is no dataset, it has no {FILE}\n help: `trace dataset plan` begins one, `trace dataset import` brings one in",
+                    folder.display()
+                )));
+            }
+            other => other.map_err(Error::io(&path))?,
+        };
+        serde_json::from_slice(&bytes).map_err(|e| {
+            Error::Dataset(format!(
+                "{}: this is not a dataset's recipe: {e}\n help: run the command that began the dataset again with another --out, or restore the file",
+                path.display()
+            ))
+        })
+    }
+
+    /// Its text.
+    pub fn text(&self) -> Result<Vec<u8>> {
+        json(self)
+    }
+
+    /// What decides the bytes of an image's native files: SHA-256 of the recipe without its length, formats and words.
+    pub fn fingerprint(&self) -> Result<String> {
+        let same = Self { count: 0, formats: Vec::new(), licence: String::new(), ..self.clone() };
+        Ok(hex(&Sha256::digest(json(&same)?)))
+    }
+
+    /// How it is rendered; an error for images from elsewhere.
+    pub fn rendering(&self) -> Result<&Rendering> {
+        match &self.made {
+            Made::Rendered(rendering) => Ok(rendering),
+            Made::Imported { from } => Err(Error::Dataset(format!(
+                "these images were imported from {from} and cannot be rendered\n help: `trace dataset verify` checks them, \
+                 `trace dataset finish --format …` writes further formats"
+            ))),
+        }
+    }
+
+    /// Whether `other` makes the same images as far as both go: it may be longer and have other formats.
+    pub fn check_goes_on(&self, folder: &Path, other: &Self) -> Result<()> {
+        let (before, now) = (fields(self)?, fields(other)?);
+        let free = ["count", "formats", "licence"];
+        let differs: Vec<String> = now
+            .iter()
+            .filter(|(key, value)| !free.contains(&key.as_str()) && before.get(*key) != Some(value))
+            .map(|(key, value)| format!("{key} {} there, {value} here", before.get(key).unwrap_or(&"none".into())))
+            .collect();
+        if differs.is_empty() && other.count >= self.count {
+            return Ok(());
+        }
+        let what = if differs.is_empty() {
+            format!("it has {} images, more than {}", self.count, other.count)
+        } else {
+            differs.join("; ")
+        };
+        Err(Error::Dataset(format!(
+            "{}: another dataset lies in this folder: {what}\n help: give another --out, or the same arguments to go on with it; \
+             --count may grow and --format may be longer",
+            folder.display()
+        )))
+    }
+}
+
+/// The recipe's values by name, those of its rendering as well.
+fn fields(recipe: &Recipe) -> Result<std::collections::BTreeMap<String, String>> {
+    let mut all = std::collections::BTreeMap::new();
+    let mut todo = vec![(String::new(), serde_json::to_value(recipe).map_err(failed)?)];
+    while let Some((name, value)) = todo.pop() {
+        match value {
+            serde_json::Value::Object(object) => todo.extend(object),
+            value => drop(all.insert(name, value.to_string())),
+        }
+    }
+    Ok(all)
+}
+
+fn failed(e: impl std::fmt::Display) -> Error {
+    Error::Dataset(format!("cannot write JSON: {e}"))
+}
+
+/// Readable JSON with a line's end.
+pub(super) fn json(value: &impl Serialize) -> Result<Vec<u8>> {
+    let mut bytes = serde_json::to_vec_pretty(value).map_err(failed)?;
+    bytes.push(b'\n');
+    Ok(bytes)
+}
+
+/// Bytes in hex.
+pub(super) fn hex(bytes: &[u8]) -> String {
+    use std::fmt::Write;
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}

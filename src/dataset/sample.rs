@@ -1,0 +1,71 @@
+//! One image and everything that is known of it, in memory: what formats are made of.
+
+use super::record::Record;
+use crate::film::Film;
+use crate::render::LabelMap;
+use std::collections::BTreeMap;
+
+/// One image of a dataset. Maps hold one value a pixel, row by row from the top; a map that is not known is empty.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sample {
+    /// What is known in words and numbers.
+    pub record: Record,
+    /// 8-bit sRGB.
+    pub rgb: Vec<[u8; 3]>,
+    /// 8-bit near infrared.
+    pub nir: Vec<u8>,
+    /// Class: 0 soil, 1 crop, 2 weed, [`IGNORE`] for no label.
+    pub semantics: Vec<u8>,
+    /// Number of the species in the dataset's table, 0 for none.
+    pub species: Vec<u8>,
+    /// Number of the plant, 0 for none.
+    pub plants: Vec<u16>,
+    /// Number of the leaf on its plant, 0 for none.
+    pub leaves: Vec<u16>,
+    /// Share of soil, crop and weed in the pixel, of 255; they sum to 255.
+    pub coverage: Vec<[u8; 3]>,
+    /// Distance along the optical axis, metres; infinite where nothing is.
+    pub depth: Vec<f32>,
+    /// Unit normal in the world, facing the camera; zero where nothing is.
+    pub normals: Vec<[f32; 3]>,
+    /// What was rendered; only in the process that rendered it.
+    pub film: Option<Rendered>,
+}
+
+/// What formats for film people want beyond a photograph.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rendered {
+    /// Linear radiance, its variance, what each sample met.
+    pub film: Film,
+    /// Which part lies at each pixel's centre, and who that is.
+    pub labels: LabelMap,
+    /// Who each part is: one tag a part.
+    pub tags: Vec<crate::scene::tag::Tag>,
+}
+
+/// Stands for "no label" in [`Sample::semantics`].
+pub const IGNORE: u8 = 255;
+
+impl Sample {
+    /// Width and height, pixels.
+    pub fn size(&self) -> (u32, u32) {
+        (self.record.width, self.record.height)
+    }
+
+    /// Number of pixels.
+    pub fn pixels(&self) -> usize {
+        self.record.width as usize * self.record.height as usize
+    }
+
+    /// A number for every leaf that is unique in the image, 0 for none: leaves count through the image by plant and leaf.
+    pub fn leaf_instances(&self) -> Vec<u32> {
+        let numbers: BTreeMap<(u16, u16), u32> = self
+            .record
+            .leaves()
+            .enumerate()
+            .map(|(i, (plant, leaf))| ((plant.number, leaf.number), i as u32 + 1))
+            .collect();
+        let of = |(plant, leaf): (&u16, &u16)| numbers.get(&(*plant, *leaf)).copied().unwrap_or(0);
+        self.plants.iter().zip(&self.leaves).map(of).collect()
+    }
+}

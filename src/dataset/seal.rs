@@ -1,0 +1,132 @@
+//! Which files make an image, each with its SHA-256: an image is there when its seal is and every file agrees with it.
+//!
+//! A seal is written last. It holds a hash of itself, so a damaged seal is no seal.
+
+use super::File;
+use super::recipe::{Recipe, hex, json};
+use super::set::Set;
+use crate::output::write_atomically;
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What an image is made of.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Seal {
+    /// Its number.
+    pub index: u64,
+    /// [`Recipe::fingerprint`] of what made it.
+    pub recipe: String,
+    /// Its files by path below the dataset's folder.
+    pub files: BTreeMap<String, Print>,
+}
+
+/// What tells a file.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Print {
+    /// SHA-256, hex.
+    pub sha256: String,
+    /// Length.
+    pub bytes: u64,
+}
+
+impl Print {
+    /// Of a file's contents.
+    pub fn of(bytes: &[u8]) -> Self {
+        Self { sha256: hex(&Sha256::digest(bytes)), bytes: bytes.len() as u64 }
+    }
+
+    /// Whether the file is there and has these contents.
+    pub fn holds(&self, path: &Path) -> bool {
+        self.fault(path).is_none()
+    }
+
+    /// What is wrong with the file, in words.
+    pub fn fault(&self, path: &Path) -> Option<String> {
+        match std::fs::metadata(path) {
+            Err(e) => {
+                return Some(if e.kind() == std::io::ErrorKind::NotFound {
+                    "is missing".into()
+                } else {
+                    format!("cannot be read: {e}")
+                });
+            }
+            Ok(about) if about.len() != self.bytes => {
+                return Some(format!("has {} bytes instead of {}", about.len(), self.bytes));
+            }
+            Ok(_) => {}
+        }
+        match std::fs::read(path) {
+            Err(e) => Some(format!("cannot be read: {e}")),
+            Ok(bytes) if Self::of(&bytes) != *self => Some("was changed: its SHA-256 differs".into()),
+            Ok(_) => None,
+        }
+    }
+}
+
+/// A seal as it lies on disk.
+#[derive(Serialize, Deserialize)]
+struct Written {
+    #[serde(flatten)]
+    seal: Seal,
+    /// SHA-256 of the rest.
+    seal_sha256: String,
+}
+
+impl Seal {
+    /// Of files that were just made.
+    pub fn of(index: u64, recipe: &Recipe, files: &[File]) -> Result<Self> {
+        let files = files.iter().map(|f| (f.path.clone(), Print::of(&f.bytes))).collect();
+        Ok(Self { index, recipe: recipe.fingerprint()?, files })
+    }
+
+    /// Where the seal of an image lies.
+    pub fn path(folder: &Path, index: u64) -> PathBuf {
+        folder.join("seals").join(format!("{}.json", Set::name(index)))
+    }
+
+    /// Reads an image's seal; `None` where there is none or it is damaged.
+    pub fn read(folder: &Path, index: u64) -> Option<Self> {
+        let bytes = std::fs::read(Self::path(folder, index)).ok()?;
+        let written: Written = serde_json::from_slice(&bytes).ok()?;
+        let own = written.seal.hash().ok()?;
+        (own == written.seal_sha256 && written.seal.index == index).then_some(written.seal)
+    }
+
+    /// Writes it: after everything that it names.
+    pub fn write(&self, folder: &Path) -> Result<()> {
+        let written = Written { seal: self.clone(), seal_sha256: self.hash()? };
+        write_atomically(&Self::path(folder, self.index), &json(&written)?)
+    }
+
+    /// SHA-256 over everything in it, hex.
+    pub fn hash(&self) -> Result<String> {
+        Ok(hex(&Sha256::digest(json(self)?)))
+    }
+
+    /// The same over its native files alone, whatever formats there are.
+    pub fn image_hash(&self) -> Result<String> {
+        let mut own = self.clone();
+        own.files.retain(|path, _| path.starts_with("images/"));
+        own.hash()
+    }
+
+    /// The files that are missing or changed, each with what is wrong with it.
+    pub fn faults(&self, folder: &Path) -> Vec<(String, String)> {
+        let fault = |(path, print): (&String, &Print)| Some((path.clone(), print.fault(&folder.join(path))?));
+        self.files.iter().filter_map(fault).collect()
+    }
+}
+
+/// Writes files, each whole or not at all.
+pub(super) fn write_files(folder: &Path, files: &[File]) -> Result<()> {
+    for file in files {
+        if file.bytes.is_empty() {
+            return Err(Error::Dataset(format!("{}: refused to write an empty file", file.path)));
+        }
+        write_atomically(&folder.join(&file.path), &file.bytes)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,200 @@
+//! Grows field k, has it drawn, labels it: a [`Sample`].
+
+use super::annotate::{self, keypoint, of_255};
+use super::recipe::Recipe;
+use super::record::{Grown, Leaf, Plant, Record, Seen};
+use super::sample::{Rendered, Sample};
+use super::set::Set;
+use crate::accel::EmbreeAccel;
+use crate::film::Film;
+use crate::geometry::Window;
+use crate::output::{Provenance, half};
+use crate::render::{self, LabelMap, Watch};
+use crate::scene::build::{self, Options};
+use crate::scene::{Field, PlantRecord};
+use crate::{Error, Result};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Draws fields: a path tracer, a rasterizer.
+pub trait Engine: Sync {
+    /// Draws a whole field. Called inside a pool.
+    fn draw(&self, field: &Field, geometry: &EmbreeAccel, watch: &Watch<'_>) -> Result<Drawn>;
+
+    /// What the files say of where they came from.
+    fn provenance(&self, field: &Field) -> Provenance;
+}
+
+/// What an engine drew.
+pub struct Drawn {
+    /// The film.
+    pub film: Film,
+    /// The film that the photographs are made of, where it is another: one without noise.
+    pub clean: Option<Film>,
+}
+
+/// Where an image's time went.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Times {
+    /// Growing the field and building what rays hit.
+    pub grow: Duration,
+    /// Drawing, denoising included.
+    pub draw: Duration,
+    /// Labels and extents.
+    pub label: Duration,
+}
+
+/// A new image.
+pub struct Shot {
+    /// The image.
+    pub sample: Sample,
+    /// What its pictures say of where they came from.
+    pub text: String,
+    /// Where the time went.
+    pub times: Times,
+}
+
+/// Makes image `index` of a dataset in `folder`. Call it inside a pool.
+pub fn shoot(folder: &Path, recipe: &Recipe, index: u64, engine: &dyn Engine, watch: &Watch<'_>) -> Result<Shot> {
+    let rendering = recipe.rendering()?;
+    let begin = Instant::now();
+    let options =
+        Options { seed: Some(rendering.seed), index, width: Some(rendering.width), height: Some(rendering.height) };
+    let page = folder.join(&rendering.scene);
+    let field = build::field(&page, &options)?;
+    if field.hash != rendering.scene_sha256 {
+        return Err(Error::Dataset(format!(
+            "{}: the page or something that it names was changed since the dataset was begun\n help: restore {}/scene/, or begin \
+             another dataset",
+            page.display(),
+            folder.display()
+        )));
+    }
+    let threads = rayon::current_num_threads() as u32;
+    let geometry = EmbreeAccel::build(&field.scene.surfaces(), threads)?;
+    let grow = begin.elapsed();
+    let begin = Instant::now();
+    let drawn = engine.draw(&field, &geometry, watch)?;
+    let draw = begin.elapsed();
+    let begin = Instant::now();
+    let window = Window::full(field.scene.camera.width(), field.scene.camera.height());
+    let labels = render::label(&geometry, &field.scene.parts, &field.scene.camera, window);
+    let provenance = engine.provenance(&field);
+    let text = provenance.photograph_text(drawn.clean.is_some());
+    let sample = expose(recipe, &field, drawn, labels)?;
+    Ok(Shot { sample, text, times: Times { grow, draw, label: begin.elapsed() } })
+}
+
+/// The sample of a field that was drawn and labelled.
+fn expose(recipe: &Recipe, field: &Field, drawn: Drawn, labels: LabelMap) -> Result<Sample> {
+    let Drawn { film, clean } = drawn;
+    let photograph = field.photograph(clean.as_ref().unwrap_or(&film));
+    let tags = field.scene.tags();
+    let kinds: BTreeMap<u16, u16> = field.plants.iter().map(|p| (p.number, p.kind)).collect();
+    let kind = |plant: u16| kinds.get(&plant).copied().unwrap_or(0);
+    let mut sample = Sample {
+        record: Record {
+            index: field.index,
+            name: Set::name(field.index),
+            source: None,
+            split: recipe.split.of(field.index),
+            width: film.window.width(),
+            height: film.window.height(),
+            classes: Vec::new(),
+            ignored: 0,
+            plants: Vec::new(),
+            conditions: serde_json::to_value(&field.conditions)
+                .map_err(|e| Error::Dataset(format!("cannot write down the conditions: {e}")))?,
+            warnings: field.warnings.clone(),
+        },
+        rgb: photograph.rgb.as_chunks::<3>().0.to_vec(),
+        nir: photograph.nir,
+        semantics: labels.tags.iter().map(|t| t.class as u8).collect(),
+        // The recipe holds no more species than 8 bits number.
+        species: labels.tags.iter().map(|t| kind(t.plant) as u8).collect(),
+        plants: labels.tags.iter().map(|t| t.plant).collect(),
+        leaves: labels.tags.iter().map(|t| t.leaf).collect(),
+        coverage: render::coverage(&film, &tags).into_iter().map(of_255).collect(),
+        depth: labels.depth.clone(),
+        normals: labels.normals.iter().map(|n| n.to_array().map(half)).collect(),
+        film: None,
+    };
+    (sample.record.classes, sample.record.ignored) = annotate::classes(&sample);
+    sample.record.plants = plants(field, &labels, &sample);
+    sample.film = Some(Rendered { film, labels, tags });
+    Ok(sample)
+}
+
+/// The plants of a field that its image shows or hides, in the order of their numbers.
+fn plants(field: &Field, labels: &LabelMap, sample: &Sample) -> Vec<Plant> {
+    let extents = render::extents(&field.scene, labels);
+    let camera = &field.scene.camera;
+    let mut shown: BTreeMap<u16, Plant> = annotate::plants(sample).into_iter().map(|p| (p.number, p)).collect();
+    let mut all = Vec::new();
+    for grown in &field.plants {
+        let Some(extent) = extents.get(&(grown.number, 0)).filter(|e| e.unoccluded > 0) else { continue };
+        let mut plant = shown.remove(&grown.number).unwrap_or_else(|| hidden(grown));
+        let known = |seen: &mut Seen, extent: &render::Extent| {
+            (seen.unoccluded, seen.whole) = (Some(extent.unoccluded), Some(extent.whole));
+        };
+        known(&mut plant.seen, extent);
+        for leaf in &mut plant.leaves {
+            if let Some(extent) = extents.get(&(grown.number, leaf.number)) {
+                known(&mut leaf.seen, extent);
+            }
+        }
+        // Leaves of which no pixel is seen.
+        for ((_, number), extent) in extents.range((grown.number, 1)..=(grown.number, u16::MAX)) {
+            if extent.unoccluded > 0
+                && let Err(place) = plant.leaves.binary_search_by_key(number, |l| l.number)
+            {
+                let mut leaf = Leaf { number: *number, seen: Seen::default(), base: None, tip: None };
+                known(&mut leaf.seen, extent);
+                plant.leaves.insert(place, leaf);
+            }
+        }
+        let of_plant = |i: usize| sample.plants[i] == grown.number;
+        plant.stem = keypoint(camera, grown.position, of_plant);
+        for axis in &grown.leaf_axes {
+            if let Ok(place) = plant.leaves.binary_search_by_key(&axis.leaf, |l| l.number) {
+                let owns = |i: usize| of_plant(i) && sample.leaves[i] == axis.leaf;
+                let leaf = &mut plant.leaves[place];
+                leaf.base = keypoint(camera, axis.base, owns);
+                leaf.tip = keypoint(camera, axis.tip, owns);
+            }
+        }
+        plant.grown = Some(described(grown));
+        plant.kind = grown.kind;
+        all.push(plant);
+    }
+    all.sort_by_key(|p: &Plant| p.number);
+    all
+}
+
+/// A plant of which no pixel is seen.
+fn hidden(grown: &PlantRecord) -> Plant {
+    Plant {
+        number: grown.number,
+        class: grown.class,
+        kind: grown.kind,
+        seen: Seen::default(),
+        stem: None,
+        grown: None,
+        leaves: Vec::new(),
+    }
+}
+
+fn described(grown: &PlantRecord) -> Grown {
+    Grown {
+        species: grown.species.clone(),
+        eppo: grown.eppo.clone(),
+        bbch: grown.bbch,
+        age_days: grown.age_days,
+        position_m: grown.position.to_array(),
+        axis: grown.axis.to_array(),
+        height_m: grown.height,
+        radius_m: grown.radius,
+        leaves: grown.leaves,
+    }
+}

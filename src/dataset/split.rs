@@ -1,0 +1,93 @@
+//! Training, validation and test images.
+//!
+//! Every image is a field of its own, with plants and ground of its own, so a split by images lets no plant and no patch of soil
+//! into two splits. Splits alternate in a fixed pattern over the image numbers: a longer dataset begins with the same images in
+//! the same splits, and every stretch of it is shared out alike.
+
+use serde::{Deserialize, Serialize};
+
+/// Which part of a dataset an image belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Split {
+    /// To train on.
+    Train,
+    /// To watch the training by.
+    Val,
+    /// To judge by.
+    Test,
+}
+
+impl Split {
+    /// All splits.
+    pub const ALL: [Self; 3] = [Self::Train, Self::Val, Self::Test];
+
+    /// Lower-case name, as folders have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Train => "train",
+            Self::Val => "val",
+            Self::Test => "test",
+        }
+    }
+}
+
+/// Shares of the splits: of any `train + val + test` images in a row, the first are for training, then validation, then test.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Shares(pub [u32; 3]);
+
+impl Default for Shares {
+    fn default() -> Self {
+        Self([8, 1, 1])
+    }
+}
+
+impl Shares {
+    /// Reads `8,1,1` or `80,10,10`.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let wrong = || "write the shares of train,val,test such as 8,1,1; one of them at least above 0".to_owned();
+        let numbers: Option<Vec<u32>> = text.split(',').map(|t| t.trim().parse().ok()).collect();
+        let shares: [u32; 3] = numbers.and_then(|n| n.try_into().ok()).ok_or_else(wrong)?;
+        let divisor = shares.into_iter().fold(0, gcd);
+        if divisor == 0 || shares.iter().any(|n| *n > 1_000_000) {
+            return Err(wrong());
+        }
+        Ok(Self(shares.map(|n| n / divisor)))
+    }
+
+    /// The split of an image.
+    pub fn of(self, index: u64) -> Split {
+        let [train, val, test] = self.0.map(u64::from);
+        let place = index % (train + val + test).max(1);
+        if place < train {
+            Split::Train
+        } else if place < train + val {
+            Split::Val
+        } else {
+            Split::Test
+        }
+    }
+}
+
+fn gcd(a: u32, b: u32) -> u32 {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_hold_in_every_stretch() {
+        let shares = Shares::parse("80, 10,10").unwrap();
+        assert_eq!(shares, Shares::default());
+        for start in [0, 7, 1000] {
+            let count = |split| (start..start + 100).filter(|k| shares.of(*k) == split).count();
+            assert_eq!(Split::ALL.map(count), [80, 10, 10]);
+        }
+        assert_eq!(Shares::parse("0,0,1").unwrap().of(5), Split::Test);
+        for bad in ["", "1,2", "0,0,0", "a,b,c", "1,2,-3", "1,2,3,4"] {
+            assert!(Shares::parse(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! Whether a dataset is whole and is what it says it is.
+
+use super::finish::{MANIFEST, lacks, ranges};
+use super::generate::Task;
+use super::seal::{Print, Seal};
+use super::set::Set;
+use super::shoot::{Engine, shoot};
+use super::split::Split;
+use super::{File, format, generate, invariants, ledger, native};
+use crate::render::Watch;
+use crate::sampling::rng::mix;
+use crate::{Error, Result};
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::atomic::AtomicBool;
+
+/// What was found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Findings {
+    /// Images that are not there, or not whole.
+    pub missing: Vec<u64>,
+    /// What is wrong, one sentence each.
+    pub faults: Vec<String>,
+    /// Images that were checked.
+    pub checked: u64,
+    /// Images that were rendered again and came out the same.
+    pub rendered: u64,
+}
+
+impl Findings {
+    /// Everything that was found in one error, or nothing.
+    pub fn verdict(&self, set: &Set) -> Result<()> {
+        const MOST: usize = 20;
+        let mut words: Vec<String> = self.faults.iter().take(MOST).cloned().collect();
+        if self.faults.len() > MOST {
+            words.push(format!("and {} more", self.faults.len() - MOST));
+        }
+        if !self.missing.is_empty() {
+            words.push(lacks(set, &self.missing));
+        }
+        if words.is_empty() { Ok(()) } else { Err(Error::Damaged(words.join("\nerror: "))) }
+    }
+}
+
+/// Checks every file and every invariant, and renders `again` images anew. Call it inside a pool.
+pub fn verify(
+    set: &Set,
+    again: u64,
+    engine: Option<&dyn Engine>,
+    done: &(dyn Fn(u64) + Sync),
+    stop: &AtomicBool,
+) -> Result<Findings> {
+    let count = set.recipe.count;
+    let looked: Vec<Looked> = (0..count)
+        .into_par_iter()
+        .map(|index| {
+            if stop.load(std::sync::atomic::Ordering::Relaxed) {
+                return Err(Error::Interrupted);
+            }
+            let looked = look(set, index)?;
+            done(index);
+            Ok(looked)
+        })
+        .collect::<Result<_>>()?;
+    let mut found = Findings::default();
+    for (index, looked) in (0..count).zip(&looked) {
+        if looked.missing {
+            found.missing.push(index);
+        } else {
+            found.checked += 1;
+        }
+        found.faults.extend(looked.faults.iter().cloned());
+    }
+    found.faults.extend(twins(set, &looked));
+    found.faults.extend(disputes(set)?);
+    if found.missing.is_empty() {
+        found.faults.extend(listed(set)?);
+    }
+    for index in drawn(count, again) {
+        if found.missing.contains(&index) {
+            continue;
+        }
+        let engine = engine.ok_or_else(|| set.recipe.rendering().err().unwrap_or(Error::Interrupted))?;
+        match rerender(set, index, engine, stop)? {
+            Some(fault) => found.faults.push(fault),
+            None => found.rendered += 1,
+        }
+    }
+    Ok(found)
+}
+
+/// What was seen of one image.
+struct Looked {
+    missing: bool,
+    faults: Vec<String>,
+    /// SHA-256 of its photograph.
+    photograph: Option<String>,
+}
+
+fn look(set: &Set, index: u64) -> Result<Looked> {
+    let name = Set::name(index);
+    let Some(seal) = Seal::read(&set.folder, index) else {
+        return Ok(Looked { missing: true, faults: Vec::new(), photograph: None });
+    };
+    let mut faults: Vec<String> =
+        seal.faults(&set.folder).into_iter().map(|(path, fault)| format!("{path} {fault}")).collect();
+    let mut missing = !faults.is_empty();
+    if !missing && generate::task(set, index)? != Task::Done {
+        missing = true;
+        faults.push(format!("image {name}: it was made by another recipe, or lacks a format"));
+    }
+    if !missing {
+        match native::read(&set.folder, &name) {
+            Ok(sample) => {
+                let broken = invariants::faults(&set.recipe, &sample);
+                faults.extend(broken.into_iter().map(|fault| format!("image {name}: {fault}")));
+            }
+            Err(e) => faults.push(e.to_string()),
+        }
+    }
+    let photograph = seal.files.get(&format!("{}/rgb.png", native::folder(&name))).map(|p| p.sha256.clone());
+    Ok(Looked { missing, faults, photograph })
+}
+
+/// Photographs that are in two splits.
+fn twins(set: &Set, looked: &[Looked]) -> Vec<String> {
+    let mut places: BTreeMap<&str, BTreeSet<Split>> = BTreeMap::new();
+    for (index, looked) in looked.iter().enumerate() {
+        if let Some(hash) = &looked.photograph {
+            places.entry(hash).or_default().insert(set.recipe.split.of(index as u64));
+        }
+    }
+    let twice = places.values().filter(|splits| splits.len() > 1).count();
+    if twice == 0 { Vec::new() } else { vec![format!("{twice} photographs are in two splits")] }
+}
+
+/// Images that two runs made differently.
+fn disputes(set: &Set) -> Result<Vec<String>> {
+    let mut images: BTreeMap<u64, BTreeSet<String>> = BTreeMap::new();
+    for row in ledger::rows(&set.folder)? {
+        images.entry(row.index).or_default().insert(row.image);
+    }
+    let several: Vec<u64> = images.into_iter().filter(|(_, found)| found.len() > 1).map(|(index, _)| index).collect();
+    if several.is_empty() {
+        return Ok(Vec::new());
+    }
+    Ok(vec![format!("two runs made different files of the images {}: are all machines alike?", ranges(&several))])
+}
+
+/// A manifest, as far as it is checked.
+#[derive(serde::Deserialize)]
+struct Listed {
+    files: BTreeMap<String, Print>,
+}
+
+/// What the manifest lists and is not so.
+fn listed(set: &Set) -> Result<Vec<String>> {
+    let path = set.folder.join(MANIFEST);
+    let bytes = match std::fs::read(&path) {
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
+            return Ok(vec![format!(
+                "{MANIFEST} is missing: `trace dataset finish {}` writes it",
+                set.folder.display()
+            )]);
+        }
+        other => other.map_err(Error::io(&path))?,
+    };
+    let listed: Listed = match serde_json::from_slice(&bytes) {
+        Ok(listed) => listed,
+        Err(e) => return Ok(vec![format!("{MANIFEST} is damaged: {e}")]),
+    };
+    let mut sealed: BTreeMap<String, Print> = BTreeMap::new();
+    for index in 0..set.recipe.count {
+        sealed.extend(Seal::read(&set.folder, index).map(|s| s.files).unwrap_or_default());
+    }
+    let mut faults = Vec::new();
+    for (path, print) in &listed.files {
+        match sealed.remove(path) {
+            // Looked at with its image.
+            Some(seal) if seal == *print => {}
+            Some(_) => faults.push(format!("{path} is another file than {MANIFEST} lists")),
+            None => faults.extend(print.fault(&set.folder.join(path)).map(|fault| format!("{path} {fault}"))),
+        }
+    }
+    if !sealed.is_empty() {
+        faults.push(format!("{MANIFEST} lacks {} files: `trace dataset finish` writes it anew", sealed.len()));
+    }
+    Ok(faults)
+}
+
+/// Which images are rendered again: spread over the dataset, the same ones every time.
+fn drawn(count: u64, again: u64) -> Vec<u64> {
+    let mut all: Vec<u64> = (0..count).collect();
+    all.sort_by_key(|k| mix(*k));
+    all.truncate(again.min(count) as usize);
+    all.sort_unstable();
+    all
+}
+
+fn rerender(set: &Set, index: u64, engine: &dyn Engine, stop: &AtomicBool) -> Result<Option<String>> {
+    let watch = Watch { done: &|_| (), stop };
+    let shot = shoot(&set.folder, &set.recipe, index, engine, &watch)?;
+    let mut files = native::files(&shot.sample, &shot.text)?;
+    for (_, format) in format::all(&set.recipe)? {
+        files.extend(format.image(&set.recipe, &shot.sample)?);
+    }
+    let differs = |file: &&File| !Print::of(&file.bytes).holds(&set.folder.join(&file.path));
+    let wrong: Vec<&str> = files.iter().filter(differs).map(|f| f.path.as_str()).collect();
+    Ok((!wrong.is_empty()).then(|| format!("rendered again, these come out otherwise: {}", wrong.join(", "))))
+}

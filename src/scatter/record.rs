@@ -1,0 +1,78 @@
+//! Rows and patches as they were drawn.
+
+use super::{Rows, WeedsDesc};
+use crate::sampling::{Purpose, Stream};
+use serde::Serialize;
+
+/// The rows of one field.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RowsRecord {
+    /// From row to row.
+    pub spacing_m: f32,
+    /// From seed to seed.
+    pub in_row_m: f32,
+    /// Direction of the rows, clockwise from north.
+    pub azimuth_deg: f32,
+    /// Distance of row 0 from the world's origin, towards the rows' right-hand side.
+    pub offset_m: f32,
+    /// Standard deviation of a seed's place across the row.
+    pub jitter_across_m: f32,
+    /// Standard deviation of a seed's place along the row.
+    pub jitter_along_m: f32,
+    /// Share of the seeds that emerged.
+    pub emergence: f64,
+    /// Share of the places that got two seeds.
+    pub doubles: f64,
+}
+
+impl Rows {
+    /// The numbers that were drawn.
+    pub fn record(&self) -> RowsRecord {
+        RowsRecord {
+            spacing_m: self.spacing_m,
+            in_row_m: self.in_row_m,
+            azimuth_deg: self.azimuth.to_degrees(),
+            offset_m: self.offset_m,
+            jitter_across_m: self.jitter.x,
+            jitter_along_m: self.jitter.y,
+            emergence: self.emergence,
+            doubles: self.doubles,
+        }
+    }
+}
+
+/// One species of weed in one field.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct WeedsRecord {
+    /// Mean number of the distribution, not of this piece of ground.
+    pub per_m2: f32,
+    /// Aggregation: k of the negative binomial.
+    pub k: f32,
+    /// Size of the patches.
+    pub range_m: f32,
+    /// Share of the plants that stand in clusters.
+    pub clusters_share: f32,
+    /// Mean number of plants in a cluster.
+    pub clusters_plants: f32,
+    /// Standard deviation of their distance from its centre.
+    pub clusters_sd_m: f32,
+    /// No two stems stand closer.
+    pub min_distance_m: f32,
+}
+
+impl WeedsRecord {
+    /// Draws the numbers of a field's weeds; `stream` is that of their places.
+    pub fn draw(desc: &WeedsDesc, stream: &Stream) -> Self {
+        // 3 is the stream of the patches themselves.
+        let child = |k| stream.child(Purpose::Page, k);
+        Self {
+            per_m2: desc.per_m2.draw32(&mut child(0)),
+            k: desc.k.draw32(&mut child(1)),
+            range_m: desc.range_m.draw32(&mut child(2)),
+            clusters_share: desc.clusters.share.draw32(&mut child(4)),
+            clusters_plants: desc.clusters.plants.draw32(&mut child(5)),
+            clusters_sd_m: desc.clusters.sd_m.draw32(&mut child(6)),
+            min_distance_m: desc.min_distance_m.draw32(&mut child(7)),
+        }
+    }
+}

@@ -1,0 +1,62 @@
+//! The season of a field: which of the growths that a page lists side by side all its plants have.
+
+use crate::page::Page;
+use crate::sampling::Stream;
+use crate::sampling::place::Step;
+use crate::scene::desc::{FieldDesc, Growth};
+use crate::{Error, Result};
+use serde::Serialize;
+
+/// What a field drew where its page lists growths: `growth: Either([…, …])`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Season {
+    /// Place in the lists, from 0; none where the page has no such list.
+    pub drawn: Option<usize>,
+    /// How long the lists are.
+    pub of: usize,
+}
+
+impl Season {
+    /// Draws the place; refuses lists that do not fit together, where they stand in the page.
+    pub(super) fn draw(page: &Page, desc: &FieldDesc, stream: &mut Stream) -> Result<Self> {
+        let mut of = 0;
+        for (room, k, growth) in growths(desc) {
+            let Growth::Either(list) = growth else { continue };
+            let at = [Step::Field(room), Step::Item(k), Step::Field("growth"), Step::Item(0)];
+            let fault = |at: &[Step<'_>], words: String| Err(page.blame(at, Error::Scene(words)));
+            if list.is_empty() {
+                return fault(
+                    &at,
+                    "an empty list: there is nothing to draw\n help: Either([AgeDays(12), AgeDays(40)])".into(),
+                );
+            }
+            if let Some(i) = list.iter().position(|g| matches!(g, Growth::Either(_))) {
+                let words = "an Either inside an Either\n help: write all growths side by side in one list";
+                return fault(&[&at[..], &[Step::Item(i)]].concat(), words.into());
+            }
+            if of > 0 && list.len() != of {
+                let words = format!(
+                    "this list has {} growths, an earlier one of this page {of}\n help: one place is drawn for all lists \
+                     of a page, so give all of them the same length; a growth may be written twice",
+                    list.len()
+                );
+                return fault(&at, words);
+            }
+            of = list.len();
+        }
+        Ok(Self { drawn: (of > 0).then(|| stream.index(of)), of })
+    }
+
+    /// Place in the lists; 0 where there are none.
+    pub(super) fn place(self) -> usize {
+        self.drawn.unwrap_or(0)
+    }
+}
+
+/// Every growth of a page, with the list that it stands in and its place there.
+fn growths(desc: &FieldDesc) -> impl Iterator<Item = (&'static str, usize, &Growth)> {
+    let crops = desc.crops.iter().enumerate().map(|(k, c)| ("crops", k, &c.growth));
+    let weeds = desc.weeds.iter().enumerate().map(|(k, w)| ("weeds", k, &w.growth));
+    let plants = desc.plants.iter().enumerate().map(|(k, p)| ("plants", k, &p.growth));
+    crops.chain(weeds).chain(plants)
+}

@@ -1,0 +1,56 @@
+//! What a field knows of itself beside its meshes: who may grow in it, and under what conditions.
+
+use super::build::Season;
+use super::tag::{Class, lowercase};
+use crate::light::LightRecord;
+use crate::scatter::{RowsRecord, WeedsRecord};
+use crate::sensor::CameraRecord;
+use crate::soil::SoilRecord;
+use serde::{Deserialize, Serialize};
+
+/// One of the species that a page can draw, or a model from disk.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SpeciesRecord {
+    /// Scientific name; of a model its file's name.
+    pub name: String,
+    /// EPPO code; empty for a model.
+    pub eppo: String,
+    /// Crop or weed.
+    #[serde(with = "lowercase")]
+    pub class: Class,
+}
+
+/// What was drawn for one field. Every number is SI or carries its unit in its name; bands are R, G, B, NIR.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Conditions {
+    /// Who looks, at the size of the image.
+    pub camera: CameraRecord,
+    /// What shines, in the order of the page.
+    pub lights: Vec<LightRecord>,
+    /// The ground; none where the page has none.
+    pub soil: Option<SoilRecord>,
+    /// What was sown, in the order of the page.
+    pub crops: Vec<CropRecord>,
+    /// What came by itself, in the order of the page.
+    pub weeds: Vec<WeedRecord>,
+    /// Which of the page's growths all plants have.
+    pub season: Season,
+}
+
+/// One crop of a field.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CropRecord {
+    /// Scientific name.
+    pub species: String,
+    /// Where it was drilled.
+    pub rows: RowsRecord,
+}
+
+/// One weed of a field.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct WeedRecord {
+    /// Scientific name.
+    pub species: String,
+    /// How densely it came and how it gathers.
+    pub spread: WeedsRecord,
+}

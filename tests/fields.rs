@@ -1,0 +1,235 @@
+//! What a field is and what it says of itself.
+//!
+//! Rationale: people learn from what is written beside the images, so it must be what was drawn, in the units it names.
+//! Expected: a season is shared by all plants of a field; records agree with the scene that was built from the same numbers.
+
+mod common;
+
+use common::program::{SMALL, field, small_text};
+use furrow::light::LightRecord;
+use furrow::math::{Spectrum, vec3};
+use furrow::scene::build::{self, Options};
+use furrow::scene::tag::Class;
+use furrow::scene::{Field, PlantRecord};
+use std::path::Path;
+
+/// A row of beets among cleavers on a bare plane, by what their growths are.
+fn meadow(beet: &str, cleavers: &str, index: u64) -> Field {
+    let text = format!(
+        r#"Field(
+            seed: 4,
+            camera: Pinhole(size: (32, 24), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.8)),
+            lights: [Constant(radiance: (1, 1, 1, 1))],
+            crops: [(species: "scenes/species/sugar_beet.ron", growth: {beet}, rows: (in_row_m: 0.15))],
+            weeds: [(species: "scenes/species/galium.ron", growth: {cleavers}, spread: (per_m2: 40))],
+        )"#
+    );
+    field(&text, &Options { index, ..Options::default() })
+}
+
+fn of(field: &Field, eppo: &str) -> Vec<PlantRecord> {
+    field.plants.iter().filter(|p| p.eppo == eppo).cloned().collect()
+}
+
+#[test]
+fn all_plants_of_a_field_share_its_season() {
+    let mut seen = [0, 0];
+    for index in 0..12 {
+        let field = meadow("Either([Bbch(10), Bbch(16)])", "Either([AgeDays(3), AgeDays(25)])", index);
+        let late = field.plants[0].bbch == 16;
+        seen[usize::from(late)] += 1;
+        let (beets, cleavers) = (of(&field, "BEAVX"), of(&field, "GALAP"));
+        assert!(!beets.is_empty() && !cleavers.is_empty());
+        assert!(beets.iter().all(|p| p.bbch == if late { 16 } else { 10 }), "field {index}");
+        assert!(cleavers.iter().all(|p| p.age_days == if late { 25.0 } else { 3.0 }), "field {index}");
+    }
+    assert!(seen[0] > 1 && seen[1] > 1, "{seen:?}: one season never comes");
+}
+
+#[test]
+fn a_list_of_growths_moves_nothing_else() {
+    let growth = "AgeDays(Uniform(8, 30))";
+    let (plain, listed) = (meadow(growth, growth, 2), meadow(growth, &format!("Either([{growth}, {growth}])"), 2));
+    assert!(plain.plants.len() > 5);
+    assert_eq!(plain.plants, listed.plants);
+    let other = meadow(growth, "Either([AgeDays(5), AgeDays(6)])", 2);
+    assert_eq!(of(&plain, "BEAVX"), of(&other, "BEAVX"));
+    assert_ne!(of(&plain, "GALAP"), of(&other, "GALAP"));
+}
+
+/// An empty field without ground, by what its camera and its lights are.
+fn studio(camera: &str, lights: &str, options: &Options) -> Field {
+    field(&format!("Field(seed: 9, camera: {camera}, lights: [{lights}])"), options)
+}
+
+#[test]
+fn a_cameras_record_projects_points_as_the_camera_does() {
+    let camera = "JaiAd130(focal_mm: Uniform(8, 15), height_m: Uniform(0.8, 1.1), at_m: (0.1, -0.2), yaw_deg: Uniform(0, 360), \
+                  pitch_deg: 5, roll_deg: -3, distortion: (k1: -0.08, k2: 0.01, p1: 0.001, p2: -0.002, k3: 0.001), f_number: 4)";
+    for index in 0..4 {
+        let field = studio(camera, "", &Options { index, width: Some(480), height: Some(360), ..Options::default() });
+        let of = &field.conditions.camera;
+        assert_eq!((of.width_px, of.height_px), (480, 360));
+        assert!(of.aperture.as_ref().is_some_and(|a| (a.focus_m - of.position_m[2] as f32).abs() < 1e-6));
+        for k in 0..40 {
+            let point = vec3(0.1 + 0.01 * (k % 7) as f32, -0.25 + 0.02 * (k / 7) as f32, 0.003 * k as f32);
+            // The formula as OpenCV's manual has it.
+            let d: Vec<f64> = (0..3).map(|i| f64::from(point[i]) - of.position_m[i]).collect();
+            let [x, y, z] = of.world_to_camera.map(|row| row.iter().zip(&d).map(|(r, d)| r * d).sum::<f64>());
+            let (x, y) = (x / z, y / z);
+            let r2 = x * x + y * y;
+            let radial = 1.0 + of.k1 * r2 + of.k2 * r2.powi(2) + of.k3 * r2.powi(3);
+            let u = of.fx_px * (x * radial + 2.0 * of.p1 * x * y + of.p2 * (r2 + 2.0 * x * x)) + of.cx_px;
+            let v = of.fy_px * (y * radial + of.p1 * (r2 + 2.0 * y * y) + 2.0 * of.p2 * x * y) + of.cy_px;
+            let seen = field.scene.camera.project(point).unwrap();
+            assert!((f64::from(seen.x) - u).abs() < 2e-3 && (f64::from(seen.y) - v).abs() < 2e-3, "{seen} {u} {v}");
+        }
+    }
+}
+
+#[test]
+fn the_lights_records_tell_what_reaches_the_ground() {
+    let lights = "Daylight(sun: Angles(elevation_deg: Uniform(20, 60), azimuth_deg: Uniform(0, 360)), cloud: Uniform(0, 1)), \
+                  Overcast(illuminance_klx: Uniform(5, 20)), Constant(radiance: (0.1, 0.2, 0.3, 0.4)), \
+                  Lamp(shape: Disc(radius_m: 0.05), position_m: (0.3, 0, 0.8), glow: Radiance(1, 1, 1, 0.5))";
+    for index in 0..4 {
+        let camera = "Pinhole(size: (8, 8), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 1))";
+        let field = studio(camera, lights, &Options { index, ..Options::default() });
+        let records = &field.conditions.lights;
+        let whole = field.scene.lights.iter().fold(Spectrum::ZERO, |sum, l| sum + l.horizontal_irradiance());
+        let told = records.iter().fold(Spectrum::ZERO, |sum, r| sum + r.irradiance_w_m2_nm());
+        for (a, b) in whole.to_array().into_iter().zip(told.to_array()) {
+            assert!((a - b).abs() < 1e-5 * a && a > 0.0, "{a} {b}");
+        }
+        let [LightRecord::Daylight { sun_elevation_deg, sun_irradiance_w_m2_nm, .. }, rest @ ..] = &records[..] else {
+            panic!("{records:?}")
+        };
+        assert!((20.0..60.0).contains(sun_elevation_deg));
+        let sun = field.scene.lights[0].horizontal_irradiance();
+        assert_eq!(sun, *sun_irradiance_w_m2_nm);
+        let LightRecord::Lamp { power_w_nm, round, position_m, .. } = &rest[2] else { panic!("{rest:?}") };
+        // A Lambertian disc of radiance 1 and radius 5 cm sends out π² r².
+        let power = std::f32::consts::PI.powi(2) * 0.05 * 0.05;
+        assert!(*round && *position_m == [0.3, 0.0, 0.8]);
+        assert!((power_w_nm.to_array()[0] / power - 1.0).abs() < 1e-5, "{power_w_nm:?} {power}");
+    }
+}
+
+#[test]
+fn the_species_of_a_page_are_numbered_the_same_in_every_field() {
+    let page = |weeds: f32| {
+        format!(
+            r#"Field(
+                camera: Pinhole(size: (32, 24), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.8)),
+                lights: [Constant(radiance: (1, 1, 1, 1))],
+                crops: [(species: "scenes/species/sugar_beet.ron", growth: Bbch(14), rows: (in_row_m: 0.15))],
+                weeds: [
+                    (species: "scenes/species/galium.ron", growth: Bbch(12), spread: (per_m2: {weeds})),
+                    (species: "scenes/species/capsella.ron", growth: Bbch(12), spread: (per_m2: 60)),
+                    (species: "scenes/species/galium.ron", growth: Bbch(10), spread: (per_m2: {weeds})),
+                ],
+                plants: [(species: "scenes/species/sugar_beet.ron", growth: Bbch(10))],
+                models: [
+                    (file: "scenes/models/seedling.glb", position_m: (0.1, 0)),
+                    (file: "scenes/models/seedling.glb", class: Weed, position_m: (0, 0.1)),
+                    (file: "scenes/models/peg.obj", class: Soil, scale: 0.001),
+                ],
+            )"#
+        )
+    };
+    let mut tables = Vec::new();
+    for (weeds, index) in [(40.0, 0), (40.0, 5), (0.0, 1)] {
+        let field = field(&page(weeds), &Options { index, ..Options::default() });
+        assert!(field.plants.iter().any(|p| p.eppo == "GALAP") == (weeds > 0.0));
+        for plant in &field.plants {
+            let of = &field.species[usize::from(plant.kind) - 1];
+            assert_eq!((&of.name, &of.eppo, of.class), (&plant.species, &plant.eppo, plant.class));
+        }
+        assert_eq!(field.conditions.crops.len(), 1);
+        assert_eq!(field.conditions.weeds.len(), 3);
+        tables.push(field.species);
+    }
+    assert!(tables.iter().all(|t| *t == tables[0]));
+    let told: Vec<(&str, Class)> = tables[0].iter().map(|s| (s.eppo.as_str(), s.class)).collect();
+    let models = [("", told[3].1), ("", told[4].1)];
+    assert_eq!(told[..3], [("BEAVX", Class::Crop), ("GALAP", Class::Weed), ("CAPBP", Class::Weed)]);
+    assert_eq!(models, [("", Class::Crop), ("", Class::Weed)], "a model's own class, then the page's");
+    assert!(tables[0][3..].iter().all(|s| s.name == "seedling") && tables[0].len() == 5, "{:?}", tables[0]);
+}
+
+#[test]
+fn the_rows_record_tells_where_the_crop_stands() {
+    let drilled = "rows: (spacing_m: 0.3, in_row_m: 0.1, azimuth_deg: Uniform(0, 180), offset_m: Uniform(-0.1, 0.1))";
+    let text =
+        small_text().replace("rows: (spacing_m: 0.5, in_row_m: 0.3)", drilled).replace("plants: [", "models: [], // ");
+    assert!(text.contains(drilled) && text.contains("models: []"));
+    for index in 0..3 {
+        let field = field(&text, &Options { index, ..Options::default() });
+        let rows = &field.conditions.crops[0].rows;
+        let (sin, cos) = rows.azimuth_deg.to_radians().sin_cos();
+        let beets: Vec<_> = field.plants.iter().filter(|p| p.class == Class::Crop).collect();
+        assert!(beets.len() > 3);
+        for beet in beets {
+            let rows_away = (beet.position.x * cos - beet.position.y * sin - rows.offset_m) / rows.spacing_m;
+            let off = (rows_away - rows_away.round()).abs() * rows.spacing_m;
+            assert!(off <= 5.0 * rows.jitter_across_m + 1e-4, "{off} m from a row");
+        }
+    }
+}
+
+#[test]
+fn the_grounds_record_holds_what_the_page_asked_for() {
+    let soil = |more: &str| {
+        let text = format!(
+            r#"Field(
+                seed: 2,
+                camera: Pinhole(size: (32, 24), intrinsics: FieldOfView(horizontal_deg: 20), pose: Nadir(height_m: 0.5)),
+                soil: (
+                    layers: [
+                        (albedo: "textures/soil/dirt.png", size_m: 0.5, height_mm: (0, 0), share: 3),
+                        (albedo: "textures/soil/stony.png", size_m: 0.5, height_mm: (0, 0)),
+                    ],
+                    blend: (scale_m: 0.2, sharpness: 5),
+                    moisture: (mean: 0.4, spread: 0, patch_m: 0.1, drying: 0),
+                    stones: [(cover: 0.01), (cover: Uniform(0.01, 0.02))],
+                    clods: (over_5mm_per_m2: 3000, min_mm: 4, exponent: 3),
+                    {more}
+                ),
+            )"#
+        );
+        field(&text, &Options::default()).conditions.soil.unwrap()
+    };
+    let record =
+        soil("relief: (rms_mm: 0, tilt_deg: 5), litter: (straw_cover: 0.02, sticks_per_m2: 3, bits_per_m2: 40)");
+    assert_eq!((record.moisture.mean, record.moisture.spread), (0.4, 0.0));
+    let layers: Vec<(&str, f32)> = record.layers.iter().map(|l| (l.name.as_str(), l.share)).collect();
+    assert_eq!(layers, [("dirt.png", 0.75), ("stony.png", 0.25)]);
+    assert!((record.blend_scale_m - 0.2).abs() < 1e-12 && record.blend_sharpness == 5.0);
+    assert!(record.stones_cover[0] == 0.01 && (0.01..0.02).contains(&record.stones_cover[1]));
+    assert_eq!((record.clods.over_5mm_per_m2, record.clods.exponent), (3000.0, 3.0));
+    let litter = &record.litter;
+    assert_eq!((litter.straw_cover, litter.sticks_per_m2, litter.bits_per_m2), (0.02, 3.0, 40.0));
+    assert!(record.relief.row.is_none() && record.relief.tilt_deg == 5.0 && record.relief.rms_mm == 0.0);
+    assert!((0.0..360.0).contains(&record.relief.tilt_azimuth_deg));
+}
+
+#[test]
+fn a_field_names_every_file_that_it_was_made_of() {
+    let field = build::field(Path::new(SMALL), &Options::default()).unwrap();
+    assert_eq!(field.text, std::fs::read_to_string(SMALL).unwrap());
+    assert!(field.files.iter().all(|f| f.is_file()), "{:?}", field.files);
+    for ending in ["small.ron", "sugar_beet.ron", "dirt.png"] {
+        assert!(field.files.iter().any(|f| f.to_string_lossy().ends_with(ending)), "no {ending} in {:?}", field.files);
+    }
+}
+
+#[test]
+fn conditions_are_written_with_their_units() {
+    let field = build::field(Path::new(SMALL), &Options::default()).unwrap();
+    let json = serde_json::to_value(&field.conditions).unwrap();
+    assert_eq!(json["lights"][0]["kind"], "daylight");
+    assert_eq!(json["lights"][0]["sky_irradiance_w_m2_nm"].as_array().unwrap().len(), 4);
+    assert_eq!(json["camera"]["width_px"], field.scene.camera.width());
+    assert!(json["soil"]["moisture"]["mean"].is_number() && json["crops"][0]["rows"]["azimuth_deg"].is_number());
+    assert_eq!(serde_json::to_value(&field.species[0]).unwrap()["class"], "crop");
+}
