@@ -1,9 +1,9 @@
 //! What belongs to all images together, written when all are there: the formats' lists, the manifest, the report.
 
-use super::format;
 use super::recipe::{FILE, Recipe, hex};
 use super::seal::{Print, Seal};
 use super::set::{Set, Stream, Whole};
+use super::{format, report};
 use crate::output::UNFINISHED;
 use crate::{Error, Result};
 use sha2::{Digest, Sha256};
@@ -25,6 +25,7 @@ pub fn finish(set: &Set) -> Result<Vec<PathBuf>> {
     for (_, format) in format::all(recipe)? {
         format.whole(set, &mut whole)?;
     }
+    report::write(set, &mut whole)?;
     let mut files = own_files(folder, recipe)?;
     files.append(&mut whole.files.clone());
     let mut paths: Vec<PathBuf> = whole.files.keys().map(|p| folder.join(p)).collect();

@@ -22,6 +22,7 @@
 //! | `seal`, `set` | which files make an image; the dataset on disk |
 //! | `plan`, `generate`, `ledger`, `finish` | from a page to files; what remains to be done is found by looking at the disk |
 //! | `invariants`, `verify` | what must hold of every image, and whether it does |
+//! | `report` | all of it on one page, for people |
 
 pub mod annotate;
 pub mod finish;
@@ -33,6 +34,7 @@ pub mod native;
 pub mod plan;
 pub mod recipe;
 pub mod record;
+pub mod report;
 pub mod rle;
 pub mod sample;
 pub mod seal;
