@@ -117,6 +117,12 @@ impl Recipe {
         }
     }
 
+    /// The name of a species by its number in `species.png`; `None` for 0 and numbers of no species.
+    pub fn species_name(&self, number: u16) -> Option<&str> {
+        let place = usize::from(number).checked_sub(1)?;
+        self.species.get(place).map(|s| s.name.as_str())
+    }
+
     /// Whether `other` makes the same images as far as both go: it may be longer and have other formats.
     pub fn check_goes_on(&self, folder: &Path, other: &Self) -> Result<()> {
         let (before, now) = (fields(self)?, fields(other)?);
@@ -162,6 +168,13 @@ fn failed(e: impl std::fmt::Display) -> Error {
 /// Readable JSON with a line's end.
 pub(super) fn json(value: &impl Serialize) -> Result<Vec<u8>> {
     let mut bytes = serde_json::to_vec_pretty(value).map_err(failed)?;
+    bytes.push(b'\n');
+    Ok(bytes)
+}
+
+/// JSON on one line.
+pub(super) fn compact(value: &impl Serialize) -> Result<Vec<u8>> {
+    let mut bytes = serde_json::to_vec(value).map_err(failed)?;
     bytes.push(b'\n');
     Ok(bytes)
 }
