@@ -69,7 +69,7 @@ pub(super) fn provenance(recipe: &Recipe) -> String {
 }
 
 /// Splits with their numbers of images.
-pub(super) fn splits(names: &[Vec<String>; 3], images: u64) -> String {
+pub(super) fn splits(recipe: &Recipe, names: &[Vec<String>; 3], images: u64) -> String {
     let mut rows = String::new();
     for (split, names) in Split::ALL.into_iter().zip(names) {
         let n = names.len() as u64;
@@ -78,7 +78,13 @@ pub(super) fn splits(names: &[Vec<String>; 3], images: u64) -> String {
         let _ =
             write!(rows, "<tr><th>{}</th><td>{}</td><td>{share}</td></tr>", split.name(), keyed(&key, n, &whole(n)));
     }
-    format!("<table><thead><tr><th>split</th><th>images</th><th>share</th></tr></thead><tbody>{rows}</tbody></table>")
+    let words = match &recipe.made {
+        Made::Rendered(_) => "Every image is a field of its own: no plant and no patch of soil is in two splits.",
+        Made::Imported { .. } => "Whether one plant or one field is in two splits only the source can tell.",
+    };
+    format!(
+        "<table><thead><tr><th>split</th><th>images</th><th>share</th></tr></thead><tbody>{rows}</tbody></table><p>{words}</p>"
+    )
 }
 
 /// Species with what the images show of them.

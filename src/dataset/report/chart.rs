@@ -15,6 +15,8 @@ const BARS: f64 = 58.0;
 /// Between two rows, and below the last.
 const GAP: f64 = 8.0;
 const FOOT: f64 = 18.0;
+/// What is higher takes the place of two.
+const TALL: f64 = 190.0;
 
 /// A row of bars.
 pub(super) struct Series<'a> {
@@ -34,6 +36,12 @@ pub(super) fn histograms(key: &str, title: &str, unit: &str, series: &[Series<'_
         return String::new();
     }
     let values: Vec<&Histogram> = shown.iter().map(|s| s.values).collect();
+    if let [one] = shown.as_slice()
+        && let Some((least, most)) = one.values.range()
+        && least == most
+    {
+        return constant(key, title, unit, one, least);
+    }
     let rows = Histogram::bars(&values);
     let axis = Axis::of(&rows[0], values[0]);
     let height = rows.len() as f64 * (WORDS + BARS + GAP) - GAP + FOOT;
@@ -50,13 +58,28 @@ pub(super) fn histograms(key: &str, title: &str, unit: &str, series: &[Series<'_
     figure(title, unit, height, &body)
 }
 
+/// What is the same everywhere needs no bars.
+fn constant(key: &str, title: &str, unit: &str, one: &Series<'_>, value: f64) -> String {
+    let n = one.values.n();
+    let body = format!(
+        "<g class=\"{}\" data-key=\"{key}\" data-n=\"{n}\" data-mean=\"{value}\"><text class=\"same\" x=\"0\" y=\"36\">{}</text>\
+         <text class=\"tick\" x=\"0\" y=\"56\">the same in all {}</text></g>",
+        one.class,
+        number(value),
+        whole(n)
+    );
+    figure(title, unit, 66.0, &body)
+}
+
 /// A chart with its title.
 fn figure(title: &str, unit: &str, height: f64, body: &str) -> String {
     let unit = if unit.is_empty() { String::new() } else { format!(" <small>{}</small>", escape(unit)) };
     let title = escape(title);
     format!(
-        "<figure class=\"chart\"><figcaption>{title}{unit}</figcaption>\
-         <svg viewBox=\"0 0 {WIDTH} {height}\" role=\"img\" aria-label=\"{title}\">{body}</svg></figure>\n"
+        "<figure class=\"chart{}\"><figcaption>{title}{unit}</figcaption>\
+         <svg viewBox=\"0 0 {WIDTH} {height}\" role=\"img\" aria-label=\"{title}\">{body}</svg></figure>\n",
+        // Beside two rows of others.
+        if height > TALL { " tall" } else { "" }
     )
 }
 

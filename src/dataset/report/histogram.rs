@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-/// Most bars of a chart.
-const MOST_BARS: i64 = 24;
+/// Fewest and most bars that a chart is cut into where its values are spread over as many bins.
+const BARS: (f64, f64) = (6.0, 24.0);
 
 /// How values are put into bins.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,9 +49,9 @@ impl Histogram {
         Self::linear(1.0)
     }
 
-    /// For shares: 1 falls into the last bin below it.
-    pub(super) fn shares() -> Self {
-        Self::new(Bins::Linear(0.002), 1.0)
+    /// For shares in percent: 100 falls into the last bin below it.
+    pub(super) fn percents() -> Self {
+        Self::new(Bins::Linear(0.2), 100.0)
     }
 
     /// For sizes from 1 on, over orders of magnitude.
@@ -69,7 +69,7 @@ impl Histogram {
             return;
         }
         let place = match self.bins {
-            // Half of a thousandth of a bin: 0.6 is the 300th of 0.002 whatever its last bit says.
+            // Half of a thousandth of a bin: 0.6 is the third of 0.2 whatever its last bit says.
             Bins::Linear(width) => (value / width + 5e-4).floor() as i64,
             Bins::Logarithmic => (value.max(1.0).log2() * PER_DOUBLING + 5e-4).floor() as i64,
         };
@@ -127,8 +127,11 @@ impl Histogram {
         let places = || all.iter().flat_map(|h| h.counts.keys().copied());
         let (Some(first), Some(last)) = (places().min(), places().max()) else { return vec![Vec::new(); all.len()] };
         let logarithmic = all[0].is_logarithmic();
+        // Of few values few bars tell more. Source: Rice's rule, 2 n^(1/3).
+        let n = all.iter().map(|h| h.n).max().unwrap_or(0) as f64;
+        let most = (2.0 * n.cbrt()).clamp(BARS.0, BARS.1) as i64;
         let factor =
-            factors(logarithmic).find(|f| last.div_euclid(*f) - first.div_euclid(*f) < MOST_BARS).unwrap_or(i64::MAX);
+            factors(logarithmic).find(|f| last.div_euclid(*f) - first.div_euclid(*f) < most).unwrap_or(i64::MAX);
         let (from, to) = (first.div_euclid(factor), last.div_euclid(factor));
         let of = |h: &Self| {
             let count = |k: i64| h.counts.range(k * factor..(k + 1) * factor).map(|(_, n)| n).sum();
@@ -143,7 +146,7 @@ impl Histogram {
 /// By how many bins a bar may be wide: 1, 2, 5, 10, … of linear ones, so that bars end at round numbers; doublings of the others.
 fn factors(logarithmic: bool) -> Box<dyn Iterator<Item = i64>> {
     if logarithmic {
-        Box::new([2, 4, 8, 16, 32].into_iter())
+        Box::new([4, 8, 16, 32].into_iter())
     } else {
         Box::new((0..12).flat_map(|k| [1, 2, 5].map(|f| f * 10_i64.pow(k))))
     }
@@ -160,7 +163,7 @@ mod tests {
             let mut histogram = if log { Histogram::sizes() } else { Histogram::linear(0.5) };
             values.iter().for_each(|v| histogram.add(*v));
             let bars = &Histogram::bars(&[&histogram])[0];
-            prop_assert!(bars.len() as i64 <= MOST_BARS);
+            prop_assert!(bars.len() as f64 <= BARS.1);
             prop_assert_eq!(bars.iter().map(|b| b.count).sum::<u64>(), values.len() as u64);
             for bar in bars {
                 let slack = 1e-3 * bar.to;
@@ -173,11 +176,11 @@ mod tests {
 
     #[test]
     fn all_of_a_thing_is_the_last_bar_of_its_shares() {
-        let mut shares = Histogram::shares();
-        (0..=100).for_each(|k| shares.add(f64::from(k) / 100.0));
+        let mut shares = Histogram::percents();
+        (0..=1000).for_each(|k| shares.add(f64::from(k) / 10.0));
         let bars = &Histogram::bars(&[&shares])[0];
-        assert_eq!((bars.len(), bars[0].count, bars[19].count), (20, 5, 6));
-        assert_eq!((bars[19].from, bars[19].to), (0.95, 1.0));
+        assert_eq!((bars.len(), bars[0].count, bars[9].count), (10, 100, 101));
+        assert_eq!((bars[9].from, bars[9].to), (90.0, 100.0));
     }
 
     #[test]
@@ -188,7 +191,7 @@ mod tests {
         b.add(f64::NAN);
         let bars = Histogram::bars(&[&a, &b]);
         assert_eq!(bars[0].len(), bars[1].len());
-        assert_eq!((bars[0][0].from, bars[0][0].to), (0.0, 5.0));
+        assert_eq!((bars[0][0].from, bars[0][0].to), (0.0, 20.0));
         assert_eq!((bars[0][0].count, bars[1].last().unwrap().count), (1, 1));
         assert_eq!((b.n(), b.mean(), b.range()), (1, 90.0, Some((90.0, 90.0))));
     }

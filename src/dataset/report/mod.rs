@@ -72,10 +72,9 @@ fn html(set: &Set, found: &Statistics, photographs: &Photographs, names: &[Vec<S
     section("Soil", &grid(&soil(found)));
     section("Camera and photographs", &grid(&camera(found, photographs)));
     let card = format!(
-        "<div class=\"two\"><div><h3>Where it comes from</h3>{}</div><div><h3>Splits</h3>{}<p>Every image is a field of its own: no plant and \
-         no patch of soil is in two splits.</p></div></div>",
+        "<div class=\"two\"><div><h3>Where it comes from</h3>{}</div><div><h3>Splits</h3>{}</div></div>",
         card::provenance(recipe),
-        card::splits(names, found.images)
+        card::splits(recipe, names, found.images)
     );
     section("Dataset card", &card);
     section("How to read it", &card::reading(recipe));
@@ -130,12 +129,22 @@ fn one(key: &str, title: &str, unit: &str, class: &str, values: &Histogram) -> S
 fn labels(found: &Statistics) -> String {
     let [_, crop, weed] = &found.shares;
     let row = |name, values| Series { name, class: name, values };
-    histograms("share", "Share of an image", "of its pixels; images", &[row("crop", crop), row("weed", weed)])
+    histograms("share", "Share of an image", "% of its pixels; images", &[row("crop", crop), row("weed", weed)])
         + &pair("plants", "Plants in an image", "images", &found.plants)
         + &pair("plant_pixels", "Size of a plant", "pixels seen; plants", &found.plant_pixels)
         + &pair("leaf_pixels", "Size of a leaf", "pixels seen; leaves", &found.leaf_pixels)
-        + &pair("plant_visible", "Visible fraction of a plant", "1: nothing hides it; plants", &found.plant_visible)
-        + &pair("leaf_visible", "Visible fraction of a leaf", "1: nothing hides it; leaves", &found.leaf_visible)
+        + &pair(
+            "plant_visible",
+            "Visible fraction of a plant",
+            "%, 100 where nothing hides it; plants",
+            &found.plant_visible,
+        )
+        + &pair(
+            "leaf_visible",
+            "Visible fraction of a leaf",
+            "%, 100 where nothing hides it; leaves",
+            &found.leaf_visible,
+        )
 }
 
 fn plants(found: &Statistics) -> String {
@@ -153,7 +162,7 @@ fn light(found: &Statistics) -> String {
     chart::suns(&light.suns)
         + &one("sun_elevation_deg", "Elevation of the sun", "degrees; images", "light", &light.elevation_deg)
         + &one("irradiance", "Light on the ground", "mean of R, G, B, W·m⁻²·nm⁻¹; images", "light", &light.irradiance)
-        + &one("cloud", "Cloud cover", "0 clear, 1 overcast; images", "light", &light.cloud)
+        + &one("cloud", "Cloud cover", "%; images", "light", &light.cloud)
         + &one("turbidity", "Turbidity", "2 clear, 10 hazy; images", "light", &light.turbidity)
         + &kinds
 }
@@ -164,11 +173,11 @@ fn soil(found: &Statistics) -> String {
     let name = |file: &str| file.rsplit_once('.').map_or(file, |(stem, _)| stem).to_owned();
     let layers: Vec<(String, &str, f64)> =
         soil.layers.iter().map(|(file, sum)| (name(file), "soil", sum / all.max(1e-12))).collect();
-    one("moisture", "Moisture", "0 air-dry, 1 saturated; images", "soil", &soil.moisture)
+    one("moisture", "Moisture", "% of saturation; images", "soil", &soil.moisture)
         + &chart::shares("Layers", "mean share of the ground", &layers)
         + &one("roughness_mm", "Roughness", "rms height of the ground, mm; images", "soil", &soil.roughness_mm)
         + &one("clods", "Clods", "longer than 5 mm, on a square metre; images", "soil", &soil.clods)
-        + &one("straw", "Straw", "share of the ground; images", "soil", &soil.straw)
+        + &one("straw", "Straw", "% of the ground; images", "soil", &soil.straw)
 }
 
 fn camera(found: &Statistics, photographs: &Photographs) -> String {
@@ -180,5 +189,5 @@ fn camera(found: &Statistics, photographs: &Photographs) -> String {
         + &chart::swatches("Mean colours of photographs", &unit("dark to bright"), &photographs.colors)
         + &one("brightness", "Brightness", &unit("mean of R, G, B, of 255"), "plain", &photographs.brightness)
         + &one("nir", "Brightness in near infrared", &unit("of 255"), "plain", &photographs.nir)
-        + &one("clipped", "Overexposed pixels", &unit("share of an image"), "plain", &photographs.clipped)
+        + &one("clipped", "Overexposed pixels", &unit("% of an image"), "plain", &photographs.clipped)
 }

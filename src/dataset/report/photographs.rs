@@ -16,7 +16,7 @@ pub(super) struct Photographs {
     pub(super) brightness: Histogram,
     /// Mean near infrared of an image, of 255.
     pub(super) nir: Histogram,
-    /// Share of an image's pixels with a channel at 255.
+    /// Percent of an image's pixels with a channel at 255.
     pub(super) clipped: Histogram,
     /// Mean colours, dark ones first.
     pub(super) colors: Vec<[u8; 3]>,
@@ -37,12 +37,12 @@ pub(super) fn measure(set: &Set) -> Result<Photographs> {
         measured,
         brightness: Histogram::linear(0.5),
         nir: Histogram::linear(0.5),
-        clipped: Histogram::linear(0.0002),
+        clipped: Histogram::linear(0.01),
         colors: Vec::new(),
     };
     for Means(rgb, clipped, nir) in &all {
         found.brightness.add(rgb.iter().sum::<f64>() / 3.0);
-        found.clipped.add(*clipped);
+        found.clipped.add(100.0 * clipped);
         nir.iter().for_each(|x| found.nir.add(*x));
         found.colors.push(rgb.map(|x| x.round() as u8));
     }

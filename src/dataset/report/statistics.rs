@@ -25,7 +25,7 @@ pub(super) struct Statistics {
     /// Pixels by class, and without a label.
     pub(super) pixels: [u64; Class::ALL.len()],
     pub(super) ignored: u64,
-    /// Share of each image, by class.
+    /// Share of each image, by class; percent, as all shares here.
     pub(super) shares: [Histogram; Class::ALL.len()],
     /// Plants, each with at least one pixel, in an image.
     pub(super) plants: Pair,
@@ -105,12 +105,12 @@ impl Statistics {
             sizes: BTreeMap::new(),
             pixels: [0; Class::ALL.len()],
             ignored: 0,
-            shares: std::array::from_fn(|_| Histogram::shares()),
+            shares: std::array::from_fn(|_| Histogram::percents()),
             plants: pair(Histogram::whole),
             plant_pixels: pair(Histogram::sizes),
             leaf_pixels: pair(Histogram::sizes),
-            plant_visible: pair(Histogram::shares),
-            leaf_visible: pair(Histogram::shares),
+            plant_visible: pair(Histogram::percents),
+            leaf_visible: pair(Histogram::percents),
             hidden: 0,
             cut: 0,
             bbch: pair(Histogram::whole),
@@ -121,15 +121,15 @@ impl Statistics {
                 kinds: BTreeMap::new(),
                 suns: Vec::new(),
                 elevation_deg: Histogram::linear(1.0 / 2.0),
-                cloud: Histogram::shares(),
+                cloud: Histogram::percents(),
                 turbidity: Histogram::linear(0.05),
                 irradiance: Histogram::linear(0.01),
             },
             soil: Soil {
-                moisture: Histogram::shares(),
+                moisture: Histogram::percents(),
                 roughness_mm: Histogram::linear(0.05),
-                straw: Histogram::shares(),
-                clods: Histogram::sizes(),
+                straw: Histogram::linear(0.02),
+                clods: Histogram::linear(50.0),
                 layers: BTreeMap::new(),
             },
             camera: Camera {
@@ -149,7 +149,7 @@ impl Statistics {
         for share in &record.classes {
             let class = share.class as usize;
             self.pixels[class] += share.pixels;
-            self.shares[class].add(share.pixels as f64 / pixels);
+            self.shares[class].add(100.0 * share.pixels as f64 / pixels);
         }
         for (k, class) in PLANTS.into_iter().enumerate() {
             let of_class = || record.plants.iter().filter(|p| p.class == class);
@@ -172,10 +172,10 @@ impl Statistics {
     fn add_plant(&mut self, class: usize, plant: &Plant) {
         let seen = &plant.seen;
         if seen.unoccluded.is_some() {
-            self.plant_visible[class].add(seen.visible_fraction());
+            self.plant_visible[class].add(100.0 * seen.visible_fraction());
         }
         for leaf in plant.leaves.iter().filter(|l| l.seen.unoccluded.is_some()) {
-            self.leaf_visible[class].add(leaf.seen.visible_fraction());
+            self.leaf_visible[class].add(100.0 * leaf.seen.visible_fraction());
         }
         if seen.pixels == 0 {
             self.hidden += 1;
@@ -216,7 +216,7 @@ impl Statistics {
                     light.suns.push([azimuth, elevation, number("cloud").unwrap_or(0.0)]);
                 }
             }
-            number("cloud").into_iter().for_each(|x| light.cloud.add(x));
+            number("cloud").into_iter().for_each(|x| light.cloud.add(100.0 * x));
             number("turbidity").into_iter().for_each(|x| light.turbidity.add(x));
         }
         if !lights.is_empty() {
@@ -227,13 +227,13 @@ impl Statistics {
 
 impl Soil {
     fn add(&mut self, soil: &Value) {
-        let add = |to: &mut Histogram, path: &str| {
-            soil.pointer(path).and_then(Value::as_f64).into_iter().for_each(|x| to.add(x))
+        let add = |to: &mut Histogram, path: &str, scale: f64| {
+            soil.pointer(path).and_then(Value::as_f64).into_iter().for_each(|x| to.add(scale * x));
         };
-        add(&mut self.moisture, "/moisture/mean");
-        add(&mut self.roughness_mm, "/relief/rms_mm");
-        add(&mut self.straw, "/litter/straw_cover");
-        add(&mut self.clods, "/clods/over_5mm_per_m2");
+        add(&mut self.moisture, "/moisture/mean", 100.0);
+        add(&mut self.roughness_mm, "/relief/rms_mm", 1.0);
+        add(&mut self.straw, "/litter/straw_cover", 100.0);
+        add(&mut self.clods, "/clods/over_5mm_per_m2", 1.0);
         for layer in soil["layers"].as_array().into_iter().flatten() {
             if let (Some(name), Some(share)) = (layer["name"].as_str(), layer["share"].as_f64()) {
                 *self.layers.entry(name.to_owned()).or_default() += share;
