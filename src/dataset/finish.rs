@@ -7,18 +7,19 @@ use super::{format, report};
 use crate::output::UNFINISHED;
 use crate::{Error, Result};
 use sha2::{Digest, Sha256};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// The manifest's file.
 pub const MANIFEST: &str = "manifest.json";
 
-/// Writes everything that belongs to all images. An [`Error::Damaged`] names the images that are missing.
-pub fn finish(set: &Set) -> Result<Vec<PathBuf>> {
+/// Writes everything that belongs to all images. An [`Error::Damaged`] names the images that are missing, and, of a dataset in so many
+/// `shards`, those.
+pub fn finish(set: &Set, shards: Option<u64>) -> Result<Vec<PathBuf>> {
     let Set { folder, recipe } = set;
     let missing: Vec<u64> = (0..recipe.count).filter(|k| Seal::read(folder, *k).is_none()).collect();
     if !missing.is_empty() {
-        return Err(Error::Damaged(lacks(set, &missing)));
+        return Err(Error::Damaged(lacks(set, &missing, shards)));
     }
     sweep(folder)?;
     let mut whole = Whole::new(folder);
@@ -35,10 +36,18 @@ pub fn finish(set: &Set) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// Says which images are missing, for a person and for a scheduler.
-pub fn lacks(set: &Set, missing: &[u64]) -> String {
+/// Says which images are missing, for a person, and, where their number is known, which shards, for a scheduler.
+pub fn lacks(set: &Set, missing: &[u64], shards: Option<u64>) -> String {
+    let again = match shards {
+        None => "run `trace dataset render` again; it makes what is missing".to_owned(),
+        Some(of) => {
+            let lacking: BTreeSet<u64> = missing.iter().map(|k| k % of).collect();
+            let lacking: Vec<u64> = lacking.into_iter().collect();
+            format!("run the shards again that have them: --array={}", ranges(&lacking))
+        }
+    };
     format!(
-        "{}: {} of {} images are missing\n help: run `trace dataset render` again; it makes what is missing: {}",
+        "{}: {} of {} images are missing: {}\n help: {again}",
         set.folder.display(),
         missing.len(),
         set.recipe.count,
