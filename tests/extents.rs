@@ -98,7 +98,6 @@ fn check(scene: &Scene, window: Window) -> Extents {
             compared += expected[1];
         }
     }
-    eprintln!("{compared} pixels, {doubtful} in doubt");
     assert!(doubtful * 2000 <= compared, "{doubtful} of {compared} pixels in doubt");
     found
 }
@@ -119,6 +118,16 @@ fn extents_are_those_of_each_plant_and_leaf_alone() {
     let hidden = found.values().filter(|e| e.visible < e.unoccluded).count();
     let cut = found.values().filter(|e| e.unoccluded < e.whole).count();
     assert!(found.len() > 20 && hidden > 5 && cut > 2, "{} extents, {hidden} hidden, {cut} cut", found.len());
+}
+
+/// A closed canopy, where leaves lie over leaves many times, and models from disk, whose triangles may be large.
+#[test]
+fn extents_hold_in_a_canopy_and_for_models() {
+    for page in ["benches/canopy.ron", "scenes/07-model.ron"] {
+        let options = Options { width: Some(64), ..Options::default() };
+        let scene = build::field(Path::new(page), &options).unwrap_or_else(|e| panic!("{e}")).scene;
+        assert!(!check(&scene, full(&scene)).is_empty());
+    }
 }
 
 #[test]

@@ -101,6 +101,25 @@ fn a_printed_page_reads_the_same() {
     }
 }
 
+#[test]
+fn the_papers_four_sets_differ_in_their_weeds_and_seeds_alone() {
+    let read = |set: char| -> FieldDesc {
+        Page::read(Path::new(&format!("scenes/synthetic-{set}.ron"))).unwrap().parse().unwrap_or_else(|e| panic!("{e}"))
+    };
+    let all = ['a', 'b', 'c', 'd'].map(read);
+    for (i, page) in all.iter().enumerate() {
+        for other in &all[..i] {
+            assert!(page.seed != other.seed && page.weeds != other.weeds);
+            let alike = FieldDesc { seed: page.seed, weeds: page.weeds.clone(), ..other.clone() };
+            assert!(alike == *page, "seed {}: something else than weeds and seed differs", page.seed);
+        }
+    }
+    let species = |page: &FieldDesc| page.weeds.iter().map(|w| w.species.clone()).collect::<Vec<_>>();
+    assert_eq!(species(&all[1]), ["species/capsella.ron"]);
+    assert_eq!(species(&all[2]), ["species/galium.ron"]);
+    assert_eq!(species(&all[3]).len(), 5);
+}
+
 /// What a bad page is told, as the program prints it.
 fn told(path: &Path) -> String {
     match build::field(path, &Options { width: Some(16), ..Options::default() }) {

@@ -7,9 +7,10 @@
 use super::ledger::{Ledger, Row};
 use super::seal::{Seal, write_files};
 use super::set::Set;
-use super::shoot::{Engine, Times, shoot};
+use super::shoot::{Engine, Times, shoot, source};
 use super::{File, format, native};
 use crate::render::{self, Watch};
+use crate::scene::build::Source;
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::sync::Mutex;
@@ -85,7 +86,10 @@ pub fn generate(set: &Set, work: &Work, engine: Option<&dyn Engine>, overseer: &
     let at_once = if work.at_once == 0 { (threads / 2).clamp(2, 16) } else { work.at_once }.min(tasks.len().max(1));
     let run = Run {
         set,
-        engine,
+        studio: engine
+            .filter(|_| tasks.iter().any(|(_, t)| *t == Task::All))
+            .map(|e| source(set).map(|s| (s, e)))
+            .transpose()?,
         overseer,
         threads,
         at_once,
@@ -159,7 +163,8 @@ fn in_format(path: &str, format: &str) -> bool {
 /// A run of a shard.
 struct Run<'a> {
     set: &'a Set,
-    engine: Option<&'a dyn Engine>,
+    /// What images are made of, and by whom.
+    studio: Option<(Source, &'a dyn Engine)>,
     overseer: &'a Overseer<'a>,
     threads: usize,
     at_once: usize,
@@ -174,9 +179,9 @@ impl Run<'_> {
         let (files, times) = if task == Task::Formats {
             (derived(self.set, index)?, Times::default())
         } else {
-            let engine = self.engine.ok_or_else(|| lost(self.set, index))?;
+            let (source, engine) = self.studio.as_ref().ok_or_else(|| lost(self.set, index))?;
             let watch = Watch { done: &|_| (), stop: self.overseer.now };
-            let shot = shoot(folder, recipe, index, engine, &watch)?;
+            let shot = shoot(self.set, source, index, *engine, &watch)?;
             super::invariants::check(recipe, &shot.sample)?;
             let mut files = native::files(&shot.sample, &shot.text)?;
             files.extend(formatted(self.set, &shot.sample)?);

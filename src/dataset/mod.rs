@@ -10,6 +10,7 @@
 //! coco/ phenobench/ …   the same for other people's tools
 //! seals/000123.json     SHA-256 of each of its files; written last
 //! ledger/               how long each image took, one file a run: the only place with clock times
+//! jobs/                 what `emit` wrote for a scheduler, and its logs; belongs to no image
 //! manifest.json         everything above in one list, written when all images are there
 //! report.html           what is in it, for people
 //! ```
@@ -21,9 +22,12 @@
 //! | `native`, `format` | as files, ours and other people's |
 //! | `seal`, `set` | which files make an image; the dataset on disk |
 //! | `plan`, `generate`, `ledger`, `finish` | from a page to files; what remains to be done is found by looking at the disk |
+//! | `cluster` | the same on many machines: job files for schedulers |
 //! | `invariants`, `verify` | what must hold of every image, and whether it does |
+//! | `report` | all of it on one page, for people |
 
 pub mod annotate;
+pub mod cluster;
 pub mod finish;
 pub mod format;
 pub mod generate;
@@ -33,6 +37,7 @@ pub mod native;
 pub mod plan;
 pub mod recipe;
 pub mod record;
+pub mod report;
 pub mod rle;
 pub mod sample;
 pub mod seal;

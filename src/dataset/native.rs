@@ -11,7 +11,7 @@
 //! | `record.json` | what is known in words and numbers |
 
 use super::File;
-use super::recipe::json;
+use super::recipe::compact;
 use super::record::Record;
 use super::sample::{IGNORE, Sample};
 use crate::output::{self, Picture};
@@ -57,7 +57,7 @@ pub fn files(sample: &Sample, text: &str) -> Result<Vec<File>> {
     if !sample.depth.is_empty() {
         add("geometry.exr", output::encode_geometry(w, h, &sample.depth, &sample.normals)?);
     }
-    add("record.json", json(&sample.record)?);
+    add("record.json", compact(&sample.record)?);
     Ok(files)
 }
 

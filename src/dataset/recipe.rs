@@ -172,6 +172,13 @@ pub(super) fn json(value: &impl Serialize) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// JSON on one line.
+pub(super) fn compact(value: &impl Serialize) -> Result<Vec<u8>> {
+    let mut bytes = serde_json::to_vec(value).map_err(failed)?;
+    bytes.push(b'\n');
+    Ok(bytes)
+}
+
 /// Bytes in hex.
 pub(super) fn hex(bytes: &[u8]) -> String {
     use std::fmt::Write;

@@ -3,7 +3,7 @@
 //! A seal is written last. It holds a hash of itself, so a damaged seal is no seal.
 
 use super::File;
-use super::recipe::{Recipe, hex, json};
+use super::recipe::{Recipe, compact, hex};
 use super::set::Set;
 use crate::output::write_atomically;
 use crate::{Error, Result};
@@ -98,12 +98,12 @@ impl Seal {
     /// Writes it: after everything that it names.
     pub fn write(&self, folder: &Path) -> Result<()> {
         let written = Written { seal: self.clone(), seal_sha256: self.hash()? };
-        write_atomically(&Self::path(folder, self.index), &json(&written)?)
+        write_atomically(&Self::path(folder, self.index), &compact(&written)?)
     }
 
     /// SHA-256 over everything in it, hex.
     pub fn hash(&self) -> Result<String> {
-        Ok(hex(&Sha256::digest(json(self)?)))
+        Ok(hex(&Sha256::digest(compact(self)?)))
     }
 
     /// The same over its native files alone, whatever formats there are.

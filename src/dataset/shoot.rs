@@ -10,11 +10,10 @@ use crate::film::Film;
 use crate::geometry::Window;
 use crate::output::{Provenance, half};
 use crate::render::{self, LabelMap, Watch};
-use crate::scene::build::{self, Options};
+use crate::scene::build::{Options, Source};
 use crate::scene::{Field, PlantRecord};
 use crate::{Error, Result};
 use std::collections::BTreeMap;
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Draws fields: a path tracer, a rasterizer.
@@ -55,19 +54,24 @@ pub struct Shot {
     pub times: Times,
 }
 
-/// Makes image `index` of a dataset in `folder`. Call it inside a pool.
-pub fn shoot(folder: &Path, recipe: &Recipe, index: u64, engine: &dyn Engine, watch: &Watch<'_>) -> Result<Shot> {
+/// The page that a dataset is rendered from.
+pub fn source(set: &Set) -> Result<Source> {
+    Source::open(&set.folder.join(&set.recipe.rendering()?.scene))
+}
+
+/// Makes image `index` of a dataset from its [`source`]. Call it inside a pool.
+pub fn shoot(set: &Set, source: &Source, index: u64, engine: &dyn Engine, watch: &Watch<'_>) -> Result<Shot> {
+    let Set { folder, recipe } = set;
     let rendering = recipe.rendering()?;
     let begin = Instant::now();
     let options =
         Options { seed: Some(rendering.seed), index, width: Some(rendering.width), height: Some(rendering.height) };
-    let page = folder.join(&rendering.scene);
-    let field = build::field(&page, &options)?;
+    let field = source.field(&options)?;
     if field.hash != rendering.scene_sha256 {
         return Err(Error::Dataset(format!(
             "{}: the page or something that it names was changed since the dataset was begun\n help: restore {}/scene/, or begin \
              another dataset",
-            page.display(),
+            folder.join(&rendering.scene).display(),
             folder.display()
         )));
     }

@@ -4,11 +4,12 @@ use super::finish::{MANIFEST, lacks, ranges};
 use super::generate::Task;
 use super::seal::{Print, Seal};
 use super::set::Set;
-use super::shoot::{Engine, shoot};
+use super::shoot::{Engine, shoot, source};
 use super::split::Split;
 use super::{File, format, generate, invariants, ledger, native};
 use crate::render::Watch;
 use crate::sampling::rng::mix;
+use crate::scene::build::Source;
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -28,15 +29,15 @@ pub struct Findings {
 }
 
 impl Findings {
-    /// Everything that was found in one error, or nothing.
-    pub fn verdict(&self, set: &Set) -> Result<()> {
+    /// Everything that was found in one error, or nothing; `shards` is how many the dataset is made in, where that is known.
+    pub fn verdict(&self, set: &Set, shards: Option<u64>) -> Result<()> {
         const MOST: usize = 20;
         let mut words: Vec<String> = self.faults.iter().take(MOST).cloned().collect();
         if self.faults.len() > MOST {
             words.push(format!("and {} more", self.faults.len() - MOST));
         }
         if !self.missing.is_empty() {
-            words.push(lacks(set, &self.missing));
+            words.push(lacks(set, &self.missing, shards));
         }
         if words.is_empty() { Ok(()) } else { Err(Error::Damaged(words.join("\nerror: "))) }
     }
@@ -76,12 +77,16 @@ pub fn verify(
     if found.missing.is_empty() {
         found.faults.extend(listed(set)?);
     }
+    if again == 0 {
+        return Ok(found);
+    }
+    let source = source(set)?;
     for index in drawn(count, again) {
         if found.missing.contains(&index) {
             continue;
         }
-        let engine = engine.ok_or_else(|| set.recipe.rendering().err().unwrap_or(Error::Interrupted))?;
-        match rerender(set, index, engine, stop)? {
+        let Some(engine) = engine else { continue };
+        match rerender(set, &source, index, engine, stop)? {
             Some(fault) => found.faults.push(fault),
             None => found.rendered += 1,
         }
@@ -197,9 +202,9 @@ fn drawn(count: u64, again: u64) -> Vec<u64> {
     all
 }
 
-fn rerender(set: &Set, index: u64, engine: &dyn Engine, stop: &AtomicBool) -> Result<Option<String>> {
+fn rerender(set: &Set, source: &Source, index: u64, engine: &dyn Engine, stop: &AtomicBool) -> Result<Option<String>> {
     let watch = Watch { done: &|_| (), stop };
-    let shot = shoot(&set.folder, &set.recipe, index, engine, &watch)?;
+    let shot = shoot(set, source, index, engine, &watch)?;
     let mut files = native::files(&shot.sample, &shot.text)?;
     for (_, format) in format::all(&set.recipe)? {
         files.extend(format.image(&set.recipe, &shot.sample)?);

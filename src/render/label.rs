@@ -63,13 +63,15 @@ pub fn label(geometry: &dyn Intersect, parts: &[Part], camera: &Camera, window: 
 
 /// The interpolated unit normal at a hit on the side that a ray along `direction` comes from. Near the outline of a curved
 /// surface it may point away from the eye, which the triangle's own normal never does.
+#[inline]
 fn facing(mesh: &Mesh, hit: &Hit, direction: Vec3) -> Vec3 {
     let corners = mesh.triangles[hit.triangle as usize].map(|i| i as usize);
     let [a, b, c] = corners.map(|i| mesh.positions[i]);
     let [na, nb, nc] = corners.map(|i| mesh.normals[i]);
-    let flat = (b - a).cross(c - a).normalize_or(-direction);
-    let smooth = (na * (1.0 - hit.u - hit.v) + nb * hit.u + nc * hit.v).normalize_or(flat);
+    let flat = (b - a).cross(c - a);
+    let flat = if flat.dot(direction) > 0.0 { -flat } else { flat };
+    let smooth = na * (1.0 - hit.u - hit.v) + nb * hit.u + nc * hit.v;
     let smooth = if smooth.dot(flat) < 0.0 { -smooth } else { smooth };
-    let side = if flat.dot(direction) > 0.0 { -1.0 } else { 1.0 };
-    side * if side * smooth.dot(direction) < 0.0 { smooth } else { flat }
+    let faces = smooth.dot(direction) < 0.0;
+    if faces { smooth.normalize() } else { flat.normalize_or(-direction) }
 }

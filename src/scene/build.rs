@@ -27,7 +27,7 @@ use crate::{Error, Result};
 use rayon::prelude::*;
 pub use season::Season;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 impl Field {
     /// Seed of the samples: a field of its own noise for every image.
@@ -113,17 +113,43 @@ const MOST_PLANTS: usize = u16::MAX as usize;
 
 /// Builds field `options.index` of the page at `path`.
 pub fn field(path: &Path, options: &Options) -> Result<Field> {
-    let mut library = Library::default();
-    let page = library.page(path)?;
-    let desc: FieldDesc = page.parse()?;
-    Builder::new(&page, &desc, options, library)?.build()
+    Source::open(path)?.field(options)
 }
 
 /// Builds a field from a page's text; paths are relative to the working directory.
 pub fn field_of(text: &str, options: &Options) -> Result<Field> {
-    let page = Page::of(text);
-    let desc: FieldDesc = page.parse()?;
-    Builder::new(&page, &desc, options, Library::default())?.build()
+    Source::of(Page::of(text), Library::default())?.field(options)
+}
+
+/// A page and what its fields have read so far, so that the next field need not read it again. Several may be built at once.
+pub struct Source {
+    page: Page,
+    desc: FieldDesc,
+    library: Mutex<Library>,
+}
+
+impl Source {
+    /// Reads a page.
+    pub fn open(path: &Path) -> Result<Self> {
+        let mut library = Library::default();
+        let page = library.page(path)?;
+        Self::of(page, library)
+    }
+
+    fn of(page: Page, library: Library) -> Result<Self> {
+        let desc: FieldDesc = page.parse()?;
+        Ok(Self { page, desc, library: Mutex::new(library) })
+    }
+
+    /// Builds field `options.index`. Call it inside a pool.
+    pub fn field(&self, options: &Options) -> Result<Field> {
+        let held = || self.library.lock().unwrap_or_else(PoisonError::into_inner);
+        // A copy of names and references: fields that are built at once do not wait for each other.
+        let library = held().clone();
+        let (field, library) = Builder::new(&self.page, &self.desc, options, library)?.build()?;
+        *held() = library;
+        Ok(field)
+    }
 }
 
 /// A plant to be grown: where, which, how old.
@@ -141,7 +167,7 @@ struct Seedling {
 /// The ground while it is being covered.
 struct Earth {
     ground: Ground,
-    maps: Vec<Layer>,
+    maps: Vec<Arc<Layer>>,
     pile: Pile,
     stones: Vec<Debris>,
 }
@@ -244,7 +270,8 @@ impl<'a> Builder<'a> {
         self.scene.parts.push(Part { mesh, mask: None, material, tag: Tag::default() });
     }
 
-    fn build(mut self) -> Result<Field> {
+    /// The field, and the library with whatever was read for it.
+    fn build(mut self) -> Result<(Field, Library)> {
         let wanted = self.desc.soil.is_some() || !self.desc.crops.is_empty() || !self.desc.weeds.is_empty();
         let view = if wanted { self.view()? } else { Rect::new(-0.5, -0.5, 0.5, 0.5) };
         let (sown, shown) = (view.grown(PLANT_MARGIN), wanted.then_some(view));
@@ -283,7 +310,7 @@ impl<'a> Builder<'a> {
             weeds: self.weed_records()?,
             season: self.season,
         };
-        Ok(Field {
+        let field = Field {
             scene: self.scene,
             plants,
             species,
@@ -295,12 +322,13 @@ impl<'a> Builder<'a> {
             seed: self.seed,
             index: self.index,
             warnings: self.warnings,
-        })
+        };
+        Ok((field, self.library))
     }
 
     /// The ground and the stones in it: what must be known before plants can be placed.
     fn break_ground(&mut self, desc: &SoilDesc, view: Rect) -> Result<Earth> {
-        let mut maps: Vec<Layer> = Vec::new();
+        let mut maps: Vec<Arc<Layer>> = Vec::new();
         for layer in &desc.layers {
             maps.push(self.library.layer(self.page, layer)?);
         }

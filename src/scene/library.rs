@@ -31,12 +31,13 @@ pub(super) struct Species {
 }
 
 /// What was read so far. Every file's bytes go into the hash in the order of their paths.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Library {
     files: BTreeMap<PathBuf, [u8; 32]>,
     pictures: BTreeMap<PathBuf, Cut>,
     species: BTreeMap<PathBuf, Arc<Species>>,
     models: BTreeMap<(PathBuf, bool), Arc<Model>>,
+    layers: BTreeMap<(PathBuf, PathBuf), Arc<Layer>>,
 }
 
 impl Library {
@@ -146,7 +147,11 @@ impl Library {
     }
 
     /// A soil layer's textures.
-    pub(super) fn layer(&mut self, page: &Page, desc: &LayerDesc) -> Result<Layer> {
+    pub(super) fn layer(&mut self, page: &Page, desc: &LayerDesc) -> Result<Arc<Layer>> {
+        let key = (desc.albedo.clone(), desc.height.clone());
+        if let Some(known) = self.layers.get(&key) {
+            return Ok(known.clone());
+        }
         let mut need = |path: &Path| -> Result<(PathBuf, String)> {
             let text = path.to_string_lossy().into_owned();
             let full = page.need_file(&text)?;
@@ -162,7 +167,9 @@ impl Library {
             let (height, text) = need(&desc.height)?;
             Height::load(&height, 1.0).map_err(|e| at_its_place(page, &text, e))?
         };
-        Ok(Layer { albedo, height: height.wrapped(Wrap::Repeat) })
+        let layer = Arc::new(Layer { albedo, height: height.wrapped(Wrap::Repeat) });
+        self.layers.insert(key, layer.clone());
+        Ok(layer)
     }
 
     fn note(&mut self, path: &Path) -> Result<()> {

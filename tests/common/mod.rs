@@ -2,6 +2,7 @@
 #![allow(dead_code, unreachable_pub, reason = "each test uses its part")]
 
 pub mod chi2;
+pub mod dataset;
 pub mod layers;
 pub mod pictures;
 pub mod program;

@@ -1,5 +1,6 @@
 //! `trace dataset`: many fields, with all their labels, in the formats of other tools.
 
+mod emit;
 mod engine;
 mod finish;
 mod order;
@@ -34,7 +35,8 @@ Examples:
 On several machines that share a folder:
   trace dataset plan --scene scenes/synthetic-d.ron --count 100000 --out data/d --spp 32
   trace dataset render data/d --shard 0/64              … to 63/64, each anywhere, in any order, as often as needed
-  trace dataset finish data/d";
+  trace dataset finish data/d
+  trace dataset emit data/d --engine slurm --shards 64  job files that do the last two, for `bash data/d/jobs/submit.sh`";
 
 #[derive(Subcommand)]
 enum Verb {
@@ -46,6 +48,8 @@ enum Verb {
     Finish(finish::Args),
     /// Check every file and every label; render some images again.
     Verify(verify::Args),
+    /// Write job files for a cluster: Slurm, Kubernetes, or GNU parallel.
+    Emit(emit::Args),
 }
 
 #[derive(clap::Args)]
@@ -63,10 +67,11 @@ pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
         Some(Verb::Render(args)) => render::run(args, signals),
         Some(Verb::Finish(args)) => finish::run(args, signals),
         Some(Verb::Verify(args)) => verify::run(args, signals),
+        Some(Verb::Emit(args)) => emit::run(args),
         None => {
             let set = order::run(&cli.make.order)?;
             render::generate(&set, &cli.make.work, furrow::dataset::generate::Shard::ALL, signals)?;
-            finish::write(&set)
+            furrow::dataset::finish::finish(&set, None)
         }
     }
 }

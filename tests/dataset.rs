@@ -1,0 +1,264 @@
+//! Datasets: image k is field k and nothing else, whatever makes it, in whatever order and however often it is interrupted.
+//!
+//! Rationale: what is rendered over a night on many machines must be one dataset, and must be what it says. Expected: equality
+//! byte for byte, with the single field and between shards, threads and repairs; every damage found, every broken rule told;
+//! bad input refused with nothing changed. Source: none needed, equality is exact.
+
+mod common;
+
+use common::dataset::{fail, made, make, path, same, succeed, tree, verb};
+use common::program::{SMALL, run, scratch, trace};
+use furrow::dataset::record::PointState;
+use furrow::dataset::{Sample, Set, invariants, native};
+use std::fs;
+use std::path::Path;
+
+#[test]
+fn an_image_of_a_dataset_is_the_single_field() {
+    let (_keep, data) = scratch();
+    let (_keep, one) = scratch();
+    succeed(make(&data, 3, &[]));
+    run(&one, &["--index", "2", "--width", "96", "--spp", "2"]);
+    for name in ["rgb.png", "nir.png", "semantics.png", "plants.png", "leaves.png"] {
+        let (ours, single) = (fs::read(data.join("images/000002").join(name)), fs::read(one.join(name)));
+        assert_eq!(ours.unwrap(), single.unwrap(), "{name}");
+    }
+}
+
+#[test]
+fn shards_threads_and_order_make_the_same_bytes() {
+    let (_keep, whole) = scratch();
+    let (_keep, parts) = scratch();
+    succeed(make(&whole, 5, &["--threads", "1", "--at-once", "1"]));
+    let page = ["--scene", SMALL, "--out", path(&parts), "--count", "5"];
+    succeed(trace(&[&["dataset", "plan"], &page[..], &common::dataset::SIZE].concat()));
+    for shard in ["2/3", "0/3", "1/3"] {
+        succeed(verb("render", &parts, &["--shard", shard, "--threads", "3", "--at-once", "2"]));
+    }
+    succeed(verb("finish", &parts, &[]));
+    same(&tree(&parts), &tree(&whole));
+    let said = succeed(verb("verify", &parts, &["--rerender", "2"])).stderr;
+    let said = String::from_utf8_lossy(&said).into_owned();
+    assert!(said.contains("5 of 5 images checked, 2 rendered again and the same; 0 faults"), "{said}");
+}
+
+#[test]
+fn a_longer_dataset_with_more_formats_begins_with_the_shorter_one() {
+    let (_keep, grown) = scratch();
+    let (_keep, fresh) = scratch();
+    let bare = |count: &str| {
+        let mut command = trace(&["dataset", "--scene", SMALL, "--quiet", "--out", path(&grown), "--count", count]);
+        command.args(&common::dataset::SIZE[..4]);
+        command
+    };
+    succeed(bare("2"));
+    succeed(bare("4"));
+    assert_eq!(made(&grown).len(), 4, "the first two are not made again");
+    succeed(verb("finish", &grown, &["--format", "imagefolder", "--quiet"]));
+    succeed(make(&fresh, 4, &[]));
+    same(&tree(&grown), &tree(&fresh));
+}
+
+#[test]
+fn what_is_damaged_is_found_and_made_again_and_nothing_else() {
+    let (_keep, data) = scratch();
+    succeed(make(&data, 6, &[]));
+    let whole = tree(&data);
+    let at = |name: &str| data.join(name);
+    let flip = |name: &str| {
+        let mut bytes = fs::read(at(name)).unwrap();
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 1;
+        fs::write(at(name), bytes).unwrap();
+    };
+    flip("images/000000/rgb.png");
+    fs::remove_file(at("images/000001/plants.png")).unwrap();
+    fs::File::options().write(true).open(at("images/000002/record.json")).unwrap().set_len(100).unwrap();
+    flip("seals/000003.json");
+    flip("imagefolder/train/masks/000004.png");
+    fs::write(at("images/000005/.furrow-left"), b"half").unwrap();
+    let said = fail(verb("verify", &data, &["--shards", "3"]), 1);
+    for name in [
+        "images/000000/rgb.png was changed",
+        "images/000001/plants.png is missing",
+        "images/000002/record.json has 100 bytes",
+        "imagefolder/train/masks/000004.png was changed",
+        "5 of 6 images are missing: 0-4\n",
+        "--array=0-2",
+    ] {
+        assert!(said.contains(name), "{name}: {said}");
+    }
+    let before = made(&data).len();
+    succeed(make(&data, 6, &[]));
+    same(&tree(&data), &whole);
+    let mut again = made(&data).split_off(before);
+    again.sort_unstable();
+    assert_eq!(again, [0, 1, 2, 3, 4]);
+    succeed(verb("verify", &data, &[]));
+}
+
+#[test]
+fn a_lying_label_is_found_though_its_hash_is_right() {
+    let (_keep, data) = scratch();
+    succeed(make(&data, 2, &[]));
+    let set = Set::open(&data).unwrap();
+    let mut sample = native::read(&data, "000001").unwrap();
+    let other = sample.semantics.iter().position(|c| *c == 0).unwrap();
+    sample.semantics[other] = 2;
+    let files = native::files(&sample, "").unwrap();
+    let mut seal = furrow::dataset::seal::Seal::read(&data, 1).unwrap();
+    for file in files {
+        fs::write(data.join(&file.path), &file.bytes).unwrap();
+        seal.files.insert(file.path, furrow::dataset::seal::Print::of(&file.bytes));
+    }
+    seal.write(&data).unwrap();
+    let said = fail(verb("verify", &set.folder, &[]), 1);
+    assert!(said.contains("image 000001: 1 pixels are crop or weed but no plant"), "{said}");
+    assert!(said.contains("images/000001/semantics.png is another file than manifest.json lists"), "{said}");
+    let said = fail(verb("verify", &set.folder, &["--rerender", "2"]), 1);
+    assert!(said.contains("rendered again, these come out otherwise"), "{said}");
+}
+
+#[test]
+fn samples_come_back_from_their_files() {
+    let (_keep, data) = scratch();
+    succeed(make(&data, 1, &[]));
+    let sample = native::read(&data, "000000").unwrap();
+    for file in native::files(&sample, "").unwrap().iter().filter(|f| !f.path.ends_with(".png")) {
+        assert!(fs::read(data.join(&file.path)).unwrap() == file.bytes, "{}", file.path);
+    }
+    let (_keep, copy) = scratch();
+    for file in native::files(&sample, "").unwrap() {
+        fs::create_dir_all(copy.join(&file.path).parent().unwrap()).unwrap();
+        fs::write(copy.join(&file.path), &file.bytes).unwrap();
+    }
+    assert!(native::read(&copy, "000000").unwrap() == sample);
+}
+
+/// A sample whose plants and leaves are many enough to break.
+fn sample(data: &Path) -> (Set, Sample) {
+    succeed(make(data, 1, &[]));
+    let set = Set::open(data).unwrap();
+    let sample = native::read(data, "000000").unwrap();
+    assert!(sample.record.leaves().count() > 4 && sample.record.seen().count() > 1);
+    (set, sample)
+}
+
+/// Each break is one that a bug, a disk or a hand could make; each must be told in words of its own.
+#[test]
+fn every_broken_invariant_is_told() {
+    let (_keep, data) = scratch();
+    let (set, whole) = sample(&data);
+    assert_eq!(invariants::faults(&set.recipe, &whole), Vec::<String>::new());
+    let plant = whole.plants.iter().position(|p| *p > 0).unwrap();
+    let soil = whole.plants.iter().position(|p| *p == 0).unwrap();
+    let leaf = whole.leaves.iter().position(|l| *l > 0).unwrap();
+    type Break<'a> = (&'a str, Box<dyn Fn(&mut Sample) + 'a>);
+    let breaks: Vec<Break<'_>> = vec![
+        ("nir has", Box::new(|s| s.nir.truncate(7))),
+        ("have a class that there is none of", Box::new(|s| s.semantics[soil] = 9)),
+        ("have a leaf or a species but no plant", Box::new(|s| s.leaves[soil] = 1)),
+        ("are crop or weed but no plant", Box::new(|s| s.semantics[soil] = 1)),
+        ("another class or species", Box::new(|s| s.semantics[plant] = 3 - s.semantics[plant])),
+        ("or are soil", Box::new(|s| s.semantics[plant] = 0)),
+        ("is not among the", Box::new(|s| s.species.iter_mut().filter(|k| **k > 0).for_each(|k| *k = 200))),
+        ("it is in the split", Box::new(|s| s.record.split = furrow::dataset::split::Split::Test)),
+        ("a keypoint is not a number", Box::new(|s| s.record.plants[0].stem.as_mut().unwrap().x = f32::NAN)),
+        ("pixels of a class", Box::new(|s| s.record.classes[0].pixels += 1)),
+        (
+            "plants, boxes or masks",
+            Box::new(|s| {
+                let seen = s.record.plants.iter_mut().find(|p| p.seen.pixels > 0).unwrap();
+                seen.seen.bounds.as_mut().unwrap().0[2] += 1;
+            }),
+        ),
+        ("plants, boxes or masks", Box::new(|s| s.leaves[leaf] += 1)),
+        (
+            "more is seen of plant",
+            Box::new(|s| {
+                let seen = &mut s.record.plants.iter_mut().find(|p| p.seen.pixels > 0).unwrap().seen;
+                seen.unoccluded = Some(seen.pixels - 1);
+            }),
+        ),
+        (
+            "is larger than the plant",
+            Box::new(|s| {
+                let plant = s.record.plants.iter_mut().find(|p| !p.leaves.is_empty()).unwrap();
+                (plant.leaves[0].seen.unoccluded, plant.leaves[0].seen.whole) = (Some(1 << 20), Some(1 << 20));
+            }),
+        ),
+        ("do not sum to one", Box::new(|s| s.coverage[soil][0] ^= 1)),
+        ("by their samples", Box::new(|s| s.coverage.iter_mut().for_each(|c| *c = [0, 0, 255]))),
+        ("a depth is not a number", Box::new(|s| s.depth[3] = f32::NAN)),
+        ("not before the camera", Box::new(|s| s.depth[3] = -1.0)),
+        ("not a unit vector", Box::new(|s| s.normals[3] = [0.0, 0.0, 1.2])),
+    ];
+    for (words, damage) in breaks {
+        let mut broken = whole.clone();
+        damage(&mut broken);
+        let faults = invariants::faults(&set.recipe, &broken).join("; ");
+        assert!(faults.contains(words), "`{words}` is not among: {faults}");
+    }
+}
+
+/// Expected: a stem and leaf ends lie where the label maps say that their plant is, within a pixel, wherever they are told to be visible.
+#[test]
+fn keypoints_lie_on_what_they_belong_to() {
+    let (_keep, data) = scratch();
+    let (_, sample) = sample(&data);
+    let (w, h) = sample.size();
+    let near = |x: f32, y: f32, is: &dyn Fn(usize) -> bool| {
+        let (x, y) = (x.floor() as i64, y.floor() as i64);
+        (y - 1..=y + 1)
+            .flat_map(|y| (x - 1..=x + 1).map(move |x| (x, y)))
+            .filter(|(x, y)| (0..i64::from(w)).contains(x) && (0..i64::from(h)).contains(y))
+            .any(|(x, y)| is((y * i64::from(w) + x) as usize))
+    };
+    let (mut visible, mut other) = (0, 0);
+    for plant in &sample.record.plants {
+        for leaf in &plant.leaves {
+            for point in leaf.base.iter().chain(&leaf.tip) {
+                let inside = (0.0..w as f32).contains(&point.x) && (0.0..h as f32).contains(&point.y);
+                assert_eq!(inside, point.state != PointState::Outside);
+                let on =
+                    near(point.x, point.y, &|i| sample.plants[i] == plant.number && sample.leaves[i] == leaf.number);
+                assert_eq!(inside && on, point.state == PointState::Visible);
+                if point.state == PointState::Visible { visible += 1 } else { other += 1 }
+            }
+        }
+    }
+    assert!(visible > 10 && other > 0, "{visible} visible, {other} not");
+}
+
+#[test]
+fn bad_input_is_refused_and_changes_nothing() {
+    let (_keep, data) = scratch();
+    succeed(make(&data, 2, &[]));
+    let before = tree(&data);
+    let other = |more: &[&str], words: &str| {
+        let said = fail(make(&data, 2, more), 2);
+        assert!(said.contains(words), "`{words}`: {said}");
+    };
+    other(&["--seed", "9"], "seed 3 there, 9 here");
+    other(&["--height", "40"], "height 72 there, 40 here");
+    let said = fail(make(&data, 1, &[]), 2);
+    assert!(said.contains("it has 2 images, more than 1"), "{said}");
+    let said = fail(verb("verify", data.parent().unwrap(), &[]), 2);
+    assert!(said.contains("this is no dataset"), "{said}");
+    let said = fail(verb("render", &data, &["--shard", "3/3"]), 2);
+    assert!(said.contains("k from 0 to N - 1"), "{said}");
+    same(&tree(&data), &before);
+    // A folder with other things in it.
+    let (_keep, full) = scratch();
+    fs::create_dir_all(&full).unwrap();
+    fs::write(full.join("thesis.tex"), b"three years").unwrap();
+    let said = fail(make(&full, 1, &[]), 2);
+    assert!(said.contains("thesis.tex among them"), "{said}");
+    assert_eq!(tree(&full).len(), 1);
+    // A page that was changed under the dataset.
+    let page = fs::read_to_string(data.join("scene/tests/ref/small.ron")).unwrap();
+    fs::write(data.join("scene/tests/ref/small.ron"), page.replace("elevation_deg: 45", "elevation_deg: 50")).unwrap();
+    fs::remove_file(data.join("images/000001/rgb.png")).unwrap();
+    let said = fail(verb("render", &data, &[]), 2);
+    assert!(said.contains("was changed since the dataset was begun"), "{said}");
+}

@@ -1,0 +1,126 @@
+//! No image is lost: a dataset that is killed at any moment, or whose disk is full, is gone on with and ends as if nothing had been.
+//!
+//! Rationale: a night's rendering meets power cuts, preemption and full disks. Expected: after any number of kills the same command
+//! ends with the bytes of an uninterrupted run and no file beside them; a full disk is one clear error and no half file; TERM and USR1 are
+//! exit code 75. Source: none needed, equality is exact.
+
+mod common;
+
+use common::dataset::{made, make, path, same, succeed, tree};
+use common::program::{SMALL, scratch, trace};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// A small generator: the moments must differ, and be the same in every run of the test.
+fn moments() -> impl FnMut() -> u64 {
+    let mut state = 0x2545_f491_4f6c_dd1d_u64;
+    move || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        state
+    }
+}
+
+#[test]
+fn killed_twenty_times_it_ends_as_if_never_killed() {
+    const COUNT: u64 = 8;
+    let (_keep, whole) = scratch();
+    let (_keep, data) = scratch();
+    let begin = Instant::now();
+    succeed(make(&whole, COUNT, &[]));
+    let once = begin.elapsed();
+    let mut next = moments();
+    let mut alive = 0;
+    for _ in 0..20 {
+        let mut child =
+            make(&data, COUNT, &[]).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program");
+        // Within the first quarter of a whole run: so that many kills hit work.
+        std::thread::sleep(once.mul_f64(0.25 * (next() % 1000) as f64 / 1000.0));
+        alive += u32::from(child.try_wait().expect("a child").is_none());
+        child.kill().expect("a kill");
+        child.wait().expect("an end");
+    }
+    assert!(alive > 10, "{alive} of 20 kills hit a running program");
+    succeed(make(&data, COUNT, &[]));
+    same(&tree(&data), &tree(&whole));
+    assert!(made(&data).len() as u64 >= COUNT);
+}
+
+/// A file system of its own, so small that it gets full: tmpfs, in a mount namespace of its own where this user may not mount.
+fn on_a_small_disk(folder: &Path, kilobytes: u32, script: &str) -> Option<std::process::Output> {
+    std::fs::create_dir_all(folder).expect("a folder");
+    let mount = format!("mount -t tmpfs -o size={kilobytes}k tmpfs '{}' && {{ {script}; }}", path(folder));
+    for how in [&["unshare", "--mount"][..], &["unshare", "--map-root-user", "--mount"]] {
+        let probe = Command::new(how[0]).args(&how[1..]).args(["true"]).output();
+        if probe.is_ok_and(|o| o.status.success()) {
+            let shell = Command::new(how[0]).args(&how[1..]).args(["sh", "-c", &mount]).output().expect("a shell");
+            if !String::from_utf8_lossy(&shell.stderr).starts_with("mount:") {
+                return Some(shell);
+            }
+        }
+    }
+    // A right that a machine may withhold, not a program that could be installed.
+    eprintln!("skipped: this user can mount no small disk");
+    None
+}
+
+#[test]
+fn a_full_disk_is_one_clear_error_and_no_half_file() {
+    let (_keep, disk) = scratch();
+    let (_keep, whole) = scratch();
+    succeed(make(&whole, 8, &[]));
+    let size: usize = tree(&whole).values().map(Vec::len).sum();
+    // Half of it fits. Then room is made, and the same command ends as if nothing had been.
+    let data = disk.join("data");
+    let command = format!("{:?}", make(&data, 8, &[]));
+    let copy = disk.with_extension("copy");
+    let script = format!(
+        "{command}; echo code $? >&2; find '{data}' -name '.furrow-*' >&2; \
+         mount -o remount,size={large}k '{disk}'; {command} && cp -r '{data}' '{copy}'",
+        data = path(&data),
+        disk = path(&disk),
+        copy = path(&copy),
+        large = size / 1024 * 4,
+    );
+    let Some(output) = on_a_small_disk(&disk, (size / 2048) as u32, &script) else { return };
+    let said = String::from_utf8_lossy(&output.stderr);
+    let lines: Vec<&str> = said.lines().collect();
+    let [error, code] = lines[..] else { panic!("one error and its code, but: {said}") };
+    assert!(error.starts_with("error: ") && error.contains("No space left on device"), "{error}");
+    assert_eq!(code, "code 1");
+    assert!(output.status.success(), "{said}");
+    same(&tree(&copy), &tree(&whole));
+    std::fs::remove_dir_all(copy).expect("the copy goes");
+}
+
+/// Expected: USR1 lets the images under way be finished, TERM does not wait for them; both are 75, and what is there stays.
+#[test]
+fn signals_stop_a_dataset_cleanly() {
+    for signal in ["-USR1", "-TERM"] {
+        let (_keep, data) = scratch();
+        let plan = ["dataset", "--scene", SMALL, "--count", "500", "--width", "96", "--spp", "2", "--quiet"];
+        let mut child = trace(&[&plan[..], &["--out", path(&data)]].concat())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program");
+        let deadline = Instant::now() + Duration::from_secs(120);
+        while made(&data).is_empty() && Instant::now() < deadline {
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        let id = child.id().to_string();
+        assert!(Command::new("kill").args([signal, &id]).status().expect("kill").success());
+        let status = child.wait().expect("an end");
+        assert_eq!(status.code(), Some(75), "{signal}");
+        let files = tree(&data);
+        assert!(files.keys().all(|name| !name.contains(".furrow-")), "{signal}");
+        let sealed = files.keys().filter(|name| name.starts_with("seals/")).count();
+        let images = files.keys().filter(|name| name.ends_with("/record.json")).count();
+        assert!(sealed > 0 && sealed < 500, "{signal}: {sealed}");
+        if signal == "-USR1" {
+            assert_eq!(sealed, images, "images under way are finished");
+        }
+    }
+}
