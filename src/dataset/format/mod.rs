@@ -51,6 +51,7 @@ mod picture;
 formats! {
     "coco" => coco: "COCO instances and keypoints of plants and leaves, for `pycocotools`",
     "imagefolder" => imagefolder: "Hugging Face ImageFolder: images, masks and metadata.jsonl for `datasets`",
+    "layers" => layers: "OpenEXR: radiance, variance, ids, coverage and Cryptomattes in one file an image",
     "phenobench" => phenobench: "PhenoBench: semantics, plants, leaves and visibility, for `phenobench`",
 }
 
