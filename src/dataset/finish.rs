@@ -1,30 +1,32 @@
 //! What belongs to all images together, written when all are there: the formats' lists, the manifest, the report.
 
-use super::format;
 use super::recipe::{FILE, Recipe, hex};
 use super::seal::{Print, Seal};
 use super::set::{Set, Stream, Whole};
+use super::{format, report};
 use crate::output::UNFINISHED;
 use crate::{Error, Result};
 use sha2::{Digest, Sha256};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// The manifest's file.
 pub const MANIFEST: &str = "manifest.json";
 
-/// Writes everything that belongs to all images. An [`Error::Damaged`] names the images that are missing.
-pub fn finish(set: &Set) -> Result<Vec<PathBuf>> {
+/// Writes everything that belongs to all images. An [`Error::Damaged`] names the images that are missing, and, of a dataset in so many
+/// `shards`, those.
+pub fn finish(set: &Set, shards: Option<u64>) -> Result<Vec<PathBuf>> {
     let Set { folder, recipe } = set;
     let missing: Vec<u64> = (0..recipe.count).filter(|k| Seal::read(folder, *k).is_none()).collect();
     if !missing.is_empty() {
-        return Err(Error::Damaged(lacks(set, &missing)));
+        return Err(Error::Damaged(lacks(set, &missing, shards)));
     }
     sweep(folder)?;
     let mut whole = Whole::new(folder);
     for (_, format) in format::all(recipe)? {
         format.whole(set, &mut whole)?;
     }
+    report::write(set, &mut whole)?;
     let mut files = own_files(folder, recipe)?;
     files.append(&mut whole.files.clone());
     let mut paths: Vec<PathBuf> = whole.files.keys().map(|p| folder.join(p)).collect();
@@ -34,10 +36,18 @@ pub fn finish(set: &Set) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// Says which images are missing, for a person and for a scheduler.
-pub fn lacks(set: &Set, missing: &[u64]) -> String {
+/// Says which images are missing, for a person, and, where their number is known, which shards, for a scheduler.
+pub fn lacks(set: &Set, missing: &[u64], shards: Option<u64>) -> String {
+    let again = match shards {
+        None => "run `trace dataset render` again; it makes what is missing".to_owned(),
+        Some(of) => {
+            let lacking: BTreeSet<u64> = missing.iter().map(|k| k % of).collect();
+            let lacking: Vec<u64> = lacking.into_iter().collect();
+            format!("run the shards again that have them: --array={}", ranges(&lacking))
+        }
+    };
     format!(
-        "{}: {} of {} images are missing\n help: run `trace dataset render` again; it makes what is missing: {}",
+        "{}: {} of {} images are missing: {}\n help: {again}",
         set.folder.display(),
         missing.len(),
         set.recipe.count,

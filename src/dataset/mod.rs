@@ -24,6 +24,7 @@
 //! | `plan`, `generate`, `ledger`, `finish` | from a page to files; what remains to be done is found by looking at the disk |
 //! | `cluster` | the same on many machines: job files for schedulers |
 //! | `invariants`, `verify` | what must hold of every image, and whether it does |
+//! | `report` | all of it on one page, for people |
 
 pub mod annotate;
 pub mod cluster;
@@ -36,6 +37,7 @@ pub mod native;
 pub mod plan;
 pub mod recipe;
 pub mod record;
+pub mod report;
 pub mod rle;
 pub mod sample;
 pub mod seal;

@@ -117,6 +117,12 @@ impl Recipe {
         }
     }
 
+    /// The name of a species by its number in `species.png`; `None` for 0 and numbers of no species.
+    pub fn species_name(&self, number: u16) -> Option<&str> {
+        let place = usize::from(number).checked_sub(1)?;
+        self.species.get(place).map(|s| s.name.as_str())
+    }
+
     /// Whether `other` makes the same images as far as both go: it may be longer and have other formats.
     pub fn check_goes_on(&self, folder: &Path, other: &Self) -> Result<()> {
         let (before, now) = (fields(self)?, fields(other)?);

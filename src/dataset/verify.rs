@@ -29,15 +29,15 @@ pub struct Findings {
 }
 
 impl Findings {
-    /// Everything that was found in one error, or nothing.
-    pub fn verdict(&self, set: &Set) -> Result<()> {
+    /// Everything that was found in one error, or nothing; `shards` is how many the dataset is made in, where that is known.
+    pub fn verdict(&self, set: &Set, shards: Option<u64>) -> Result<()> {
         const MOST: usize = 20;
         let mut words: Vec<String> = self.faults.iter().take(MOST).cloned().collect();
         if self.faults.len() > MOST {
             words.push(format!("and {} more", self.faults.len() - MOST));
         }
         if !self.missing.is_empty() {
-            words.push(lacks(set, &self.missing));
+            words.push(lacks(set, &self.missing, shards));
         }
         if words.is_empty() { Ok(()) } else { Err(Error::Damaged(words.join("\nerror: "))) }
     }

@@ -6,6 +6,7 @@ mod exr;
 pub mod gltf;
 pub mod mitsuba;
 mod overlay;
+mod photo;
 mod png;
 
 use crate::film::Film;
@@ -19,6 +20,7 @@ use std::path::{Path, PathBuf};
 pub use self::exr::{Geometry, encode_geometry, half, read_geometry};
 pub use self::png::{Picture, encode as encode_png, read_gray, read_gray16, read_indexed, read_rgb, write_png};
 pub use denoise::Denoiser;
+pub use photo::{encode_jpeg, shrink, shrunk};
 
 /// How many samples the pixels of an image have.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -46,8 +46,12 @@ macro_rules! formats {
     };
 }
 
+mod picture;
+
 formats! {
+    "coco" => coco: "COCO instances and keypoints of plants and leaves, for `pycocotools`",
     "imagefolder" => imagefolder: "Hugging Face ImageFolder: images, masks and metadata.jsonl for `datasets`",
+    "phenobench" => phenobench: "PhenoBench: semantics, plants, leaves and visibility, for `phenobench`",
 }
 
 /// The formats that a recipe names.

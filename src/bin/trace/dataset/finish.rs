@@ -13,6 +13,9 @@ use std::path::PathBuf;
 pub(crate) struct Args {
     /// Folder of the dataset.
     dir: PathBuf,
+    /// How many shards it is made in: what is missing is then told as shards too, as Slurm's --array takes them.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    shards: Option<u64>,
     /// Further formats, separated by commas; made from the images that are there.
     #[arg(long, value_delimiter = ',', value_name = "FORMAT", value_parser = formats())]
     format: Vec<String>,
@@ -29,10 +32,5 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         }
         generate(&set, &args.work, Shard::ALL, signals)?;
     }
-    write(&set)
-}
-
-/// Writes what belongs to all images; returns the manifest and the formats' lists.
-pub(super) fn write(set: &Set) -> Result<Vec<PathBuf>> {
-    finish::finish(set)
+    finish::finish(&set, args.shards)
 }

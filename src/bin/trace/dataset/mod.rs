@@ -71,7 +71,7 @@ pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
         None => {
             let set = order::run(&cli.make.order)?;
             render::generate(&set, &cli.make.work, furrow::dataset::generate::Shard::ALL, signals)?;
-            finish::write(&set)
+            furrow::dataset::finish::finish(&set, None)
         }
     }
 }

@@ -15,6 +15,9 @@ use std::time::Instant;
 pub(crate) struct Args {
     /// Folder of the dataset.
     dir: PathBuf,
+    /// How many shards it is made in: what is missing is then told as shards too, as Slurm's --array takes them.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    shards: Option<u64>,
     /// Render so many images again and compare their bytes.
     #[arg(long, value_name = "N", default_value_t = 0)]
     rerender: u64,
@@ -47,6 +50,6 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
             found.faults.len()
         );
     }
-    found.verdict(&set)?;
+    found.verdict(&set, args.shards)?;
     Ok(Vec::new())
 }

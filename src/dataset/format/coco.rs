@@ -1,0 +1,189 @@
+//! COCO instances and keypoints: `annotations/instances_SPLIT.json` and `images/SPLIT/NAME.png`; `pycocotools.coco.COCO` reads it.
+//!
+//! Categories are 1 crop, 2 weed, 3 leaf. Every plant and every leaf that an image shows is an annotation: `segmentation` is a
+//! compressed run-length mask with `iscrowd` 0, for leaves have holes and parts that polygons cannot hold; `area` is its number of
+//! pixels; ids begin at 1, for `COCOeval` takes a match with id 0 for none.
+//!
+//! All categories share the keypoints stem, base, tip, because readers want one number of them in a file: a plant has the first, a
+//! leaf the others, the rest is `0 0 0`. A point in sight has 2, a hidden one 1, one outside the image `0 0 0`. Points are in the
+//! coordinates of the boxes, where the first pixel's centre is (0.5, 0.5).
+//!
+//! `attributes`, which `pycocotools` passes over and datumaro and CVAT read, tell the number in `plants.png` and `leaves.png`, the
+//! species, and how much is visible.
+//!
+//! Source: COCO data format, <https://cocodataset.org/#format-data>; cocoapi issue 332 on id 0.
+
+use super::{Format, Whole, picture};
+use crate::dataset::recipe::Recipe;
+use crate::dataset::record::{Keypoint, Leaf, Plant, PointState, Record, Seen};
+use crate::dataset::sample::Sample;
+use crate::dataset::set::{Set, Stream};
+use crate::dataset::split::Split;
+use crate::dataset::File;
+use crate::scene::tag::Class;
+use crate::Result;
+use serde::Serialize;
+use serde_json::{Value, json};
+
+pub(super) struct Writer;
+
+const FOLDER: &str = "coco";
+
+/// Category of leaves, behind those of the classes.
+const LEAF: u32 = 3;
+
+impl Format for Writer {
+    fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
+        let Record { name, split, .. } = &sample.record;
+        Ok(vec![picture::photograph(sample, format!("{FOLDER}/images/{}/{name}.png", split.name()))?])
+    }
+
+    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+        for split in Split::ALL {
+            if set.names(split).is_empty() {
+                continue;
+            }
+            out.file(&format!("{FOLDER}/annotations/instances_{}.json", split.name()), |w| {
+                head(w, set, split)?;
+                w.put("\"categories\": [")?;
+                w.items(categories().into_iter().map(Ok))?;
+                w.put("],\n\"annotations\": [")?;
+                w.items(annotations(set, split))?;
+                w.put("]\n}\n")
+            })?;
+        }
+        Ok(())
+    }
+}
+
+/// What COCO files of all kinds begin with: where they come from, their licence, their images.
+pub(super) fn head(w: &mut Stream<'_>, set: &Set, split: Split) -> Result<()> {
+    let recipe = &set.recipe;
+    let info = json!({ "description": "Crop fields rendered by Furrow", "version": recipe.furrow });
+    w.put("{\n\"info\": ")?;
+    w.json(&info)?;
+    w.put(",\n\"licenses\": ")?;
+    w.json(&json!([{ "id": 1, "name": recipe.licence, "url": "" }]))?;
+    w.put(",\n\"images\": [")?;
+    w.items(set.records(split).map(|record| Ok(image(&record?))))?;
+    w.put("],\n")
+}
+
+/// The id of an image, from 1.
+pub(super) fn image_id(record: &Record) -> u64 {
+    record.index + 1
+}
+
+fn image(record: &Record) -> Value {
+    json!({
+        "id": image_id(record),
+        "file_name": format!("{}.png", record.name),
+        "width": record.width,
+        "height": record.height,
+        "license": 1,
+    })
+}
+
+/// The category of a class: its number.
+pub(super) fn category(class: Class) -> u32 {
+    class as u32
+}
+
+fn categories() -> Vec<Value> {
+    let category = |(id, name, supercategory): (u32, &str, &str)| {
+        // The blade runs from keypoint 2, its base, to keypoint 3, its tip.
+        let skeleton = if id == LEAF { json!([[2, 3]]) } else { json!([]) };
+        let keypoints = ["stem", "base", "tip"];
+        json!({ "id": id, "name": name, "supercategory": supercategory, "keypoints": keypoints, "skeleton": skeleton })
+    };
+    let class = |class: Class| (self::category(class), class.name(), "plant");
+    [class(Class::Crop), class(Class::Weed), (LEAF, "leaf", "organ")].map(category).to_vec()
+}
+
+/// A plant or a leaf.
+#[derive(Serialize)]
+struct Annotation {
+    id: u64,
+    image_id: u64,
+    category_id: u32,
+    segmentation: Value,
+    area: u32,
+    bbox: Value,
+    iscrowd: u32,
+    keypoints: Vec<Value>,
+    num_keypoints: usize,
+    attributes: Value,
+}
+
+/// All annotations of a split, image by image, a plant before its leaves.
+fn annotations(set: &Set, split: Split) -> impl Iterator<Item = Result<Annotation>> + '_ {
+    let of_image = |record: Result<Record>| match record {
+        Ok(record) => record.seen().flat_map(|plant| of_plant(set, &record, plant)).map(Ok).collect(),
+        Err(e) => vec![Err(e)],
+    };
+    let numbered = |(i, annotation): (usize, Result<Annotation>)| {
+        annotation.map(|annotation| Annotation { id: i as u64 + 1, ..annotation })
+    };
+    set.records(split).flat_map(of_image).enumerate().map(numbered)
+}
+
+fn of_plant(set: &Set, record: &Record, plant: &Plant) -> Vec<Annotation> {
+    let mut all = vec![annotation(record, category(plant.class), &plant.seen, [plant.stem, None, None], about(set, plant))];
+    for leaf in plant.leaves.iter().filter(|l| l.seen.pixels > 0) {
+        let about = json!({
+            "plant": plant.number,
+            "leaf": leaf.number,
+            "class": plant.class.name(),
+            "visible_fraction": leaf.seen.visible_fraction(),
+            "inside_fraction": leaf.seen.inside_fraction(),
+        });
+        let Leaf { base, tip, .. } = leaf;
+        all.push(annotation(record, LEAF, &leaf.seen, [None, *base, *tip], about));
+    }
+    all
+}
+
+fn annotation(
+    record: &Record,
+    category_id: u32,
+    seen: &Seen,
+    points: [Option<Keypoint>; 3],
+    attributes: Value,
+) -> Annotation {
+    let points = points.map(|p| keypoint(p).unwrap_or_else(|| [0, 0, 0].map(Value::from)));
+    Annotation {
+        id: 0,
+        image_id: image_id(record),
+        category_id,
+        segmentation: json!(seen.mask),
+        area: seen.pixels,
+        bbox: json!(seen.bounds),
+        iscrowd: 0,
+        num_keypoints: points.iter().filter(|p| p[2] != 0).count(),
+        keypoints: points.concat(),
+        attributes,
+    }
+}
+
+/// x, y, and 2 in sight, 1 behind something; `None` outside the image.
+fn keypoint(point: Option<Keypoint>) -> Option<[Value; 3]> {
+    let Keypoint { x, y, state } = point?;
+    let v = match state {
+        PointState::Visible => 2,
+        PointState::Hidden => 1,
+        PointState::Outside => return None,
+    };
+    // A hundredth of a pixel; more digits say nothing.
+    let rounded = |x: f32| Value::from((f64::from(x) * 100.0).round() / 100.0);
+    Some([rounded(x), rounded(y), v.into()])
+}
+
+fn about(set: &Set, plant: &Plant) -> Value {
+    json!({
+        "plant": plant.number,
+        "species": set.recipe.species_name(plant.kind),
+        "bbch": plant.grown.as_ref().map(|g| g.bbch),
+        "visible_fraction": plant.seen.visible_fraction(),
+        "inside_fraction": plant.seen.inside_fraction(),
+    })
+}

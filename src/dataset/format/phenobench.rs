@@ -1,0 +1,112 @@
+//! PhenoBench: `SPLIT/{images,semantics,plant_instances,…}/NAME.png`, read by the `phenobench` package and judged by `phenobench-eval`.
+//!
+//! | folder | holds |
+//! |---|---|
+//! | `images` | the photograph; `test` has nothing else, as in the original |
+//! | `semantics` | 16 bit: 0 soil, 1 crop, 2 weed, 3 and 4 the same of partial plants, 255 no label |
+//! | `plant_instances` | 16 bit: number of the plant, unique over crop and weed; 0 for none |
+//! | `leaf_instances` | 16 bit: number of the crop leaf, unique in the image; weeds' leaves have none, as in the original |
+//! | `plant_visibility`, `leaf_visibility` | 8 bit, one value an instance: share of it within the frame, of 255 |
+//!
+//! A plant is partial where less than half of its pixels lie within the frame. The original was cut from larger pictures, and its
+//! visibility is what the cut left of an instance: the evaluation takes instances of 0.5 and less for partial and asks nothing of
+//! them. So visibility here is [`Seen::inside_fraction`] as well; what *others* hide is another matter and stands in `record.json`.
+//! Rounding keeps the two alike: a share of a half or more rounds to 128 or more, and 128/255 is more than a half.
+//!
+//! Source: Weyler et al. 2024, "PhenoBench", and its loader and evaluation, version 0.1.0. The loader's `make_unique_ids` changes a
+//! copy and so nothing: numbers are unique before it.
+
+use super::{Format, picture};
+use crate::dataset::recipe::Recipe;
+use crate::dataset::record::{Plant, Seen};
+use crate::dataset::sample::Sample;
+use crate::dataset::split::Split;
+use crate::dataset::File;
+use crate::output::Picture;
+use crate::scene::tag::Class;
+use crate::{Error, Result};
+use std::collections::BTreeMap;
+
+pub(super) struct Writer;
+
+const FOLDER: &str = "phenobench";
+
+/// Pixels across and down that `phenobench-eval` takes for granted where it judges boxes.
+const SIZE: u32 = 1024;
+
+/// Share of a plant within the frame below which it is partial.
+const PARTIAL: f64 = 0.5;
+
+impl Format for Writer {
+    fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
+        let record = &sample.record;
+        let at = |kind: &str| format!("{FOLDER}/{}/{kind}/{}.png", record.split.name(), record.name);
+        let mut files = vec![picture::photograph(sample, at("images"))?];
+        if record.split == Split::Test {
+            return Ok(files);
+        }
+        let plants: BTreeMap<u16, &Plant> = record.seen().map(|p| (p.number, p)).collect();
+        let leaves = crop_leaves(sample)?;
+        let pixels = sample.plants.iter().zip(&sample.leaves);
+        let leaf_of = |(plant, leaf): (&u16, &u16)| leaves.get(&(*plant, *leaf));
+        let semantics = |(class, plant): (&u8, &u16)| semantics(*class, plants.get(plant).copied());
+        let gray16 = |kind: &str, map: &[u16]| picture::file(sample, at(kind), &Picture::Gray16(map));
+        let gray = |kind: &str, map: &[u8]| picture::file(sample, at(kind), &Picture::Gray(map));
+        let semantics: Vec<u16> = sample.semantics.iter().zip(&sample.plants).map(semantics).collect();
+        files.push(gray16("semantics", &semantics)?);
+        files.push(gray16("plant_instances", &sample.plants)?);
+        let numbers: Vec<u16> = pixels.clone().map(|p| leaf_of(p).map_or(0, |l| l.number)).collect();
+        files.push(gray16("leaf_instances", &numbers)?);
+        let seen = |plant: &u16| plants.get(plant).map_or(0, |p| visibility(&p.seen));
+        let shown: Vec<u8> = sample.plants.iter().map(seen).collect();
+        files.push(gray("plant_visibility", &shown)?);
+        let shown: Vec<u8> = pixels.map(|p| leaf_of(p).map_or(0, |l| l.visibility)).collect();
+        files.push(gray("leaf_visibility", &shown)?);
+        Ok(files)
+    }
+
+    fn warnings(&self, recipe: &Recipe) -> Vec<String> {
+        let size = recipe.rendering().ok().map(|r| (r.width, r.height));
+        let other = size.filter(|size| *size != (SIZE, SIZE));
+        let words = |(w, h)| {
+            format!(
+                "`phenobench-eval` judges boxes on {SIZE} × {SIZE} pixels, these images have {w} × {h}; the loader and the other tasks \
+                 do not mind"
+            )
+        };
+        other.map(words).into_iter().collect()
+    }
+}
+
+/// A crop leaf as the pictures tell it.
+struct CropLeaf {
+    number: u16,
+    visibility: u8,
+}
+
+/// The crop leaves that the image shows by plant and leaf, numbered from 1.
+fn crop_leaves(sample: &Sample) -> Result<BTreeMap<(u16, u16), CropLeaf>> {
+    let mut all = BTreeMap::new();
+    for (plant, leaf) in sample.record.leaves().filter(|(p, _)| p.class == Class::Crop) {
+        let number = u16::try_from(all.len() + 1).map_err(|_| too_many(&sample.record.name))?;
+        all.insert((plant.number, leaf.number), CropLeaf { number, visibility: visibility(&leaf.seen) });
+    }
+    Ok(all)
+}
+
+fn too_many(name: &str) -> Error {
+    Error::Dataset(format!(
+        "image {name} shows more than the {} crop leaves that PhenoBench's 16 bits number\n help: sow fewer plants, or leave out \
+         --format {FOLDER}",
+        u16::MAX
+    ))
+}
+
+fn semantics(class: u8, plant: Option<&Plant>) -> u16 {
+    let partial = plant.is_some_and(|p| p.seen.inside_fraction() < PARTIAL);
+    u16::from(class) + if partial { 2 } else { 0 }
+}
+
+fn visibility(seen: &Seen) -> u8 {
+    (seen.inside_fraction() * 255.0).round() as u8
+}

@@ -1,0 +1,130 @@
+//! The contact sheet: some images of each split, their labels over them.
+
+use super::html::{count, escape};
+use crate::Result;
+use crate::dataset::record::Record;
+use crate::dataset::sample::{IGNORE, Sample};
+use crate::dataset::split::Split;
+use crate::dataset::{Set, native};
+use crate::output::{self, Picture};
+use crate::scene::tag::Class;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use rayon::prelude::*;
+
+/// Most images.
+const MOST: usize = 24;
+/// Most pixels of a side.
+const SIDE: u32 = 360;
+/// Quality of the JPEGs.
+const QUALITY: u8 = 82;
+
+/// The sheet as HTML. `names` are the images of each split, in the order of [`Split::ALL`].
+pub(super) fn sheet(set: &Set, names: &[Vec<String>; 3]) -> Result<String> {
+    let all: Vec<&String> = chosen(names.each_ref().map(Vec::len))
+        .into_iter()
+        .zip(names)
+        .flat_map(|(places, names)| places.into_iter().map(move |k| &names[k]))
+        .collect();
+    let cards: Vec<String> =
+        all.par_iter().map(|name| card(&native::read(&set.folder, name)?)).collect::<Result<_>>()?;
+    Ok(cards.concat())
+}
+
+/// Which images of splits of these sizes are shown: of each the same number as far as they go, spread over it.
+fn chosen(sizes: [usize; Split::ALL.len()]) -> [Vec<usize>; Split::ALL.len()] {
+    let mut quota = [0; Split::ALL.len()];
+    while quota.iter().sum::<usize>() < MOST && quota != sizes {
+        // Of the splits with images left, the one that shows the fewest.
+        let left = (0..sizes.len()).filter(|k| quota[*k] < sizes[*k]).min_by_key(|k| quota[*k]);
+        left.into_iter().for_each(|k| quota[k] += 1);
+    }
+    std::array::from_fn(|k| (0..quota[k]).map(|i| i * sizes[k] / quota[k]).collect())
+}
+
+/// One image: photograph, labels, words.
+fn card(sample: &Sample) -> Result<String> {
+    let Record { name, source, split, width, height, .. } = &sample.record;
+    let (w, h, rgb) = output::shrink(*width, *height, &sample.rgb, SIDE);
+    let photograph = STANDARD.encode(output::encode_jpeg(w, h, &rgb, QUALITY)?);
+    let labels = STANDARD.encode(output::encode_png(w, h, &Picture::Rgba(&overlay(sample, w, h)), "")?);
+    let source = source.as_ref().map(|s| format!(" title=\"{}\"", escape(s))).unwrap_or_default();
+    Ok(format!(
+        "<figure class=\"shot\"><label{source}><input type=\"checkbox\"><span class=\"frame\">\
+         <img src=\"data:image/jpeg;base64,{photograph}\" width=\"{w}\" height=\"{h}\" alt=\"image {name}\">\
+         <img class=\"labels\" src=\"data:image/png;base64,{labels}\" width=\"{w}\" height=\"{h}\" alt=\"its labels\"></span></label>\
+         <figcaption><b>{name}</b> {} · {}</figcaption></figure>\n",
+        split.name(),
+        words(&sample.record)
+    ))
+}
+
+/// What an image shows.
+fn words(record: &Record) -> String {
+    let of = |class: Class| record.seen().filter(|p| p.class == class).count() as u64;
+    let stages: Vec<u32> =
+        record.seen().filter(|p| p.class == Class::Crop).filter_map(|p| Some(p.grown.as_ref()?.bbch)).collect();
+    let stage = match (stages.iter().min(), stages.iter().max()) {
+        (Some(a), Some(b)) if a == b => format!(" at BBCH {a}"),
+        (Some(a), Some(b)) => format!(" at BBCH {a} to {b}"),
+        _ => String::new(),
+    };
+    format!(
+        "{}{stage}, {}",
+        count(of(Class::Crop), "crop plant", "crop plants"),
+        count(of(Class::Weed), "weed", "weeds")
+    )
+}
+
+/// Labels as colours to lay over a photograph of this size: classes tinted, one plant a little other than the next, each outlined.
+fn overlay(sample: &Sample, w: u32, h: u32) -> Vec<[u8; 4]> {
+    let (width, height) = sample.size();
+    // The pixel that the middle of the small one lies in.
+    let of = |x: u32, y: u32| {
+        let at = |k: u32, small: u32, large: u32| (2 * u64::from(k) + 1) * u64::from(large) / (2 * u64::from(small));
+        (at(y, h, height) * u64::from(width) + at(x, w, width)) as usize
+    };
+    let who = |x: u32, y: u32| (sample.semantics[of(x, y)], sample.plants[of(x, y)]);
+    let mut out = Vec::with_capacity(w as usize * h as usize);
+    for y in 0..h {
+        for x in 0..w {
+            let here = who(x, y);
+            let edge = x + 1 < w && who(x + 1, y) != here
+                || y + 1 < h && who(x, y + 1) != here
+                || x > 0 && who(x - 1, y) != here
+                || y > 0 && who(x, y - 1) != here;
+            out.push(tint(here, edge));
+        }
+    }
+    out
+}
+
+/// The colour over a pixel of a class and a plant.
+fn tint((class, plant): (u8, u16), edge: bool) -> [u8; 4] {
+    const CROP: [[u8; 3]; 3] = [[40, 200, 80], [20, 160, 120], [130, 210, 50]];
+    const WEED: [[u8; 3]; 3] = [[235, 60, 50], [215, 50, 120], [250, 125, 40]];
+    let shade = usize::from(plant % 3);
+    let color = match class {
+        c if c == Class::Crop as u8 => CROP[shade],
+        c if c == Class::Weed as u8 => WEED[shade],
+        IGNORE => [140; 3],
+        _ => return [0; 4],
+    };
+    let [r, g, b] = color;
+    if edge { [r, g, b, 255] } else { [r, g, b, 115] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_split_is_shown_as_far_as_it_goes() {
+        assert_eq!(chosen([10, 1, 1]), [(0..10).collect(), vec![0], vec![0]]);
+        let many = chosen([80_000, 10_000, 10_000]);
+        assert_eq!(many.each_ref().map(Vec::len), [8, 8, 8]);
+        assert_eq!(many[0][1], 10_000);
+        assert_eq!(chosen([100, 0, 2]).map(|p| p.len()), [22, 0, 2]);
+        assert_eq!(chosen([0, 0, 0]).map(|p| p.len()), [0, 0, 0]);
+    }
+}

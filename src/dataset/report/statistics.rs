@@ -1,0 +1,257 @@
+//! What the records of a dataset say together, added up one by one: of any number of images in little memory.
+
+use super::histogram::Histogram;
+use crate::dataset::record::{Plant, Record};
+use crate::scene::tag::Class;
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+/// Most suns that a chart shows, spread over the images.
+pub(super) const MOST_SUNS: u64 = 600;
+
+/// Crop and weed.
+pub(super) const PLANTS: [Class; 2] = [Class::Crop, Class::Weed];
+
+/// One histogram for crop, one for weed.
+pub(super) type Pair = [Histogram; 2];
+
+/// What is known of all images.
+pub(super) struct Statistics {
+    /// Number of images; how many there are in the dataset.
+    pub(super) images: u64,
+    of: u64,
+    /// Images by width and height.
+    pub(super) sizes: BTreeMap<(u32, u32), u64>,
+    /// Pixels by class, and without a label.
+    pub(super) pixels: [u64; Class::ALL.len()],
+    pub(super) ignored: u64,
+    /// Share of each image, by class; percent, as all shares here.
+    pub(super) shares: [Histogram; Class::ALL.len()],
+    /// Plants, each with at least one pixel, in an image.
+    pub(super) plants: Pair,
+    /// Pixels of a plant, of a leaf.
+    pub(super) plant_pixels: Pair,
+    pub(super) leaf_pixels: Pair,
+    /// Share of a plant, of a leaf, that nothing hides, within the frame; those wholly hidden as well.
+    pub(super) plant_visible: Pair,
+    pub(super) leaf_visible: Pair,
+    /// Plants that others hide wholly, and plants that the frame cuts.
+    pub(super) hidden: u64,
+    pub(super) cut: u64,
+    /// Of each plant seen.
+    pub(super) bbch: Pair,
+    pub(super) age_days: Pair,
+    pub(super) height_cm: Pair,
+    /// By number in the dataset's table; 0 is of none.
+    pub(super) species: BTreeMap<u16, Species>,
+    /// What was drawn for the images.
+    pub(super) light: Light,
+    pub(super) soil: Soil,
+    pub(super) camera: Camera,
+    /// What was to be known of images, and of how many.
+    pub(super) warnings: BTreeMap<String, u64>,
+}
+
+/// One species in all images.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Species {
+    /// Plants seen, their pixels, images that show one.
+    pub(super) plants: u64,
+    pub(super) pixels: u64,
+    pub(super) images: u64,
+    /// Least and most growth stage.
+    pub(super) bbch: Option<(u32, u32)>,
+}
+
+/// Light over all images.
+pub(super) struct Light {
+    /// Images by what shines.
+    pub(super) kinds: BTreeMap<String, u64>,
+    /// Azimuth, elevation (degrees) and cloud of some suns.
+    pub(super) suns: Vec<[f64; 3]>,
+    pub(super) elevation_deg: Histogram,
+    pub(super) cloud: Histogram,
+    pub(super) turbidity: Histogram,
+    /// What the ground gets of all lights, mean of R, G, B, W·m⁻²·nm⁻¹.
+    pub(super) irradiance: Histogram,
+}
+
+/// Soil over all images.
+pub(super) struct Soil {
+    pub(super) moisture: Histogram,
+    pub(super) roughness_mm: Histogram,
+    pub(super) straw: Histogram,
+    pub(super) clods: Histogram,
+    /// Sum over images of a layer's share, by its name.
+    pub(super) layers: BTreeMap<String, f64>,
+}
+
+/// Cameras over all images.
+pub(super) struct Camera {
+    pub(super) height_m: Histogram,
+    /// Between the optical axis and straight down.
+    pub(super) tilt_deg: Histogram,
+    /// Height over focal length: what a pixel spans straight below.
+    pub(super) pixel_mm: Histogram,
+}
+
+impl Statistics {
+    /// Of nothing yet; `of` images will come.
+    pub(super) fn new(of: u64) -> Self {
+        let pair = |one: fn() -> Histogram| [one(), one()];
+        Self {
+            images: 0,
+            of,
+            sizes: BTreeMap::new(),
+            pixels: [0; Class::ALL.len()],
+            ignored: 0,
+            shares: std::array::from_fn(|_| Histogram::percents()),
+            plants: pair(Histogram::whole),
+            plant_pixels: pair(Histogram::sizes),
+            leaf_pixels: pair(Histogram::sizes),
+            plant_visible: pair(Histogram::percents),
+            leaf_visible: pair(Histogram::percents),
+            hidden: 0,
+            cut: 0,
+            bbch: pair(Histogram::whole),
+            age_days: pair(|| Histogram::linear(0.5)),
+            height_cm: pair(|| Histogram::linear(0.1)),
+            species: BTreeMap::new(),
+            light: Light {
+                kinds: BTreeMap::new(),
+                suns: Vec::new(),
+                elevation_deg: Histogram::linear(1.0 / 2.0),
+                cloud: Histogram::percents(),
+                turbidity: Histogram::linear(0.05),
+                irradiance: Histogram::linear(0.01),
+            },
+            soil: Soil {
+                moisture: Histogram::percents(),
+                roughness_mm: Histogram::linear(0.05),
+                straw: Histogram::linear(0.02),
+                clods: Histogram::linear(50.0),
+                layers: BTreeMap::new(),
+            },
+            camera: Camera {
+                height_m: Histogram::linear(0.002),
+                tilt_deg: Histogram::linear(0.05),
+                pixel_mm: Histogram::linear(0.002),
+            },
+            warnings: BTreeMap::new(),
+        }
+    }
+
+    /// Counts an image.
+    pub(super) fn add(&mut self, record: &Record) {
+        *self.sizes.entry((record.width, record.height)).or_default() += 1;
+        let pixels = f64::from(record.width) * f64::from(record.height);
+        self.ignored += record.ignored;
+        for share in &record.classes {
+            let class = share.class as usize;
+            self.pixels[class] += share.pixels;
+            self.shares[class].add(100.0 * share.pixels as f64 / pixels);
+        }
+        for (k, class) in PLANTS.into_iter().enumerate() {
+            let of_class = || record.plants.iter().filter(|p| p.class == class);
+            self.plants[k].add(of_class().filter(|p| p.seen.pixels > 0).count() as f64);
+            of_class().for_each(|plant| self.add_plant(k, plant));
+        }
+        let mut here: BTreeMap<u16, u64> = BTreeMap::new();
+        record.seen().for_each(|plant| *here.entry(plant.kind).or_default() += 1);
+        here.keys().for_each(|kind| self.species.entry(*kind).or_default().images += 1);
+        record.warnings.iter().for_each(|words| *self.warnings.entry(words.clone()).or_default() += 1);
+        let conditions = &record.conditions;
+        if let Some(lights) = conditions["lights"].as_array() {
+            self.add_lights(lights);
+        }
+        self.soil.add(&conditions["soil"]);
+        self.camera.add(&conditions["camera"]);
+        self.images += 1;
+    }
+
+    fn add_plant(&mut self, class: usize, plant: &Plant) {
+        let seen = &plant.seen;
+        if seen.unoccluded.is_some() {
+            self.plant_visible[class].add(100.0 * seen.visible_fraction());
+        }
+        for leaf in plant.leaves.iter().filter(|l| l.seen.unoccluded.is_some()) {
+            self.leaf_visible[class].add(100.0 * leaf.seen.visible_fraction());
+        }
+        if seen.pixels == 0 {
+            self.hidden += 1;
+            return;
+        }
+        self.cut += u64::from(seen.inside_fraction() < 1.0);
+        self.plant_pixels[class].add(f64::from(seen.pixels));
+        for leaf in plant.leaves.iter().filter(|l| l.seen.pixels > 0) {
+            self.leaf_pixels[class].add(f64::from(leaf.seen.pixels));
+        }
+        let species = self.species.entry(plant.kind).or_default();
+        species.plants += 1;
+        species.pixels += u64::from(seen.pixels);
+        if let Some(grown) = &plant.grown {
+            self.bbch[class].add(f64::from(grown.bbch));
+            self.age_days[class].add(f64::from(grown.age_days));
+            self.height_cm[class].add(f64::from(grown.height_m) * 100.0);
+            let (least, most) = species.bbch.unwrap_or((grown.bbch, grown.bbch));
+            species.bbch = Some((least.min(grown.bbch), most.max(grown.bbch)));
+        }
+    }
+
+    fn add_lights(&mut self, lights: &[Value]) {
+        let light = &mut self.light;
+        let mut ground = 0.0;
+        for one in lights {
+            let kind = one["kind"].as_str().unwrap_or("other");
+            *light.kinds.entry(kind.to_owned()).or_default() += 1;
+            for bands in ["sun_irradiance_w_m2_nm", "sky_irradiance_w_m2_nm", "irradiance_w_m2_nm"] {
+                ground += (0..3).filter_map(|k| one[bands][k].as_f64()).sum::<f64>() / 3.0;
+            }
+            let number = |name: &str| one[name].as_f64();
+            let (azimuth, elevation) = (number("sun_azimuth_deg"), number("sun_elevation_deg"));
+            if let (Some(azimuth), Some(elevation)) = (azimuth, elevation) {
+                light.elevation_deg.add(elevation);
+                // Every n-th image, so that any number of them fits a chart.
+                if self.images.is_multiple_of(self.of.div_ceil(MOST_SUNS).max(1)) {
+                    light.suns.push([azimuth, elevation, number("cloud").unwrap_or(0.0)]);
+                }
+            }
+            number("cloud").into_iter().for_each(|x| light.cloud.add(100.0 * x));
+            number("turbidity").into_iter().for_each(|x| light.turbidity.add(x));
+        }
+        if !lights.is_empty() {
+            light.irradiance.add(ground);
+        }
+    }
+}
+
+impl Soil {
+    fn add(&mut self, soil: &Value) {
+        let add = |to: &mut Histogram, path: &str, scale: f64| {
+            soil.pointer(path).and_then(Value::as_f64).into_iter().for_each(|x| to.add(scale * x));
+        };
+        add(&mut self.moisture, "/moisture/mean", 100.0);
+        add(&mut self.roughness_mm, "/relief/rms_mm", 1.0);
+        add(&mut self.straw, "/litter/straw_cover", 100.0);
+        add(&mut self.clods, "/clods/over_5mm_per_m2", 1.0);
+        for layer in soil["layers"].as_array().into_iter().flatten() {
+            if let (Some(name), Some(share)) = (layer["name"].as_str(), layer["share"].as_f64()) {
+                *self.layers.entry(name.to_owned()).or_default() += share;
+            }
+        }
+    }
+}
+
+impl Camera {
+    fn add(&mut self, camera: &Value) {
+        let number = |path: &str| camera.pointer(path).and_then(Value::as_f64);
+        let Some(height) = number("/position_m/2") else { return };
+        self.height_m.add(height);
+        if let Some(down) = number("/world_to_camera/2/2") {
+            self.tilt_deg.add((-down).clamp(-1.0, 1.0).acos().to_degrees());
+        }
+        if let Some(focal) = number("/fx_px").filter(|f| *f > 0.0) {
+            self.pixel_mm.add(1000.0 * height / focal);
+        }
+    }
+}

@@ -1,0 +1,53 @@
+//! Photographs made small, for pages that people look at. The door to the `image` crate for writing.
+
+use crate::{Error, Result};
+use image::codecs::jpeg::JpegEncoder;
+use image::{ExtendedColorType, RgbImage, imageops};
+
+/// An 8-bit sRGB picture at most `most` pixels wide and high, of the same shape: width, height, pixels. Each pixel is the mean of
+/// those that it stands for; a picture that is small enough stays as it is.
+pub fn shrink(width: u32, height: u32, rgb: &[[u8; 3]], most: u32) -> (u32, u32, Vec<[u8; 3]>) {
+    let (w, h) = shrunk(width, height, most);
+    if (w, h) == (width, height) {
+        return (w, h, rgb.to_vec());
+    }
+    let picture = RgbImage::from_raw(width, height, rgb.as_flattened().to_vec()).unwrap_or_default();
+    (w, h, imageops::thumbnail(&picture, w, h).into_raw().as_chunks::<3>().0.to_vec())
+}
+
+/// Width and height of a picture that is made at most `most` pixels wide and high.
+pub fn shrunk(width: u32, height: u32, most: u32) -> (u32, u32) {
+    let longest = width.max(height);
+    if longest <= most {
+        return (width, height);
+    }
+    let scale = |n: u32| ((u64::from(n) * u64::from(most) + u64::from(longest) / 2) / u64::from(longest)).max(1) as u32;
+    (scale(width), scale(height))
+}
+
+/// Encodes an 8-bit sRGB picture as JPEG; `quality` is 1 to 100.
+pub fn encode_jpeg(width: u32, height: u32, rgb: &[[u8; 3]], quality: u8) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    JpegEncoder::new_with_quality(&mut bytes, quality)
+        .encode(rgb.as_flattened(), width, height, ExtendedColorType::Rgb8)
+        .map_err(|e| Error::Scene(format!("cannot encode a JPEG: {e}")))?;
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_keeps_its_shape_and_its_mean() {
+        assert_eq!(shrunk(1296, 966, 360), (360, 268));
+        assert_eq!(shrunk(966, 1296, 360), (268, 360));
+        assert_eq!(shrunk(360, 10, 360), (360, 10));
+        assert_eq!(shrunk(5000, 1, 360), (360, 1));
+        let checks: Vec<[u8; 3]> =
+            (0..64).map(|i| if (i % 8 + i / 8) % 2 == 0 { [0, 100, 200] } else { [200, 100, 0] }).collect();
+        let (w, h, small) = shrink(8, 8, &checks, 4);
+        assert_eq!((w, h), (4, 4));
+        assert!(small.iter().all(|p| *p == [100; 3]), "{small:?}");
+    }
+}

@@ -1,0 +1,114 @@
+//! Formats of other people's tools: each is opened by its own client, which must find what our maps say.
+//!
+//! Rationale: a format is right when the program that it was made for reads it and finds the same pixels, boxes and points.
+//! Expected: masks, areas, boxes and keypoints equal to those of the native files, on a field and on bare soil. Source: the clients
+//! themselves, named with their versions in each format's file. The clients are Python packages; without them the tests say so and pass,
+//! with `FURROW_REQUIRE_PEERS=1` they fail.
+
+mod common;
+
+use common::program::{SMALL, small_text, trace};
+use common::python::python;
+use furrow::dataset::format::{self, NAMES};
+use furrow::dataset::{Recipe, Sample, Set, native, seal};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::LazyLock;
+
+/// A dataset of all formats, rendered once for all tests: six images to train on, three to validate and three to test.
+static FIELD: LazyLock<PathBuf> = LazyLock::new(|| dataset("formats-field", Path::new(SMALL), 12));
+
+/// The same of ground where nothing grows, with no image to test.
+static BARE: LazyLock<PathBuf> = LazyLock::new(|| {
+    let text = small_text();
+    let bare = text.lines().filter(|l| !["crops:", "weeds:", "plants:"].iter().any(|key| l.trim().starts_with(key)));
+    let page = Path::new(env!("CARGO_TARGET_TMPDIR")).join("formats-bare.ron");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("textures");
+    let text = bare.collect::<Vec<_>>().join("\n").replace("textures", root.to_str().unwrap());
+    std::fs::write(&page, text).unwrap();
+    dataset("formats-bare", &page, 3)
+});
+
+/// Renders a dataset of all formats into a folder that stays until the next time.
+fn dataset(name: &str, page: &Path, count: u32) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    if folder.exists() {
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+    let formats: Vec<&str> = NAMES.iter().map(|(name, _)| *name).collect();
+    let mut command = trace(&["dataset", "--spp", "2", "--split", "2,1,1", "--quiet", "--licence", "CC-BY-4.0"]);
+    command.arg("--scene").arg(page).arg("--out").arg(&folder).args(["--count", &count.to_string()]);
+    let output = command.args(["--format", &formats.join(",")]).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    folder
+}
+
+/// Has a client's script look at both datasets; `probe` is a line of Python that runs where the client is installed.
+fn ask(script: &str, probe: &str) {
+    let Some(python) = python(probe) else { return };
+    for dataset in [&*FIELD, &*BARE] {
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/formats").join(script);
+        // No stray files in the sources, nothing asked of the network.
+        let quiet = [("PYTHONDONTWRITEBYTECODE", "1"), ("HF_HUB_OFFLINE", "1"), ("HF_DATASETS_OFFLINE", "1")];
+        let output = Command::new(&python).arg(script).arg(dataset).envs(quiet).output().unwrap();
+        let words = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{}: {words}", dataset.display());
+        eprintln!("{}", String::from_utf8_lossy(&output.stdout));
+    }
+}
+
+#[test]
+fn phenobench_reads_what_we_wrote() {
+    ask("check_phenobench.py", "import phenobench");
+}
+
+#[test]
+fn pycocotools_reads_what_we_wrote() {
+    ask("check_coco.py", "import pycocotools");
+}
+
+/// The images of a dataset as they lie on the disk.
+fn samples(folder: &Path) -> (Recipe, Vec<Sample>) {
+    let set = Set::open(folder).unwrap();
+    let names = (0..set.recipe.count).map(Set::name);
+    let samples = names.map(|name| native::read(folder, &name).unwrap()).collect();
+    (set.recipe, samples)
+}
+
+#[test]
+fn every_format_writes_files_for_every_image_with_plants_and_without() {
+    for folder in [&*FIELD, &*BARE] {
+        let (_, samples) = samples(folder);
+        assert!(samples.iter().all(|s| s.record.plants.is_empty() == (*folder == *BARE)));
+        for sample in &samples {
+            let seal = seal::Seal::read(folder, sample.record.index).unwrap();
+            let formats: BTreeSet<&str> = seal.files.keys().filter_map(|path| Some(path.split_once('/')?.0)).collect();
+            let expected: BTreeSet<&str> = NAMES.iter().map(|(name, _)| *name).chain(["images"]).collect();
+            assert_eq!(formats, expected);
+        }
+    }
+}
+
+/// A format that is added later must be the one that would have been written with the images.
+#[test]
+fn every_format_comes_out_the_same_from_the_native_files() {
+    for folder in [&*FIELD, &*BARE] {
+        let (recipe, samples) = samples(folder);
+        for (name, _) in NAMES {
+            let writer = format::named(name).unwrap();
+            if writer.needs_film() {
+                continue;
+            }
+            for sample in &samples {
+                let files = writer.image(&recipe, sample).unwrap();
+                assert!(!files.is_empty());
+                for file in files {
+                    assert!(file.path.starts_with(&format!("{name}/")), "{}", file.path);
+                    let written = std::fs::read(folder.join(&file.path)).unwrap();
+                    assert!(written == file.bytes, "{}: another file than was written with the image", file.path);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,92 @@
+"""Opens DATASET/coco with pycocotools and holds masks, boxes and keypoints against the native maps; truth judged by itself is perfect."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from pycocotools.coco import COCO
+from pycocotools.cocoeval import COCOeval
+
+import native
+
+dataset = Path(sys.argv[1])
+images = native.read(dataset)
+STATES = {"visible": 2, "hidden": 1, "outside": 0}
+plants = leaves = 0
+states = {0: 0, 1: 0, 2: 0}
+
+
+def point(keypoint):
+    """x, y, v of one of our keypoints; nothing where there is none."""
+    state = STATES[keypoint["state"]] if keypoint else 0
+    return (keypoint["x"], keypoint["y"], state) if state else (0, 0, 0)
+
+
+def same(annotation, mask, seen, points):
+    assert annotation["iscrowd"] == 0 and annotation["id"] > 0
+    assert np.array_equal(coco.annToMask(annotation), mask)
+    assert annotation["area"] == seen["pixels"] == mask.sum()
+    ys, xs = np.where(mask)
+    box = [xs.min(), ys.min(), xs.max() + 1 - xs.min(), ys.max() + 1 - ys.min()]
+    assert annotation["bbox"] == box == seen["box"]
+    written = np.array(annotation["keypoints"]).reshape(3, 3)
+    expected = np.array([point(p) for p in points])
+    assert np.abs(written - expected).max() <= 0.0051
+    assert annotation["num_keypoints"] == (expected[:, 2] > 0).sum()
+    for v in written[:, 2]:
+        states[int(v)] += 1
+
+
+def judge(kind, **settings):
+    """COCOeval of the truth against itself: average precision and recall at the largest number of detections."""
+    truth = [dict(a, score=1.0) for a in coco.dataset["annotations"]]
+    if kind == "keypoints":
+        truth = [a for a in truth if a["num_keypoints"] > 0]
+    if not truth:
+        return
+    answers = coco.loadRes(truth)
+    judge = COCOeval(coco, answers, kind)
+    judge.params.maxDets = [1, 100, 10000]
+    judge.params.areaRng, judge.params.areaRngLbl = [[0, 1e10]], ["all"]
+    for name, value in settings.items():
+        setattr(judge.params, name, np.array(value))
+    judge.evaluate()
+    judge.accumulate()
+    precision, recall = judge.eval["precision"][..., -1], judge.eval["recall"][..., -1]
+    assert (precision > -1).any() and (precision[precision > -1] == 1).all()
+    assert (recall[recall > -1] == 1).all()
+
+
+for split in native.SPLITS:
+    path = dataset / f"coco/annotations/instances_{split}.json"
+    own_images = native.of_split(images, split)
+    assert path.exists() == bool(own_images)
+    if not own_images:
+        continue
+    coco = COCO(str(path))
+    assert [c["name"] for c in coco.loadCats(coco.getCatIds())] == ["crop", "weed", "leaf"]
+    assert len(coco.getImgIds()) == len(own_images)
+    assert sorted(coco.getAnnIds()) == list(range(1, len(coco.anns) + 1))
+    for image in coco.loadImgs(coco.getImgIds()):
+        own = images[image["file_name"].removesuffix(".png")]
+        assert (image["height"], image["width"]) == own.semantics.shape
+        assert np.array_equal(native.picture(dataset / "coco/images" / split / image["file_name"]), own.rgb)
+        annotations = coco.loadAnns(coco.getAnnIds(imgIds=image["id"]))
+        by_key = {(a["attributes"]["plant"], a["attributes"].get("leaf", 0)): a for a in annotations}
+        assert len(by_key) == len(annotations) == len(own.seen()) + len(own.seen_leaves())
+        for plant in own.seen():
+            annotation = by_key[plant["number"], 0]
+            assert coco.cats[annotation["category_id"]]["name"] == plant["class"]
+            assert annotation["attributes"]["species"] == plant["grown"]["species"]
+            same(annotation, own.plant_mask(plant), plant["seen"], [plant.get("stem"), None, None])
+            plants += 1
+        for plant, leaf in own.seen_leaves():
+            annotation = by_key[plant["number"], leaf["number"]]
+            assert coco.cats[annotation["category_id"]]["name"] == "leaf"
+            same(annotation, own.leaf_mask(plant, leaf), leaf["seen"], [None, leaf.get("base"), leaf.get("tip")])
+            leaves += 1
+    judge("segm")
+    judge("bbox")
+    judge("keypoints", kpt_oks_sigmas=[0.05, 0.05, 0.05])
+
+print(f"coco: {plants} plants, {leaves} leaves, points by state {states}")

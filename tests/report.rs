@@ -1,0 +1,191 @@
+//! The report of a dataset: what it says is so, it needs nothing but itself, and a browser shows it.
+//!
+//! Rationale: a page that people judge a dataset by must not be wrong, and must open anywhere. Expected: its numbers are those
+//! added up here from the records; no request leaves the page; every picture is decoded; nothing hangs over a narrow window's edge.
+//! Source: the records on disk; headless Chromium (Debian's `chromium`).
+
+mod common;
+
+use common::program::{SMALL, scratch, trace};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Images of the small dataset.
+const COUNT: u64 = 6;
+
+/// A small dataset, and its report.
+fn dataset(out: &Path) -> String {
+    let arguments = ["dataset", "--scene", SMALL, "--spp", "2", "--width", "96", "--height", "72", "--split", "4,1,1"];
+    let mut command = trace(&arguments);
+    command.args(["--count", &COUNT.to_string(), "--quiet", "--out", out.to_str().unwrap()]);
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    std::fs::read_to_string(out.join("report.html")).unwrap()
+}
+
+fn records(out: &Path) -> Vec<Value> {
+    let read = |k| std::fs::read(out.join(format!("images/{k:06}/record.json"))).unwrap();
+    (0..COUNT).map(|k| serde_json::from_slice(&read(k)).unwrap()).collect()
+}
+
+/// An attribute of the element with this `data-key`.
+fn attribute<'a>(page: &'a str, key: &str, name: &str) -> &'a str {
+    let of = |text: &'a str, before: &str| -> &'a str {
+        let at = text.find(before).unwrap_or_else(|| panic!("no {before} of {key}")) + before.len();
+        text[at..].split('"').next().unwrap()
+    };
+    let at = page.find(&format!("data-key=\"{key}\"")).unwrap_or_else(|| panic!("nothing has the key {key}"));
+    of(page[at..].split('>').next().unwrap(), &format!("{name}=\""))
+}
+
+fn number(page: &str, key: &str, name: &str) -> f64 {
+    attribute(page, key, name).parse().unwrap()
+}
+
+/// Plants of a class that an image shows.
+fn seen<'a>(record: &'a Value, class: &'a str) -> impl Iterator<Item = &'a Value> {
+    let plants = record["plants"].as_array().unwrap().iter();
+    plants.filter(move |p| p["class"] == class && p["seen"]["pixels"].as_u64() > Some(0))
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+#[test]
+fn numbers_of_the_report_are_those_of_the_records() {
+    let (_kept, out) = scratch();
+    let page = dataset(&out);
+    let records = records(&out);
+    assert_eq!(number(&page, "images", "data-value"), COUNT as f64);
+    let splits = ["train", "val", "test"].map(|s| records.iter().filter(|r| r["split"] == s).count() as f64);
+    assert_eq!(["train", "val", "test"].map(|s| number(&page, &format!("split.{s}"), "data-value")), splits);
+    for (k, class) in ["soil", "crop", "weed"].into_iter().enumerate() {
+        let pixels: f64 = records.iter().map(|r| r["classes"][k]["pixels"].as_f64().unwrap()).sum();
+        assert_eq!(number(&page, &format!("pixels.{class}"), "data-value"), pixels, "{class}");
+    }
+    let mut leaves = 0;
+    for class in ["crop", "weed"] {
+        let plants: Vec<&Value> = records.iter().flat_map(|r| seen(r, class)).collect();
+        assert!(!plants.is_empty(), "the page shows no {class}");
+        assert_eq!(number(&page, &format!("plants.{class}"), "data-value"), plants.len() as f64);
+        leaves += plants
+            .iter()
+            .flat_map(|p| p["leaves"].as_array().unwrap())
+            .filter(|l| l["seen"]["pixels"].as_u64() > Some(0))
+            .count();
+        let of = |path: &str| -> Vec<f64> { plants.iter().filter_map(|p| p.pointer(path)?.as_f64()).collect() };
+        for (key, path) in [("plant_pixels", "/seen/pixels"), ("bbch", "/grown/bbch"), ("age_days", "/grown/age_days")]
+        {
+            let (key, values) = (format!("{key}.{class}"), of(path));
+            assert_eq!(number(&page, &key, "data-n"), values.len() as f64, "{key}");
+            assert!((number(&page, &key, "data-mean") - mean(&values)).abs() <= 1e-9 * mean(&values), "{key}");
+            let bars = attribute(&page, &key, "data-counts").split(' ').map(|n| n.parse::<usize>().unwrap());
+            assert_eq!(bars.sum::<usize>(), values.len(), "bars of {key}");
+        }
+    }
+    assert_eq!(number(&page, "leaves", "data-value"), leaves as f64);
+    let hidden =
+        records.iter().flat_map(|r| r["plants"].as_array().unwrap()).filter(|p| p["seen"]["pixels"] == 0).count();
+    assert_eq!(number(&page, "plants.hidden", "data-value"), hidden as f64);
+    let heights: Vec<f64> =
+        records.iter().map(|r| r["conditions"]["camera"]["position_m"][2].as_f64().unwrap()).collect();
+    assert!((number(&page, "camera_height_m", "data-mean") - mean(&heights)).abs() < 1e-9);
+    // Each species stands in the table with what was seen of it.
+    let recipe: Value = serde_json::from_slice(&std::fs::read(out.join("dataset.json")).unwrap()).unwrap();
+    for (k, species) in recipe["species"].as_array().unwrap().iter().enumerate() {
+        assert!(page.contains(species["name"].as_str().unwrap()));
+        let plants = records.iter().flat_map(|r| r["plants"].as_array().unwrap());
+        let n = plants.filter(|p| p["kind"] == k as u64 + 1 && p["seen"]["pixels"].as_u64() > Some(0)).count();
+        assert_eq!(number(&page, &format!("species.{}.plants", k + 1), "data-value"), n as f64);
+    }
+}
+
+#[test]
+fn equal_datasets_have_equal_reports_that_ask_for_nothing() {
+    let (_kept, out) = scratch();
+    let page = dataset(&out.join("a"));
+    assert_eq!(page, dataset(&out.join("b")), "the same dataset in another folder");
+    for word in ["http:", "https:", "url(", "@import", "<script", "<iframe"] {
+        assert!(!page.contains(word), "the page has {word}");
+    }
+    let outside = page.match_indices("src=\"").filter(|(at, m)| !page[at + m.len()..].starts_with("data:image/"));
+    assert_eq!(outside.count(), 0, "pictures that lie outside the page");
+    assert_eq!(page.matches("<figure class=\"shot\">").count() as u64, COUNT);
+    let manifest: Value = serde_json::from_slice(&std::fs::read(out.join("a/manifest.json")).unwrap()).unwrap();
+    assert_eq!(manifest["files"]["report.html"]["bytes"], page.len());
+}
+
+/// Chromium by the names that systems have for it; `None`, and a word about it, where there is none.
+fn browser() -> Option<PathBuf> {
+    let works = |name: &&str| Command::new(name).arg("--version").output().is_ok_and(|o| o.status.success());
+    let found = ["chromium", "chromium-browser", "google-chrome"].into_iter().find(works).map(PathBuf::from);
+    if found.is_none() {
+        let required = std::env::var_os("FURROW_REQUIRE_PEERS").is_some_and(|v| v == "1");
+        assert!(!required, "no Chromium: apt-get install chromium");
+        eprintln!("skipped: no Chromium");
+    }
+    found
+}
+
+/// Looks at the page from inside and leaves what it sees in the document; no part of what is shipped.
+const PROBE: &str = r#"<script>addEventListener("load", () => {
+  const opacity = () => getComputedStyle(document.querySelector(".frame .labels")).opacity;
+  document.querySelectorAll(".labels").forEach(i => i.style.transition = "none");
+  const before = opacity();
+  document.querySelector("label.switch").click();
+  document.body.dataset.probe = JSON.stringify({
+    images: document.images.length,
+    decoded: [...document.images].filter(i => i.complete && i.naturalWidth > 0).length,
+    over: document.documentElement.scrollWidth - innerWidth,
+    width: innerWidth,
+    before: +before, after: +opacity(),
+    requests: performance.getEntriesByType("resource").map(e => e.name).filter(n => !n.startsWith("data:")),
+  });
+});</script></body>"#;
+
+#[test]
+fn a_browser_shows_the_report_in_wide_and_narrow_windows() {
+    let Some(browser) = browser() else { return };
+    let (_kept, out) = scratch();
+    let page = dataset(&out).replace("</body>", PROBE);
+    let file = out.join("probed.html");
+    std::fs::write(&file, page).unwrap();
+    for width in [1280, 500] {
+        let profile = out.join(format!("profile-{width}"));
+        let output = Command::new(&browser)
+            .args([
+                "--headless",
+                "--no-sandbox",
+                "--disable-gpu",
+                "--enable-logging=stderr",
+                "--hide-scrollbars",
+                "--dump-dom",
+            ])
+            .arg(format!("--user-data-dir={}", profile.display()))
+            .arg(format!("--window-size={width},900"))
+            .arg(format!("file://{}", file.display()))
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        let console: Vec<&str> = said.lines().filter(|l| l.contains("CONSOLE")).collect();
+        assert_eq!(console, Vec::<&str>::new(), "the browser's console");
+        let dom = String::from_utf8_lossy(&output.stdout);
+        let probe = dom
+            .split("data-probe=\"")
+            .nth(1)
+            .and_then(|rest| rest.split('"').next())
+            .unwrap_or_else(|| panic!("{said}"));
+        let seen: Value = serde_json::from_str(&probe.replace("&quot;", "\"")).unwrap();
+        assert_eq!(seen["images"], 2 * COUNT, "{seen}");
+        assert_eq!(seen["decoded"], seen["images"], "{seen}");
+        assert_eq!((seen["width"].as_i64(), seen["over"].as_i64()), (Some(width), Some(0)), "{seen}");
+        assert_eq!(
+            (seen["before"].as_f64(), seen["after"].as_f64()),
+            (Some(0.0), Some(1.0)),
+            "labels by click: {seen}"
+        );
+        assert_eq!(seen["requests"], serde_json::json!([]), "{seen}");
+    }
+}
