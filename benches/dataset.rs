@@ -17,7 +17,9 @@ const ROWS: [(u32, u32, u32, bool, u64); 3] =
 
 #[expect(clippy::print_stdout, reason = "a table is what a bench is for")]
 fn main() {
-    println!("| size | samples | denoised | images | images an hour | s an image: grow / draw / label / rest | not drawing |");
+    println!(
+        "| size | samples | denoised | images | images an hour | s an image: grow / draw / label / rest | not drawing |"
+    );
     println!("|---|---|---|---|---|---|---|");
     for (width, height, spp, denoise, count) in ROWS {
         if denoise && std::env::var_os("OIDN_DIR").is_none() {
@@ -52,7 +54,9 @@ fn make(out: &Path, [width, height, spp]: [u32; 3], count: u64, denoise: bool, m
     let mut command = Command::new(env!("CARGO_BIN_EXE_trace"));
     command.current_dir(env!("CARGO_MANIFEST_DIR"));
     command.args(["dataset", "--scene", "scenes/synthetic-d.ron", "--quiet", "--format", "phenobench,coco"]);
-    for (flag, value) in [("--width", width.into()), ("--height", height.into()), ("--spp", spp.into()), ("--count", count)] {
+    for (flag, value) in
+        [("--width", width.into()), ("--height", height.into()), ("--spp", spp.into()), ("--count", count)]
+    {
         command.args([flag, &value.to_string()]);
     }
     if denoise {
