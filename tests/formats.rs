@@ -68,6 +68,36 @@ fn pycocotools_reads_what_we_wrote() {
     ask("check_coco.py", "import pycocotools");
 }
 
+#[test]
+fn supervision_reads_what_we_wrote() {
+    ask("check_yolo.py", "import supervision");
+}
+
+#[test]
+fn datumaro_reads_what_we_wrote() {
+    ask("check_datumaro.py", "import datumaro");
+}
+
+#[test]
+fn datasets_reads_what_we_wrote() {
+    ask("check_imagefolder.py", "import datasets");
+}
+
+#[test]
+fn segments_of_the_panoptic_format_are_those_of_its_pictures() {
+    ask("check_panoptic.py", "import numpy, PIL");
+}
+
+#[test]
+fn instances_of_the_cityscapes_layout_hold_their_classes() {
+    ask("check_cityscapes.py", "import numpy, PIL");
+}
+
+#[test]
+fn cropandweed_is_read_as_its_own_scripts_read_it() {
+    ask("check_cropandweed.py", "import numpy, PIL");
+}
+
 /// The images of a dataset as they lie on the disk.
 fn samples(folder: &Path) -> (Recipe, Vec<Sample>) {
     let set = Set::open(folder).unwrap();

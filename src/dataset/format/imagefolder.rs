@@ -1,19 +1,25 @@
-//! Hugging Face ImageFolder: `SPLIT/metadata.jsonl` with one line an image; `datasets.load_dataset("imagefolder", data_dir=…)` reads
-//! it, the pictures named by `file_name` and every `…_file_name`, all other keys as columns.
+//! Hugging Face ImageFolder: `SPLIT/metadata.jsonl` with one line an image, and a dataset card; `datasets.load_dataset("DIR/imagefolder")`
+//! reads the pictures named by `file_name` and every `…_file_name`, all other keys as columns.
 //!
-//! Source: Hugging Face datasets documentation, "Create an image dataset", ImageFolder with metadata; read with datasets 5.2.0, in
-//! which 16-bit masks keep their numbers.
+//! The reader takes a column's type from a split's first lines and refuses splits whose types differ. So a number that some image
+//! lacks is null there, and one that a whole split lacks is no column at all.
+//!
+//! Source: Hugging Face datasets documentation, "Create an image dataset", ImageFolder with metadata, and "Dataset cards"; read with
+//! datasets 5.2.0, in which 16-bit masks keep their numbers.
 
-use super::{Format, Whole};
+use super::conditions::Brief;
+use super::{Format, Whole, picture};
+use crate::Result;
+use crate::dataset::File;
 use crate::dataset::recipe::Recipe;
 use crate::dataset::record::Record;
 use crate::dataset::sample::Sample;
-use crate::dataset::set::Set;
+use crate::dataset::set::{Set, Stream};
 use crate::dataset::split::Split;
-use crate::dataset::File;
-use crate::output::{self, Picture};
-use crate::Result;
-use serde_json::json;
+use crate::output::Picture;
+use crate::scene::tag::Class;
+use serde_json::{Value, json};
+use std::collections::{BTreeMap, BTreeSet};
 
 pub(super) struct Writer;
 
@@ -21,20 +27,19 @@ const FOLDER: &str = "imagefolder";
 
 impl Format for Writer {
     fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
-        let (w, h) = sample.size();
         let Record { name, split, .. } = &sample.record;
-        let base = format!("{FOLDER}/{}", split.name());
-        let file = |kind: &str, picture: &Picture<'_>| -> Result<File> {
-            let bytes = output::encode_png(w, h, picture, "")?;
-            Ok(File { path: format!("{base}/{kind}/{name}.png"), bytes })
-        };
+        let at = |kind: &str| format!("{FOLDER}/{}/{kind}/{name}.png", split.name());
+        let file = |kind: &str, picture: &Picture<'_>| picture::file(sample, at(kind), picture);
         let mut files = vec![
-            file("images", &Picture::Rgb(&sample.rgb))?,
+            picture::photograph(sample, at("images"))?,
             // Numbers, not palette colours: a reader that turns pictures into RGB would lose them.
             file("masks", &Picture::Gray(&sample.semantics))?,
             file("plants", &Picture::Gray16(&sample.plants))?,
             file("leaves", &Picture::Gray16(&sample.leaves))?,
         ];
+        if !sample.species.is_empty() {
+            files.push(file("species", &Picture::Gray(&sample.species))?);
+        }
         if !sample.nir.is_empty() {
             files.push(file("nir", &Picture::Gray(&sample.nir))?);
         }
@@ -42,35 +47,156 @@ impl Format for Writer {
     }
 
     fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
-        for split in Split::ALL {
-            if set.names(split).is_empty() {
-                continue;
-            }
+        let splits: Vec<Split> = Split::ALL.into_iter().filter(|s| !set.names(*s).is_empty()).collect();
+        let known = known(set, &splits)?;
+        for split in &splits {
             out.file(&format!("{FOLDER}/{}/metadata.jsonl", split.name()), |w| {
-                for record in set.records(split) {
-                    w.json(&line(&record?))?;
+                for record in set.records(*split) {
+                    let mut columns = columns(set, &record?);
+                    columns.retain(|(key, _)| known.contains(*key));
+                    w.json(&columns.into_iter().collect::<BTreeMap<_, _>>())?;
                     w.put("\n")?;
                 }
                 Ok(())
             })?;
         }
-        Ok(())
+        out.file(&format!("{FOLDER}/README.md"), |w| card(set, &splits, w))
     }
 }
 
-/// One image's columns.
-fn line(record: &Record) -> serde_json::Value {
-    let name = &record.name;
-    let mut columns = json!({
-        "file_name": format!("images/{name}.png"),
-        "mask_file_name": format!("masks/{name}.png"),
-        "plants_file_name": format!("plants/{name}.png"),
-        "leaves_file_name": format!("leaves/{name}.png"),
-        "index": record.index,
-        "plants_seen": record.seen().count(),
-    });
-    for share in &record.classes {
-        columns[format!("{}_pixels", share.class.name())] = share.pixels.into();
+/// The columns of which every split knows something.
+fn known(set: &Set, splits: &[Split]) -> Result<BTreeSet<&'static str>> {
+    let mut all: Option<BTreeSet<&str>> = None;
+    for split in splits {
+        let mut here = BTreeSet::new();
+        for record in set.records(*split) {
+            here.extend(columns(set, &record?).into_iter().filter(|(_, value)| !value.is_null()).map(|(key, _)| key));
+        }
+        all = Some(all.map_or(here.clone(), |all| all.intersection(&here).copied().collect()));
     }
-    columns
+    Ok(all.unwrap_or_default())
+}
+
+/// One image's columns.
+fn columns(set: &Set, record: &Record) -> Vec<(&'static str, Value)> {
+    let Record { name, split, .. } = record;
+    let file = |kind: &str| {
+        let below = format!("{kind}/{name}.png");
+        set.folder.join(FOLDER).join(split.name()).join(&below).is_file().then_some(below)
+    };
+    let pixels = |class: Class| record.classes.iter().find(|c| c.class == class).map_or(0, |c| c.pixels);
+    let count = |class: Class| record.seen().filter(|p| p.class == class).count();
+    let species: BTreeSet<&str> = record.seen().filter_map(|p| set.recipe.species_name(p.kind)).collect();
+    let brief = Brief::of(record);
+    // Texts are never null: an empty text has a type.
+    let list = |words: Vec<&str>| json!(words.join(", "));
+    vec![
+        ("file_name", json!(format!("images/{name}.png"))),
+        ("mask_file_name", json!(format!("masks/{name}.png"))),
+        ("plants_file_name", json!(format!("plants/{name}.png"))),
+        ("leaves_file_name", json!(format!("leaves/{name}.png"))),
+        ("species_file_name", json!(file("species"))),
+        ("nir_file_name", json!(file("nir"))),
+        ("index", json!(record.index)),
+        ("soil_pixels", json!(pixels(Class::Soil))),
+        ("crop_pixels", json!(pixels(Class::Crop))),
+        ("weed_pixels", json!(pixels(Class::Weed))),
+        ("crops", json!(count(Class::Crop))),
+        ("weeds", json!(count(Class::Weed))),
+        ("leaves_seen", json!(record.leaves().count())),
+        ("species_names", list(species.into_iter().collect())),
+        ("light", list(brief.kinds_of_light())),
+        ("sun_elevation_deg", json!(brief.sun_elevation_deg())),
+        ("sun_azimuth_deg", json!(brief.sun_azimuth_deg())),
+        ("sun_share", json!(brief.sun_share())),
+        ("turbidity", json!(brief.turbidity())),
+        ("soil", list(brief.layers())),
+        ("soil_moisture", json!(brief.moisture())),
+        ("soil_relief_mm", json!(brief.relief_mm())),
+        ("clods_over_5mm_per_m2", json!(brief.clods_per_m2())),
+        ("straw_cover", json!(brief.straw())),
+        ("camera_height_m", json!(brief.camera_height_m())),
+    ]
+}
+
+/// Licences that Hugging Face knows by identifier, as far as people give datasets such.
+const LICENCES: [&str; 14] = [
+    "apache-2.0", "mit", "cc0-1.0", "cc-by-2.0", "cc-by-3.0", "cc-by-4.0", "cc-by-sa-3.0", "cc-by-sa-4.0", "cc-by-nc-4.0",
+    "cc-by-nc-sa-4.0", "cc-by-nc-nd-4.0", "cc-by-nd-4.0", "odbl", "pddl",
+];
+
+/// The licence as the head of a dataset card has it.
+fn licence(words: &str) -> String {
+    let id = words.to_lowercase();
+    if LICENCES.contains(&id.as_str()) {
+        format!("license: {id}\n")
+    } else if words == "not stated" {
+        "license: unknown\n".into()
+    } else {
+        // JSON texts are YAML texts.
+        format!("license: other\nlicense_name: {}\n", Value::from(words))
+    }
+}
+
+/// Hugging Face's name of a split.
+fn split_name(split: Split) -> &'static str {
+    match split {
+        Split::Val => "validation",
+        other => other.name(),
+    }
+}
+
+/// The dataset card: a head that programs read, then words for people.
+fn card(set: &Set, splits: &[Split], w: &mut Stream<'_>) -> Result<()> {
+    let recipe = &set.recipe;
+    w.put("---\n")?;
+    w.put(licence(&recipe.licence))?;
+    w.put("task_categories:\n- image-segmentation\ntags:\n- agriculture\n- synthetic\n")?;
+    w.put("configs:\n- config_name: default\n  data_files:\n")?;
+    for split in splits {
+        w.put(format!("  - split: {}\n    path: {}/**\n", split_name(*split), split.name()))?;
+    }
+    w.put("---\n\n# Crop fields, rendered and labelled exactly\n\n")?;
+    w.put(format!("{} images, made by Furrow {}. Licence: {}.\n\n", recipe.count, recipe.furrow, recipe.licence))?;
+    if let Ok(rendering) = recipe.rendering() {
+        let line = format!(
+            "Scene `{}` (SHA-256 `{}`), seed {}, {} × {} pixels, {} samples a pixel.\n\n",
+            rendering.scene, rendering.scene_sha256, rendering.seed, rendering.width, rendering.height, rendering.spp
+        );
+        w.put(line)?;
+    }
+    w.put(COLUMNS)?;
+    w.put("\n`species` numbers:\n\n| number | species | EPPO code | class |\n|---|---|---|---|\n| 0 | none | | |\n")?;
+    for (i, species) in recipe.species.iter().enumerate() {
+        w.put(format!("| {} | {} | {} | {} |\n", i + 1, species.name, species.eppo, species.class.name()))?;
+    }
+    Ok(())
+}
+
+const COLUMNS: &str = "\
+| column | holds |
+|---|---|
+| `image`, `nir` | the photographs: colour, near infrared |
+| `mask` | class of each pixel: 0 soil, 1 crop, 2 weed, 255 no label |
+| `plants`, `leaves` | number of the plant, of the leaf on it; 16 bit, 0 for none |
+| `species` | number of the species, 0 for none |
+| `soil_pixels`, `crop_pixels`, `weed_pixels` | pixels of each class |
+| `crops`, `weeds`, `leaves_seen`, `species_names` | what the image shows |
+| `light`, `sun_elevation_deg`, `sun_azimuth_deg`, `turbidity` | the light; azimuth clockwise from north |
+| `sun_share` | share of the ground's visible light that comes straight from the sun |
+| `soil`, `soil_moisture`, `soil_relief_mm` | the soil's layers; 0 dry to 1 saturated; roughness, root mean square |
+| `clods_over_5mm_per_m2`, `straw_cover` | clods; share of the ground under straw |
+| `camera_height_m` | the lens over the ground |
+";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_licence_is_told_in_the_words_of_the_hub() {
+        assert_eq!(licence("CC-BY-4.0"), "license: cc-by-4.0\n");
+        assert_eq!(licence("not stated"), "license: unknown\n");
+        assert_eq!(licence("ask \"me\": first"), "license: other\nlicense_name: \"ask \\\"me\\\": first\"\n");
+    }
 }

@@ -1,0 +1,116 @@
+//! The layout of Cityscapes: `leftImg8bit/SPLIT/CITY/CITY_SSSSSS_FFFFFF_leftImg8bit.png` and
+//! `gtFine/SPLIT/CITY/…_gtFine_{labelIds,labelTrainIds,instanceIds,color}.png`; torchvision, mmsegmentation and datumaro read it.
+//!
+//! The city is the page's name, the sequence and frame are the image's number. `labelIds` and `labelTrainIds` are the same:
+//! 0 soil, 1 crop, 2 weed, 255 no label. `instanceIds`, 16 bit, are class · 1000 + k for the k-th plant of its class in the image,
+//! k from 0, and the class alone where there is no plant. `label_colors.txt` tells datumaro the classes, which it would else take for
+//! streets'; it reads classes from `labelTrainIds`, since it knows no instances.
+//!
+//! Three digits number 1000 plants of a class. Where an image shows more, the smallest of them have the class alone, which is
+//! how Cityscapes marks groups that nobody told apart; `groups.json` lists them.
+//!
+//! Source: Cordts et al. 2016, "The Cityscapes Dataset", and cityscapesScripts 2.3.0 (whose evaluation knows streets only: this is the
+//! layout, not the benchmark).
+
+use super::{Format, Whole, picture};
+use crate::Result;
+use crate::dataset::File;
+use crate::dataset::recipe::{Made, Recipe};
+use crate::dataset::record::{Plant, Record};
+use crate::dataset::sample::Sample;
+use crate::dataset::set::Set;
+use crate::output::Picture;
+use crate::scene::tag::Class;
+use serde_json::json;
+use std::collections::BTreeMap;
+
+pub(super) struct Writer;
+
+const FOLDER: &str = "cityscapes";
+
+/// Plants of a class that three digits number.
+const MOST: usize = 1000;
+
+impl Format for Writer {
+    fn image(&self, recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
+        let record = &sample.record;
+        let at = |kind: &str, suffix: &str| path(recipe, record, kind, suffix);
+        let labels = |suffix: &str| picture::file(sample, at("gtFine", suffix), &Picture::Gray(&sample.semantics));
+        let numbers = numbers(record);
+        let instance = |(class, plant): (&u8, &u16)| match numbers.get(plant) {
+            Some(k) => u16::from(*class) * MOST as u16 + k,
+            None => u16::from(*class),
+        };
+        let instances: Vec<u16> = sample.semantics.iter().zip(&sample.plants).map(instance).collect();
+        let color = |class: &u8| crate::dataset::annotate::class_of(*class).map_or([128; 3], Class::color);
+        let colors: Vec<[u8; 3]> = sample.semantics.iter().map(color).collect();
+        Ok(vec![
+            picture::photograph(sample, at("leftImg8bit", "leftImg8bit"))?,
+            labels("gtFine_labelIds")?,
+            labels("gtFine_labelTrainIds")?,
+            picture::file(sample, at("gtFine", "gtFine_instanceIds"), &Picture::Gray16(&instances))?,
+            picture::file(sample, at("gtFine", "gtFine_color"), &Picture::Rgb(&colors))?,
+        ])
+    }
+
+    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+        out.file(&format!("{FOLDER}/label_colors.txt"), |w| {
+            for class in Class::ALL {
+                let [r, g, b] = class.color();
+                w.put(format!("{r} {g} {b} {}\n", class.name()))?;
+            }
+            Ok(())
+        })?;
+        out.file(&format!("{FOLDER}/groups.json"), |w| {
+            w.put("{\n\"about\": \"plants beyond the largest 1000 of their class, whose instanceIds are the class alone\",\n")?;
+            w.put("\"groups\": [")?;
+            w.items(set.all().flat_map(|record| match record {
+                Ok(record) => groups(&record).into_iter().map(Ok).collect(),
+                Err(e) => vec![Err(e)],
+            }))?;
+            w.put("]\n}\n")
+        })
+    }
+}
+
+/// A file of an image; `kind` is the folder, `suffix` ends the name.
+fn path(recipe: &Recipe, record: &Record, kind: &str, suffix: &str) -> String {
+    let (city, split) = (city(recipe), record.split.name());
+    let (sequence, frame) = (record.index / 1_000_000, record.index % 1_000_000);
+    format!("{FOLDER}/{kind}/{split}/{city}/{city}_{sequence:06}_{frame:06}_{suffix}.png")
+}
+
+/// The page's name, or the format that images were imported from, in letters and digits: a `_` would end it.
+fn city(recipe: &Recipe) -> String {
+    let name = match &recipe.made {
+        Made::Rendered(rendering) => rendering.scene.rsplit('/').next().and_then(|file| file.split('.').next()),
+        Made::Imported { from } => Some(from.as_str()),
+    };
+    let letters: String = name.unwrap_or_default().chars().filter(char::is_ascii_alphanumeric).collect();
+    if letters.is_empty() { "field".into() } else { letters.to_ascii_lowercase() }
+}
+
+/// The plants of a class that an image shows, the largest first where they are too many to be numbered, else by number.
+fn ordered(record: &Record, class: Class) -> Vec<&Plant> {
+    let mut plants: Vec<&Plant> = record.seen().filter(|p| p.class == class).collect();
+    if plants.len() > MOST {
+        plants.sort_by_key(|p| (std::cmp::Reverse(p.seen.pixels), p.number));
+    }
+    plants
+}
+
+/// The place of each plant among those of its class; plants beyond [`MOST`] have none.
+fn numbers(record: &Record) -> BTreeMap<u16, u16> {
+    let place = |(k, plant): (usize, &Plant)| (plant.number, k as u16);
+    let of_class = |class: Class| ordered(record, class).into_iter().take(MOST).enumerate().map(place).collect::<Vec<_>>();
+    [Class::Crop, Class::Weed].into_iter().flat_map(of_class).collect()
+}
+
+/// The plants of each class that have no number.
+fn groups(record: &Record) -> Vec<serde_json::Value> {
+    let of_class = |class: Class| {
+        let rest: Vec<u16> = ordered(record, class).iter().skip(MOST).map(|p| p.number).collect();
+        (!rest.is_empty()).then(|| json!({ "image": record.name, "class": class.name(), "plants": rest }))
+    };
+    [Class::Crop, Class::Weed].into_iter().filter_map(of_class).collect()
+}

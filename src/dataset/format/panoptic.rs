@@ -1,0 +1,127 @@
+//! COCO panoptic: `annotations/panoptic_SPLIT.json`, `annotations/panoptic_SPLIT/NAME.png`, `images/SPLIT/NAME.png`; datumaro and
+//! panopticapi read it.
+//!
+//! A pixel's segment is R + 256 G + 65536 B, 0 for none. A plant's segment is its number in `plants.png`; what belongs to no plant is
+//! 65536 + category: soil, and crop or weed that an imported mask gives no plant, which is a crowd. Soil is stuff, plants are
+//! things. Categories are those of COCO instances, and 4 for soil, for 0 is no category.
+//!
+//! Boxes of segments without a plant stand in no record, so each image's `segments_info` is written with the image, to
+//! `segments/SPLIT/NAME.json`, and gathered in the end.
+//!
+//! Source: COCO data format, panoptic segmentation, <https://cocodataset.org/#format-data>; panopticapi's `rgb2id`.
+
+use super::{Format, Whole, coco, picture};
+use crate::dataset::recipe::{Recipe, json};
+use crate::dataset::record::Record;
+use crate::dataset::rle::Box2;
+use crate::dataset::sample::Sample;
+use crate::dataset::set::Set;
+use crate::dataset::split::Split;
+use crate::dataset::{File, annotate};
+use crate::output::Picture;
+use crate::scene::tag::Class;
+use crate::{Error, Result};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+
+pub(super) struct Writer;
+
+const FOLDER: &str = "panoptic";
+
+/// Segments without a plant begin here, behind all numbers of plants.
+const STUFF: u32 = 1 << 16;
+
+impl Format for Writer {
+    fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
+        let Record { name, split, .. } = &sample.record;
+        let split = split.name();
+        let (ids, segments) = segments(sample);
+        let colors: Vec<[u8; 3]> = ids.iter().map(|id| [*id as u8, (id >> 8) as u8, (id >> 16) as u8]).collect();
+        Ok(vec![
+            picture::photograph(sample, format!("{FOLDER}/images/{split}/{name}.png"))?,
+            picture::file(
+                sample,
+                format!("{FOLDER}/annotations/panoptic_{split}/{name}.png"),
+                &Picture::Linear(&colors),
+            )?,
+            File { path: segments_path(split, name), bytes: json(&segments)? },
+        ])
+    }
+
+    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+        for split in Split::ALL {
+            if set.names(split).is_empty() {
+                continue;
+            }
+            out.file(&format!("{FOLDER}/annotations/panoptic_{}.json", split.name()), |w| {
+                coco::head(w, set, split)?;
+                w.put("\"categories\": ")?;
+                w.json(&categories())?;
+                w.put(",\n\"annotations\": [")?;
+                w.items(set.records(split).map(|record| annotation(set, &record?)))?;
+                w.put("]\n}\n")
+            })?;
+        }
+        Ok(())
+    }
+}
+
+fn segments_path(split: &str, name: &str) -> String {
+    format!("{FOLDER}/segments/{split}/{name}.json")
+}
+
+fn category(class: Class) -> u32 {
+    match class {
+        Class::Soil => 4,
+        plant => coco::category(plant),
+    }
+}
+
+fn categories() -> Value {
+    let category = |class: Class| {
+        let thing = class != Class::Soil;
+        // Soil is black in our masks; here black is void.
+        let color = if thing { class.color() } else { [120, 85, 60] };
+        json!({
+            "id": category(class),
+            "name": class.name(),
+            "supercategory": if thing { "plant" } else { "ground" },
+            "isthing": u32::from(thing),
+            "color": color,
+        })
+    };
+    json!([Class::Crop, Class::Weed, Class::Soil].map(category))
+}
+
+/// The segment of each pixel, and what is known of each segment.
+fn segments(sample: &Sample) -> (Vec<u32>, Value) {
+    let width = sample.record.width;
+    let mut ids = Vec::with_capacity(sample.pixels());
+    let mut found: BTreeMap<u32, (Class, u32, Box2)> = BTreeMap::new();
+    for (i, (class, plant)) in sample.semantics.iter().zip(&sample.plants).enumerate() {
+        let Some(class) = annotate::class_of(*class) else {
+            ids.push(0);
+            continue;
+        };
+        let id = if *plant == 0 { STUFF + category(class) } else { u32::from(*plant) };
+        let (x, y) = (i as u32 % width, i as u32 / width);
+        let (_, area, bounds) = found.entry(id).or_insert((class, 0, Box2::of(x, y)));
+        *area += 1;
+        bounds.add(x, y);
+        ids.push(id);
+    }
+    let info = |(id, (class, area, bounds)): (u32, (Class, u32, Box2))| {
+        let crowd = id >= STUFF && class != Class::Soil;
+        json!({ "id": id, "category_id": category(class), "iscrowd": u32::from(crowd), "area": area, "bbox": bounds })
+    };
+    (ids, found.into_iter().map(info).collect())
+}
+
+fn annotation(set: &Set, record: &Record) -> Result<Value> {
+    let path = set.folder.join(segments_path(record.split.name(), &record.name));
+    let bytes = std::fs::read(&path).map_err(Error::io(&path))?;
+    let segments: Value = serde_json::from_slice(&bytes)
+        .map_err(|e| Error::Damaged(format!("{}: these are no segments: {e}", path.display())))?;
+    let file = format!("{}.png", record.name);
+    Ok(json!({ "image_id": coco::image_id(record), "file_name": file, "segments_info": segments }))
+}
