@@ -3,7 +3,7 @@
 # programs that the tests ask for a second opinion (a browser, a batch system, Python clients in target/venv). What is there already is left alone.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-packages="libembree-dev build-essential python3-venv libllvm19 chromium slurm-wlm munge parallel"
+packages="libembree-dev build-essential python3-venv libllvm19 chromium slurm-wlm munge iproute2 procps parallel"
 # shellcheck disable=SC2086 # a list of packages
 if ! dpkg -s $packages >/dev/null 2>&1; then
   sudo=$([ "$(id -u)" = 0 ] || echo sudo)

@@ -18,51 +18,45 @@ threads=${THREADS:-@CPUS@}
 jobs=${JOBS:-$(($(nproc) / threads))}
 [ "$jobs" -gt 0 ] || jobs=1
 
-# Runs a command in a group of its own, hands signals on to all of the group, returns the command's exit code.
-asked= child=
+# Runs a command in a session of its own, hands signals on to everyone in it, waits for all of them, returns the command's exit
+# code. Not a process group: GNU parallel gives each of its jobs one.
+asked="" child=""
 hand_on() {
     asked=$asked$1,
-    [ -z "$child" ] || kill -s "$1" -- "-$child" 2>/dev/null
+    [ -z "$child" ] || kill -s "$1" $(ps -o pid= -s "$child") 2>/dev/null
 }
-for signal in USR1 TERM INT HUP; do trap "hand_on $signal" "$signal"; done
+# USR1: finish the images under way. TERM: stop at once.
+trap 'hand_on TERM' INT TERM
+trap 'hand_on USR1' USR1 HUP
 run() {
-    set -m
-    "$@" &
+    setsid "$@" &
     child=$!
-    set +m
     # `wait` returns whenever a signal is trapped: then the command is waited for again.
-    local last=started
+    local last=none
     while [ "$last" != "$asked" ]; do
         last=$asked
         wait "$child"
         code=$?
     done
+    # xargs may end before the shards that it started.
+    while [ -n "$(ps -o pid= -s "$child")" ]; do sleep 0.1; done
     child=
     return "$code"
 }
 
-# The first shard that fails lets those under way end and starts no other.
-by_parallel() {
-    exec parallel --will-cite --quote --tag --line-buffer --jobs "$jobs" --halt soon,fail=1 ${HOSTS:+--sshlogin "$HOSTS"} \
-        "$trace" dataset render "$dir" --threads "$threads" --shard "{}/$shards" ::: $(seq 0 $((shards - 1)))
-}
-
-# The same without it. xargs stops at 255, and must not be ended by the signals that are meant for the program: the program
-# watches for them although they are ignored here.
-by_xargs() {
-    trap '' USR1 TERM INT HUP
-    seq 0 $((shards - 1)) | xargs -P "$jobs" -I{} \
-        bash -c '"$@" || { code=$?; echo "shard ended with $code" >&2; exit 255; }' \
-        bash "$trace" dataset render "$dir" --threads "$threads" --shard "{}/$shards"
-}
-
 if parallel --version 2>/dev/null | grep -q "GNU parallel"; then
-    run by_parallel
+    # The first shard that fails lets those under way go on and starts no other.
+    run parallel --will-cite --quote --tag --line-buffer --jobs "$jobs" --halt soon,fail=1 ${HOSTS:+--sshlogin "$HOSTS"} \
+        "$trace" dataset render "$dir" --threads "$threads" --shard "{}/$shards" ::: $(seq 0 $((shards - 1)))
 elif [ -n "${HOSTS:-}" ]; then
     echo "HOSTS needs GNU parallel: install it, or run this script without HOSTS" >&2
     exit 2
 else
-    run by_xargs
+    # xargs starts no other at 255. It must not be ended by the signals that are meant for the program; the program watches for
+    # them although they are ignored here.
+    run env --ignore-signal=USR1,TERM xargs -a <(seq 0 $((shards - 1))) -P "$jobs" -I{} \
+        bash -c '"$@" || { code=$?; echo "shard ended with $code" >&2; exit 255; }' \
+        bash "$trace" dataset render "$dir" --threads "$threads" --shard "{}/$shards"
 fi
 code=$?
 if [ -n "$asked" ]; then

@@ -84,7 +84,7 @@ fn path(recipe: &Recipe, record: &Record, kind: &str, suffix: &str) -> String {
 fn city(recipe: &Recipe) -> String {
     let name = match &recipe.made {
         Made::Rendered(rendering) => rendering.scene.rsplit('/').next().and_then(|file| file.split('.').next()),
-        Made::Imported { from } => Some(from.as_str()),
+        Made::Imported { from, .. } => Some(from.as_str()),
     };
     let letters: String = name.unwrap_or_default().chars().filter(char::is_ascii_alphanumeric).collect();
     if letters.is_empty() { "field".into() } else { letters.to_ascii_lowercase() }

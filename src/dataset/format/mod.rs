@@ -55,6 +55,7 @@ formats! {
     "coco" => coco: "COCO instances and keypoints of plants and leaves, for `pycocotools`",
     "cropandweed" => cropandweed: "CropAndWeed: boxes with stems as CSV, label maps, parameters",
     "imagefolder" => imagefolder: "Hugging Face ImageFolder: images, masks, metadata and card for `datasets`",
+    "layers" => layers: "OpenEXR: radiance, variance, ids, coverage and Cryptomattes in one file an image",
     "panoptic" => panoptic: "COCO panoptic: plants as things, soil as stuff, for `panopticapi` and `datumaro`",
     "phenobench" => phenobench: "PhenoBench: semantics, plants, leaves and visibility, for `phenobench`",
     "yolo" => yolo: "YOLO segmentation: a polygon a plant, with what is lost by it, for Ultralytics and `supervision`",

@@ -3,15 +3,22 @@
 //! Channels: `R G B NIR` (radiance, W·m⁻²·sr⁻¹·nm⁻¹, f32), `variance.*` (of that mean, f32), `albedo.*` and `normal.{X,Y,Z}`
 //! (f16), `depth.Z` (metres along the ray, f32, infinite where nothing was met), `id.class`, `id.plant`, `id.leaf`,
 //! `id.part` (u32, from the label pass; part + 1, 0 for none); where pixels have different numbers of samples, `spp` (u32).
-//! The header's comment holds the provenance.
+//! The header's comment holds the provenance. For film people there are `coverage.{soil,crop,weed}` and Cryptomattes as well.
+
+mod cryptomatte;
+mod order;
 
 use crate::film::Film;
 use crate::geometry::Window;
 use crate::math::Spectrum;
-use crate::render::{LabelMap, label::NONE};
+use crate::render::{self, LabelMap, label::NONE};
+use crate::scene::tag::{Class, Tag};
 use crate::{Error, Result};
 use exr::prelude::*;
 use std::path::Path;
+
+/// Channels of one layer.
+type Channels = SmallVec<[AnyChannel<FlatSamples>; 4]>;
 
 fn channel(name: &str, samples: FlatSamples) -> AnyChannel<FlatSamples> {
     AnyChannel { name: name.into(), sample_data: samples, quantize_linearly: false, sampling: Vec2(1, 1) }
@@ -25,6 +32,50 @@ pub(super) fn encode_map(width: u32, height: u32, channels: &[(&str, Vec<f32>)])
 
 /// Encodes a film and its labels, which must share a window; `with_spp` adds each pixel's number of samples.
 pub(super) fn encode(film: &Film, labels: &LabelMap, with_spp: bool, text: &str) -> Result<Vec<u8>> {
+    write(film.window, channels(film, labels, with_spp), text)
+}
+
+/// Encodes a film, its labels, the share of each class in its pixels, and the Cryptomattes `CryptoClass`, `CryptoPlant` and `CryptoLeaf`.
+/// `tags` says who each part is.
+pub fn encode_layers(film: &Film, labels: &LabelMap, tags: &[Tag], text: &str) -> Result<Vec<u8>> {
+    let mut channels = channels(film, labels, false);
+    let coverage = render::coverage(film, tags);
+    for class in Class::ALL {
+        let shares = coverage.iter().map(|c| c[class as usize]).collect();
+        channels.push(channel(&format!("coverage.{}", class.name()), FlatSamples::F32(shares)));
+    }
+    let class_name = |tag: Tag| tag.class.name().to_owned();
+    let names: [(&str, NameOf); 3] =
+        [("CryptoClass", class_name), ("CryptoPlant", plant_name), ("CryptoLeaf", leaf_name)];
+    let mut words = Vec::new();
+    for (layer, name) in names {
+        let names: Vec<String> = tags.iter().copied().map(name).collect();
+        let matte = cryptomatte::matte(layer, film, &names);
+        words.extend(matte.attributes());
+        channels.extend(matte.channels.into_iter().map(|(name, values)| channel(&name, FlatSamples::F32(values))));
+    }
+    write_with(film.window, channels, text, words)
+}
+
+/// What a part is called in a Cryptomatte.
+type NameOf = fn(Tag) -> String;
+
+/// What a plant is called; everything without a plant is ground.
+fn plant_name(tag: Tag) -> String {
+    if tag.plant == 0 { "ground".into() } else { format!("plant_{}", tag.plant) }
+}
+
+/// What a leaf is called, and what is no leaf of a plant.
+fn leaf_name(tag: Tag) -> String {
+    match (tag.plant, tag.leaf) {
+        (0, _) => plant_name(tag),
+        (_, 0) => format!("{}/stem", plant_name(tag)),
+        (_, leaf) => format!("{}/leaf_{leaf}", plant_name(tag)),
+    }
+}
+
+/// What every file of a film and its labels holds.
+fn channels(film: &Film, labels: &LabelMap, with_spp: bool) -> Channels {
     let mut channels = SmallVec::new();
     let pixels = &film.pixels;
     for (band, name) in Spectrum::NAMES.iter().enumerate() {
@@ -51,7 +102,7 @@ pub(super) fn encode(film: &Film, labels: &LabelMap, with_spp: bool, text: &str)
     if with_spp {
         channels.push(channel("spp", FlatSamples::U32(pixels.iter().map(|p| p.samples).collect())));
     }
-    write(film.window, channels, text)
+    channels
 }
 
 /// Encodes a film's radiance alone.
@@ -96,12 +147,24 @@ pub fn read_geometry(path: &Path) -> Result<Geometry> {
     Ok((layer.size.0 as u32, layer.size.1 as u32, depth?, normals))
 }
 
-fn write(w: Window, channels: SmallVec<[AnyChannel<FlatSamples>; 4]>, text: &str) -> Result<Vec<u8>> {
-    let attributes = LayerAttributes {
+fn write(w: Window, channels: Channels, text: &str) -> Result<Vec<u8>> {
+    write_with(w, channels, text, Vec::new())
+}
+
+/// The same with further words in the header, by their names.
+fn write_with(w: Window, channels: Channels, text: &str, words: Vec<(String, String)>) -> Result<Vec<u8>> {
+    let failed = |e: &dyn std::fmt::Display| Error::Scene(format!("cannot encode an EXR: {e}"));
+    let mut attributes = LayerAttributes {
         layer_position: Vec2(w.x0 as i32, w.y0 as i32),
         comments: Text::new_or_none(text),
         ..LayerAttributes::default()
     };
+    let with_words = !words.is_empty();
+    for (name, value) in words {
+        let pair = Text::new_or_none(&name).zip(Text::new_or_none(&value));
+        let (name, value) = pair.ok_or_else(|| failed(&format!("{name} has letters that a header cannot hold")))?;
+        attributes.other.insert(name, exr::prelude::attribute::AttributeValue::Text(value));
+    }
     // Rows in increasing order, whichever thread compressed them first: equal runs write equal bytes.
     let encoding = Encoding {
         compression: Compression::ZIP16,
@@ -111,6 +174,7 @@ fn write(w: Window, channels: SmallVec<[AnyChannel<FlatSamples>; 4]>, text: &str
     let size = Vec2(w.width() as usize, w.height() as usize);
     let image = Image::from_layer(Layer::new(size, attributes, encoding, AnyChannels::sort(channels)));
     let mut bytes = std::io::Cursor::new(Vec::new());
-    image.write().to_unbuffered(&mut bytes).map_err(|e| Error::Scene(format!("cannot encode an EXR: {e}")))?;
-    Ok(bytes.into_inner())
+    image.write().to_unbuffered(&mut bytes).map_err(|e| failed(&e))?;
+    let bytes = bytes.into_inner();
+    if with_words { order::sorted(bytes).ok_or_else(|| failed(&"its header is not whole")) } else { Ok(bytes) }
 }

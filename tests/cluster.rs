@@ -1,0 +1,480 @@
+//! Job files of clusters, run for real: Slurm with a power cut, GNU parallel, xargs; Kubernetes against its schema.
+//!
+//! Rationale: what a scheduler does to jobs (cuts, stops, starts twice) is not what its manual makes one think. Expected: however a
+//! dataset was cut up, stopped and gone on with, its bytes are those of one run on one machine; the exit code tells a scheduler what
+//! to do. Source: none needed, equality is exact; the Kubernetes schema is that of PyPI's kubernetes-validate.
+#![cfg(unix)]
+
+mod common;
+
+use common::dataset::{fail, made, path, same, succeed, tree, verb};
+use common::program::{SMALL, scratch, trace};
+use common::python::python;
+use std::collections::BTreeMap;
+use std::os::unix::process::ExitStatusExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// Begins a dataset of `count` images, each of which takes about a second.
+fn plan(folder: &Path, count: u64) {
+    let count = count.to_string();
+    succeed(trace(&[
+        "dataset",
+        "plan",
+        "--scene",
+        SMALL,
+        "--width",
+        "96",
+        "--spp",
+        "32",
+        "--count",
+        &count,
+        "--out",
+        path(folder),
+    ]));
+}
+
+/// Job files of a dataset.
+fn emit(folder: &Path, engine: &str, shards: u64, more: &[&str]) -> PathBuf {
+    succeed(verb(
+        "emit",
+        folder,
+        &[&["--engine", engine, "--shards", &shards.to_string(), "--cpus", "1"], more].concat(),
+    ));
+    folder.join("jobs")
+}
+
+/// The files of a dataset, its job files left out.
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    tree(folder).into_iter().filter(|(name, _)| !name.starts_with("jobs/")).collect()
+}
+
+/// The same dataset made by one run.
+fn whole(count: u64) -> BTreeMap<String, Vec<u8>> {
+    let (_keep, folder) = scratch();
+    plan(&folder, count);
+    succeed(verb("render", &folder, &["--quiet"]));
+    succeed(verb("finish", &folder, &["--quiet"]));
+    files(&folder)
+}
+
+/// Whether programs are installed. With `FURROW_REQUIRE_PEERS=1` their absence is a failure, else a message.
+fn installed(programs: &[&str], package: &str) -> bool {
+    let there = |p: &&str| {
+        Command::new("sh").arg("-c").arg(format!("command -v {p}")).output().is_ok_and(|o| o.status.success())
+    };
+    let lacking: Vec<_> = programs.iter().filter(|p| !there(p)).collect();
+    if lacking.is_empty() {
+        return true;
+    }
+    let words = format!("{lacking:?} not found: apt-get install {package}");
+    assert!(std::env::var_os("FURROW_REQUIRE_PEERS").is_none_or(|v| v != "1"), "{words}");
+    eprintln!("skipped: {words}");
+    false
+}
+
+fn send(signal: &str, child: &Child) {
+    let sent = Command::new("sh").arg("-c").arg(format!("kill -{signal} {}", child.id())).status().unwrap();
+    assert!(sent.success());
+}
+
+/// Waits until something holds; two minutes at most.
+fn until(what: &str, mut holds: impl FnMut() -> bool) {
+    let begin = Instant::now();
+    while !holds() {
+        assert!(begin.elapsed() < Duration::from_secs(120), "in two minutes: not {what}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+fn end(child: &mut Child) -> ExitStatus {
+    let mut status = None;
+    until("ended", || {
+        status = child.try_wait().unwrap();
+        status.is_some()
+    });
+    status.unwrap()
+}
+
+fn sealed(folder: &Path) -> usize {
+    std::fs::read_dir(folder.join("seals"))
+        .map_or(0, |d| d.filter(|e| !e.as_ref().unwrap().file_name().to_string_lossy().starts_with('.')).count())
+}
+
+#[test]
+fn job_files_are_complete_and_can_be_read_by_bash() {
+    let (_keep, folder) = scratch();
+    let folder = folder.join("it's a \"set\"");
+    plan(&folder, 9);
+    let mut seen = 0;
+    for engine in ["slurm", "kubernetes", "parallel"] {
+        let jobs = folder.join("jobs").join(engine);
+        emit(&folder, engine, 3, &["--out", path(&jobs)]);
+        for entry in std::fs::read_dir(&jobs).unwrap() {
+            let file = entry.unwrap().path();
+            let text = std::fs::read_to_string(&file).unwrap();
+            let open = text
+                .split('@')
+                .skip(1)
+                .find(|w| !w.is_empty() && w.chars().all(|c| c.is_ascii_uppercase() || c == '_'));
+            assert_eq!(open, None, "{}", file.display());
+            seen += 1;
+            if file.extension().is_some_and(|e| e != "yaml") {
+                let read = Command::new("bash").arg("-n").arg(&file).output().unwrap();
+                assert!(read.status.success(), "{}: {}", file.display(), String::from_utf8_lossy(&read.stderr));
+            }
+        }
+    }
+    assert_eq!(seen, 7);
+    let slurm = std::fs::read_to_string(folder.join("jobs/slurm/render.sbatch")).unwrap();
+    for words in ["#SBATCH --array=0-2\n", "#SBATCH --time=04:00:00\n", "#SBATCH --signal=B:USR1@300\n", "\nshards=3\n"]
+    {
+        assert!(slurm.contains(words), "no {words:?} in\n{slurm}");
+    }
+}
+
+#[test]
+fn edited_job_files_are_never_overwritten() {
+    let (_keep, folder) = scratch();
+    plan(&folder, 4);
+    let jobs = emit(&folder, "slurm", 2, &[]);
+    // The same again changes nothing.
+    emit(&folder, "slurm", 2, &[]);
+    let file = jobs.join("finish.sbatch");
+    let edited = std::fs::read_to_string(&file).unwrap().replace("##SBATCH --partition=…", "#SBATCH --partition=night");
+    std::fs::write(&file, &edited).unwrap();
+    let before = tree(&folder);
+    let said = fail(verb("emit", &folder, &["--engine", "slurm", "--shards", "3"]), 2);
+    assert!(said.contains("edited") && said.contains("--out"), "{said}");
+    same(&tree(&folder), &before);
+    let elsewhere = jobs.join("other");
+    emit(&folder, "slurm", 3, &["--out", path(&elsewhere)]);
+    assert!(elsewhere.join("render.sbatch").is_file());
+}
+
+#[test]
+fn orders_that_make_no_sense_are_refused() {
+    let (_keep, folder) = scratch();
+    plan(&folder, 4);
+    for (more, words) in [
+        (&["--engine", "slurm", "--shards", "5"][..], "some would be empty"),
+        (&["--engine", "slurm", "--shards", "0"], "1.."),
+        (&["--engine", "slurm", "--shards", "2", "--time", "5m"], "--grace 300"),
+        (&["--engine", "slurm", "--shards", "2", "--time", "soon"], "4h"),
+        (&["--engine", "pbs", "--shards", "2"], "slurm, kubernetes, parallel"),
+    ] {
+        let said = fail(verb("emit", &folder, more), 2);
+        assert!(said.contains(words), "{more:?}: no `{words}` in\n{said}");
+    }
+    assert!(!folder.join("jobs").exists());
+    let said = fail(verb("emit", folder.parent().unwrap(), &["--engine", "slurm", "--shards", "2"]), 2);
+    assert!(said.contains("dataset.json"), "{said}");
+}
+
+#[test]
+fn kubernetes_jobs_follow_the_schema() {
+    let Some(python) = python("import kubernetes_validate, yaml") else { return };
+    let (_keep, folder) = scratch();
+    let folder = folder.join("It's $(a) \"set\": #1");
+    plan(&folder, 9);
+    let jobs = emit(&folder, "kubernetes", 3, &["--image", "registry.example/furrow:1", "--claim", "fields"]);
+    let check = "
+import sys, yaml, kubernetes_validate
+for name in ('render', 'finish'):
+    job = yaml.safe_load(open(f'{sys.argv[1]}/{name}.yaml'))
+    for version in ('1.29', kubernetes_validate.latest_version()):
+        kubernetes_validate.validate(job, version, strict=True)
+spec = yaml.safe_load(open(f'{sys.argv[1]}/render.yaml'))['spec']
+trace = spec['template']['spec']['containers'][0]
+assert spec['completions'] == 3 and spec['completionMode'] == 'Indexed'
+assert trace['command'][:3] == ['trace', 'dataset', 'render'], trace
+assert trace['command'][3] == '/data/It\\'s $$(a) \"set\": #1', trace
+assert trace['command'][4:] == ['--shard', '$(SHARD)/3', '--threads', '1'], trace
+wrong = dict(spec, completionMode=7)
+try:
+    kubernetes_validate.validate(dict(apiVersion='batch/v1', kind='Job', spec=wrong), '1.29', strict=True)
+except kubernetes_validate.ValidationError:
+    sys.exit(0)
+sys.exit('the schema refuses nothing')
+";
+    let done = Command::new(python).args(["-c", check, path(&jobs)]).output().unwrap();
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+}
+
+/// Runs a shard's job script as Slurm would, with an `scontrol` that notes what it was asked in the file `asked`.
+fn task(jobs: &Path, number: u64) -> Command {
+    let tools = jobs.join("tools");
+    std::fs::create_dir_all(&tools).unwrap();
+    let scontrol = tools.join("scontrol");
+    std::fs::write(&scontrol, "#!/bin/sh\necho \"$@\" >> \"$(dirname \"$0\")/asked\"\n").unwrap();
+    std::fs::set_permissions(&scontrol, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
+    let mut command = Command::new("bash");
+    command
+        .arg(jobs.join("render.sbatch"))
+        .env("PATH", format!("{}:{}", tools.display(), std::env::var("PATH").unwrap()))
+        .envs([("SLURM_ARRAY_JOB_ID", "7"), ("SLURM_CPUS_PER_TASK", "1")])
+        .env("SLURM_ARRAY_TASK_ID", number.to_string())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null());
+    command
+}
+
+#[test]
+fn a_slurm_task_tells_its_scheduler_what_to_do() {
+    let (_keep, folder) = scratch();
+    plan(&folder, 40);
+    let jobs = emit(&folder, "slurm", 2, &[]);
+    let asked = || std::fs::read_to_string(jobs.join("tools/asked")).unwrap_or_default();
+    // Out of time: the image under way is finished, and the task alone is queued again.
+    let mut child = task(&jobs, 1).spawn().unwrap();
+    until("sealed", || sealed(&folder) > 0);
+    send("USR1", &child);
+    assert_eq!(end(&mut child).code(), Some(75));
+    assert_eq!(asked(), "requeue 7_1\n");
+    let so_far = sealed(&folder);
+    assert!((1..20).contains(&so_far), "{so_far}");
+    // Cancelled: not queued again. Sent twice in a row, as a scheduler does that signals script and program.
+    let mut child = task(&jobs, 1).spawn().unwrap();
+    until("sealed", || sealed(&folder) > so_far);
+    send("TERM", &child);
+    assert_eq!(end(&mut child).code(), Some(75));
+    assert_eq!(asked(), "requeue 7_1\n");
+    // Told to hurry while it finishes: time is up, so it is queued again.
+    let mut child = task(&jobs, 0).spawn().unwrap();
+    until("sealed", || sealed(&folder) > so_far + 1);
+    send("USR1", &child);
+    send("TERM", &child);
+    assert_eq!(end(&mut child).code(), Some(75));
+    assert_eq!(asked(), "requeue 7_1\nrequeue 7_0\n");
+    // What gets nowhere is not started for ever.
+    let mut child = task(&jobs, 0).env("SLURM_RESTART_COUNT", "100").spawn().unwrap();
+    let before = sealed(&folder);
+    until("sealed", || sealed(&folder) > before);
+    send("USR1", &child);
+    assert_eq!(end(&mut child).code(), Some(75));
+    assert_eq!(asked().lines().count(), 2);
+    // Left alone it ends well, and only its own images are there.
+    assert_eq!(task(&jobs, 1).status().unwrap().code(), Some(0));
+    let odd = (0..20).all(|k| folder.join(format!("seals/{:06}.json", 2 * k + 1)).is_file());
+    assert!(odd && made(&folder).len() >= 20);
+    // Wrong input is never tried again.
+    std::fs::remove_file(folder.join("dataset.json")).unwrap();
+    assert_eq!(task(&jobs, 1).status().unwrap().code(), Some(2));
+    assert_eq!(asked().lines().count(), 2);
+}
+
+#[test]
+fn the_job_that_finishes_says_which_shards_lack_images() {
+    let (_keep, folder) = scratch();
+    plan(&folder, 6);
+    let jobs = emit(&folder, "slurm", 3, &["--rerender", "1"]);
+    let finish = || {
+        let mut command = Command::new("bash");
+        command.arg(jobs.join("finish.sbatch")).env("SLURM_CPUS_PER_TASK", "1");
+        command
+    };
+    assert_eq!(task(&jobs, 1).status().unwrap().code(), Some(0));
+    let said = fail(finish(), 1);
+    assert!(said.contains("4 of 6 images are missing: 0,2-3,5") && said.contains("--array=0,2"), "{said}");
+    for number in [0, 2] {
+        assert_eq!(task(&jobs, number).status().unwrap().code(), Some(0));
+    }
+    let done = succeed(finish());
+    let said = String::from_utf8_lossy(&done.stderr);
+    assert!(said.contains("6 of 6 images checked, 1 rendered again and the same; 0 faults"), "{said}");
+    same(&files(&folder), &whole(6));
+}
+
+#[test]
+fn the_kubernetes_script_finishes_when_the_shards_have_ended_and_tells_how() {
+    let (_keep, folder) = scratch();
+    plan(&folder, 4);
+    let jobs = emit(&folder, "kubernetes", 2, &[]);
+    let kubectl = jobs.join("kubectl");
+    // Says of each job what the test wants it to say, and notes what it was asked.
+    let script = "#!/bin/sh\necho \"$1 $2 $3\" >> asked\ncase \"$1 $3\" in\n'get '*-finish) echo \"$FINISH\" ;;\nget*) echo Failed ;;\nesac\n";
+    std::fs::write(&kubectl, script).unwrap();
+    std::fs::set_permissions(&kubectl, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
+    for (finish, code) in [("Complete", Some(0)), ("Failed", Some(1))] {
+        let _ = std::fs::remove_file(jobs.join("asked"));
+        let mut command = Command::new("bash");
+        command.arg(jobs.join("submit.sh")).env("FINISH", finish);
+        command.env("PATH", format!("{}:{}", jobs.display(), std::env::var("PATH").unwrap()));
+        assert_eq!(command.output().unwrap().status.code(), code, "{finish}");
+        let asked = std::fs::read_to_string(jobs.join("asked")).unwrap();
+        let applied: Vec<&str> = asked.lines().filter_map(|l| l.strip_prefix("apply -f ")).collect();
+        assert_eq!(applied, ["render.yaml", "finish.yaml"], "{asked}");
+        assert!(asked.starts_with("delete job"), "{asked}");
+    }
+}
+
+/// A Slurm of two nodes on this machine; down when it is dropped.
+struct Slurm(PathBuf);
+
+impl Slurm {
+    fn up(folder: &Path) -> Self {
+        let slurm = Self(folder.join("slurm"));
+        let up = slurm.script("up", &["2", "1"]);
+        assert!(up.status.success(), "{}", String::from_utf8_lossy(&up.stderr));
+        slurm
+    }
+
+    fn script(&self, verb: &str, more: &[&str]) -> Output {
+        // Runs beside each other have ports of their own, below those that the system hands out.
+        let port = 20000 + std::process::id() % 60 * 200;
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cluster/mini-slurm.sh");
+        let mut command = Command::new("bash");
+        command.arg(script).arg(verb).arg(&self.0).args(more).env("MINI_SLURM_PORT", port.to_string());
+        command.stdin(Stdio::null()).output().unwrap()
+    }
+
+    /// A command that speaks to this cluster.
+    fn command(&self, program: &str, arguments: &[&str]) -> Command {
+        let mut command = Command::new(program);
+        command.args(arguments).env("SLURM_CONF", self.0.join("slurm.conf")).stdin(Stdio::null());
+        command
+    }
+
+    /// What it says.
+    fn say(&self, program: &str, arguments: &[&str]) -> String {
+        let done = self.command(program, arguments).output().unwrap();
+        assert!(done.status.success(), "{program} {arguments:?}: {}", String::from_utf8_lossy(&done.stderr));
+        String::from_utf8(done.stdout).unwrap()
+    }
+
+    /// Waits until no job is left. Slurm takes half a minute to believe that a node is gone.
+    fn idle(&self) {
+        until("without jobs", || self.say("squeue", &["--noheader"]).is_empty());
+    }
+}
+
+impl Drop for Slurm {
+    fn drop(&mut self) {
+        self.script("down", &[]);
+    }
+}
+
+/// All logs of a dataset's jobs.
+fn logs(jobs: &Path) -> String {
+    let mut paths: Vec<_> = std::fs::read_dir(jobs.join("logs")).unwrap().map(|e| e.unwrap().path()).collect();
+    paths.sort();
+    paths.iter().map(|p| format!("--- {}\n{}", p.display(), std::fs::read_to_string(p).unwrap())).collect()
+}
+
+#[test]
+fn slurm_makes_the_same_dataset_although_a_node_loses_power_and_a_task_its_time() {
+    const COUNT: u64 = 24;
+    if !installed(&["slurmctld", "slurmd", "munged", "sbatch", "ss"], "slurm-wlm munge iproute2") {
+        return;
+    }
+    let (_keep, folder) = scratch();
+    let folder = folder.join("a set");
+    plan(&folder, COUNT);
+    let jobs = emit(&folder, "slurm", 4, &["--memory", "1", "--time", "10m", "--grace", "1m", "--rerender", "1"]);
+    let slurm = Slurm::up(folder.parent().unwrap());
+    slurm.say("bash", &[path(&jobs.join("submit.sh"))]);
+    // Both nodes are at work.
+    let running = |node: &str| {
+        slurm
+            .say("squeue", &["--noheader", "--states=R", "--array", "--format=%i %N"])
+            .lines()
+            .find_map(|l| l.strip_suffix(&format!(" {node}")).map(str::to_owned))
+    };
+    until("at work", || running("node1").is_some() && running("node2").is_some() && sealed(&folder) > 1);
+    let hasty = running("node1").unwrap();
+    // One node loses its power; the other's task is told that its time is nearly up. scancel asks again until the task is gone, and
+    // then says that there is none.
+    let lost = slurm.script("node-kill", &["node2"]);
+    assert!(lost.status.success(), "{}", String::from_utf8_lossy(&lost.stderr));
+    let mut told = slurm.command("scancel", &["--signal=USR1", "--batch", &hasty]).spawn().unwrap();
+    slurm.idle();
+    told.wait().unwrap();
+    let logs = logs(&jobs) + &String::from_utf8_lossy(&lost.stdout);
+    assert!(logs.contains("ended with 75"), "no task was stopped:\n{logs}");
+    assert!(logs.matches("start 2").count() >= 2, "two tasks must have been started again:\n{logs}");
+    assert!(logs.contains("24 of 24 images checked, 1 rendered again and the same; 0 faults"), "{logs}");
+    same(&files(&folder), &whole(COUNT));
+    succeed(verb("verify", &folder, &["--quiet"]));
+}
+
+/// A folder with the programs that the script needs, GNU parallel not among them.
+fn without_parallel(folder: &Path) -> PathBuf {
+    let tools = folder.join("tools");
+    std::fs::create_dir_all(&tools).unwrap();
+    for name in ["bash", "env", "seq", "xargs", "grep", "nproc", "ps", "setsid", "sleep"] {
+        let found = Command::new("sh").arg("-c").arg(format!("command -v {name}")).output().unwrap();
+        let found = String::from_utf8(found.stdout).unwrap();
+        std::os::unix::fs::symlink(found.trim(), tools.join(name)).unwrap();
+    }
+    tools
+}
+
+/// Stops the script with a signal while it renders, starts it again, compares.
+fn stop_and_go(search: Option<&Path>) {
+    const COUNT: u64 = 16;
+    let expected = whole(COUNT);
+    for signal in ["USR1", "TERM"] {
+        let (_keep, folder) = scratch();
+        let folder = folder.join("a set");
+        plan(&folder, COUNT);
+        let jobs = emit(&folder, "parallel", 4, &["--rerender", "1"]);
+        let script = || {
+            let mut command = Command::new("bash");
+            command
+                .arg(jobs.join("render.sh"))
+                .env("JOBS", "2")
+                .stdin(Stdio::null())
+                .stdout(Stdio::piped())
+                .stderr(Stdio::piped());
+            if let Some(search) = search {
+                command.env("PATH", search);
+            }
+            command
+        };
+        let mut child = script().spawn().unwrap();
+        until("sealed", || sealed(&folder) > 1);
+        send(signal, &child);
+        let status = end(&mut child);
+        assert_eq!((status.code(), status.signal()), (Some(75), None), "{signal}");
+        // Nothing of it is left running.
+        let so_far = sealed(&folder);
+        assert!(so_far < COUNT as usize, "{signal}: all was done before it stopped");
+        std::thread::sleep(Duration::from_secs(1));
+        assert_eq!(sealed(&folder), so_far, "{signal}");
+        let done = script().output().unwrap();
+        let words = String::from_utf8_lossy(&done.stderr);
+        assert_eq!(done.status.code(), Some(0), "{signal}: {words}");
+        assert!(words.contains("16 of 16 images checked, 1 rendered again and the same; 0 faults"), "{words}");
+        same(&files(&folder), &expected);
+        // Wrong input is an error, not a stop.
+        std::fs::write(folder.join("dataset.json"), "{}").unwrap();
+        let code = script().output().unwrap().status.code();
+        assert!(code.is_some_and(|c| c != 0 && c != 75), "{code:?}");
+    }
+}
+
+#[test]
+fn gnu_parallel_stops_cleanly_and_goes_on() {
+    if installed(&["parallel"], "parallel") {
+        stop_and_go(None);
+    }
+}
+
+#[test]
+fn xargs_does_the_same_where_gnu_parallel_is_not_installed() {
+    let (_keep, folder) = scratch();
+    let tools = without_parallel(&folder);
+    assert!(!tools.join("parallel").exists());
+    stop_and_go(Some(&tools));
+}
+
+#[test]
+fn a_dataset_made_in_one_go_has_the_same_bytes() {
+    // What `whole` compares with is what `trace dataset` makes, so the tests above say something about it too.
+    let (_keep, folder) = scratch();
+    let mut command = trace(&["dataset", "--scene", SMALL, "--width", "96", "--spp", "32", "--count", "4", "--quiet"]);
+    command.args(["--out", path(&folder)]);
+    succeed(command);
+    same(&tree(&folder), &whole(4));
+}
