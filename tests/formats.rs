@@ -150,7 +150,7 @@ fn every_format_comes_out_the_same_from_the_native_files() {
 #[test]
 fn every_format_takes_an_image_that_little_is_known_of() {
     let (mut recipe, _) = samples(&FIELD);
-    recipe.made = Made::Imported { from: "masks".into() };
+    recipe.made = Made::Imported { from: "masks".into(), source_sha256: String::new() };
     recipe.species.clear();
     let (none, ignore) = (0, IGNORE);
     let mut sample = Sample {

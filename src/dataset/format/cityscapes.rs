@@ -167,7 +167,7 @@ mod tests {
     fn a_city_has_no_underscore() {
         let of = |from: &str| Recipe {
             furrow: String::new(),
-            made: Made::Imported { from: from.into() },
+            made: Made::Imported { from: from.into(), source_sha256: String::new() },
             count: 0,
             split: crate::dataset::split::Shares::default(),
             formats: Vec::new(),
