@@ -11,7 +11,7 @@
 //!
 //! Images are JPEG, because the original's are and its scripts look for that name; other formats have them without loss.
 //!
-//! `params` are what annotators judged by eye; here numbers decide, see [`Params`]. `train.txt`, `val.txt` and `test.txt` list the names
+//! `params` are what annotators judged by eye; here numbers decide, as `labels.json` tells. `train.txt`, `val.txt` and `test.txt` list the names
 //! of each split, for which the original has no folders.
 //!
 //! Source: Steininger et al. 2023, "The CropAndWeed Dataset", and its repository, `cnw/utilities/datasets.py`,

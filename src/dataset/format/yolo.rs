@@ -1,7 +1,7 @@
 //! YOLO segmentation: `images/SPLIT/NAME.png`, `labels/SPLIT/NAME.txt`, `data.yaml`; Ultralytics and supervision read it.
 //!
 //! A row is a plant: its class (0 crop, 1 weed), then x and y of a polygon's corners, shares of the image's width and height. The
-//! format has one closed polygon a plant and neither holes nor parts; [`outline`] joins them by cuts, and `loss.json` tells for every plant
+//! format has one closed polygon a plant and neither holes nor parts; they are joined by cuts, and `loss.json` tells for every plant
 //! the intersection over union of its mask and what readers paint, with the mean and the worst. Leaves, which a plant's row cannot
 //! tell, are left out.
 //!
