@@ -10,7 +10,10 @@ mod common;
 use common::program::{SMALL, small_text, trace};
 use common::python::python;
 use furrow::dataset::format::{self, NAMES};
-use furrow::dataset::{Recipe, Sample, Set, native, seal};
+use furrow::dataset::recipe::Made;
+use furrow::dataset::sample::IGNORE;
+use furrow::dataset::{Recipe, Record, Sample, Set, annotate, native, seal};
+use furrow::output;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -141,4 +144,67 @@ fn every_format_comes_out_the_same_from_the_native_files() {
             }
         }
     }
+}
+
+/// Imported images have pixels without a label, vegetation of no plant, and plants of which nothing more is known.
+#[test]
+fn every_format_takes_an_image_that_little_is_known_of() {
+    let (mut recipe, _) = samples(&FIELD);
+    recipe.made = Made::Imported { from: "masks".into(), source_sha256: String::new() };
+    recipe.species.clear();
+    let (none, ignore) = (0, IGNORE);
+    let mut sample = Sample {
+        record: Record {
+            index: 2,
+            name: Set::name(2),
+            source: Some("photo.jpg".into()),
+            split: recipe.split.of(2),
+            width: 4,
+            height: 2,
+            classes: Vec::new(),
+            ignored: 0,
+            plants: Vec::new(),
+            conditions: serde_json::Value::Null,
+            warnings: Vec::new(),
+        },
+        rgb: vec![[90, 80, 70]; 8],
+        nir: Vec::new(),
+        semantics: vec![0, 1, 1, ignore, 2, 2, 0, 1],
+        species: Vec::new(),
+        plants: vec![none, 7, 7, none, 9, 9, none, none],
+        leaves: vec![none; 8],
+        coverage: Vec::new(),
+        depth: Vec::new(),
+        normals: Vec::new(),
+        film: None,
+    };
+    (sample.record.classes, sample.record.ignored) = annotate::classes(&sample);
+    sample.record.plants = annotate::plants(&sample);
+    assert_eq!((sample.record.ignored, sample.record.plants.len()), (1, 2));
+    let (folder, written) = common::program::scratch();
+    for (name, _) in NAMES {
+        let writer = format::named(name).unwrap();
+        if writer.needs_film() {
+            continue;
+        }
+        for file in writer.image(&recipe, &sample).unwrap() {
+            assert!(!file.bytes.is_empty(), "{}", file.path);
+            let path = written.join(&file.path);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, &file.bytes).unwrap();
+        }
+    }
+    let gray16 = |path: &str| output::read_gray16(&written.join(path)).unwrap().2;
+    assert_eq!(gray16("phenobench/val/semantics/000002.png"), [0, 1, 1, 255, 2, 2, 0, 1]);
+    let instances = gray16("cityscapes/gtFine/val/masks/masks_000000_000002_gtFine_instanceIds.png");
+    assert_eq!(instances, [0, 1000, 1000, 255, 2000, 2000, 0, 1]);
+    let (_, _, segments) = output::read_rgb(&written.join("panoptic/annotations/panoptic_val/000002.png")).unwrap();
+    // Soil and a crowd of crop behind the plants' numbers, void where there is no label.
+    let (soil, crowd) = ([4, 0, 1], [1, 0, 1]);
+    let plants = ([7, 0, 0], [9, 0, 0]);
+    assert_eq!(segments, [soil, plants.0, plants.0, [0; 3], plants.1, plants.1, soil, crowd]);
+    let (_, _, labels) =
+        output::read_gray(&written.join("cropandweed/labelIds/CropAndWeed/ave-0000-0002.png")).unwrap();
+    assert_eq!(labels, [0, 255, 255, 0, 255, 255, 0, 0]);
+    drop(folder);
 }

@@ -204,7 +204,7 @@ impl Run<'_> {
 }
 
 /// The files of all formats of an image.
-fn formatted(set: &Set, sample: &super::Sample) -> Result<Vec<File>> {
+pub(super) fn formatted(set: &Set, sample: &super::Sample) -> Result<Vec<File>> {
     let mut files = Vec::new();
     for (_, format) in format::all(&set.recipe)? {
         files.extend(format.image(&set.recipe, sample)?);

@@ -24,6 +24,7 @@
 //! | `plan`, `generate`, `ledger`, `finish` | from a page to files; what remains to be done is found by looking at the disk |
 //! | `cluster` | the same on many machines: job files for schedulers |
 //! | `invariants`, `verify` | what must hold of every image, and whether it does |
+//! | `import` | other people's images and labels |
 //! | `report` | all of it on one page, for people |
 
 pub mod annotate;
@@ -31,6 +32,7 @@ pub mod cluster;
 pub mod finish;
 pub mod format;
 pub mod generate;
+pub mod import;
 pub mod invariants;
 pub mod ledger;
 pub mod native;

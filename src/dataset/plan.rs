@@ -108,7 +108,7 @@ fn warnings(recipe: &Recipe) -> Result<Vec<String>> {
 }
 
 /// Refuses a folder in which other things lie: nothing of the user's may be overwritten.
-fn refuse_full(folder: &Path) -> Result<()> {
+pub(super) fn refuse_full(folder: &Path) -> Result<()> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
     // A dataset that was stopped while it began has left its scene and nothing else.
     let other = entries.filter_map(|e| Some(e.ok()?.file_name())).find(|name| name != "scene");
@@ -164,6 +164,15 @@ pub fn add_formats(set: &mut Set, names: &[String]) -> Result<Vec<String>> {
         if !recipe.formats.contains(name) {
             recipe.formats.push(name.clone());
         }
+    }
+    if recipe.rendering().is_err()
+        && let Some((name, _)) = format::all(&recipe)?.into_iter().find(|(_, f)| f.needs_film())
+    {
+        return Err(Error::Dataset(format!(
+            "{}: --format {name} holds what only the renderer knows, and these images were not rendered\n help: other formats can be \
+             added; `trace dataset finish --help` lists them",
+            set.folder.display()
+        )));
     }
     let warnings = warnings(&recipe)?;
     seal::write_files(&set.folder, &[File { path: FILE.into(), bytes: recipe.text()? }])?;

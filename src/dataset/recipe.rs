@@ -39,6 +39,8 @@ pub enum Made {
     Imported {
         /// The format that they were in.
         from: String,
+        /// SHA-256 of everything that told how they were read: options, names and lengths of files.
+        source_sha256: String,
     },
 }
 
@@ -110,7 +112,7 @@ impl Recipe {
     pub fn rendering(&self) -> Result<&Rendering> {
         match &self.made {
             Made::Rendered(rendering) => Ok(rendering),
-            Made::Imported { from } => Err(Error::Dataset(format!(
+            Made::Imported { from, .. } => Err(Error::Dataset(format!(
                 "these images were imported from {from} and cannot be rendered\n help: `trace dataset verify` checks them, \
                  `trace dataset finish --format …` writes further formats"
             ))),

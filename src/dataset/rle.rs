@@ -79,6 +79,11 @@ impl Rle {
         Self { size: [height, width], counts: pack(&runs) }
     }
 
+    /// Of run lengths that are not packed, zeros first.
+    pub fn of_runs(size: [u32; 2], runs: &[u64]) -> Self {
+        Self { size, counts: pack(runs) }
+    }
+
     /// Run lengths, zeros first. An error where the text is none or does not fill the image.
     pub fn runs(&self) -> Result<Vec<u64>> {
         let runs = unpack(&self.counts).ok_or_else(|| self.fault("its `counts` are not COCO's run lengths"))?;

@@ -18,9 +18,11 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 pub use self::exr::{Geometry, encode_geometry, encode_layers, half, read_geometry};
-pub use self::png::{Picture, encode as encode_png, read_gray, read_gray16, read_indexed, read_rgb, write_png};
+pub use self::png::{
+    Map, Picture, encode as encode_png, read_gray, read_gray16, read_indexed, read_map, read_rgb, write_png,
+};
 pub use denoise::Denoiser;
-pub use photo::{encode_jpeg, shrink, shrunk};
+pub use photo::{encode_jpeg, read_gray_photo, read_photo, shrink, shrunk};
 
 /// How many samples the pixels of an image have.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,8 +1,33 @@
-//! Photographs made small, for pages that people look at. The door to the `image` crate for writing.
+//! Photographs of other people, in whatever shape they come; and ours made small, for pages that people look at.
 
 use crate::{Error, Result};
 use image::codecs::jpeg::JpegEncoder;
-use image::{ExtendedColorType, RgbImage, imageops};
+use image::{DynamicImage, ExtendedColorType, RgbImage, imageops};
+use std::path::Path;
+
+/// Reads a PNG or JPEG photograph of any depth as 8-bit sRGB: width, height, pixels.
+pub fn read_photo(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
+    let photo = decode(path)?.into_rgb8();
+    let (w, h) = photo.dimensions();
+    Ok((w, h, photo.into_raw().as_chunks::<3>().0.to_vec()))
+}
+
+/// Reads one as 8-bit gray: width, height, values.
+pub fn read_gray_photo(path: &Path) -> Result<(u32, u32, Vec<u8>)> {
+    let photo = decode(path)?.into_luma8();
+    let (w, h) = photo.dimensions();
+    Ok((w, h, photo.into_raw()))
+}
+
+fn decode(path: &Path) -> Result<DynamicImage> {
+    let reader = image::ImageReader::open(path).and_then(image::ImageReader::with_guessed_format);
+    reader.map_err(Error::io(path))?.decode().map_err(|e| match e {
+        image::ImageError::IoError(source) if source.kind() != std::io::ErrorKind::UnexpectedEof => {
+            Error::io(path)(source)
+        }
+        e => Error::Image { path: path.into(), what: format!("this image cannot be read: {e}; PNG and JPEG can") },
+    })
+}
 
 /// An 8-bit sRGB picture at most `most` pixels wide and high, of the same shape: width, height, pixels. Each pixel is the mean of
 /// those that it stands for; a picture that is small enough stays as it is.

@@ -107,3 +107,75 @@ pub fn read_gray16(path: &Path) -> Result<(u32, u32, Vec<u16>)> {
     let (w, h, bytes) = read(path, BitDepth::Sixteen, ColorType::Grayscale, "a 16-bit gray PNG")?;
     Ok((w, h, bytes.chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]])).collect()))
 }
+
+/// What other people's masks hold.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Map {
+    /// Numbers of a gray picture, opacity left out.
+    Numbers(Vec<u16>),
+    /// Indices, and the colours they stand for.
+    Indexed(Vec<u16>, Vec<[u8; 3]>),
+    /// 8-bit colours, opacity left out.
+    Colors(Vec<[u8; 3]>),
+}
+
+impl Map {
+    /// As colours: an index as the colour that it stands for (black where there is none), a number as gray.
+    pub fn colors(self) -> Vec<[u8; 3]> {
+        match self {
+            Self::Numbers(numbers) => numbers.into_iter().map(|n| [n.min(255) as u8; 3]).collect(),
+            Self::Indexed(indices, palette) => {
+                indices.into_iter().map(|i| palette.get(usize::from(i)).copied().unwrap_or_default()).collect()
+            }
+            Self::Colors(colors) => colors,
+        }
+    }
+}
+
+/// Reads a PNG whose numbers or colours stand for something, as they are: width, height, pixels. A picture in colour that is gray
+/// all over is one of numbers.
+pub fn read_map(path: &Path) -> Result<(u32, u32, Map)> {
+    let wrong = |what: String| Error::Image { path: path.into(), what };
+    let file = std::fs::File::open(path).map_err(Error::io(path))?;
+    let mut decoder = png::Decoder::new(std::io::BufReader::new(file));
+    decoder.set_transformations(png::Transformations::IDENTITY);
+    let unreadable = |e: png::DecodingError| wrong(format!("this mask cannot be read: {e}; masks are PNG files"));
+    let mut reader = decoder.read_info().map_err(unreadable)?;
+    let (w, h) = (reader.info().width, reader.info().height);
+    let (color, depth) = (reader.info().color_type, reader.info().bit_depth as u8);
+    let palette = reader.info().palette.as_ref().map(|p| p.as_chunks::<3>().0.to_vec()).unwrap_or_default();
+    let size = reader.output_buffer_size().ok_or_else(|| wrong("it is too large".into()))?;
+    let mut data = vec![0; size];
+    reader.next_frame(&mut data).map_err(unreadable)?;
+    let values = unpack(&data, w as usize * color.samples(), depth);
+    let map = match color {
+        ColorType::Indexed => Map::Indexed(values, palette),
+        ColorType::Grayscale => Map::Numbers(values),
+        ColorType::GrayscaleAlpha => Map::Numbers(values.as_chunks::<2>().0.iter().map(|[n, _]| *n).collect()),
+        ColorType::Rgb | ColorType::Rgba => {
+            let pixels: Vec<&[u16]> = values.chunks_exact(color.samples()).collect();
+            if pixels.iter().all(|p| p[0] == p[1] && p[1] == p[2]) {
+                Map::Numbers(pixels.iter().map(|p| p[0]).collect())
+            } else if depth == 8 {
+                Map::Colors(pixels.iter().map(|p| [p[0], p[1], p[2]].map(|v| v as u8)).collect())
+            } else {
+                return Err(wrong("it has 16 bits a colour; masks in colour have 8".into()));
+            }
+        }
+    };
+    Ok((w, h, map))
+}
+
+/// Values of 1, 2, 4, 8 or 16 bits; each row begins with a byte of its own.
+fn unpack(data: &[u8], in_row: usize, bits: u8) -> Vec<u16> {
+    if bits == 16 {
+        return data.as_chunks::<2>().0.iter().map(|b| u16::from_be_bytes(*b)).collect();
+    }
+    let per_byte = 8 / usize::from(bits);
+    let mask = (1_u16 << bits) - 1;
+    let value = |row: &[u8], k: usize| {
+        let shift = 8 - usize::from(bits) * (k % per_byte + 1);
+        u16::from(row[k / per_byte]) >> shift & mask
+    };
+    data.chunks_exact(in_row.div_ceil(per_byte)).flat_map(|row| (0..in_row).map(move |k| value(row, k))).collect()
+}

@@ -181,14 +181,11 @@ pub(super) fn limits(recipe: &Recipe, found: &Statistics) -> String {
                     .into(),
             );
             all.push("Stones, straw and everything else that is no plant is soil.".into());
-            if !made.denoise {
-                all.push(format!(
-                    "The photographs hold the noise of {} samples a pixel, beside the sensor's.",
-                    made.spp
-                ));
+            all.push(if made.denoise {
+                "Denoising blurs what is finer than a pixel.".into()
             } else {
-                all.push("Denoising blurs what is finer than a pixel.".into());
-            }
+                format!("The photographs hold the noise of {} samples a pixel, beside the sensor's.", made.spp)
+            });
             all.push("No disease, no damage by insects, no wind, no motion blur.".into());
         }
         Made::Imported { .. } => {
@@ -199,7 +196,7 @@ pub(super) fn limits(recipe: &Recipe, found: &Statistics) -> String {
     for (words, n) in &found.warnings {
         all.push(format!("{}: {}", count(*n, "image", "images"), escape(words)));
     }
-    format!("<ul>{}</ul>", all.iter().map(|words| format!("<li>{words}</li>")).collect::<String>())
+    format!("<ul><li>{}</li></ul>", all.join("</li><li>"))
 }
 
 /// Whose work it stands on.

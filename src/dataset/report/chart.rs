@@ -198,14 +198,16 @@ fn short(value: f64) -> String {
     }
 }
 
+/// Radius of the horizon, and where the zenith lies.
+const RADIUS: f64 = 82.0;
+const SKY: (f64, f64) = (WIDTH / 2.0, 100.0);
+
 /// Suns in the sky, north up, the zenith in the middle, the horizon around; each as azimuth, elevation (degrees), cloud.
 pub(super) fn suns(suns: &[[f64; 3]]) -> String {
     if suns.is_empty() {
         return String::new();
     }
-    const RADIUS: f64 = 82.0;
-    const MIDDLE: (f64, f64) = (WIDTH / 2.0, 100.0);
-    let (x0, y0) = MIDDLE;
+    let (x0, y0) = SKY;
     let mut body = String::new();
     for elevation in [0.0, 30.0, 60.0] {
         let r = RADIUS * (90.0 - elevation) / 90.0;
@@ -302,7 +304,9 @@ mod tests {
     #[test]
     fn bars_lie_in_the_picture_and_ticks_below_it() {
         let mut values = Histogram::whole();
-        [10.0, 12.0, 12.0, 14.0].into_iter().for_each(|v| values.add(v));
+        for value in [10.0, 12.0, 12.0, 14.0] {
+            values.add(value);
+        }
         let svg = histograms("k", "Title", "", &[Series { name: "a < b", class: "crop", values: &values }]);
         assert!(svg.contains("data-counts=\"1 0 2 0 1\"") && svg.contains("a &lt; b"), "{svg}");
         let bars = Histogram::bars(&[&values]).remove(0);

@@ -161,7 +161,9 @@ mod tests {
         #[test]
         fn every_value_stands_in_the_bar_that_holds_it(values in prop::collection::vec(0.0..5000.0_f64, 1..200), log in any::<bool>()) {
             let mut histogram = if log { Histogram::sizes() } else { Histogram::linear(0.5) };
-            values.iter().for_each(|v| histogram.add(*v));
+            for value in &values {
+                histogram.add(*value);
+            }
             let bars = &Histogram::bars(&[&histogram])[0];
             prop_assert!(bars.len() as f64 <= BARS.1);
             prop_assert_eq!(bars.iter().map(|b| b.count).sum::<u64>(), values.len() as u64);
@@ -177,7 +179,9 @@ mod tests {
     #[test]
     fn all_of_a_thing_is_the_last_bar_of_its_shares() {
         let mut shares = Histogram::percents();
-        (0..=1000).for_each(|k| shares.add(f64::from(k) / 10.0));
+        for k in 0..=1000 {
+            shares.add(f64::from(k) / 10.0);
+        }
         let bars = &Histogram::bars(&[&shares])[0];
         assert_eq!((bars.len(), bars[0].count, bars[9].count), (10, 100, 101));
         assert_eq!((bars[9].from, bars[9].to), (90.0, 100.0));

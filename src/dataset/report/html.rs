@@ -21,7 +21,7 @@ pub(super) fn whole(n: u64) -> String {
     let digits = n.to_string();
     let mut out = String::new();
     for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i) % 3 == 0 {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
             // Narrow, and no line breaks at it.
             out.push('\u{202f}');
         }

@@ -43,7 +43,9 @@ pub(super) fn measure(set: &Set) -> Result<Photographs> {
     for Means(rgb, clipped, nir) in &all {
         found.brightness.add(rgb.iter().sum::<f64>() / 3.0);
         found.clipped.add(100.0 * clipped);
-        nir.iter().for_each(|x| found.nir.add(*x));
+        if let Some(nir) = nir {
+            found.nir.add(*nir);
+        }
         found.colors.push(rgb.map(|x| x.round() as u8));
     }
     found.colors.sort_by_key(|c| (c.iter().map(|x| u32::from(*x)).sum::<u32>(), *c));

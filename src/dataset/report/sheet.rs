@@ -37,7 +37,9 @@ fn chosen(sizes: [usize; Split::ALL.len()]) -> [Vec<usize>; Split::ALL.len()] {
     while quota.iter().sum::<usize>() < MOST && quota != sizes {
         // Of the splits with images left, the one that shows the fewest.
         let left = (0..sizes.len()).filter(|k| quota[*k] < sizes[*k]).min_by_key(|k| quota[*k]);
-        left.into_iter().for_each(|k| quota[k] += 1);
+        if let Some(k) = left {
+            quota[k] += 1;
+        }
     }
     std::array::from_fn(|k| (0..quota[k]).map(|i| i * sizes[k] / quota[k]).collect())
 }

@@ -4,7 +4,7 @@ use super::histogram::Histogram;
 use crate::dataset::record::{Plant, Record};
 use crate::scene::tag::Class;
 use serde_json::Value;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Most suns that a chart shows, spread over the images.
 pub(super) const MOST_SUNS: u64 = 600;
@@ -156,9 +156,10 @@ impl Statistics {
             self.plants[k].add(of_class().filter(|p| p.seen.pixels > 0).count() as f64);
             of_class().for_each(|plant| self.add_plant(k, plant));
         }
-        let mut here: BTreeMap<u16, u64> = BTreeMap::new();
-        record.seen().for_each(|plant| *here.entry(plant.kind).or_default() += 1);
-        here.keys().for_each(|kind| self.species.entry(*kind).or_default().images += 1);
+        let here: BTreeSet<u16> = record.seen().map(|plant| plant.kind).collect();
+        for kind in here {
+            self.species.entry(kind).or_default().images += 1;
+        }
         record.warnings.iter().for_each(|words| *self.warnings.entry(words.clone()).or_default() += 1);
         let conditions = &record.conditions;
         if let Some(lights) = conditions["lights"].as_array() {
@@ -216,8 +217,12 @@ impl Statistics {
                     light.suns.push([azimuth, elevation, number("cloud").unwrap_or(0.0)]);
                 }
             }
-            number("cloud").into_iter().for_each(|x| light.cloud.add(100.0 * x));
-            number("turbidity").into_iter().for_each(|x| light.turbidity.add(x));
+            if let Some(cloud) = number("cloud") {
+                light.cloud.add(100.0 * cloud);
+            }
+            if let Some(turbidity) = number("turbidity") {
+                light.turbidity.add(turbidity);
+            }
         }
         if !lights.is_empty() {
             light.irradiance.add(ground);

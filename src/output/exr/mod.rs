@@ -44,11 +44,12 @@ pub fn encode_layers(film: &Film, labels: &LabelMap, tags: &[Tag], text: &str) -
         let shares = coverage.iter().map(|c| c[class as usize]).collect();
         channels.push(channel(&format!("coverage.{}", class.name()), FlatSamples::F32(shares)));
     }
-    let names: [(&str, fn(&Tag) -> String); 3] =
-        [("CryptoClass", |t| t.class.name().to_owned()), ("CryptoPlant", plant_name), ("CryptoLeaf", leaf_name)];
+    let class_name = |tag: Tag| tag.class.name().to_owned();
+    let names: [(&str, NameOf); 3] =
+        [("CryptoClass", class_name), ("CryptoPlant", plant_name), ("CryptoLeaf", leaf_name)];
     let mut words = Vec::new();
     for (layer, name) in names {
-        let names: Vec<String> = tags.iter().map(name).collect();
+        let names: Vec<String> = tags.iter().copied().map(name).collect();
         let matte = cryptomatte::matte(layer, film, &names);
         words.extend(matte.attributes());
         channels.extend(matte.channels.into_iter().map(|(name, values)| channel(&name, FlatSamples::F32(values))));
@@ -56,13 +57,16 @@ pub fn encode_layers(film: &Film, labels: &LabelMap, tags: &[Tag], text: &str) -
     write_with(film.window, channels, text, words)
 }
 
-/// What a plant is called in a Cryptomatte; everything without a plant is ground.
-fn plant_name(tag: &Tag) -> String {
+/// What a part is called in a Cryptomatte.
+type NameOf = fn(Tag) -> String;
+
+/// What a plant is called; everything without a plant is ground.
+fn plant_name(tag: Tag) -> String {
     if tag.plant == 0 { "ground".into() } else { format!("plant_{}", tag.plant) }
 }
 
 /// What a leaf is called, and what is no leaf of a plant.
-fn leaf_name(tag: &Tag) -> String {
+fn leaf_name(tag: Tag) -> String {
     match (tag.plant, tag.leaf) {
         (0, _) => plant_name(tag),
         (_, 0) => format!("{}/stem", plant_name(tag)),

@@ -40,7 +40,7 @@ mod tests {
         let attribute = |name: &str, value: &[u8]| {
             [name.as_bytes(), b"\0string\0", &(value.len() as u32).to_le_bytes(), value].concat()
         };
-        let (a, b) = (attribute("a/long/name", b"12\0345"), attribute("b", b""));
+        let (a, b) = (attribute("a/long/name", b"12\x00345"), attribute("b", b""));
         let file = |header: [&[u8]; 2]| [b"magicver".as_slice(), header[0], header[1], b"\0rest"].concat();
         assert_eq!(sorted(file([&b, &a])), Some(file([&a, &b])));
         assert_eq!(sorted(file([&a, &b])), Some(file([&a, &b])));

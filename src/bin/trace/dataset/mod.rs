@@ -3,6 +3,7 @@
 mod emit;
 mod engine;
 mod finish;
+mod import;
 mod order;
 mod progress;
 mod render;
@@ -31,6 +32,7 @@ Examples:
   trace dataset --scene scenes/synthetic-d.ron --count 1300 --out data/d --width 480 --height 360 --spp 32 --format phenobench,coco
   trace dataset verify data/d --rerender 5              hashes, invariants, and five images rendered again
   trace dataset finish data/d --format yolo             a further format of the same images
+  trace dataset import --format masks --images real/images --masks real/labels --out data/real
 
 On several machines that share a folder:
   trace dataset plan --scene scenes/synthetic-d.ron --count 100000 --out data/d --spp 32
@@ -46,6 +48,8 @@ enum Verb {
     Render(render::Args),
     /// Write what belongs to all images: lists of the formats, manifest, report.
     Finish(finish::Args),
+    /// Bring other people's images and labels in: masks, PhenoBench, COCO.
+    Import(Box<import::Args>),
     /// Check every file and every label; render some images again.
     Verify(verify::Args),
     /// Write job files for a cluster: Slurm, Kubernetes, or GNU parallel.
@@ -66,6 +70,7 @@ pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
         Some(Verb::Plan(args)) => order::run(args).map(|set| vec![set.folder.join(furrow::dataset::recipe::FILE)]),
         Some(Verb::Render(args)) => render::run(args, signals),
         Some(Verb::Finish(args)) => finish::run(args, signals),
+        Some(Verb::Import(args)) => import::run(args, signals),
         Some(Verb::Verify(args)) => verify::run(args, signals),
         Some(Verb::Emit(args)) => emit::run(args),
         None => {

@@ -1,0 +1,390 @@
+//! COCO instances: masks of plants, and of leaves where it has them, as polygons or run lengths; keypoints by the names stem, base, tip.
+//!
+//! What no mask covers is soil. Where masks overlap, the smaller lies on top. A leaf belongs to the plant that most of it lies on. A crowd
+//! (`iscrowd` 1) has a class and no instance. Polygons hold the pixels whose centres lie inside, by the even-odd rule; the
+//! reference implementation may put a pixel on the outline otherwise. Source: COCO data format, <https://cocodataset.org/#format-data>.
+
+use super::classes::{Meaning, Names};
+use super::files::{length, same_size};
+use super::instances::{Instances, instances};
+use super::{Labelled, Listed, Source};
+use crate::dataset::record::{Keypoint, PointState};
+use crate::dataset::rle::Rle;
+use crate::dataset::split::Split;
+use crate::output;
+use crate::scene::tag::Class;
+use crate::{Error, Result};
+use serde::Deserialize;
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+/// Images with their annotations.
+pub struct Coco {
+    listed: Vec<Listed>,
+    images: Vec<Annotated>,
+    words: String,
+}
+
+/// An image and what is drawn on it.
+struct Annotated {
+    path: PathBuf,
+    /// The file that says so.
+    document: PathBuf,
+    size: (u32, u32),
+    things: Vec<Thing>,
+}
+
+/// A plant, a leaf, a crowd, a patch without a label.
+struct Thing {
+    id: u64,
+    meaning: Meaning,
+    crowd: bool,
+    /// Number of its plant, where its maker told it.
+    plant: Option<u32>,
+    segmentation: Segmentation,
+    /// Stem, base, tip.
+    points: [Option<Keypoint>; 3],
+}
+
+#[derive(Deserialize)]
+struct Document {
+    images: Vec<Image>,
+    annotations: Vec<Annotation>,
+    categories: Vec<Category>,
+}
+
+#[derive(Deserialize)]
+struct Image {
+    id: u64,
+    file_name: String,
+    width: u32,
+    height: u32,
+}
+
+#[derive(Deserialize)]
+struct Annotation {
+    #[serde(default)]
+    id: u64,
+    image_id: u64,
+    category_id: u64,
+    segmentation: Option<Segmentation>,
+    #[serde(default)]
+    iscrowd: u8,
+    #[serde(default)]
+    keypoints: Vec<f32>,
+    #[serde(default)]
+    attributes: Value,
+}
+
+#[derive(Deserialize)]
+struct Category {
+    id: u64,
+    name: String,
+    #[serde(default)]
+    keypoints: Vec<String>,
+}
+
+/// A mask as COCO writes it.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Segmentation {
+    Packed(Rle),
+    Runs { size: [u32; 2], counts: Vec<u64> },
+    Polygons(Vec<Vec<f64>>),
+}
+
+impl Coco {
+    /// Opens a file of annotations, or a folder with `annotations/instances_SPLIT.json`. Images lie in `images`, or in its folder of the
+    /// split; without it in `images` beside the annotations. `classes` tells what categories mean; without it they are called
+    /// soil, crop, weed and leaf.
+    pub fn open(from: &Path, images: Option<&Path>, classes: Option<&Names>) -> Result<Self> {
+        let mut all =
+            Self { listed: Vec::new(), images: Vec::new(), words: format!("{:?}\n", classes.map(Names::words)) };
+        let mut found: Vec<(Listed, Annotated)> = Vec::new();
+        for (split, document) in documents(from)? {
+            let folder = images.map_or_else(|| beside(from, &document), Path::to_path_buf);
+            found.extend(all.document(split, &document, &folder, classes)?);
+        }
+        found.sort_by(|a, b| a.0.cmp(&b.0));
+        if let Some(pair) = found.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+            return Err(Error::Dataset(format!("{}: it is listed twice", pair[0].1.path.display())));
+        }
+        if found.is_empty() {
+            return Err(Error::Dataset(format!("{}: there are no images in it", from.display())));
+        }
+        for (one, image) in found {
+            let _ = writeln!(all.words, "{one:?} {}", length(&image.path)?);
+            all.listed.push(one);
+            all.images.push(image);
+        }
+        Ok(all)
+    }
+
+    /// The images of one file.
+    fn document(
+        &mut self,
+        split: Option<Split>,
+        path: &Path,
+        folder: &Path,
+        classes: Option<&Names>,
+    ) -> Result<Vec<(Listed, Annotated)>> {
+        let bytes = std::fs::read(path).map_err(Error::io(path))?;
+        let _ = writeln!(self.words, "{split:?} {:x?}", Sha256::digest(&bytes));
+        let wrong = |what: String| Error::Dataset(format!("{}: {what}", path.display()));
+        let Document { images, annotations, categories } =
+            serde_json::from_slice(&bytes).map_err(|e| wrong(format!("this is not a COCO file of instances: {e}")))?;
+        let mut kinds: BTreeMap<u64, (Meaning, Vec<String>)> = BTreeMap::new();
+        for category in categories {
+            let known = match classes {
+                Some(names) => names.0.get(&category.name).copied(),
+                None => Meaning::named(&category.name),
+            };
+            if let Some(meaning) = known {
+                kinds.insert(category.id, (meaning, category.keypoints));
+            } else if annotations.iter().any(|a| a.category_id == category.id) {
+                return Err(wrong(format!(
+                    "no class was given for the category `{0}`\n help: give --classes '{0}=crop,…'; classes are soil, crop, weed, leaf, ignore",
+                    category.name
+                )));
+            }
+        }
+        let mut found: BTreeMap<u64, (Listed, Annotated)> = BTreeMap::new();
+        for Image { id, file_name, width, height } in images {
+            let of_split = split.map(|s| folder.join(s.name()).join(&file_name)).filter(|p| p.is_file());
+            let image = of_split.unwrap_or_else(|| folder.join(&file_name));
+            if !image.is_file() {
+                return Err(wrong(format!(
+                    "its image {} is missing\n help: say where images lie with --images",
+                    image.display()
+                )));
+            }
+            let annotated = Annotated { path: image, document: path.into(), size: (width, height), things: Vec::new() };
+            if found.insert(id, (Listed { split, name: file_name }, annotated)).is_some() {
+                return Err(wrong(format!("two images have the id {id}")));
+            }
+        }
+        for annotation in annotations {
+            let id = annotation.id;
+            let (_, image) = found
+                .get_mut(&annotation.image_id)
+                .ok_or_else(|| wrong(format!("annotation {id} is of image {}, which it lacks", annotation.image_id)))?;
+            let (meaning, names) = kinds.get(&annotation.category_id).ok_or_else(|| {
+                wrong(format!("annotation {id} has the category {}, which it lacks", annotation.category_id))
+            })?;
+            image.things.push(Thing {
+                id,
+                meaning: *meaning,
+                crowd: annotation.iscrowd != 0,
+                plant: annotation.attributes["plant"].as_u64().and_then(|n| u32::try_from(n).ok()),
+                segmentation: annotation
+                    .segmentation
+                    .ok_or_else(|| wrong(format!("annotation {id} has no mask; boxes alone cannot label pixels")))?,
+                points: ["stem", "base", "tip"].map(|name| point(names, name, &annotation.keypoints)),
+            });
+        }
+        Ok(found.into_values().collect())
+    }
+}
+
+/// The files of annotations, each with its split where its name tells one.
+fn documents(from: &Path) -> Result<Vec<(Option<Split>, PathBuf)>> {
+    if from.is_file() {
+        return Ok(vec![(None, from.into())]);
+    }
+    let file = |split: Split| from.join("annotations").join(format!("instances_{}.json", split.name()));
+    let found: Vec<_> = Split::ALL.into_iter().map(|s| (Some(s), file(s))).filter(|(_, path)| path.is_file()).collect();
+    if found.is_empty() {
+        return Err(Error::Dataset(format!(
+            "{}: there is no annotations/instances_train.json, …_val.json or …_test.json in it\n help: give --from such a folder or one JSON file",
+            from.display()
+        )));
+    }
+    Ok(found)
+}
+
+/// Where the images of a file lie unless one says otherwise.
+fn beside(from: &Path, document: &Path) -> PathBuf {
+    let root = if from.is_file() { document.parent().unwrap_or(Path::new(".")) } else { from };
+    let images = root.join("images");
+    if images.is_dir() { images } else { root.into() }
+}
+
+/// The keypoint of this name, where the annotation has it.
+fn point(names: &[String], name: &str, values: &[f32]) -> Option<Keypoint> {
+    let at = names.iter().position(|n| n == name)?;
+    let [x, y, v] = values.as_chunks::<3>().0.get(at)?;
+    let state = match v {
+        2.0 => PointState::Visible,
+        1.0 => PointState::Hidden,
+        _ => return None,
+    };
+    Some(Keypoint { x: *x, y: *y, state })
+}
+
+impl Source for Coco {
+    fn name(&self) -> &'static str {
+        "coco"
+    }
+
+    fn images(&self) -> &[Listed] {
+        &self.listed
+    }
+
+    fn words(&self) -> &str {
+        &self.words
+    }
+
+    fn read(&self, place: usize) -> Result<Labelled> {
+        let image = &self.images[place];
+        let (w, h, rgb) = output::read_photo(&image.path)?;
+        same_size(&image.path, (w, h), image.size)?;
+        let (semantics, found, points) = painted(image)?;
+        let Instances { plants, leaves, warnings, .. } = found;
+        Ok(Labelled { size: (w, h), rgb, nir: Vec::new(), semantics, plants, leaves, points, warnings })
+    }
+}
+
+type Points = BTreeMap<(u16, u16), [Option<Keypoint>; 3]>;
+
+/// Classes, plants and leaves of an image, and their points.
+fn painted(image: &Annotated) -> Result<(Vec<u8>, Instances, Points)> {
+    let (w, h) = image.size;
+    let n = w as usize * h as usize;
+    let (mut semantics, mut plants, mut leaves) = (vec![Class::Soil as u8; n], vec![0_u32; n], vec![0_u32; n]);
+    let mut masks: Vec<(usize, Vec<u32>)> = Vec::new();
+    for (k, thing) in image.things.iter().enumerate() {
+        masks.push((k, pixels(image, thing)?));
+    }
+    masks.sort_by_key(|(k, pixels)| (std::cmp::Reverse(pixels.len()), *k));
+    let numbers = plant_numbers(&image.things);
+    for (k, pixels) in masks.iter().filter(|(k, _)| image.things[*k].meaning != Meaning::Leaf) {
+        for i in pixels {
+            semantics[*i as usize] = image.things[*k].meaning.number();
+            plants[*i as usize] = numbers[*k];
+        }
+    }
+    let mut owners = vec![0; image.things.len()];
+    for (k, pixels) in masks.iter().filter(|(k, _)| image.things[*k].meaning == Meaning::Leaf) {
+        let mut votes: BTreeMap<u32, u64> = BTreeMap::new();
+        for i in pixels {
+            *votes.entry(plants[*i as usize]).or_default() += 1;
+        }
+        votes.remove(&0);
+        // Of equal ones the first.
+        let owner =
+            votes.into_iter().max_by_key(|(plant, n)| (*n, std::cmp::Reverse(*plant))).map_or(0, |(plant, _)| plant);
+        owners[*k] = owner;
+        for i in pixels.iter().filter(|i| owner == 0 || plants[**i as usize] == owner) {
+            leaves[*i as usize] = *k as u32 + 1;
+        }
+    }
+    let found = instances(&image.path, &semantics, &plants, &leaves)?;
+    let mut points = Points::new();
+    for (k, thing) in image.things.iter().enumerate() {
+        let leaf = thing.meaning == Meaning::Leaf;
+        let own = if leaf { (owners[k], k as u32 + 1) } else { (numbers[k], 0) };
+        if let Some(place) = found.numbers.get(&own) {
+            points.insert(*place, thing.points);
+        }
+    }
+    Ok((semantics, found, points))
+}
+
+/// Numbers of plants, 0 for what is none: those that their maker gave if they are all there and differ, else from 1.
+fn plant_numbers(things: &[Thing]) -> Vec<u32> {
+    let is_plant = |t: &Thing| !t.crowd && matches!(t.meaning, Meaning::Class(Class::Crop | Class::Weed));
+    let told: Vec<u32> = things.iter().filter(|t| is_plant(t)).filter_map(|t| t.plant).collect();
+    let distinct: BTreeSet<u32> = told.iter().copied().filter(|n| *n > 0).collect();
+    let own = distinct.len() == things.iter().filter(|t| is_plant(t)).count();
+    let mut last = 0;
+    let number = |thing: &Thing| {
+        if !is_plant(thing) {
+            return 0;
+        }
+        last += 1;
+        thing.plant.filter(|_| own).unwrap_or(last)
+    };
+    things.iter().map(number).collect()
+}
+
+/// The pixels of a mask, as places in the image row by row.
+fn pixels(image: &Annotated, thing: &Thing) -> Result<Vec<u32>> {
+    let (w, h) = image.size;
+    let wrong = |what: String| Error::Dataset(format!("{}: annotation {}: {what}", image.document.display(), thing.id));
+    let rle = match &thing.segmentation {
+        Segmentation::Polygons(polygons) => return Ok(inside(w, h, polygons)),
+        Segmentation::Packed(rle) => rle.clone(),
+        Segmentation::Runs { size, counts } => Rle::of_runs(*size, counts),
+    };
+    if rle.size != [h, w] {
+        return Err(wrong(format!("its mask is {} × {} pixels, its image {w} × {h}", rle.size[1], rle.size[0])));
+    }
+    let mut all = Vec::new();
+    let mut at = 0;
+    for (k, run) in rle.runs().map_err(|e| wrong(e.to_string()))?.into_iter().enumerate() {
+        if k % 2 == 1 {
+            // Down the columns.
+            all.extend((at..at + run).map(|i| (i % u64::from(h) * u64::from(w) + i / u64::from(h)) as u32));
+        }
+        at += run;
+    }
+    Ok(all)
+}
+
+/// The pixels whose centres lie in an odd number of the polygons' windings.
+fn inside(w: u32, h: u32, polygons: &[Vec<f64>]) -> Vec<u32> {
+    let mut all = Vec::new();
+    for row in 0..h {
+        let y = f64::from(row) + 0.5;
+        let mut spans: Vec<u32> = Vec::new();
+        for polygon in polygons {
+            for (from, to) in crossings(polygon, y).as_chunks::<2>().0.iter().map(|[a, b]| (a, b)) {
+                // Pixels with a centre from one crossing to the next.
+                let first = (from - 0.5).ceil().clamp(0.0, f64::from(w)) as u32;
+                let end = (to - 0.5).ceil().clamp(0.0, f64::from(w)) as u32;
+                spans.extend((first..end).map(|x| row * w + x));
+            }
+        }
+        // Parts of one thing may lie on each other.
+        spans.sort_unstable();
+        spans.dedup();
+        all.append(&mut spans);
+    }
+    all
+}
+
+/// Where a polygon crosses a row, from the left.
+fn crossings(polygon: &[f64], y: f64) -> Vec<f64> {
+    let points = polygon.as_chunks::<2>().0;
+    let mut all = Vec::new();
+    for (k, [x0, y0]) in points.iter().enumerate() {
+        let [x1, y1] = points[(k + 1) % points.len()];
+        if (*y0 <= y) != (y1 <= y) {
+            all.push(x0 + (y - y0) / (y1 - y0) * (x1 - x0));
+        }
+    }
+    all.sort_by(f64::total_cmp);
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_polygon_holds_the_pixels_whose_centres_lie_in_it() {
+        let square = vec![1.0, 1.0, 3.0, 1.0, 3.0, 3.0, 1.0, 3.0];
+        assert_eq!(inside(5, 4, std::slice::from_ref(&square)), [6, 7, 11, 12]);
+        // A second part, of one pixel, outside the image in part.
+        let corner = vec![4.4, -1.0, 9.0, -1.0, 9.0, 0.6, 4.4, 0.6];
+        assert_eq!(inside(5, 4, &[square, corner]), [4, 6, 7, 11, 12]);
+        // Above its centres it holds none.
+        assert_eq!(inside(5, 4, &[vec![0.0, 0.0, 5.0, 0.0, 5.0, 0.4, 0.0, 0.4]]), Vec::<u32>::new());
+        let triangle = vec![0.0, 0.0, 4.0, 0.0, 0.0, 4.0];
+        assert_eq!(inside(4, 4, &[triangle]).len(), 6);
+        assert_eq!(inside(4, 4, &[vec![]]), Vec::<u32>::new());
+    }
+}
