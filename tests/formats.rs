@@ -209,3 +209,39 @@ fn every_format_takes_an_image_that_little_is_known_of() {
     assert_eq!(labels, [0, 255, 255, 0, 255, 255, 0, 0]);
     drop(folder);
 }
+
+/// A photograph is written once, however many formats have it.
+#[cfg(unix)]
+#[test]
+fn equal_pictures_take_space_once() {
+    use std::os::unix::fs::MetadataExt;
+    let of = |path: &str| std::fs::metadata(FIELD.join(path)).unwrap();
+    let photograph = of("coco/images/train/000000.png");
+    for path in
+        ["yolo/images/train/000000.png", "panoptic/images/train/000000.png", "phenobench/train/images/000000.png"]
+    {
+        assert_eq!((of(path).dev(), of(path).ino()), (photograph.dev(), photograph.ino()), "{path}");
+    }
+}
+
+/// A split without images is no folder and no list, not an empty one that a reader stumbles over.
+#[test]
+fn a_split_without_images_leaves_nothing_behind() {
+    let mut todo = vec![BARE.clone()];
+    let mut files = 0;
+    while let Some(at) = todo.pop() {
+        for entry in std::fs::read_dir(&at).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_name().unwrap().to_str().unwrap();
+            assert!(!name.contains("test") || path.starts_with(BARE.join("scene")), "{}", path.display());
+            if path.is_dir() {
+                assert!(std::fs::read_dir(&path).unwrap().next().is_some(), "{} is empty", path.display());
+                todo.push(path);
+            } else {
+                assert!(std::fs::metadata(&path).unwrap().len() > 0, "{} is empty", path.display());
+                files += 1;
+            }
+        }
+    }
+    assert!(files > 3 * NAMES.len());
+}
