@@ -165,6 +165,7 @@ fn every_format_takes_an_image_that_little_is_known_of() {
             ignored: 0,
             plants: Vec::new(),
             conditions: serde_json::Value::Null,
+            exposure: None,
             warnings: Vec::new(),
         },
         rgb: vec![[90, 80, 70]; 8],

@@ -143,6 +143,7 @@ mod tests {
             ignored: 0,
             plants: (1..=count).map(weed).collect(),
             conditions: serde_json::Value::Null,
+            exposure: None,
             warnings: Vec::new(),
         }
     }
