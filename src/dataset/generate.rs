@@ -1,8 +1,8 @@
 //! Makes the images that are missing, several at once, until all are there or someone asks to stop.
 //!
-//! Growing a field and writing its files keep one core busy, drawing keeps all of them: so several images are under way at once,
-//! each driven by a thread of its own, and all share one pool of workers. Memory grows with the images at once, not with
-//! the dataset.
+//! Growing a field, labelling and writing it keep one core busy, drawing keeps all of them: so several images are under way at once,
+//! each with a share of the threads as a pool of its own. (In one pool for all, a thread that waits for a part of its image takes up
+//! a part of another, and may take up all of it.) Memory grows with the images at once, not with the dataset.
 
 use super::ledger::{Ledger, Row};
 use super::seal::{Seal, write_files};
@@ -12,6 +12,7 @@ use super::{File, format, native};
 use crate::render::{self, Watch};
 use crate::scene::build::Source;
 use crate::{Error, Result};
+use rayon::ThreadPool;
 use rayon::prelude::*;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -46,7 +47,7 @@ pub struct Work {
     pub shard: Shard,
     /// Workers; 0 for one on each core.
     pub threads: usize,
-    /// Images under way at once; 0 for as many as keep the workers busy.
+    /// Images under way at once; 0 for one on each worker, but no more than [`MOST_AT_ONCE`].
     pub at_once: usize,
 }
 
@@ -73,6 +74,14 @@ pub enum Task {
     All,
 }
 
+/// Images under way at once unless said otherwise: more would take more memory than they save time.
+const MOST_AT_ONCE: usize = 16;
+
+/// Threads of a lane, of all that are shared out among so many; at least one.
+fn share(threads: usize, lanes: usize, lane: usize) -> usize {
+    (threads / lanes + usize::from(lane < threads % lanes)).max(1)
+}
+
 /// Makes what is missing of a shard. Stopped, it returns [`Error::Interrupted`], and the same call goes on later.
 pub fn generate(set: &Set, work: &Work, engine: Option<&dyn Engine>, overseer: &Overseer<'_>) -> Result<()> {
     let pool = render::pool(work.threads)?;
@@ -83,7 +92,9 @@ pub fn generate(set: &Set, work: &Work, engine: Option<&dyn Engine>, overseer: &
         pool.install(|| wanted.into_par_iter().map(|k| task(set, k).map(|t| (k, t))).collect::<Result<Vec<_>>>())?;
     let tasks: Vec<(u64, Task)> = tasks.into_iter().filter(|(_, t)| *t != Task::Done).collect();
     (overseer.begin)(tasks.len());
-    let at_once = if work.at_once == 0 { (threads / 2).clamp(2, 16) } else { work.at_once }.min(tasks.len().max(1));
+    let at_once = if work.at_once == 0 { threads.min(MOST_AT_ONCE) } else { work.at_once }.min(tasks.len()).max(1);
+    let pools: Vec<ThreadPool> =
+        (0..at_once).map(|lane| render::pool(share(threads, at_once, lane))).collect::<Result<_>>()?;
     let run = Run {
         set,
         studio: engine
@@ -104,7 +115,7 @@ pub fn generate(set: &Set, work: &Work, engine: Option<&dyn Engine>, overseer: &
     };
     let stopped = || overseer.soon.load(Ordering::Relaxed) || overseer.now.load(Ordering::Relaxed);
     std::thread::scope(|scope| {
-        for _ in 0..at_once {
+        for pool in &pools {
             scope.spawn(|| {
                 while !stopped() && !failed.load(Ordering::Relaxed) {
                     let Some((index, task)) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
@@ -223,4 +234,27 @@ fn lost(set: &Set, index: u64) -> Error {
         "{}: image {index} is damaged, and nothing here can make it again\n help: import the images again",
         set.folder.display()
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn threads_are_shared_out_whole() {
+        for (threads, lanes) in [(1, 1), (2, 2), (7, 3), (64, 16), (5, 4)] {
+            let shares: Vec<usize> = (0..lanes).map(|lane| share(threads, lanes, lane)).collect();
+            assert_eq!(shares.iter().sum::<usize>(), threads);
+            assert!(shares.iter().max().unwrap() - shares.iter().min().unwrap() <= 1);
+        }
+        assert_eq!(share(2, 3, 2), 1);
+    }
+
+    #[test]
+    fn shards_are_read_as_they_are_written() {
+        assert_eq!(Shard::parse("2/5"), Ok(Shard { number: 2, of: 5 }));
+        for bad in ["5/5", "1", "-1/2", "a/b", "0/0"] {
+            assert!(Shard::parse(bad).is_err(), "{bad}");
+        }
+    }
 }

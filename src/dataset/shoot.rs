@@ -18,8 +18,8 @@ use std::time::{Duration, Instant};
 
 /// Draws fields: a path tracer, a rasterizer.
 pub trait Engine: Sync {
-    /// Draws a whole field. Called inside a pool.
-    fn draw(&self, field: &Field, geometry: &EmbreeAccel, watch: &Watch<'_>) -> Result<Drawn>;
+    /// Draws a whole field. Called inside a pool of so many threads.
+    fn draw(&self, field: &Field, geometry: &EmbreeAccel, threads: usize, watch: &Watch<'_>) -> Result<Drawn>;
 
     /// What the files say of where they came from.
     fn provenance(&self, field: &Field) -> Provenance;
@@ -75,11 +75,11 @@ pub fn shoot(set: &Set, source: &Source, index: u64, engine: &dyn Engine, watch:
             folder.display()
         )));
     }
-    let threads = rayon::current_num_threads() as u32;
-    let geometry = EmbreeAccel::build(&field.scene.surfaces(), threads)?;
+    let threads = rayon::current_num_threads();
+    let geometry = EmbreeAccel::build(&field.scene.surfaces(), threads as u32)?;
     let grow = begin.elapsed();
     let begin = Instant::now();
-    let drawn = engine.draw(&field, &geometry, watch)?;
+    let drawn = engine.draw(&field, &geometry, threads, watch)?;
     let draw = begin.elapsed();
     let begin = Instant::now();
     let window = Window::full(field.scene.camera.width(), field.scene.camera.height());

@@ -19,14 +19,13 @@ pub(crate) struct PathTracer {
     deviations: Vec<String>,
     spp: u32,
     denoiser: Option<Denoiser>,
-    threads: usize,
     kernels: String,
 }
 
 impl PathTracer {
     /// What the recipe of a dataset asks for; `None` for images that were not rendered. An error where this machine would make
     /// other bits than the one that began the dataset.
-    pub(crate) fn of(set: &Set, threads: usize) -> Result<Option<Self>> {
+    pub(crate) fn of(set: &Set) -> Result<Option<Self>> {
         let Ok(rendering) = set.recipe.rendering() else { return Ok(None) };
         let (kernels, version) = (accel::version()?, env!("CARGO_PKG_VERSION"));
         let differs = |what: &str, there: &str, here: &str| {
@@ -52,20 +51,19 @@ impl PathTracer {
             deviations: technique.deviations(),
             spp: rendering.spp,
             denoiser: rendering.denoise.then(Denoiser::find).transpose()?,
-            threads,
             kernels,
         }))
     }
 }
 
 impl Engine for PathTracer {
-    fn draw(&self, field: &Field, geometry: &EmbreeAccel, watch: &Watch<'_>) -> Result<Drawn> {
+    fn draw(&self, field: &Field, geometry: &EmbreeAccel, threads: usize, watch: &Watch<'_>) -> Result<Drawn> {
         let scene = &field.scene;
         let world = World { scene, geometry };
         let window = Window::full(scene.camera.width(), scene.camera.height());
         let settings = Settings { spp: self.spp, seed: field.sample_seed(), window, points: self.points };
         let film = render::render(&world, &self.path, &settings, watch)?;
-        let clean = self.denoiser.as_ref().map(|d| d.denoise(&film, self.threads)).transpose()?;
+        let clean = self.denoiser.as_ref().map(|d| d.denoise(&film, threads)).transpose()?;
         Ok(Drawn { film, clean })
     }
 

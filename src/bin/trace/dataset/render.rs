@@ -29,7 +29,7 @@ pub(crate) struct WorkArgs {
     /// Threads; 0 for one on each core.
     #[arg(long, default_value_t = 0, value_parser = threads)]
     threads: usize,
-    /// Images under way at once; each takes the memory of a field. 0 for as many as keep the threads busy.
+    /// Images under way at once, which share the threads; each takes the memory of a field. 0 for one a thread, 16 at most.
     #[arg(long, default_value_t = 0, value_parser = threads)]
     at_once: usize,
     /// Print nothing but errors and the paths of the files.
@@ -47,7 +47,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
 /// Makes the images of a dataset that are missing.
 pub(super) fn generate(set: &Set, args: &WorkArgs, shard: Shard, signals: &Signals) -> Result<()> {
     let begin = Instant::now();
-    let engine = PathTracer::of(set, args.threads)?;
+    let engine = PathTracer::of(set)?;
     let (soon, now) = signals.heed_patiently();
     let progress = Progress::new(begin, args.quiet);
     let total = |n: usize| progress.expect(n as u64);

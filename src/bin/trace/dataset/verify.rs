@@ -32,7 +32,7 @@ pub(crate) struct Args {
 /// Checks; says what was found.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let set = Set::open(&args.dir)?;
-    let engine = if args.rerender > 0 { PathTracer::of(&set, args.threads)? } else { None };
+    let engine = if args.rerender > 0 { PathTracer::of(&set)? } else { None };
     let progress = Progress::new(Instant::now(), args.quiet);
     progress.expect(set.recipe.count);
     let done = |_| progress.add();
