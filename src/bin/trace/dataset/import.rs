@@ -106,7 +106,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let pool = render::pool(args.threads)?;
     let set = pool.install(|| import::import(&args.out, source.as_ref(), &order, &done, stop))?;
     progress.finish();
-    super::finish::write(&set)
+    furrow::dataset::finish::finish(&set, None)
 }
 
 fn source(args: &Args) -> Result<Box<dyn Source>> {
