@@ -10,7 +10,10 @@ mod common;
 use common::program::{SMALL, small_text, trace};
 use common::python::python;
 use furrow::dataset::format::{self, NAMES};
-use furrow::dataset::{Recipe, Sample, Set, native, seal};
+use furrow::dataset::recipe::Made;
+use furrow::dataset::sample::IGNORE;
+use furrow::dataset::{Recipe, Record, Sample, Set, annotate, native, seal};
+use furrow::output;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -141,4 +144,104 @@ fn every_format_comes_out_the_same_from_the_native_files() {
             }
         }
     }
+}
+
+/// Imported images have pixels without a label, vegetation of no plant, and plants of which nothing more is known.
+#[test]
+fn every_format_takes_an_image_that_little_is_known_of() {
+    let (mut recipe, _) = samples(&FIELD);
+    recipe.made = Made::Imported { from: "masks".into(), source_sha256: String::new() };
+    recipe.species.clear();
+    let (none, ignore) = (0, IGNORE);
+    let mut sample = Sample {
+        record: Record {
+            index: 2,
+            name: Set::name(2),
+            source: Some("photo.jpg".into()),
+            split: recipe.split.of(2),
+            width: 4,
+            height: 2,
+            classes: Vec::new(),
+            ignored: 0,
+            plants: Vec::new(),
+            conditions: serde_json::Value::Null,
+            exposure: None,
+            warnings: Vec::new(),
+        },
+        rgb: vec![[90, 80, 70]; 8],
+        nir: Vec::new(),
+        semantics: vec![0, 1, 1, ignore, 2, 2, 0, 1],
+        species: Vec::new(),
+        plants: vec![none, 7, 7, none, 9, 9, none, none],
+        leaves: vec![none; 8],
+        coverage: Vec::new(),
+        depth: Vec::new(),
+        normals: Vec::new(),
+        film: None,
+    };
+    (sample.record.classes, sample.record.ignored) = annotate::classes(&sample);
+    sample.record.plants = annotate::plants(&sample);
+    assert_eq!((sample.record.ignored, sample.record.plants.len()), (1, 2));
+    let (folder, written) = common::program::scratch();
+    for (name, _) in NAMES {
+        let writer = format::named(name).unwrap();
+        if writer.needs_film() {
+            continue;
+        }
+        for file in writer.image(&recipe, &sample).unwrap() {
+            assert!(!file.bytes.is_empty(), "{}", file.path);
+            let path = written.join(&file.path);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, &file.bytes).unwrap();
+        }
+    }
+    let gray16 = |path: &str| output::read_gray16(&written.join(path)).unwrap().2;
+    assert_eq!(gray16("phenobench/val/semantics/000002.png"), [0, 1, 1, 255, 2, 2, 0, 1]);
+    let instances = gray16("cityscapes/gtFine/val/masks/masks_000000_000002_gtFine_instanceIds.png");
+    assert_eq!(instances, [0, 1000, 1000, 255, 2000, 2000, 0, 1]);
+    let (_, _, segments) = output::read_rgb(&written.join("panoptic/annotations/panoptic_val/000002.png")).unwrap();
+    // Soil and a crowd of crop behind the plants' numbers, void where there is no label.
+    let (soil, crowd) = ([4, 0, 1], [1, 0, 1]);
+    let plants = ([7, 0, 0], [9, 0, 0]);
+    assert_eq!(segments, [soil, plants.0, plants.0, [0; 3], plants.1, plants.1, soil, crowd]);
+    let (_, _, labels) =
+        output::read_gray(&written.join("cropandweed/labelIds/CropAndWeed/ave-0000-0002.png")).unwrap();
+    assert_eq!(labels, [0, 255, 255, 0, 255, 255, 0, 0]);
+    drop(folder);
+}
+
+/// A photograph is written once, however many formats have it.
+#[cfg(unix)]
+#[test]
+fn equal_pictures_take_space_once() {
+    use std::os::unix::fs::MetadataExt;
+    let of = |path: &str| std::fs::metadata(FIELD.join(path)).unwrap();
+    let photograph = of("coco/images/train/000000.png");
+    for path in
+        ["yolo/images/train/000000.png", "panoptic/images/train/000000.png", "phenobench/train/images/000000.png"]
+    {
+        assert_eq!((of(path).dev(), of(path).ino()), (photograph.dev(), photograph.ino()), "{path}");
+    }
+}
+
+/// A split without images is no folder and no list, not an empty one that a reader stumbles over.
+#[test]
+fn a_split_without_images_leaves_nothing_behind() {
+    let mut todo = vec![BARE.clone()];
+    let mut files = 0;
+    while let Some(at) = todo.pop() {
+        for entry in std::fs::read_dir(&at).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_name().unwrap().to_str().unwrap();
+            assert!(!name.contains("test") || path.starts_with(BARE.join("scene")), "{}", path.display());
+            if path.is_dir() {
+                assert!(std::fs::read_dir(&path).unwrap().next().is_some(), "{} is empty", path.display());
+                todo.push(path);
+            } else {
+                assert!(std::fs::metadata(&path).unwrap().len() > 0, "{} is empty", path.display());
+                files += 1;
+            }
+        }
+    }
+    assert!(files > 3 * NAMES.len());
 }

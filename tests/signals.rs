@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 /// Hours of samples, for nobody will wait for them.
 fn endless(out: &Path) -> Child {
-    trace(&["--scene", SMALL, "--spp", "65536", "--width", "1024", "--threads", "1", "--out", out.to_str().unwrap()])
+    trace(&["--scene", SMALL, "--spp", "65536", "--width", "256", "--threads", "1", "--out", out.to_str().unwrap()])
         .stderr(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()
@@ -68,7 +68,8 @@ fn a_signal_while_rendering_exits_with_75_and_leaves_no_file() {
             line.clear();
             assert!(talk.read_line(&mut line).unwrap() > 0, "{signal}: it ended early");
         }
-        std::thread::sleep(Duration::from_millis(300));
+        // Labels come first, which take a few milliseconds.
+        std::thread::sleep(Duration::from_secs(1));
         send(signal, &child);
         assert_eq!(end(&mut child).code(), Some(75), "{signal}");
         let mut rest = String::new();

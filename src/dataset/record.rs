@@ -33,6 +33,9 @@ pub struct Record {
     /// What was drawn for it: camera, lights, soil, rows, stage; null for an imported image.
     #[serde(default, skip_serializing_if = "serde_json::Value::is_null")]
     pub conditions: serde_json::Value,
+    /// How the sensor was set; null for an imported image.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exposure: Option<Exposure>,
     /// What whoever made it should know.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
@@ -41,6 +44,17 @@ pub struct Record {
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference to the field")]
 fn is_zero(n: &u64) -> bool {
     *n == 0
+}
+
+/// How the sensor was set: by these numbers the photographs are the radiance's.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Exposure {
+    /// Linear level (1 is white) of green per radiance, per W·m⁻²·sr⁻¹·nm⁻¹.
+    pub gain: f32,
+    /// The same in near infrared.
+    pub nir_gain: f32,
+    /// Gains of the white balance on R, G, B.
+    pub white_balance: [f32; 3],
 }
 
 /// How much of an image a class has.

@@ -5,7 +5,7 @@
 use super::File;
 use super::recipe::{Recipe, compact, hex};
 use super::set::Set;
-use crate::output::write_atomically;
+use crate::output::{link_atomically, write_atomically};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -120,13 +120,26 @@ impl Seal {
     }
 }
 
-/// Writes files, each whole or not at all.
+/// Bytes from which on a file takes more than one block of a disk.
+const BLOCK: usize = 4096;
+
+/// Writes files, each whole or not at all. Those of the same bytes, such as the photograph in several formats, are one file with several
+/// names.
 pub(super) fn write_files(folder: &Path, files: &[File]) -> Result<()> {
+    let mut large: BTreeMap<&[u8], PathBuf> = BTreeMap::new();
     for file in files {
         if file.bytes.is_empty() {
             return Err(Error::Dataset(format!("{}: refused to write an empty file", file.path)));
         }
-        write_atomically(&folder.join(&file.path), &file.bytes)?;
+        let path = folder.join(&file.path);
+        if let Some(there) = large.get(file.bytes.as_slice()) {
+            link_atomically(there, &path, &file.bytes)?;
+            continue;
+        }
+        write_atomically(&path, &file.bytes)?;
+        if file.bytes.len() > BLOCK {
+            large.insert(&file.bytes, path);
+        }
     }
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use super::annotate::{self, keypoint, of_255};
 use super::recipe::Recipe;
-use super::record::{Grown, Leaf, Plant, Record, Seen};
+use super::record::{Exposure, Grown, Leaf, Plant, Record, Seen};
 use super::sample::{Rendered, Sample};
 use super::set::Set;
 use crate::accel::EmbreeAccel;
@@ -110,6 +110,11 @@ fn expose(recipe: &Recipe, field: &Field, drawn: Drawn, labels: LabelMap) -> Res
             plants: Vec::new(),
             conditions: serde_json::to_value(&field.conditions)
                 .map_err(|e| Error::Dataset(format!("cannot write down the conditions: {e}")))?,
+            exposure: Some(Exposure {
+                gain: photograph.gain,
+                nir_gain: photograph.nir_gain,
+                white_balance: photograph.white_balance,
+            }),
             warnings: field.warnings.clone(),
         },
         rgb: photograph.rgb.as_chunks::<3>().0.to_vec(),

@@ -128,6 +128,18 @@ pub fn stream_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> Resu
     Ok(())
 }
 
+/// Gives a file that is there a second name, so that equal files take space once; `bytes` are what it holds, written anew where the file
+/// system has no links.
+pub fn link_atomically(there: &Path, path: &Path, bytes: &[u8]) -> Result<()> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
+    let link = tempfile::Builder::new().prefix(UNFINISHED).make_in(folder, |name| std::fs::hard_link(there, name));
+    match link {
+        Ok(link) => link.into_temp_path().persist(path).map_err(|e| Error::Io { path: path.into(), source: e.error }),
+        Err(_) => write_atomically(path, bytes),
+    }
+}
+
 /// Writes every file of one image into `folder` and returns their paths: `rgb.png`, `nir.png`, `radiance.exr`,
 /// `semantics.png`, `plants.png`, `leaves.png`, `overlay.png`.
 pub fn write_image(

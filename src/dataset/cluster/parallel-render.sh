@@ -20,7 +20,7 @@ jobs=${JOBS:-$(($(nproc) / threads))}
 
 # Runs a command in a session of its own, hands signals on to everyone in it, waits for all of them, returns the command's exit
 # code. Not a process group: GNU parallel gives each of its jobs one.
-asked= child=
+asked="" child=""
 hand_on() {
     asked=$asked$1,
     [ -z "$child" ] || kill -s "$1" $(ps -o pid= -s "$child") 2>/dev/null

@@ -114,3 +114,68 @@ fn groups(record: &Record) -> Vec<serde_json::Value> {
     };
     [Class::Crop, Class::Weed].into_iter().filter_map(of_class).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::record::Seen;
+    use crate::dataset::split::Split;
+
+    /// An image with this many weeds, each a pixel larger than the one before.
+    fn weeds(count: u16) -> Record {
+        let weed = |number: u16| Plant {
+            number,
+            class: Class::Weed,
+            kind: 0,
+            seen: Seen { pixels: u32::from(number), ..Seen::default() },
+            stem: None,
+            grown: None,
+            leaves: Vec::new(),
+        };
+        Record {
+            index: 7,
+            name: "000007".into(),
+            source: None,
+            split: Split::Train,
+            width: 1,
+            height: 1,
+            classes: Vec::new(),
+            ignored: 0,
+            plants: (1..=count).map(weed).collect(),
+            conditions: serde_json::Value::Null,
+            exposure: None,
+            warnings: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_thousand_plants_of_a_class_have_numbers() {
+        let record = weeds(1000);
+        assert_eq!(numbers(&record).last_key_value(), Some((&1000, &999)));
+        assert!(groups(&record).is_empty());
+    }
+
+    #[test]
+    fn of_more_the_smallest_are_a_group_and_listed() {
+        let record = weeds(1002);
+        let numbers = numbers(&record);
+        assert_eq!(numbers.len(), MOST);
+        assert_eq!((numbers.get(&1), numbers.get(&2), numbers.get(&1002)), (None, None, Some(&0)));
+        assert_eq!(groups(&record), [json!({ "image": "000007", "class": "weed", "plants": [2, 1] })]);
+    }
+
+    #[test]
+    fn a_city_has_no_underscore() {
+        let of = |from: &str| Recipe {
+            furrow: String::new(),
+            made: Made::Imported { from: from.into(), source_sha256: String::new() },
+            count: 0,
+            split: crate::dataset::split::Shares::default(),
+            formats: Vec::new(),
+            licence: String::new(),
+            species: Vec::new(),
+        };
+        assert_eq!(city(&of("Pheno_Bench 2")), "phenobench2");
+        assert_eq!(city(&of("___")), "field");
+    }
+}

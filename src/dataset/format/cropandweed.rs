@@ -1,4 +1,4 @@
-//! CropAndWeed: `images/NAME.png`, `bboxes/CropAndWeed/NAME.csv`, `labelIds/CropAndWeed/NAME.png`, `params/NAME.csv`, with
+//! CropAndWeed: `images/NAME.jpg`, `bboxes/CropAndWeed/NAME.csv`, `labelIds/CropAndWeed/NAME.png`, `params/NAME.csv`, with
 //! NAME = `ave-SSSS-IIII`: session and image, which together are the image's number.
 //!
 //! A row of `bboxes` is a plant: left, top, right, bottom, label, stem x, stem y, whole pixels and no head, as the dataset's own
@@ -8,6 +8,8 @@
 //! Labels are those of CropAndWeed where it has the species, found by its EPPO code; maize and sugar beet by their leaves, which
 //! BBCH 12 to 19 count. Other species get labels from 100 on, 255 is a plant of no species. `labels.json` tells them all. In
 //! `labelIds` a plant's pixels have its label, soil and pixels without a label have 0.
+//!
+//! Images are JPEG, because the original's are and its scripts look for that name; other formats have them without loss.
 //!
 //! `params` are what annotators judged by eye; here numbers decide, see [`Params`]. `train.txt`, `val.txt` and `test.txt` list the names
 //! of each split, for which the original has no folders.
@@ -23,7 +25,7 @@ use crate::dataset::sample::Sample;
 use crate::dataset::set::Set;
 use crate::dataset::split::Split;
 use crate::dataset::File;
-use crate::output::Picture;
+use crate::output::{self, Picture};
 use crate::{Error, Result};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -35,6 +37,9 @@ const FOLDER: &str = "cropandweed";
 
 /// Images of a session: four digits.
 const SESSION: u64 = 10_000;
+
+/// Quality of the JPEG images, of 100.
+const QUALITY: u8 = 95;
 
 /// CropAndWeed's labels by EPPO code.
 const LABELS: &[(&str, u8)] = &[
@@ -71,6 +76,8 @@ impl Format for Writer {
         let record = &sample.record;
         let name = name(record.index);
         let labels = Labels::of(recipe)?;
+        let (width, height) = sample.size();
+        let jpeg = output::encode_jpeg(width, height, &sample.rgb, QUALITY)?;
         let mut rows = String::new();
         let mut of_plant = BTreeMap::new();
         for plant in record.seen() {
@@ -83,7 +90,7 @@ impl Format for Writer {
         }
         let map: Vec<u8> = sample.plants.iter().map(|plant| of_plant.get(plant).copied().unwrap_or(0)).collect();
         Ok(vec![
-            picture::photograph(sample, format!("{FOLDER}/images/{name}.png"))?,
+            File { path: format!("{FOLDER}/images/{name}.jpg"), bytes: jpeg },
             File { path: format!("{FOLDER}/bboxes/CropAndWeed/{name}.csv"), bytes: rows.into_bytes() },
             picture::file(sample, format!("{FOLDER}/labelIds/CropAndWeed/{name}.png"), &Picture::Gray(&map))?,
             File { path: format!("{FOLDER}/params/{name}.csv"), bytes: Params::of(record).text().into_bytes() },
@@ -109,7 +116,7 @@ impl Format for Writer {
     }
 
     fn warnings(&self, _recipe: &Recipe) -> Vec<String> {
-        vec!["images are PNG; CropAndWeed's own visualisation looks for JPEG, its other scripts look at no images".into()]
+        vec!["photographs are JPEG, as its scripts expect; the other formats have them without loss".into()]
     }
 }
 

@@ -17,7 +17,7 @@
 //! copy and so nothing: numbers are unique before it.
 
 use super::{Format, picture};
-use crate::dataset::recipe::Recipe;
+use crate::dataset::recipe::{Recipe, Rendering};
 use crate::dataset::record::{Plant, Seen};
 use crate::dataset::sample::Sample;
 use crate::dataset::split::Split;
@@ -66,15 +66,19 @@ impl Format for Writer {
     }
 
     fn warnings(&self, recipe: &Recipe) -> Vec<String> {
-        let size = recipe.rendering().ok().map(|r| (r.width, r.height));
-        let other = size.filter(|size| *size != (SIZE, SIZE));
-        let words = |(w, h)| {
-            format!(
-                "`phenobench-eval` judges boxes on {SIZE} × {SIZE} pixels, these images have {w} × {h}; the loader and the other tasks \
-                 do not mind"
-            )
-        };
-        other.map(words).into_iter().collect()
+        let mut all = Vec::new();
+        if (0..recipe.count).any(|k| recipe.split.of(k) == Split::Test) {
+            all.push("images of the split test have no labels, as in the original; `images/` and other formats have them".into());
+        }
+        if let Ok(Rendering { width, height, .. }) = recipe.rendering()
+            && (*width, *height) != (SIZE, SIZE)
+        {
+            all.push(format!(
+                "`phenobench-eval` judges boxes on {SIZE} × {SIZE} pixels, these images have {width} × {height}; the loader and the other \
+                 tasks do not mind"
+            ));
+        }
+        all
     }
 }
 

@@ -181,6 +181,7 @@ fn sample(recipe: &Recipe, listed: &Listed, index: u64, read: Labelled) -> Sampl
             ignored: 0,
             plants: Vec::new(),
             conditions: serde_json::Value::Null,
+            exposure: None,
             warnings: read.warnings,
         },
         rgb: read.rgb,
