@@ -120,7 +120,9 @@ fn masks_of_numbers_come_in_pixel_by_pixel() {
         assert_eq!(sample.record.ignored, 4);
         assert!(sample.record.plants.is_empty() && sample.coverage.is_empty());
     }
-    assert!(out.join("report.html").is_file() && out.join("manifest.json").is_file());
+    let report = std::fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(report.contains("no plant is told from another") && !report.contains("0 weeds"), "masks know classes only");
+    assert!(out.join("manifest.json").is_file());
     // Another format of ours from the same images.
     let finished = trace(&["dataset", "finish", text(&out), "--format", "imagefolder", "--quiet"]).output().unwrap();
     assert!(finished.status.success(), "{}", String::from_utf8_lossy(&finished.stderr));
