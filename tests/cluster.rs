@@ -359,7 +359,8 @@ impl Drop for Slurm {
 fn logs(jobs: &Path) -> String {
     let mut paths: Vec<_> = std::fs::read_dir(jobs.join("logs")).unwrap().map(|e| e.unwrap().path()).collect();
     paths.sort();
-    paths.iter().map(|p| format!("--- {}\n{}", p.display(), std::fs::read_to_string(p).unwrap())).collect()
+    let text = |p: &PathBuf| format!("--- {}\n{}", p.display(), std::fs::read_to_string(p).unwrap());
+    paths.iter().map(text).collect()
 }
 
 #[test]
