@@ -267,6 +267,7 @@ fn painted(image: &Annotated) -> Result<(Vec<u8>, Instances, Points)> {
         }
     }
     let mut owners = vec![0; image.things.len()];
+    let mut beyond = 0_u64;
     for (k, pixels) in masks.iter().filter(|(k, _)| image.things[*k].meaning == Meaning::Leaf) {
         let mut votes: BTreeMap<u32, u64> = BTreeMap::new();
         for i in pixels {
@@ -277,11 +278,18 @@ fn painted(image: &Annotated) -> Result<(Vec<u8>, Instances, Points)> {
         let owner =
             votes.into_iter().max_by_key(|(plant, n)| (*n, std::cmp::Reverse(*plant))).map_or(0, |(plant, _)| plant);
         owners[*k] = owner;
-        for i in pixels.iter().filter(|i| owner == 0 || plants[**i as usize] == owner) {
-            leaves[*i as usize] = *k as u32 + 1;
+        for i in pixels {
+            if plants[*i as usize] == owner {
+                leaves[*i as usize] = *k as u32 + 1;
+            } else {
+                beyond += 1;
+            }
         }
     }
-    let found = instances(&image.path, &semantics, &plants, &leaves)?;
+    let mut found = instances(&image.path, &semantics, &plants, &leaves)?;
+    if beyond > 0 {
+        found.warnings.push(format!("{beyond} pixels of leaves lie beyond their plants: they were taken from them"));
+    }
     let mut points = Points::new();
     for (k, thing) in image.things.iter().enumerate() {
         let leaf = thing.meaning == Meaning::Leaf;

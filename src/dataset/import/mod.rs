@@ -102,11 +102,21 @@ pub fn import(
     done: &(dyn Fn(u64) + Sync),
     stop: &AtomicBool,
 ) -> Result<Set> {
+    let each = |what: &(dyn Fn(u64) -> Result<()> + Sync)| {
+        (0..source.images().len() as u64).into_par_iter().try_for_each(|index| {
+            if stop.load(Ordering::Relaxed) {
+                return Err(Error::Interrupted);
+            }
+            what(index)
+        })
+    };
+    if !folder.join(FILE).exists() {
+        refuse_full(folder)?;
+        // Twice the reading, but a fault in the last image leaves nothing behind that a better command would stumble over.
+        each(&|index| source.read(index as usize).map(drop))?;
+    }
     let set = begin(folder, source, order)?;
-    (0..set.recipe.count).into_par_iter().try_for_each(|index| {
-        if stop.load(Ordering::Relaxed) {
-            return Err(Error::Interrupted);
-        }
+    each(&|index| {
         bring(&set, source, index)?;
         done(index);
         Ok(())
@@ -134,8 +144,6 @@ fn begin(folder: &Path, source: &dyn Source, order: &Order) -> Result<Set> {
         let before = Recipe::read(folder)?;
         before.check_goes_on(folder, &recipe)?;
         recipe.formats = before.formats;
-    } else {
-        refuse_full(folder)?;
     }
     write_files(folder, &[File { path: FILE.into(), bytes: recipe.text()? }])?;
     Ok(Set { folder: folder.into(), recipe })

@@ -126,16 +126,18 @@ pub(super) fn species(recipe: &Recipe, found: &Statistics) -> String {
 }
 
 /// The files of an image, and how they are opened.
-pub(super) fn reading(recipe: &Recipe) -> String {
+pub(super) fn reading(recipe: &Recipe, nir: bool) -> String {
     let rendered = matches!(recipe.made, Made::Rendered(_));
-    let mut rows: Vec<(&str, String)> = vec![
-        ("rgb.png", "photograph in colour, 8-bit sRGB".into()),
-        ("nir.png", "photograph in near infrared, 8 bit".into()),
-        ("semantics.png", "class, indexed: 0 soil, 1 crop, 2 weed, 255 no label".into()),
-        ("species.png", "number of the species in the table above, 0 for none".into()),
-        ("plants.png", "number of the plant, 16 bit, 0 for none".into()),
-        ("leaves.png", "number of the leaf on its plant, 16 bit, 0 for none".into()),
-    ];
+    let mut rows: Vec<(&str, String)> = vec![("rgb.png", "photograph in colour, 8-bit sRGB".into())];
+    if nir {
+        rows.push(("nir.png", "photograph in near infrared, 8 bit".into()));
+    }
+    rows.push(("semantics.png", "class, indexed: 0 soil, 1 crop, 2 weed, 255 no label".into()));
+    if rendered {
+        rows.push(("species.png", "number of the species in the table above, 0 for none".into()));
+    }
+    rows.push(("plants.png", "number of the plant, 16 bit, 0 for none".into()));
+    rows.push(("leaves.png", "number of the leaf on its plant, 16 bit, 0 for none".into()));
     if rendered {
         rows.push(("coverage.png", "share of soil, crop, weed in the pixel as R, G, B; they sum to 255".into()));
         rows.push((
@@ -190,6 +192,9 @@ pub(super) fn limits(recipe: &Recipe, found: &Statistics) -> String {
         }
         Made::Imported { .. } => {
             all.push("The labels are those of the source, as exact as whoever drew them.".into());
+            if !found.has_plants() {
+                all.push("The source tells classes; no plant is told from another.".into());
+            }
             all.push("How much of a plant others hide is not known: visible fractions stand at 1.".into());
         }
     }

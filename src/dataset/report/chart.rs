@@ -177,7 +177,7 @@ impl Axis {
         let step = step((self.to - self.from) / 5.0).max(if self.centred { 1.0 } else { 0.0 });
         let half = if self.centred { 0.5 } else { 0.0 };
         let (first, last) = ((self.from / step - 1e-9).ceil() as i64, ((self.to - half) / step + 1e-9).floor() as i64);
-        (first..=last).map(|k| k as f64 * step).map(|v| (self.at(v + half), short(v))).collect()
+        (first..=last).map(|k| k as f64 * step).map(|v| (self.at(v + half), number(v))).collect()
     }
 }
 
@@ -187,7 +187,7 @@ fn step(least: f64) -> f64 {
     [1.0, 2.0, 5.0, 10.0].map(|f| f * power).into_iter().find(|s| *s >= least * (1.0 - 1e-9)).unwrap_or(power * 10.0)
 }
 
-/// A number below an axis.
+/// A power of two below a logarithmic axis.
 fn short(value: f64) -> String {
     if value >= 1_048_576.0 {
         format!("{}M", number(value / 1_048_576.0))

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 /// Fewest and most bars that a chart is cut into where its values are spread over as many bins.
-const BARS: (f64, f64) = (6.0, 24.0);
+const BARS: (f64, f64) = (10.0, 24.0);
 
 /// How values are put into bins.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -195,7 +195,7 @@ mod tests {
         b.add(f64::NAN);
         let bars = Histogram::bars(&[&a, &b]);
         assert_eq!(bars[0].len(), bars[1].len());
-        assert_eq!((bars[0][0].from, bars[0][0].to), (0.0, 20.0));
+        assert_eq!((bars[0][0].from, bars[0][0].to), (0.0, 10.0));
         assert_eq!((bars[0][0].count, bars[1].last().unwrap().count), (1, 1));
         assert_eq!((b.n(), b.mean(), b.range()), (1, 90.0, Some((90.0, 90.0))));
     }

@@ -77,7 +77,7 @@ fn html(set: &Set, found: &Statistics, photographs: &Photographs, names: &[Vec<S
         card::splits(recipe, names, found.images)
     );
     section("Dataset card", &card);
-    section("How to read it", &card::reading(recipe));
+    section("How to read it", &card::reading(recipe, photographs.nir.n() > 0));
     section("Limits", &card::limits(recipe, found));
     section("Sources", card::sources(recipe));
     let _ = write!(page, "<footer>Written by Furrow {}</footer>\n</main>\n</body>\n</html>\n", escape(&recipe.furrow));
@@ -96,6 +96,8 @@ fn figures(found: &Statistics) -> String {
         ("plants.cut", found.cut, "plants cut by the frame"),
         ("plants.hidden", found.hidden, "plants wholly hidden"),
     ];
+    // Nobody counted what was not told apart.
+    let rows = if found.has_plants() { &rows[..] } else { &rows[..1] };
     let row = |(key, n, words): &(&str, u64, &str)| {
         format!("<div><b>{}</b><span>{words}</span></div>", keyed(key, n, &whole(*n)))
     };
@@ -130,7 +132,11 @@ fn labels(found: &Statistics) -> String {
     let [_, crop, weed] = &found.shares;
     let row = |name, values| Series { name, class: name, values };
     histograms("share", "Share of an image", "% of its pixels; images", &[row("crop", crop), row("weed", weed)])
-        + &pair("plants", "Plants in an image", "images", &found.plants)
+        + &if found.has_plants() {
+            pair("plants", "Plants in an image", "images", &found.plants)
+        } else {
+            String::new()
+        }
         + &pair("plant_pixels", "Size of a plant", "pixels seen; plants", &found.plant_pixels)
         + &pair("leaf_pixels", "Size of a leaf", "pixels seen; leaves", &found.leaf_pixels)
         + &pair(

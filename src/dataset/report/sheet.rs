@@ -1,6 +1,6 @@
 //! The contact sheet: some images of each split, their labels over them.
 
-use super::html::{count, escape};
+use super::html::{count, escape, percent};
 use crate::Result;
 use crate::dataset::record::Record;
 use crate::dataset::sample::{IGNORE, Sample};
@@ -61,8 +61,14 @@ fn card(sample: &Sample) -> Result<String> {
     ))
 }
 
-/// What an image shows.
+/// What an image shows: plants, or shares of classes where nobody has told plants apart.
 fn words(record: &Record) -> String {
+    let pixels = f64::from(record.width) * f64::from(record.height);
+    let share = |class: Class| record.classes.iter().find(|c| c.class == class).map_or(0, |c| c.pixels) as f64 / pixels;
+    let (crop, weed) = (share(Class::Crop), share(Class::Weed));
+    if record.plants.is_empty() && crop + weed > 0.0 {
+        return format!("crop {}, weed {}", percent(crop), percent(weed));
+    }
     let of = |class: Class| record.seen().filter(|p| p.class == class).count() as u64;
     let stages: Vec<u32> =
         record.seen().filter(|p| p.class == Class::Crop).filter_map(|p| Some(p.grown.as_ref()?.bbch)).collect();

@@ -96,6 +96,11 @@ pub(super) struct Camera {
 }
 
 impl Statistics {
+    /// Whether plants are told apart, or only classes.
+    pub(super) fn has_plants(&self) -> bool {
+        self.species.values().any(|s| s.plants > 0) || self.pixels[1..].iter().all(|n| *n == 0)
+    }
+
     /// Of nothing yet; `of` images will come.
     pub(super) fn new(of: u64) -> Self {
         let pair = |one: fn() -> Histogram| [one(), one()];

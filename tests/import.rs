@@ -1,0 +1,334 @@
+//! Other people's data: what goes in comes out as they drew it, and what cannot be read is told by its file.
+//!
+//! Rationale: real images judge what synthetic ones teach; a label that changes on the way in judges wrongly. Expected: made-up
+//! images come in pixel by pixel; what we wrote in a format of others comes back as it was; a second import makes the same bytes;
+//! every fault is one sentence with a file in it and exit code 2. Source: the layouts in `src/dataset/import/`.
+
+mod common;
+
+use common::program::{SMALL, scratch, trace};
+use furrow::dataset::record::Record;
+use furrow::dataset::split::Split;
+use furrow::dataset::{Sample, Set, native};
+use furrow::output::{Picture, encode_jpeg, write_png};
+use furrow::scene::tag::Class;
+use serde_json::{Value, json};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::process::Output;
+
+const W: u32 = 13;
+const H: u32 = 9;
+const N: usize = (W * H) as usize;
+
+/// A picture of its own for each seed.
+fn photo(seed: u8) -> Vec<[u8; 3]> {
+    (0..N).map(|i| [(i * 7) as u8, (i * 3) as u8 ^ seed, seed]).collect()
+}
+
+/// Classes of a made-up field: a crop block, a weed column, a patch without a label.
+fn classes() -> Vec<u8> {
+    let class = |x: u32, y: u32| match (x, y) {
+        (2..=5, 2..=6) => 1,
+        (9, _) => 2,
+        (11.., 7..) => 255,
+        _ => 0,
+    };
+    (0..H).flat_map(|y| (0..W).map(move |x| class(x, y))).collect()
+}
+
+fn import(out: &Path, arguments: &[&str]) -> Output {
+    let mut command = trace(&["dataset", "import", "--quiet", "--out", out.to_str().unwrap()]);
+    command.args(arguments).output().unwrap()
+}
+
+/// Imports what must succeed; the dataset must pass `verify`.
+fn imported(out: &Path, arguments: &[&str]) -> (Set, Vec<Sample>) {
+    let output = import(out, arguments);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let verified = trace(&["dataset", "verify", "--quiet", out.to_str().unwrap()]).output().unwrap();
+    assert!(verified.status.success(), "{}", String::from_utf8_lossy(&verified.stderr));
+    let set = Set::open(out).unwrap();
+    let samples = (0..set.recipe.count).map(|k| native::read(out, &Set::name(k)).unwrap()).collect();
+    (set, samples)
+}
+
+/// Imports what must fail with exit code 2, and returns what it said.
+fn refused(out: &Path, arguments: &[&str]) -> String {
+    let output = import(out, arguments);
+    let words = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {words}");
+    words
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// Every file of a folder by its path, without the ledger, which has clock times.
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut all = BTreeMap::new();
+    let mut todo = vec![folder.to_path_buf()];
+    while let Some(path) = todo.pop() {
+        for entry in std::fs::read_dir(&path).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.strip_prefix(folder).unwrap().to_str().unwrap().to_owned();
+            if path.is_dir() && name != "ledger" {
+                todo.push(path);
+            } else if path.is_file() {
+                all.insert(name, std::fs::read(&path).unwrap());
+            }
+        }
+    }
+    all
+}
+
+/// Images and masks of numbers in splits: `images/train/a.png`, `masks/train/a_mask.png`.
+fn numbered(root: &Path) {
+    for (k, (split, name)) in [("train", "b"), ("train", "a"), ("val", "c")].into_iter().enumerate() {
+        let (image, mask) = (photo(k as u8), classes());
+        write_png(&root.join(format!("images/{split}/{name}.png")), W, H, &Picture::Rgb(&image), "").unwrap();
+        let gray: Vec<u8> = image.iter().map(|p| p[0]).collect();
+        write_png(&root.join(format!("nir/{split}/{name}.png")), W, H, &Picture::Gray(&gray), "").unwrap();
+        let mask_path = root.join(format!("masks/{split}/{name}_mask.png"));
+        if k == 0 {
+            let palette: Vec<[u8; 3]> = (0..=255).map(|n| [n, 255 - n, n / 2]).collect();
+            write_png(&mask_path, W, H, &Picture::Indexed(&mask, &palette), "").unwrap();
+        } else {
+            write_png(&mask_path, W, H, &Picture::Gray(&mask), "").unwrap();
+        }
+    }
+}
+
+#[test]
+fn masks_of_numbers_come_in_pixel_by_pixel() {
+    let (kept, out) = scratch();
+    let root = kept.path();
+    numbered(root);
+    let [images, masks, nir] = ["images", "masks", "nir"].map(|name| root.join(name));
+    let arguments = ["--format", "masks", "--images", text(&images), "--masks", text(&masks), "--mask-suffix", "_mask"];
+    let (set, samples) = imported(&out, &[&arguments[..], &["--nir", text(&nir), "--licence", "CC0-1.0"]].concat());
+    let of = |s: &Sample| (s.record.source.clone().unwrap(), s.record.split);
+    let names: Vec<_> = samples.iter().map(of).collect();
+    assert_eq!(names, [("a".into(), Split::Train), ("b".into(), Split::Train), ("c".into(), Split::Val)]);
+    assert_eq!((set.names(Split::Train).len(), set.names(Split::Val).len(), set.names(Split::Test).len()), (2, 1, 0));
+    for (sample, seed) in samples.iter().zip([1, 0, 2]) {
+        assert_eq!(sample.rgb, photo(seed));
+        assert_eq!(sample.nir, photo(seed).iter().map(|p| p[0]).collect::<Vec<_>>());
+        assert_eq!(sample.semantics, classes());
+        assert_eq!(sample.record.classes[1].pixels, 20);
+        assert_eq!(sample.record.ignored, 4);
+        assert!(sample.record.plants.is_empty() && sample.coverage.is_empty());
+    }
+    let report = std::fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(report.contains("no plant is told from another") && !report.contains("0 weeds"), "masks know classes only");
+    assert!(out.join("manifest.json").is_file());
+    // Another format of ours from the same images.
+    let finished = trace(&["dataset", "finish", text(&out), "--format", "imagefolder", "--quiet"]).output().unwrap();
+    assert!(finished.status.success(), "{}", String::from_utf8_lossy(&finished.stderr));
+    assert!(out.join("imagefolder/val/masks/000002.png").is_file());
+    let film = trace(&["dataset", "finish", text(&out), "--format", "layers", "--quiet"]).output().unwrap();
+    assert_eq!(film.status.code(), Some(2), "what only the renderer knows cannot be made of imported images");
+    assert!(String::from_utf8_lossy(&film.stderr).contains("layers"));
+}
+
+#[test]
+fn masks_of_colours_and_jpeg_images_come_in() {
+    let (kept, out) = scratch();
+    let root = kept.path();
+    std::fs::create_dir_all(root.join("images")).unwrap();
+    for k in 0..10_u8 {
+        let flat = vec![[90 - 8 * k, 140, 60]; N];
+        std::fs::write(root.join(format!("images/{k}.JPG")), encode_jpeg(W, H, &flat, 95).unwrap()).unwrap();
+        let colors: Vec<[u8; 3]> = classes()
+            .iter()
+            .map(|c| [[0, 0, 0], [0, 255, 0], [255, 0, 0], [9, 9, 8]][usize::from(*c).min(3)])
+            .collect();
+        write_png(&root.join(format!("masks/{k}.png")), W, H, &Picture::Rgb(&colors), "").unwrap();
+    }
+    let [images, masks] = ["images", "masks"].map(|name| root.join(name));
+    let colors = "0,255,0=crop;255,0,0=weed;0,0,0=soil";
+    let arguments = ["--format", "masks", "--images", text(&images), "--masks", text(&masks), "--colors", colors];
+    let words = refused(&out, &arguments);
+    assert!(words.contains("masks/0.png") && words.contains("9,9,8") && words.contains("--others ignore"), "{words}");
+    let (set, samples) = imported(&out, &[&arguments[..], &["--others", "ignore", "--split", "1,1,0"]].concat());
+    assert!(samples.iter().all(|s| s.semantics == classes()));
+    assert_eq!((set.names(Split::Train).len(), set.names(Split::Val).len()), (5, 5));
+    let [r, g, b] = samples[0].rgb[N / 2];
+    assert!(r.abs_diff(90) < 6 && g.abs_diff(140) < 6 && b.abs_diff(60) < 6, "{r} {g} {b}");
+}
+
+#[test]
+fn what_cannot_be_read_is_told_by_its_file() {
+    let (kept, out) = scratch();
+    let root = kept.path();
+    numbered(root);
+    let [images, masks] = ["images", "masks"].map(|name| root.join(name));
+    let base = ["--format", "masks", "--images", text(&images), "--masks", text(&masks)];
+    let all = |more: &[&'static str]| [&base[..], more].concat();
+    assert!(refused(&out, &base).contains("--mask-suffix"), "no mask has an image's name");
+    let words = refused(&out, &all(&["--mask-suffix", "_mask", "--classes", "0=soil,1=crop,2=weed"]));
+    assert!(words.contains("a_mask.png") && words.contains("pixel 11,7 has the number 255"), "{words}");
+    assert!(refused(&out, &all(&["--mask-suffix", "_mask", "--from", "x"])).contains("--from"));
+    assert!(refused(&out, &["--format", "coco"]).contains("--from"));
+    assert!(refused(&out, &["--format", "phenobench", "--from", text(root)]).contains("train/images"));
+    assert!(refused(&out, &all(&["--colors", "0,0=crop"])).contains("no colour"));
+    // A mask of another size, and one that is cut short.
+    let mask = masks.join("val/c_mask.png");
+    write_png(&mask, 1, 1, &Picture::Gray(&[0]), "").unwrap();
+    assert!(refused(&out, &all(&["--mask-suffix", "_mask"])).contains("it has 1 × 1 pixels"));
+    std::fs::write(&mask, b"\x89PNG\r\n\x1a\n").unwrap();
+    assert!(refused(&out, &all(&["--mask-suffix", "_mask"])).contains("c_mask.png"));
+    assert!(!out.exists(), "a refused import has written something");
+    // Nothing of the user's is written over.
+    let full = root.join("full");
+    std::fs::create_dir_all(&full).unwrap();
+    std::fs::write(full.join("mine.txt"), "mine").unwrap();
+    write_png(&mask, W, H, &Picture::Gray(&classes()), "").unwrap();
+    assert!(refused(&full, &all(&["--mask-suffix", "_mask"])).contains("mine.txt"));
+}
+
+#[test]
+fn an_import_goes_on_where_it_was_stopped_and_makes_the_same_bytes() {
+    let (kept, out) = scratch();
+    let root = kept.path();
+    numbered(root);
+    let [images, masks] = ["images", "masks"].map(|name| root.join(name));
+    let arguments = ["--format", "masks", "--images", text(&images), "--masks", text(&masks), "--mask-suffix", "_mask"];
+    imported(&out, &arguments);
+    let whole = files(&out);
+    // One image gone, one damaged, the lists not written.
+    std::fs::remove_dir_all(out.join("images/000001")).unwrap();
+    std::fs::write(out.join("images/000002/rgb.png"), "damaged").unwrap();
+    std::fs::remove_file(out.join("manifest.json")).unwrap();
+    imported(&out, &arguments);
+    assert!(whole == files(&out), "other bytes after going on");
+    // Other images do not go into the same folder.
+    let other = [&arguments[..], &["--others", "ignore"]].concat();
+    assert!(refused(&out, &other).contains("another dataset lies in this folder"));
+    assert!(whole == files(&out), "a refused import has changed something");
+}
+
+/// A rendered dataset in other people's formats.
+fn rendered(out: &Path, formats: &str) -> Vec<Sample> {
+    let mut command =
+        trace(&["dataset", "--scene", SMALL, "--spp", "4", "--count", "5", "--split", "2,2,1", "--quiet"]);
+    let output = command.args(["--format", formats, "--out", text(out)]).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    (0..5).map(|k| native::read(out, &Set::name(k)).unwrap()).collect()
+}
+
+/// The image of a dataset that has this name in its source.
+fn named<'a>(samples: &'a [Sample], name: &str) -> Option<&'a Sample> {
+    samples.iter().find(|s| s.record.source.as_deref().unwrap().trim_end_matches(".png") == name)
+}
+
+/// Checks that two maps of leaves draw the same borders on every plant of these classes, whatever the numbers.
+fn same_leaves(name: &str, before: &Sample, after: &Sample, classes: &[Class]) {
+    let mut pairs: BTreeSet<((u16, u16), (u16, u16))> = BTreeSet::new();
+    for i in 0..before.pixels() {
+        if classes.iter().any(|c| *c as u8 == before.semantics[i]) {
+            pairs.insert(((before.plants[i], before.leaves[i]), (after.plants[i], after.leaves[i])));
+        }
+    }
+    let one_way: BTreeMap<_, _> = pairs.iter().copied().collect();
+    let other_way: BTreeMap<_, _> = pairs.iter().map(|(a, b)| (*b, *a)).collect();
+    assert_eq!((one_way.len(), other_way.len()), (pairs.len(), pairs.len()), "{name}: leaves were merged or cut");
+    assert!(pairs.iter().all(|((_, a), (_, b))| (*a == 0) == (*b == 0)), "{name}: leaves came or went");
+    assert!(pairs.len() > 5, "{name}: {} plants and leaves are no test", pairs.len());
+}
+
+#[test]
+fn phenobench_comes_back_as_it_was_written() {
+    let (_kept, out) = scratch();
+    let before = rendered(&out.join("ours"), "phenobench");
+    let from = out.join("ours/phenobench");
+    let (set, after) = imported(&out.join("back"), &["--format", "phenobench", "--from", text(&from)]);
+    // The original's test images have no labels, and so ours.
+    assert_eq!((set.names(Split::Train).len(), set.names(Split::Val).len(), set.names(Split::Test).len()), (2, 2, 0));
+    for sample in before.iter().filter(|s| s.record.split != Split::Test) {
+        let back = named(&after, &sample.record.name).expect("an image that came back");
+        assert_eq!((&back.rgb, &back.semantics, &back.plants), (&sample.rgb, &sample.semantics, &sample.plants));
+        assert_eq!(back.record.split, sample.record.split);
+        same_leaves(&sample.record.name, sample, back, &[Class::Crop]);
+        let partial = sample.record.seen().any(|p| p.seen.inside_fraction() < 0.5);
+        eprintln!("{}: {} plants, partial ones: {partial}", sample.record.name, sample.record.seen().count());
+    }
+    let partial = before.iter().flat_map(|s| s.record.seen()).filter(|p| p.seen.inside_fraction() < 0.5);
+    assert!(partial.count() > 0, "no plant was written as partial, which is what 3 and 4 are for");
+}
+
+#[test]
+fn coco_comes_back_as_it_was_written() {
+    let (_kept, out) = scratch();
+    let before = rendered(&out.join("ours"), "coco");
+    let from = out.join("ours/coco");
+    let (_, after) = imported(&out.join("back"), &["--format", "coco", "--from", text(&from)]);
+    assert_eq!(after.len(), before.len());
+    let mut points = 0;
+    for sample in &before {
+        let back = named(&after, &sample.record.name).expect("an image that came back");
+        assert_eq!((&back.rgb, &back.semantics, &back.plants), (&sample.rgb, &sample.semantics, &sample.plants));
+        assert_eq!(back.record.split, sample.record.split);
+        same_leaves(&sample.record.name, sample, back, &[Class::Crop, Class::Weed]);
+        let stems = |r: &Record| -> Vec<(u16, i64)> {
+            let stem = |p: &furrow::dataset::record::Plant| Some((p.number, (p.stem?.x * 100.0).round() as i64));
+            r.seen().filter_map(stem).collect()
+        };
+        let inside: Vec<_> = stems(&sample.record).into_iter().filter(|(_, x)| (0..9600).contains(x)).collect();
+        points += inside.iter().filter(|stem| stems(&back.record).contains(stem)).count();
+        let tips = |r: &Record| {
+            r.leaves()
+                .filter(|(_, l)| l.tip.is_some_and(|t| t.state != furrow::dataset::record::PointState::Outside))
+                .count()
+        };
+        assert_eq!(tips(&sample.record), tips(&back.record), "{}: tips of leaves", sample.record.name);
+    }
+    assert!(points > 3, "{points} stems came back");
+}
+
+#[test]
+fn coco_of_others_comes_in_with_polygons_runs_and_crowds() {
+    let (kept, out) = scratch();
+    let root = kept.path();
+    write_png(&root.join("x.png"), W, H, &Picture::Rgb(&photo(3)), "").unwrap();
+    let polygon = |x0: u32, y0: u32, x1: u32, y1: u32| json!([[x0, y0, x1, y0, x1, y1, x0, y1]]);
+    // A column of nine pixels at x = 9, in runs down the columns.
+    let runs = json!({ "size": [H, W], "counts": [9 * H, H, (W - 10) * H] });
+    let document = |category: &str| {
+        json!({
+            "images": [{ "id": 5, "file_name": "x.png", "width": W, "height": H }],
+            "categories": [{ "id": 1, "name": category }, { "id": 2, "name": "thistle" }, { "id": 7, "name": "Leaf" }, { "id": 8, "name": "unused" }],
+            "annotations": [
+                { "id": 1, "image_id": 5, "category_id": 1, "segmentation": polygon(2, 2, 6, 7), "iscrowd": 0 },
+                { "id": 2, "image_id": 5, "category_id": 7, "segmentation": polygon(4, 1, 6, 7) },
+                { "id": 3, "image_id": 5, "category_id": 2, "segmentation": runs, "iscrowd": 1 },
+            ],
+        })
+    };
+    let file = root.join("a.json");
+    let write = |value: Value| std::fs::write(&file, value.to_string()).unwrap();
+    write(document("maize"));
+    let classes_of = "maize=crop,thistle=weed,Leaf=leaf";
+    let arguments = ["--format", "coco", "--from", text(&file), "--classes", classes_of];
+    let (_, samples) = imported(&out, &arguments);
+    let sample = &samples[0];
+    let expected: Vec<u8> = classes().iter().map(|c| if *c == 255 { 0 } else { *c }).collect();
+    assert_eq!(sample.semantics, expected);
+    let crop = |x: u32, y: u32| (2..=5).contains(&x) && (2..=6).contains(&y);
+    let at = |map: &[u16], x: u32, y: u32| map[(y * W + x) as usize];
+    for (x, y) in (0..H).flat_map(|y| (0..W).map(move |x| (x, y))) {
+        assert_eq!(at(&sample.plants, x, y), u16::from(crop(x, y)), "plant at {x},{y}");
+        assert_eq!(at(&sample.leaves, x, y), u16::from(crop(x, y) && x >= 4), "leaf at {x},{y}");
+    }
+    assert_eq!(sample.record.warnings.len(), 1, "the leaf reaches beyond its plant: {:?}", sample.record.warnings);
+    let another = root.join("another");
+    let words = refused(&another, &["--format", "coco", "--from", text(&file)]);
+    assert!(words.contains("`maize`") && words.contains("--classes"), "{words}");
+    let mut boxes = document("maize");
+    boxes["annotations"][0]["segmentation"] = Value::Null;
+    write(boxes);
+    assert!(refused(&another, &arguments).contains("annotation 1 has no mask"));
+    std::fs::write(&file, "[1, 2").unwrap();
+    assert!(refused(&another, &arguments).contains("a.json"));
+}
