@@ -47,7 +47,7 @@ pub struct Work {
     pub shard: Shard,
     /// Workers; 0 for one on each core.
     pub threads: usize,
-    /// Images under way at once; 0 for one on each worker, but no more than [`MOST_AT_ONCE`].
+    /// Images under way at once; 0 for one on each worker, but no more than 16.
     pub at_once: usize,
 }
 

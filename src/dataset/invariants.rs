@@ -15,6 +15,10 @@ const DECIDED: u8 = 243;
 /// lie on a row of centres.
 const THIN: f64 = 0.005;
 
+/// The share that may do so for want of samples, for n samples FEW · 0.5ⁿ more: n samples of a pixel that an edge halves all miss what is at
+/// its centre with a chance of 0.5ⁿ. Where one pixel in four lies on an edge, the image is of little else.
+const FEW: f64 = 0.25;
+
 /// Checks a sample; the error names the image and everything that does not hold.
 pub fn check(recipe: &Recipe, sample: &Sample) -> Result<()> {
     let faults = faults(recipe, sample);
@@ -36,7 +40,8 @@ pub fn faults(recipe: &Recipe, sample: &Sample) -> Vec<String> {
     all.extend(nesting(sample, rendered));
     all.extend(numbers(recipe, sample));
     all.extend(counts(sample));
-    all.extend(shares(sample));
+    let spp = recipe.rendering().map_or(u32::MAX, |r| r.spp);
+    all.extend(shares(sample, spp));
     all.extend(geometry(sample));
     all
 }
@@ -146,7 +151,7 @@ fn in_order(seen: &Seen) -> bool {
 }
 
 /// Shares of a pixel sum to one, and agree with the label where they leave no doubt.
-fn shares(sample: &Sample) -> Vec<String> {
+fn shares(sample: &Sample, spp: u32) -> Vec<String> {
     let mut all = Vec::new();
     let wrong = sample.coverage.iter().filter(|c| c.iter().map(|n| u32::from(*n)).sum::<u32>() != 255).count();
     if wrong > 0 {
@@ -159,7 +164,8 @@ fn shares(sample: &Sample) -> Vec<String> {
         asked += 1;
         other += u64::from(share != label);
     }
-    if other as f64 > THIN * asked as f64 {
+    let allowed = THIN + FEW * 0.5_f64.powi(spp.min(64) as i32);
+    if other as f64 > allowed * asked as f64 {
         all.push(format!("{other} of {asked} pixels are of one class by their samples and of another by their centre"));
     }
     all
