@@ -13,7 +13,7 @@ use std::time::Instant;
 
 /// Width, height, samples a pixel, denoised, images.
 const ROWS: [(u32, u32, u32, bool, u64); 3] =
-    [(480, 360, 32, false, 24), (480, 360, 16, true, 24), (1296, 966, 64, false, 6)];
+    [(480, 360, 32, false, 20), (480, 360, 16, true, 20), (1296, 966, 64, false, 4)];
 
 #[expect(clippy::print_stdout, reason = "a table is what a bench is for")]
 fn main() {

@@ -29,12 +29,19 @@ pub trait Format: Sync {
     }
 }
 
+mod conditions;
+mod outline;
+mod picture;
+
 macro_rules! formats {
-    ($($name:literal => $file:ident: $words:literal,)*) => {
+    ($($name:literal => $file:ident: $words:literal, $read:literal;)*) => {
         $(pub mod $file;)*
 
         /// Every format: its name and what it is, in the order of their names.
         pub const NAMES: &[(&str, &str)] = &[$(($name, $words),)*];
+
+        /// How each is read in Python, from the dataset's folder, in the same order.
+        pub const READ: &[(&str, &str)] = &[$(($name, $read),)*];
 
         /// The format of this name.
         pub fn named(name: &str) -> Option<&'static dyn Format> {
@@ -46,19 +53,23 @@ macro_rules! formats {
     };
 }
 
-mod conditions;
-mod outline;
-mod picture;
-
 formats! {
     "cityscapes" => cityscapes: "Cityscapes' layout: label and instance maps by split and city",
+        r#"datumaro.Dataset.import_from("cityscapes", "cityscapes")"#;
     "coco" => coco: "COCO instances and keypoints of plants and leaves, for `pycocotools`",
+        r#"COCO("coco/annotations/instances_train.json")"#;
     "cropandweed" => cropandweed: "CropAndWeed: boxes with stems as CSV, label maps, parameters",
+        r#"csv.reader(open("cropandweed/bboxes/CropAndWeed/ave-0000-0000.csv"))"#;
     "imagefolder" => imagefolder: "Hugging Face ImageFolder: images, masks, metadata and card for `datasets`",
+        r#"datasets.load_dataset("imagefolder")["train"][0]["plants"]"#;
     "layers" => layers: "OpenEXR: radiance, variance, ids, coverage and Cryptomattes in one file an image",
+        r#"OpenEXR.File("layers/train/000000.exr").channels()"#;
     "panoptic" => panoptic: "COCO panoptic: plants as things, soil as stuff, for `panopticapi` and `datumaro`",
+        r#"datumaro.Dataset.import_from("panoptic", "coco_panoptic")"#;
     "phenobench" => phenobench: "PhenoBench: semantics, plants, leaves and visibility, for `phenobench`",
+        r#"PhenoBench("phenobench", "train", target_types=["semantics", "plant_instances", "leaf_instances"])[0]"#;
     "yolo" => yolo: "YOLO segmentation: a polygon a plant, with what is lost by it, for Ultralytics and `supervision`",
+        r#"supervision.DetectionDataset.from_yolo("yolo/images/train", "yolo/labels/train", "yolo/data.yaml", force_masks=True)"#;
 }
 
 /// The formats that a recipe names.

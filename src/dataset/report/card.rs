@@ -152,8 +152,12 @@ pub(super) fn reading(recipe: &Recipe, nir: bool) -> String {
     let mut html = pairs(&rows);
     html.push_str(EXAMPLE);
     if !recipe.formats.is_empty() {
-        let words = |name: &str| format::NAMES.iter().find(|(n, _)| *n == name).map_or("", |(_, words)| words);
-        let rows: Vec<(&str, String)> = recipe.formats.iter().map(|f| (f.as_str(), escape(words(f)))).collect();
+        let of =
+            |table: &[(&str, &'static str)], name: &str| table.iter().find(|(n, _)| *n == name).map_or("", |(_, t)| t);
+        let told = |name: &str| {
+            format!("{}<br><code>{}</code>", escape(of(format::NAMES, name)), escape(of(format::READ, name)))
+        };
+        let rows: Vec<(&str, String)> = recipe.formats.iter().map(|f| (f.as_str(), told(f))).collect();
         let _ = write!(html, "<p>The same images for other tools, each in the folder of its name:</p>{}", pairs(&rows));
     }
     html
