@@ -264,3 +264,27 @@ fn bad_input_is_refused_and_changes_nothing() {
     let said = fail(verb("render", &data, &[]), 2);
     assert!(said.contains("was changed since the dataset was begun"), "{said}");
 }
+
+/// A sun that has set in some fields and not in others: a fault of single images, told when all others are made.
+#[test]
+fn fields_that_cannot_be_do_not_keep_others_from_being() {
+    let (_keep, data) = scratch();
+    let page = data.with_extension("ron");
+    let text = |seed: u32| {
+        format!(
+            "Field(seed: {seed}, camera: Pinhole(size: (32, 24), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 1)),
+             lights: [Daylight(sun: At(latitude_deg: 50, longitude_deg: 7, utc: \"2026-06-01T12:00:00Z\", later_h: Uniform(0, 24)))])"
+        )
+    };
+    let begun = (0..20).any(|seed| {
+        fs::write(&page, text(seed)).unwrap();
+        let plan = ["dataset", "plan", "--scene", path(&page), "--count", "12", "--spp", "2", "--out", path(&data)];
+        trace(&plan).output().unwrap().status.success()
+    });
+    assert!(begun, "twenty times the sun had set in the first field");
+    let said = fail(verb("render", &data, &["--quiet"]), 2);
+    let faults = said.matches("image 0000").count();
+    let sealed = fs::read_dir(data.join("seals")).unwrap().count();
+    assert!(faults > 0 && sealed > 0 && faults + sealed == 12, "{faults} faults, {sealed} images: {said}");
+    assert!(said.contains("below the horizon"), "{said}");
+}

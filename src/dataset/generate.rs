@@ -14,8 +14,9 @@ use crate::scene::build::Source;
 use crate::{Error, Result};
 use rayon::ThreadPool;
 use rayon::prelude::*;
-use std::sync::Mutex;
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 /// Which of the images a run is for: those with index % of == number.
@@ -107,11 +108,13 @@ pub fn generate(set: &Set, work: &Work, engine: Option<&dyn Engine>, overseer: &
         ledger: Ledger::new(&set.folder, &format!("{}-of-{}", shard.number, shard.of)),
     };
     let next = AtomicUsize::new(0);
-    let failure: Mutex<Option<Error>> = Mutex::new(None);
+    let failures: Mutex<BTreeMap<u64, Error>> = Mutex::default();
     let failed = AtomicBool::new(false);
-    let fail = |error: Error| {
-        failed.store(true, Ordering::Relaxed);
-        failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner).get_or_insert(error);
+    let fail = |index: u64, error: Error| {
+        // What is wrong with one field is no reason to lose a night; what is wrong with the disk is.
+        let own = matches!(error, Error::Page(_) | Error::Scene(_) | Error::Damaged(_));
+        failed.fetch_or(!own, Ordering::Relaxed);
+        failures.lock().unwrap_or_else(PoisonError::into_inner).insert(index, error);
     };
     let stopped = || overseer.soon.load(Ordering::Relaxed) || overseer.now.load(Ordering::Relaxed);
     std::thread::scope(|scope| {
@@ -121,17 +124,36 @@ pub fn generate(set: &Set, work: &Work, engine: Option<&dyn Engine>, overseer: &
                     let Some((index, task)) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
                     match pool.install(|| run.image(*index, *task)) {
                         Ok(()) => (overseer.done)(*index),
-                        Err(e) => fail(e),
+                        Err(e) => fail(*index, e),
                     }
                 }
             });
         }
     });
-    if let Some(error) = failure.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner) {
-        return Err(error);
+    let failures = failures.into_inner().unwrap_or_else(PoisonError::into_inner);
+    if !failures.is_empty() {
+        return Err(together(failures));
     }
     // Stopped after the last image is done.
     if next.load(Ordering::Relaxed) < tasks.len() { Err(Error::Interrupted) } else { Ok(()) }
+}
+
+/// What went wrong in a run, by image: the whole run's failure alone, or those of single images in one.
+fn together(failures: BTreeMap<u64, Error>) -> Error {
+    let mut words = Vec::new();
+    let mut input = true;
+    for (index, error) in failures {
+        match error {
+            Error::Page(_) | Error::Scene(_) => words.push(format!("image {}: {error}", Set::name(index))),
+            Error::Damaged(_) => {
+                input = false;
+                words.push(error.to_string());
+            }
+            other => return other,
+        }
+    }
+    let words = words.join("\nerror: ");
+    if input { Error::Dataset(words) } else { Error::Damaged(words) }
 }
 
 /// What remains to be done for an image, from what lies on the disk.
