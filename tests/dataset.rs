@@ -57,6 +57,17 @@ fn a_longer_dataset_with_more_formats_begins_with_the_shorter_one() {
     succeed(verb("finish", &grown, &["--format", "imagefolder", "--quiet"]));
     succeed(make(&fresh, 4, &[]));
     same(&tree(&grown), &tree(&fresh));
+    // A format that was planned and not yet made is missing, not forgotten; and the order of asking makes no other dataset.
+    let page = ["dataset", "plan", "--scene", SMALL, "--count", "4", "--out", path(&grown)];
+    succeed(trace(&[&page[..], &common::dataset::SIZE[..4], &["--format", "coco"]].concat()));
+    let said = fail(verb("finish", &grown, &[]), 1);
+    assert!(said.contains("4 of 4 images are missing: 0-3"), "{said}");
+    succeed(verb("render", &grown, &["--quiet"]));
+    succeed(verb("finish", &grown, &[]));
+    succeed(verb("finish", &fresh, &["--format", "coco", "--quiet"]));
+    same(&tree(&grown), &tree(&fresh));
+    let recipe = Set::open(&grown).unwrap().recipe;
+    assert_eq!(recipe.formats, ["coco", "imagefolder"]);
 }
 
 #[test]

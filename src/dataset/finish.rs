@@ -1,5 +1,6 @@
 //! What belongs to all images together, written when all are there: the formats' lists, the manifest, the report.
 
+use super::generate::{self, Task};
 use super::recipe::{FILE, Recipe, hex};
 use super::seal::{Print, Seal};
 use super::set::{Set, Stream, Whole};
@@ -17,7 +18,13 @@ pub const MANIFEST: &str = "manifest.json";
 /// `shards`, those.
 pub fn finish(set: &Set, shards: Option<u64>) -> Result<Vec<PathBuf>> {
     let Set { folder, recipe } = set;
-    let missing: Vec<u64> = (0..recipe.count).filter(|k| Seal::read(folder, *k).is_none()).collect();
+    let mut missing = Vec::new();
+    for index in 0..recipe.count {
+        match Seal::read(folder, index) {
+            Some(seal) if generate::owed(set, &seal)? == Task::Done => {}
+            _ => missing.push(index),
+        }
+    }
     if !missing.is_empty() {
         return Err(Error::Damaged(lacks(set, &missing, shards)));
     }
@@ -98,8 +105,9 @@ fn manifest(set: &Set, files: &BTreeMap<String, Print>, out: &mut Stream<'_>) ->
         let page = folder.join(&rendering.scene);
         out.put(",\n\"scene_text\": ")?;
         out.json(&std::fs::read_to_string(&page).map_err(Error::io(&page))?)?;
+        out.put(",\n\"times\": \"ledger/*.jsonl\"")?;
     }
-    out.put(",\n\"times\": \"ledger/*.jsonl\",\n\"files\": {")?;
+    out.put(",\n\"files\": {")?;
     let mut first = true;
     let mut add = |out: &mut Stream<'_>, path: &str, print: &Print| -> Result<()> {
         content.update(format!("{} {path}\n", print.sha256));

@@ -159,30 +159,35 @@ fn together(failures: BTreeMap<u64, Error>) -> Error {
 /// What remains to be done for an image, from what lies on the disk.
 pub fn task(set: &Set, index: u64) -> Result<Task> {
     let Some(seal) = Seal::read(&set.folder, index) else { return Ok(Task::All) };
+    let task = owed(set, &seal)?;
+    if task == Task::All {
+        return Ok(task);
+    }
+    let formats = format::all(&set.recipe)?;
+    let broken = seal.faults(&set.folder);
+    let lost = |(path, _): &(String, String)| {
+        path.starts_with("images/") || formats.iter().any(|(name, f)| f.needs_film() && in_format(path, name))
+    };
+    if broken.iter().any(lost) {
+        return Ok(Task::All);
+    }
+    // A format that is no longer wanted may be damaged.
+    let wanted = |(path, _): &(String, String)| formats.iter().any(|(name, _)| in_format(path, name));
+    Ok(if broken.iter().any(wanted) { Task::Formats } else { task })
+}
+
+/// What a sealed image owes its recipe, whatever has become of its files: it may be of another recipe, or lack a format.
+pub(super) fn owed(set: &Set, seal: &Seal) -> Result<Task> {
     if seal.recipe != set.recipe.fingerprint()? {
         return Ok(Task::All);
     }
-    let formats = format::all(&set.recipe)?;
-    let has = |name: &str| seal.files.keys().any(|path| in_format(path, name));
     let mut task = Task::Done;
-    let mut need = |name: &str| {
-        let again = formats.iter().any(|(n, f)| *n == name && f.needs_film());
-        task = if again { Task::All } else { Task::Formats };
-        again
-    };
-    for (name, _) in formats.iter().filter(|(name, _)| !has(name)) {
-        if need(name) {
-            return Ok(Task::All);
-        }
-    }
-    for (path, _) in seal.faults(&set.folder) {
-        if path.starts_with("images/") {
-            return Ok(Task::All);
-        }
-        match set.recipe.formats.iter().find(|name| in_format(&path, name)) {
-            Some(name) if need(name) => return Ok(Task::All),
-            // A format that is no longer wanted may be damaged.
-            _ => {}
+    for (name, format) in format::all(&set.recipe)? {
+        if !seal.files.keys().any(|path| in_format(path, name)) {
+            if format.needs_film() {
+                return Ok(Task::All);
+            }
+            task = Task::Formats;
         }
     }
     Ok(task)

@@ -89,6 +89,8 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
         // Formats that are there stay.
         let more: Vec<String> = recipe.formats.iter().filter(|f| !before.formats.contains(f)).cloned().collect();
         recipe.formats = before.formats.into_iter().chain(more).collect();
+        // In whatever order they were asked for, it is one dataset.
+        recipe.formats.sort();
     } else {
         refuse_full(folder)?;
     }
@@ -165,6 +167,7 @@ pub fn add_formats(set: &mut Set, names: &[String]) -> Result<Vec<String>> {
             recipe.formats.push(name.clone());
         }
     }
+    recipe.formats.sort();
     if recipe.rendering().is_err()
         && let Some((name, _)) = format::all(&recipe)?.into_iter().find(|(_, f)| f.needs_film())
     {

@@ -110,7 +110,7 @@ fn look(set: &Set, index: u64) -> Result<Looked> {
     let mut faults: Vec<String> =
         seal.faults(&set.folder).into_iter().map(|(path, fault)| format!("{path} {fault}")).collect();
     let mut missing = !faults.is_empty();
-    if !missing && generate::task(set, index)? != Task::Done {
+    if !missing && generate::owed(set, &seal)? != Task::Done {
         missing = true;
         faults.push(format!("image {name}: it was made by another recipe, or lacks a format"));
     }
