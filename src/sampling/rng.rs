@@ -28,6 +28,8 @@ pub enum Purpose {
     Sensor = 8,
     /// A test.
     Test = 9,
+    /// The order of training images, and how each is varied.
+    Training = 10,
 }
 
 /// A stream of random numbers with an address.

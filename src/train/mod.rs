@@ -1,0 +1,11 @@
+//! Learning from datasets: networks trained on rendered or real images, judged on real ones.
+//!
+//! `data` turns sets on disk into batches; `net` are the networks; `fit` trains one and keeps what it learns in a run's folder
+//! ([`run`]); `measure` turns truth and prediction into numbers. Everything reads only files that a writer of datasets wrote, so
+//! rendered and imported sets are the same to it. What calls libtorch stands behind the cargo feature `train`.
+
+pub mod classes;
+pub mod data;
+pub mod net;
+pub mod run;
+pub mod weights;
