@@ -6,6 +6,7 @@
 //!
 //! | floor | rooms |
 //! |---|---|
+//! | 12 | [`train`] |
 //! | 11 | [`dataset`] |
 //! | 10 | [`output`] |
 //! | 9 | [`render`] |
@@ -43,5 +44,6 @@ pub mod scene;
 pub mod sensor;
 pub mod soil;
 pub mod texture;
+pub mod train;
 
 pub use error::{Error, Result};

@@ -33,6 +33,8 @@ const NEVER: &[(&str, &str)] = &[
     ("film", "scene sampling"),
     // It asks `render` for an image and a label map.
     ("dataset", "integrator bsdf"),
+    // It reads only what was written: a real set is a set.
+    ("train", "scene render integrator bsdf"),
     // `cli` is what the programs share.
     ("*", "cli bin"),
 ];
@@ -63,7 +65,7 @@ const DOORS: &[(&str, &str)] = &[
     ("ron", "page.rs sampling/fault.rs"),
     ("serde", "*"),
     // glTF documents, read and written; records and formats of datasets.
-    ("serde_json", "model/document.rs model/gltf.rs output/gltf/ dataset/"),
+    ("serde_json", "model/document.rs model/gltf.rs output/gltf/ dataset/ train/"),
     ("sha2", "scene/library.rs dataset/"),
     ("signal_hook", "bin/trace/signal.rs"),
     // Parts that a pixel met: one or two, nearly always.

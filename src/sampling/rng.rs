@@ -28,6 +28,8 @@ pub enum Purpose {
     Sensor = 8,
     /// A test.
     Test = 9,
+    /// Which images a resample of the bootstrap holds.
+    Resample = 10,
 }
 
 /// A stream of random numbers with an address.
