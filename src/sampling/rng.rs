@@ -30,6 +30,8 @@ pub enum Purpose {
     Test = 9,
     /// The order of training images, and how each is varied.
     Training = 10,
+    /// Which images a resample of the bootstrap holds.
+    Resample = 11,
 }
 
 /// A stream of random numbers with an address.

@@ -6,6 +6,7 @@
 
 pub mod classes;
 pub mod data;
+pub mod measure;
 pub mod net;
 pub mod run;
 pub mod weights;

@@ -1,0 +1,126 @@
+//! The confusion matrix: how many pixels of each class were taken for which.
+
+use crate::dataset::sample::IGNORE;
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+/// Pixels by true and predicted class. Written as rows: one a true class, in it one number a predicted class.
+///
+/// Sums of whole numbers: matrices of images, merged in any order, are the matrix of all of them.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "Vec<Vec<u64>>", try_from = "Vec<Vec<u64>>")]
+pub struct Confusion {
+    classes: usize,
+    /// Row by row: `counts[truth * classes + predicted]`.
+    counts: Vec<u64>,
+}
+
+impl Confusion {
+    /// Of no pixel yet; of 1 to 255 classes.
+    pub fn new(classes: usize) -> Self {
+        assert!((1..=usize::from(IGNORE)).contains(&classes), "{classes} classes");
+        Self { classes, counts: vec![0; classes * classes] }
+    }
+
+    /// From its rows, one a true class: as many numbers as rows in each.
+    pub fn from_rows(rows: &[Vec<u64>]) -> Result<Self> {
+        let classes = rows.len();
+        if !(1..=usize::from(IGNORE)).contains(&classes) || rows.iter().any(|row| row.len() != classes) {
+            let lengths: Vec<usize> = rows.iter().map(Vec::len).collect();
+            return Err(Error::Dataset(format!(
+                "a confusion matrix has as many columns as rows, 1 to 255; this one has {classes} rows of {lengths:?}"
+            )));
+        }
+        Ok(Self { classes, counts: rows.concat() })
+    }
+
+    /// Number of classes.
+    pub fn classes(&self) -> usize {
+        self.classes
+    }
+
+    /// Pixels of class `truth` that were taken for `predicted`.
+    pub fn at(&self, truth: usize, predicted: usize) -> u64 {
+        self.counts[truth * self.classes + predicted]
+    }
+
+    /// Counts the pixels of an image: classes from 0, 255 in the truth where there is no label. A fault leaves the matrix as it was.
+    pub fn add(&mut self, truth: &[u8], predicted: &[u8]) -> Result<()> {
+        if truth.len() != predicted.len() {
+            return Err(Error::Dataset(format!(
+                "the truth has {} pixels, the prediction {}",
+                truth.len(),
+                predicted.len()
+            )));
+        }
+        let mut counts = vec![0; self.counts.len()];
+        for (at, (&t, &p)) in truth.iter().zip(predicted).enumerate() {
+            let (row, column) = (usize::from(t), usize::from(p));
+            if t == IGNORE {
+                continue;
+            }
+            if row >= self.classes || column >= self.classes {
+                return Err(self.stranger(at, t, p));
+            }
+            counts[row * self.classes + column] += 1;
+        }
+        self.counts.iter_mut().zip(counts).for_each(|(sum, n)| *sum += n);
+        Ok(())
+    }
+
+    fn stranger(&self, at: usize, truth: u8, predicted: u8) -> Error {
+        let last = self.classes - 1;
+        let (who, what) = if usize::from(truth) > last { ("the truth", truth) } else { ("the prediction", predicted) };
+        Error::Dataset(format!(
+            "pixel {at} of {who} has the class {what}; classes are 0 to {last}, and 255 in the truth is no label"
+        ))
+    }
+
+    /// Adds what another matrix of as many classes has counted.
+    pub fn merge(&mut self, other: &Self) {
+        assert_eq!(self.classes, other.classes, "matrices of different classes");
+        self.counts.iter_mut().zip(&other.counts).for_each(|(sum, n)| *sum += n);
+    }
+
+    /// All pixels counted.
+    pub fn total(&self) -> u64 {
+        self.counts.iter().sum()
+    }
+
+    /// Pixels of a class in the truth.
+    pub fn truth(&self, class: usize) -> u64 {
+        (0..self.classes).map(|predicted| self.at(class, predicted)).sum()
+    }
+
+    /// Pixels that were taken for a class.
+    pub fn predicted(&self, class: usize) -> u64 {
+        (0..self.classes).map(|truth| self.at(truth, class)).sum()
+    }
+
+    /// The same pixels in fewer classes: `group[class]` is the new class of each, from 0 without gaps.
+    #[must_use]
+    pub fn grouped(&self, group: &[usize]) -> Self {
+        assert_eq!(group.len(), self.classes, "one group a class");
+        let mut out = Self::new(group.iter().max().map_or(1, |most| most + 1));
+        for (truth, row) in group.iter().zip(self.counts.chunks_exact(self.classes)) {
+            for (predicted, n) in group.iter().zip(row) {
+                out.counts[truth * out.classes + predicted] += n;
+            }
+        }
+        out
+    }
+}
+
+impl From<Confusion> for Vec<Vec<u64>> {
+    fn from(matrix: Confusion) -> Self {
+        matrix.counts.chunks_exact(matrix.classes).map(<[u64]>::to_vec).collect()
+    }
+}
+
+impl TryFrom<Vec<Vec<u64>>> for Confusion {
+    type Error = Error;
+
+    fn try_from(rows: Vec<Vec<u64>>) -> Result<Self> {
+        Self::from_rows(&rows)
+    }
+}

@@ -1,0 +1,192 @@
+//! What is found of small plants and of large ones.
+//!
+//! A plant is the pixels of one class with one number of the truth's plant map; where a plant pixel has no number, or a set tells no
+//! plants apart, it is a connected region of its class. Its size is its pixels with a label. Bins of sizes are powers of four: in bin k
+//! are plants of 4^k to 4^(k+1) − 1 pixels, each bin twice as large across as the one before.
+//!
+//! Of a bin:
+//! - recall is the share of its plants' pixels that have the plant's class in the prediction;
+//! - detected are its plants with at least half of their pixels found so;
+//! - I/U is `found / (pixels + false positives)`. A false positive is a pixel that was taken for the class and is none of it. It goes with
+//!   the connected region of the prediction that it is in: to the bin of the plant of that class that the region covers most of (the first
+//!   of equals), or, where it covers none, to the bin of the region's own size. So a frayed edge counts against the plant that it is the
+//!   edge of, a speck in bare soil against specks. COCO's detection scores by size follow the same rule: a matched detection is judged
+//!   with its object's size, an unmatched one with its own (Lin et al. 2014, `pycocotools`).
+//!
+//! Summed over bins, found, pixels and false positives are T_p, T_p + F_n and F_p of the class's I/U.
+
+use super::components::Components;
+use super::scores::ratio;
+use crate::dataset::sample::IGNORE;
+use serde::{Deserialize, Serialize};
+
+/// Bins: the last holds all that a picture of 2³² pixels can.
+const BINS: usize = 16;
+
+/// Bin of a size in pixels, from 1.
+fn bin(pixels: u32) -> usize {
+    pixels.max(1).ilog2() as usize / 2
+}
+
+/// What was counted of the plants of a class in a bin.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Tally {
+    plants: u64,
+    detected: u64,
+    pixels: u64,
+    found: u64,
+    false_positives: u64,
+}
+
+/// Plants of all classes by size; sums over images.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Sizes {
+    /// One row a class; those that are no plants stay empty.
+    tallies: Vec<[Tally; BINS]>,
+}
+
+/// Plants of one class and of one range of sizes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SizeBin {
+    /// Fewest pixels.
+    pub from_pixels: u64,
+    /// Most pixels.
+    pub to_pixels: u64,
+    /// Plants.
+    pub plants: u64,
+    /// Plants of which at least half of the pixels have the right class.
+    pub detected: u64,
+    /// Pixels of these plants.
+    pub pixels: u64,
+    /// Those with the right class.
+    pub found: u64,
+    /// Pixels wrongly taken for the class, by the rule above.
+    pub false_positives: u64,
+    /// Found of all pixels.
+    pub recall: Option<f64>,
+    /// Intersection over union.
+    pub iou: Option<f64>,
+}
+
+/// A plant of the truth.
+struct Plant {
+    class: u8,
+    pixels: u32,
+    found: u32,
+}
+
+impl Sizes {
+    /// Of no image yet, for this many classes.
+    pub fn new(classes: usize) -> Self {
+        Self { tallies: vec![[Tally::default(); BINS]; classes] }
+    }
+
+    /// Plants of one image. `plant_classes` tells which classes are plants; maps hold `width * height` values, `numbers` those of plants,
+    /// 0 of none.
+    pub fn of(
+        plant_classes: &[bool],
+        (width, height): (usize, usize),
+        truth: &[u8],
+        predicted: &[u8],
+        numbers: Option<&[u16]>,
+    ) -> Self {
+        let is_plant = |class: u8| plant_classes.get(usize::from(class)) == Some(&true);
+        let (owners, mut plants) = plants(plant_classes, (width, height), truth, numbers);
+        let claim = |at: usize| Some(predicted[at]).filter(|class| is_plant(*class) && truth[at] != IGNORE);
+        let regions = Components::of(width, height, claim);
+        let mut wrong = vec![0_u32; regions.areas.len()];
+        let mut class_of = vec![0_u8; regions.areas.len()];
+        // Region and plant of each pixel that was found, to count who covers whom.
+        let mut covers: Vec<(u32, u32)> = Vec::new();
+        for (at, region) in regions.labels.iter().enumerate().filter(|(_, region)| **region > 0) {
+            let k = *region as usize - 1;
+            class_of[k] = predicted[at];
+            if truth[at] == predicted[at] {
+                plants[owners[at] as usize - 1].found += 1;
+                covers.push((k as u32, owners[at] - 1));
+            } else {
+                wrong[k] += 1;
+            }
+        }
+        covers.sort_unstable();
+        let mut judged: Vec<u32> = regions.areas.clone();
+        for of_region in covers.chunk_by(|a, b| a.0 == b.0) {
+            let most = of_region.chunk_by(|a, b| a.1 == b.1).reduce(|a, b| if b.len() > a.len() { b } else { a });
+            if let Some((region, plant)) = most.and_then(|pairs| pairs.first()) {
+                judged[*region as usize] = plants[*plant as usize].pixels;
+            }
+        }
+        let mut out = Self::new(plant_classes.len());
+        for ((wrong, judged), class) in wrong.iter().zip(&judged).zip(&class_of) {
+            out.tallies[usize::from(*class)][bin(*judged)].false_positives += u64::from(*wrong);
+        }
+        for plant in &plants {
+            let tally = &mut out.tallies[usize::from(plant.class)][bin(plant.pixels)];
+            tally.plants += 1;
+            tally.detected += u64::from(2 * u64::from(plant.found) >= u64::from(plant.pixels));
+            tally.pixels += u64::from(plant.pixels);
+            tally.found += u64::from(plant.found);
+        }
+        out
+    }
+
+    /// Adds the plants of another image.
+    pub fn merge(&mut self, other: &Self) {
+        for (sum, tally) in self.tallies.as_flattened_mut().iter_mut().zip(other.tallies.as_flattened()) {
+            sum.plants += tally.plants;
+            sum.detected += tally.detected;
+            sum.pixels += tally.pixels;
+            sum.found += tally.found;
+            sum.false_positives += tally.false_positives;
+        }
+    }
+
+    /// The bins of a class, small to large, those left out where nothing was counted.
+    pub fn bins(&self, class: usize) -> Vec<SizeBin> {
+        let bins = self.tallies[class].iter().enumerate();
+        bins.filter(|(_, tally)| **tally != Tally::default())
+            .map(|(k, tally)| SizeBin {
+                from_pixels: 1 << (2 * k),
+                to_pixels: (1 << (2 * k + 2)) - 1,
+                plants: tally.plants,
+                detected: tally.detected,
+                pixels: tally.pixels,
+                found: tally.found,
+                false_positives: tally.false_positives,
+                recall: ratio(tally.found, tally.pixels),
+                iou: ratio(tally.found, tally.pixels + tally.false_positives),
+            })
+            .collect()
+    }
+}
+
+/// Plants of the truth: the number of each pixel's, from 1, 0 of none; and the plants.
+fn plants(
+    plant_classes: &[bool],
+    (width, height): (usize, usize),
+    truth: &[u8],
+    numbers: Option<&[u16]>,
+) -> (Vec<u32>, Vec<Plant>) {
+    let is_plant = |class: u8| plant_classes.get(usize::from(class)) == Some(&true);
+    let number = |at: usize| numbers.map_or(0, |numbers| numbers[at]);
+    let loose = Components::of(width, height, |at| Some(truth[at]).filter(|c| is_plant(*c) && number(at) == 0));
+    let mut plants: Vec<Plant> = Vec::new();
+    // One plant a number and class: sets by other hands may give one number to two classes.
+    let mut named = vec![0_u32; if numbers.is_some() { (1 << 16) * plant_classes.len() } else { 0 }];
+    let mut of_region = vec![0_u32; loose.areas.len()];
+    let mut owners = vec![0_u32; truth.len()];
+    for at in (0..truth.len()).filter(|at| is_plant(truth[*at])) {
+        let class = truth[at];
+        let owner = match number(at) {
+            0 => &mut of_region[loose.labels[at] as usize - 1],
+            n => &mut named[usize::from(n) * plant_classes.len() + usize::from(class)],
+        };
+        if *owner == 0 {
+            plants.push(Plant { class, pixels: 0, found: 0 });
+            *owner = plants.len() as u32;
+        }
+        owners[at] = *owner;
+        plants[*owner as usize - 1].pixels += 1;
+    }
+    (owners, plants)
+}
