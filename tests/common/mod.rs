@@ -9,3 +9,5 @@ pub mod program;
 pub mod python;
 pub mod scenes;
 pub mod stats;
+#[cfg(feature = "train")]
+pub mod training;

@@ -1,8 +1,10 @@
 //! `train`: learns to tell crop from weed from datasets, and says how well.
 
 mod eval;
+mod export;
 mod fit;
 mod machine;
+mod predict;
 
 use clap::{Parser, Subcommand};
 use furrow::cli::{self, signal};
@@ -26,6 +28,8 @@ Examples:
   train fit --set data/d --out runs/d                     Basic SegNet on the training images of a set
   train fit --set data/d --set data/real@0..10*4 --network unet --size 240x180 --out runs/augmented
   train eval runs/d --set data/real@12..20                how well it does on real images
+  train predict runs/d photos/ --out answers              masks of photographs, and masks over them
+  train export runs/d --format onnx                       the network for a robot
 
 A run that was stopped or killed goes on with the same command, and ends the same.
 Paths go to stdout, everything else to stderr.
@@ -37,6 +41,10 @@ enum Verb {
     Fit(Box<fit::Args>),
     /// Judge a trained network on images with labels.
     Eval(eval::Args),
+    /// Answer on pictures without labels: masks, and masks over the pictures.
+    Predict(predict::Args),
+    /// Write a trained network for other programs.
+    Export(export::Args),
 }
 
 fn main() -> ExitCode {
@@ -44,6 +52,8 @@ fn main() -> ExitCode {
     let done = match Cli::parse().verb {
         Verb::Fit(args) => fit::run(&args, &signals),
         Verb::Eval(args) => eval::run(&args, &signals),
+        Verb::Predict(args) => predict::run(&args, &signals),
+        Verb::Export(args) => export::run(&args),
     };
     match done {
         Ok(paths) => print_paths(&paths),
