@@ -43,7 +43,7 @@ fn random_map(stream: &mut Stream, width: usize, height: usize, ignore: bool) ->
         let radius = stream.range(0.5, width as f64 / 4.0);
         let class = if ignore && stream.chance(0.2) { 255 } else { 1 + stream.index(2) as u8 };
         for at in 0..map.len() {
-            if (at % width) as f64 - x < radius && ((at % width) as f64 - x).hypot((at / width) as f64 - y) < radius {
+            if ((at % width) as f64 - x).hypot((at / width) as f64 - y) < radius {
                 map[at] = class;
             }
         }
@@ -79,11 +79,14 @@ fn what_is_of_nothing_is_unknown_and_left_out_of_means() {
     let s = Scores::of(&Confusion::from_rows(&[vec![6, 2, 0], vec![1, 1, 0], vec![0, 0, 0]]).unwrap(), &PLANTS);
     let weed = &s.classes[2];
     assert_eq!((weed.iou, weed.precision, weed.recall, weed.f1), (None, None, None, None));
-    assert!(close(s.mean_iou, (6.0 / 9.0 + 1.0 / 4.0) / 2.0) && close(s.class_accuracy, (6.0 / 8.0 + 0.5) / 2.0));
+    assert!(
+        close(s.mean_iou, f64::midpoint(6.0 / 9.0, 1.0 / 4.0))
+            && close(s.class_accuracy, f64::midpoint(6.0 / 8.0, 0.5))
+    );
     // No weed in the truth, but in the prediction: it costs I/U, not accuracy.
     let s = Scores::of(&Confusion::from_rows(&[vec![8, 0, 2], vec![0, 5, 0], vec![0, 0, 0]]).unwrap(), &PLANTS);
     assert_eq!((s.classes[2].iou, s.classes[2].recall, s.classes[2].precision), (Some(0.0), None, Some(0.0)));
-    assert!(close(s.mean_iou, (0.8 + 1.0 + 0.0) / 3.0) && close(s.class_accuracy, (0.8 + 1.0) / 2.0));
+    assert!(close(s.mean_iou, (0.8 + 1.0 + 0.0) / 3.0) && close(s.class_accuracy, f64::midpoint(0.8, 1.0)));
     let s = Scores::of(&Confusion::new(3), &PLANTS);
     assert!(s.values().all(Option::is_none));
     let json = serde_json::to_value(&s).unwrap();
@@ -124,7 +127,9 @@ proptest! {
         }).collect();
         let of = |images: &[(Vec<u8>, Vec<u8>)]| {
             let mut matrix = Confusion::new(3);
-            images.iter().for_each(|(t, p)| matrix.add(t, p).unwrap());
+            for (truth, predicted) in images {
+                matrix.add(truth, predicted).unwrap();
+            }
             matrix
         };
         let mut backwards = Confusion::new(3);
@@ -392,7 +397,7 @@ fn cases() -> serde_json::Value {
     let case = |k: u64| {
         let mut stream = Stream::of(11, k, Purpose::Test, 6);
         let (w, h) = (20 + stream.index(40), 15 + stream.index(30));
-        let truth = random_map(&mut stream, w, h, k % 2 == 0);
+        let truth = random_map(&mut stream, w, h, k.is_multiple_of(2));
         let predicted = random_answer(&mut stream, &truth);
         let mut matrix = Confusion::new(3);
         matrix.add(&truth, &predicted).unwrap();

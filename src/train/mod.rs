@@ -4,6 +4,8 @@
 //!
 //! | room | idea |
 //! |---|---|
+//! | `baseline` | colour rules, to be beaten |
 //! | `measure` | truth and prediction → numbers |
 
+pub mod baseline;
 pub mod measure;
