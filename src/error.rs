@@ -35,6 +35,14 @@ pub enum Error {
         /// What is wrong, and what would be right.
         what: String,
     },
+    /// A file of a training run that cannot be used.
+    #[error("{path}: {what}", path = path.display())]
+    Run {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and what would be right.
+        what: String,
+    },
     /// Values that cannot make a scene, found while it is built.
     #[error("{0}")]
     Scene(String),
@@ -47,6 +55,9 @@ pub enum Error {
     /// A dataset that cannot be used as asked.
     #[error("{0}")]
     Dataset(String),
+    /// A training that cannot be done as asked.
+    #[error("{0}")]
+    Training(String),
     /// A dataset that is not whole or not what it says it is.
     #[error("{0}")]
     Damaged(String),
@@ -65,7 +76,13 @@ impl Error {
     /// The process exit code: 2 where the user's input must change, 75 after a clean stop, 1 for the rest.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Page(_) | Self::Image { .. } | Self::Model { .. } | Self::Scene(_) | Self::Dataset(_) => 2,
+            Self::Page(_)
+            | Self::Image { .. }
+            | Self::Model { .. }
+            | Self::Scene(_)
+            | Self::Dataset(_)
+            | Self::Run { .. }
+            | Self::Training(_) => 2,
             Self::Interrupted => 75,
             Self::Io { source, .. } if source.kind() == std::io::ErrorKind::NotFound => 2,
             Self::Io { .. } | Self::Embree(_) | Self::Denoise(_) | Self::Damaged(_) => 1,

@@ -33,8 +33,8 @@ const NEVER: &[(&str, &str)] = &[
     ("film", "scene sampling"),
     // It asks `render` for an image and a label map.
     ("dataset", "integrator bsdf"),
-    // It reads only what was written: a real set is a set.
-    ("train", "scene render integrator bsdf"),
+    // It reads what writers wrote, so it reads real images too.
+    ("train", "scene render integrator accel film light material bsdf plant soil scatter"),
     // `cli` is what the programs share.
     ("*", "cli bin"),
 ];
@@ -66,12 +66,16 @@ const DOORS: &[(&str, &str)] = &[
     ("serde", "*"),
     // glTF documents, read and written; records and formats of datasets.
     ("serde_json", "model/document.rs model/gltf.rs output/gltf/ dataset/ train/"),
-    ("sha2", "scene/library.rs dataset/"),
-    ("signal_hook", "bin/trace/signal.rs"),
+    // Weights, as every trainer reads them.
+    ("safetensors", "train/weights.rs"),
+    ("sha2", "scene/library.rs dataset/ train/run.rs train/weights.rs"),
+    ("signal_hook", "cli/signal.rs"),
     // Parts that a pixel met: one or two, nearly always.
     ("smallvec", "film/tally.rs output/exr/cryptomatte.rs"),
     ("sobol_burley", "sampling/sampler.rs"),
     ("solar_positioning", "light/position.rs"),
+    // libtorch: networks and how they learn.
+    ("tch", "train/net/ train/fit/ train/deploy/ bin/train/"),
     // Files appear whole or not at all: images of fields, and drawn textures below them. The denoiser's go through a folder.
     ("tempfile", "output/mod.rs output/denoise.rs texture/draw/write.rs"),
     ("thiserror", "error.rs"),

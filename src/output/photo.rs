@@ -2,7 +2,7 @@
 
 use crate::{Error, Result};
 use image::codecs::jpeg::JpegEncoder;
-use image::{DynamicImage, ExtendedColorType, RgbImage, imageops};
+use image::{DynamicImage, ExtendedColorType, GrayImage, RgbImage, imageops};
 use std::path::Path;
 
 /// Reads a PNG or JPEG photograph of any depth as 8-bit sRGB: width, height, pixels.
@@ -38,6 +38,15 @@ pub fn shrink(width: u32, height: u32, rgb: &[[u8; 3]], most: u32) -> (u32, u32,
     }
     let picture = RgbImage::from_raw(width, height, rgb.as_flattened().to_vec()).unwrap_or_default();
     (w, h, imageops::thumbnail(&picture, w, h).into_raw().as_chunks::<3>().0.to_vec())
+}
+
+/// A gray picture at another size, antialiased (a triangle filter as wide as two pixels of the coarser size).
+pub fn resize_gray(width: u32, height: u32, values: &[u8], to: (u32, u32)) -> Vec<u8> {
+    if (width, height) == to {
+        return values.to_vec();
+    }
+    let picture = GrayImage::from_raw(width, height, values.to_vec()).unwrap_or_default();
+    imageops::resize(&picture, to.0, to.1, imageops::FilterType::Triangle).into_raw()
 }
 
 /// Width and height of a picture that is made at most `most` pixels wide and high.

@@ -28,8 +28,10 @@ pub enum Purpose {
     Sensor = 8,
     /// A test.
     Test = 9,
+    /// The order of training images, and how each is varied.
+    Training = 10,
     /// Which images a resample of the bootstrap holds.
-    Resample = 10,
+    Resample = 11,
 }
 
 /// A stream of random numbers with an address.

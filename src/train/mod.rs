@@ -1,11 +1,14 @@
-//! What is learned from files: networks that tell soil, crop and weed apart, and how well they do.
+//! Learning from datasets: networks trained on rendered or real images, judged on real ones.
 //!
-//! It reads only what was written, by `trace dataset` or by others, and knows nothing of scenes and rays: a real set is a set.
-//!
-//! | room | idea |
-//! |---|---|
-//! | `baseline` | colour rules, to be beaten |
-//! | `measure` | truth and prediction → numbers |
+//! `data` turns sets on disk into batches; `net` are the networks; `fit` trains one and keeps what it learns in a run's folder
+//! ([`run`]); `measure` turns truth and prediction into numbers,
+//! `baseline` holds the colour rules that a network must beat. Everything reads only files that a writer of datasets wrote, so
+//! rendered and imported sets are the same to it. What calls libtorch stands behind the cargo feature `train`.
 
 pub mod baseline;
+pub mod classes;
+pub mod data;
 pub mod measure;
+pub mod net;
+pub mod run;
+pub mod weights;

@@ -5,12 +5,11 @@ mod export;
 mod field;
 mod quality;
 mod render;
-mod signal;
 mod technique;
 mod texture;
 
 use clap::{Parser, Subcommand};
-use furrow::cli;
+use furrow::cli::{self, signal};
 use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -2,10 +2,10 @@
 
 use crate::field::FieldArgs;
 use crate::quality::QualityArgs;
-use crate::signal::Signals;
 use crate::technique::TechniqueArgs;
 use clap::ValueEnum;
 use furrow::accel::{self, EmbreeAccel};
+use furrow::cli::signal::Signals;
 use furrow::film::Film;
 use furrow::geometry::Window;
 use furrow::integrator::{FalseColor, Integrator, World};

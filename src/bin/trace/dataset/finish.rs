@@ -2,8 +2,8 @@
 
 use super::order::formats;
 use super::render::{WorkArgs, generate};
-use crate::signal::Signals;
 use furrow::Result;
+use furrow::cli::signal::Signals;
 use furrow::dataset::generate::Shard;
 use furrow::dataset::{Set, finish, plan};
 use std::path::PathBuf;

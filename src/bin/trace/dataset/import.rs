@@ -2,8 +2,8 @@
 
 use super::progress::Progress;
 use crate::render::threads;
-use crate::signal::Signals;
 use clap::ValueEnum;
+use furrow::cli::signal::Signals;
 use furrow::dataset::import::classes::{Colors, Names};
 use furrow::dataset::import::coco::Coco;
 use furrow::dataset::import::masks::{Coding, Folders, Masks};

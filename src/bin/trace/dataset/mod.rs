@@ -9,9 +9,9 @@ mod progress;
 mod render;
 mod verify;
 
-use crate::signal::Signals;
 use clap::{Parser, Subcommand};
 use furrow::Result;
+use furrow::cli::signal::Signals;
 use std::path::PathBuf;
 
 /// Makes a dataset from a page, or goes on with one: `plan`, `render` and `finish` in one go.

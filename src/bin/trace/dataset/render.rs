@@ -3,8 +3,8 @@
 use super::engine::PathTracer;
 use super::progress::Progress;
 use crate::render::threads;
-use crate::signal::Signals;
 use furrow::Result;
+use furrow::cli::signal::Signals;
 use furrow::dataset::Set;
 use furrow::dataset::generate::{self, Overseer, Shard, Work};
 use furrow::dataset::shoot::Engine;

@@ -3,7 +3,7 @@
 use super::engine::PathTracer;
 use super::progress::Progress;
 use crate::render::threads;
-use crate::signal::Signals;
+use furrow::cli::signal::Signals;
 use furrow::dataset::shoot::Engine;
 use furrow::dataset::{Set, verify};
 use furrow::{Result, render};

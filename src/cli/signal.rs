@@ -22,7 +22,7 @@ const PATIENT: [i32; 2] = [signal_hook::consts::SIGHUP, signal_hook::consts::SIG
 const PATIENT: [i32; 0] = [];
 
 /// What signals have asked for.
-pub(crate) struct Signals {
+pub struct Signals {
     stop: Arc<AtomicBool>,
     urgent: Arc<AtomicBool>,
     unheeded: Arc<AtomicBool>,
@@ -30,7 +30,7 @@ pub(crate) struct Signals {
 
 impl Signals {
     /// Watches for INT, TERM, HUP and USR1. The first thing that the program does: a signal before that ends it its own way.
-    pub(crate) fn watch() -> Self {
+    pub fn watch() -> Self {
         let signals = Self { stop: Arc::default(), urgent: Arc::default(), unheeded: Arc::new(AtomicBool::new(true)) };
         if let Err(e) = signals.install() {
             eprintln!("warning: cannot watch for signals: {e}");
@@ -57,14 +57,14 @@ impl Signals {
     }
 
     /// The flag that signals raise from now on instead of ending the process.
-    pub(crate) fn heed(&self) -> &AtomicBool {
+    pub fn heed(&self) -> &AtomicBool {
         self.unheeded.store(false, Ordering::SeqCst);
         &self.stop
     }
 
     /// Two flags instead of the end of the process: the first is raised by every signal, the second by INT and TERM alone, which
     /// do not wait for the work in hand.
-    pub(crate) fn heed_patiently(&self) -> (&AtomicBool, &AtomicBool) {
+    pub fn heed_patiently(&self) -> (&AtomicBool, &AtomicBool) {
         (self.heed(), &self.urgent)
     }
 }

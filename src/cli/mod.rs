@@ -1,4 +1,6 @@
-//! What the command lines share: how an error looks, how a crop is written.
+//! What the command lines share: how an error looks, how a crop is written, what a signal does.
+
+pub mod signal;
 
 use crate::geometry::Window;
 use crate::sampling::fault::nearest;

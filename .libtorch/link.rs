@@ -1,0 +1,9 @@
+//! Build script: with the feature `train`, programs remember where libtorch lies. `torch-sys` tells its direct dependants; written as
+//! `RUNPATH`, so that `LD_LIBRARY_PATH` still puts another libtorch of the same version (one with CUDA) before it.
+
+fn main() {
+    println!("cargo:rerun-if-changed=.libtorch/link.rs");
+    if let Ok(lib) = std::env::var("DEP_TCH_LIBTORCH_LIB") {
+        println!("cargo:rustc-link-arg=-Wl,--enable-new-dtags,-rpath,{lib}");
+    }
+}

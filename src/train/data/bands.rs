@@ -1,0 +1,133 @@
+//! What a network sees of a pixel.
+
+use crate::output;
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// One band of a network's input.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
+pub enum Band {
+    /// Red of `rgb.png`.
+    Red,
+    /// Green of `rgb.png`.
+    Green,
+    /// Blue of `rgb.png`.
+    Blue,
+    /// Any other: the 8-bit gray `NAME.png` in the image's folder, `nir.png` among them.
+    Gray(String),
+}
+
+impl Band {
+    /// Red, green, blue.
+    pub const RGB: [Self; 3] = [Self::Red, Self::Green, Self::Blue];
+
+    /// Reads a band's name.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        match text.trim() {
+            "red" => Ok(Self::Red),
+            "green" => Ok(Self::Green),
+            "blue" => Ok(Self::Blue),
+            name if !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || "-_".contains(c)) => {
+                Ok(Self::Gray(name.into()))
+            }
+            name => Err(format!(
+                "`{name}` is no band: bands are red, green, blue, nir, or the name of a gray PNG in each image's folder"
+            )),
+        }
+    }
+
+    /// Reads `rgb`, `rgbn` or names with commas between.
+    pub fn list(text: &str) -> Result<Vec<Self>, String> {
+        let bands = match text.trim() {
+            "rgb" => Self::RGB.to_vec(),
+            "rgbn" | "rgb,nir" => Self::RGB.into_iter().chain([Self::Gray("nir".into())]).collect(),
+            text => text.split(',').map(Self::parse).collect::<Result<Vec<_>, _>>()?,
+        };
+        match bands.iter().enumerate().find(|(i, band)| bands[..*i].contains(band)) {
+            Some((_, twice)) => Err(format!("the band `{}` is there twice", twice.name())),
+            None => Ok(bands),
+        }
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Red => "red",
+            Self::Green => "green",
+            Self::Blue => "blue",
+            Self::Gray(name) => name,
+        }
+    }
+
+    /// Whether it is part of the photograph in colour, so that colour is varied in it with the others.
+    pub fn is_color(&self) -> bool {
+        !matches!(self, Self::Gray(_))
+    }
+}
+
+impl From<Band> for String {
+    fn from(band: Band) -> Self {
+        band.name().into()
+    }
+}
+
+impl TryFrom<String> for Band {
+    type Error = String;
+
+    fn try_from(name: String) -> Result<Self, String> {
+        Self::parse(&name)
+    }
+}
+
+/// The planes of the bands, 8 bit, from the pictures in an image's folder: width, height, one plane a band.
+pub(super) fn read(folder: &Path, bands: &[Band]) -> Result<(u32, u32, Vec<Vec<u8>>)> {
+    let rgb = bands.iter().any(Band::is_color).then(|| output::read_rgb(&folder.join("rgb.png"))).transpose()?;
+    let mut size = rgb.as_ref().map(|(w, h, _)| (*w, *h));
+    let mut planes = Vec::new();
+    for band in bands {
+        let channel = match band {
+            Band::Red => Some(0),
+            Band::Green => Some(1),
+            Band::Blue => Some(2),
+            Band::Gray(_) => None,
+        };
+        planes.push(match (channel, &rgb) {
+            (Some(channel), Some((_, _, pixels))) => pixels.iter().map(|p| p[channel]).collect(),
+            _ => {
+                let path = folder.join(format!("{}.png", band.name()));
+                if !path.is_file() {
+                    return Err(Error::Dataset(format!(
+                        "{}: this image has no band `{}`\n help: choose bands that all sets have, such as --bands rgb",
+                        path.display(),
+                        band.name()
+                    )));
+                }
+                let (w, h, values) = output::read_gray(&path)?;
+                if *size.get_or_insert((w, h)) != (w, h) {
+                    return Err(Error::Image { path, what: format!("it is {w} × {h} pixels, the others are not") });
+                }
+                values
+            }
+        });
+    }
+    let (w, h) = size.ok_or_else(|| Error::Dataset("no band was named\n help: --bands rgb".into()))?;
+    Ok((w, h, planes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_have_names() {
+        let names = |text: &str| Band::list(text).map(|b| b.iter().map(|b| b.name().to_owned()).collect::<Vec<_>>());
+        assert_eq!(names("rgb").unwrap(), ["red", "green", "blue"]);
+        assert_eq!(names("rgbn").unwrap(), ["red", "green", "blue", "nir"]);
+        assert_eq!(names("nir, green").unwrap(), ["nir", "green"]);
+        for bad in ["", "red,red", "../x", "red,,blue"] {
+            assert!(names(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! One image at the network's size.
+
+use super::bands::{self, Band};
+use crate::dataset::sample::IGNORE;
+use crate::dataset::{Set, native};
+use crate::output;
+use crate::train::classes::Map;
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// What a network takes in: bands and size.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Shape {
+    /// Its bands, in order.
+    pub bands: Vec<Band>,
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+}
+
+impl Shape {
+    /// Pixels of an image.
+    pub fn pixels(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+}
+
+/// An image with labels, brought to a network's size. Pictures of another shape are stretched, as Di Cicco et al. 2017 do:
+/// bands antialiased, labels as they are at the pixels' centres.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Example {
+    /// Its name in its set.
+    pub name: String,
+    /// One plane of `height × width` 8-bit values for each band.
+    pub planes: Vec<Vec<u8>>,
+    /// Class of each pixel, [`IGNORE`] for none.
+    pub labels: Vec<u8>,
+    /// Number of the plant of each pixel, 0 for none; empty unless asked for.
+    pub plants: Vec<u16>,
+}
+
+impl Example {
+    /// Reads an image of a set.
+    pub fn read(set: &Set, number: u64, map: &Map, shape: &Shape, with_plants: bool) -> Result<Self> {
+        let name = Set::name(number);
+        let folder = set.folder.join(native::folder(&name));
+        if !folder.is_dir() {
+            return Err(Error::Dataset(format!(
+                "{}: this image is not there yet\n help: `trace dataset verify` tells what the set lacks, the command that began it makes it",
+                folder.display()
+            )));
+        }
+        let (w, h, planes) = bands::read(&folder, &shape.bands)?;
+        let same = |path: &Path, found: (u32, u32)| match found == (w, h) {
+            true => Ok(()),
+            false => Err(Error::Image {
+                path: path.into(),
+                what: format!("it is {} × {} pixels, the photograph {w} × {h}", found.0, found.1),
+            }),
+        };
+        let path = folder.join("semantics.png");
+        let (lw, lh, semantics) = output::read_indexed(&path)?;
+        same(&path, (lw, lh))?;
+        let species = match map.needs_species() {
+            false => Vec::new(),
+            true => {
+                let path = folder.join("species.png");
+                let (lw, lh, species) = output::read_gray(&path)?;
+                same(&path, (lw, lh))?;
+                species
+            }
+        };
+        let plants = match with_plants {
+            false => Vec::new(),
+            true => {
+                let path = folder.join("plants.png");
+                let (lw, lh, plants) = output::read_gray16(&path)?;
+                same(&path, (lw, lh))?;
+                nearest((w, h), &plants, (shape.width, shape.height))
+            }
+        };
+        let to = (shape.width, shape.height);
+        Ok(Self {
+            name,
+            planes: planes.iter().map(|plane| output::resize_gray(w, h, plane, to)).collect(),
+            labels: nearest((w, h), &map.labels(&semantics, &species), to),
+            plants,
+        })
+    }
+
+    /// Bytes that it takes in memory.
+    pub fn bytes(&self) -> u64 {
+        (self.planes.iter().map(Vec::len).sum::<usize>() + self.labels.len() + 2 * self.plants.len()) as u64
+    }
+
+    /// Pixels of each of `classes` classes.
+    pub fn counts(&self, classes: usize) -> Vec<u64> {
+        let mut counts = vec![0; classes];
+        for label in self.labels.iter().filter(|l| **l != IGNORE) {
+            counts[usize::from(*label)] += 1;
+        }
+        counts
+    }
+}
+
+/// A map at another size: each pixel has what lies at its centre.
+pub(crate) fn nearest<T: Copy>(from: (u32, u32), values: &[T], to: (u32, u32)) -> Vec<T> {
+    if from == to {
+        return values.to_vec();
+    }
+    let at = |i: u32, from: u32, to: u32| ((2 * u64::from(i) + 1) * u64::from(from) / (2 * u64::from(to))) as usize;
+    let columns: Vec<usize> = (0..to.0).map(|x| at(x, from.0, to.0)).collect();
+    (0..to.1)
+        .flat_map(|y| {
+            let row = at(y, from.1, to.1) * from.0 as usize;
+            columns.iter().map(move |x| values[row + x])
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn maps_keep_what_lies_at_the_centres() {
+        let values: Vec<u8> = (0..36).collect();
+        assert_eq!(nearest((6, 6), &values, (2, 2)), [7, 10, 25, 28]);
+        assert_eq!(nearest((2, 1), &[1u8, 2], (4, 2)), [1, 1, 2, 2, 1, 1, 2, 2]);
+        assert_eq!(nearest((6, 6), &values, (6, 6)), values);
+    }
+}

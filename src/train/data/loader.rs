@@ -1,0 +1,137 @@
+//! Batches, made ahead of the network by threads of their own.
+//!
+//! Step s takes images s·b to s·b + b − 1 of an endless list: all images in a random order, then all in another, and so on.
+//! The seed and the step alone decide a batch, so a run that goes on after a kill gets the same ones, whatever the threads.
+
+use super::augment::Augment;
+use super::bands::Band;
+use super::normalise::Normalisation;
+use super::store::Store;
+use crate::Result;
+use crate::sampling::{Purpose, Stream};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, sync_channel};
+
+/// How batches are drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Order {
+    /// Decides the order and every variation.
+    pub seed: u64,
+    /// Images of a batch; ≥ 1.
+    pub batch: usize,
+    /// What is varied.
+    pub augment: Augment,
+    /// What is taken out after that.
+    pub normalisation: Normalisation,
+}
+
+/// Images in one piece of memory.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Batch {
+    /// How many.
+    pub images: usize,
+    /// `images × height × width × bands`, normalised.
+    pub pixels: Vec<f32>,
+    /// `images × height × width` classes; 255 for none.
+    pub labels: Vec<u8>,
+}
+
+/// Batches in the order of their steps.
+pub struct Loader {
+    workers: Vec<Receiver<Result<Batch>>>,
+    next: usize,
+}
+
+/// Batches that each thread may be ahead.
+const AHEAD: usize = 2;
+
+impl Loader {
+    /// Begins to load the batches of steps `from..to` with `threads` threads; the store must hold an image. Threads end when the
+    /// loader is dropped.
+    pub fn start(store: &Arc<Store>, order: &Order, from: u64, to: u64, threads: usize) -> Self {
+        let threads = threads.max(1) as u64;
+        let begin = |thread: u64| {
+            let (sender, receiver) = sync_channel(AHEAD);
+            let (store, order) = (Arc::clone(store), order.clone());
+            std::thread::spawn(move || {
+                let mut epochs = Epochs { seed: order.seed, current: None };
+                for step in (from + thread..to).step_by(threads as usize) {
+                    let made = make(&store, &order, step, &mut epochs);
+                    let failed = made.is_err();
+                    // Nobody listens any more: the loader was dropped.
+                    if sender.send(made).is_err() || failed {
+                        return;
+                    }
+                }
+            });
+            receiver
+        };
+        Self { workers: (0..threads).map(begin).collect(), next: 0 }
+    }
+}
+
+impl Iterator for Loader {
+    type Item = Result<Batch>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let worker = &self.workers[self.next % self.workers.len()];
+        self.next += 1;
+        worker.recv().ok()
+    }
+}
+
+/// Shuffled orders, the last one kept.
+struct Epochs {
+    seed: u64,
+    current: Option<(u64, Vec<usize>)>,
+}
+
+impl Epochs {
+    /// The image at a place of the endless list.
+    fn at(&mut self, place: u64, images: usize) -> usize {
+        let (epoch, within) = (place / images as u64, place % images as u64);
+        if self.current.as_ref().is_none_or(|(e, _)| *e != epoch) {
+            let mut stream = Stream::of(self.seed, epoch, Purpose::Training, 1);
+            let mut order: Vec<usize> = (0..images).collect();
+            for i in (1..images).rev() {
+                order.swap(i, stream.index(i + 1));
+            }
+            self.current = Some((epoch, order));
+        }
+        self.current.as_ref().map_or(0, |(_, order)| order[within as usize])
+    }
+}
+
+fn make(store: &Store, order: &Order, step: u64, epochs: &mut Epochs) -> Result<Batch> {
+    let shape = store.shape();
+    let colour: Vec<bool> = shape.bands.iter().map(Band::is_color).collect();
+    let mut batch = Batch { images: order.batch, pixels: Vec::new(), labels: Vec::new() };
+    for slot in 0..order.batch as u64 {
+        let place = step * order.batch as u64 + slot;
+        let example = store.get(epochs.at(place, store.len()))?;
+        let mut stream = Stream::of(order.seed, place, Purpose::Training, 2);
+        let (mut pixels, labels) = order.augment.apply(&example, (shape.width, shape.height), &colour, &mut stream);
+        order.normalisation.apply(&mut pixels, colour.len());
+        batch.pixels.extend(pixels);
+        batch.labels.extend(labels);
+    }
+    Ok(batch)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_epoch_holds_every_image_once_in_another_order() {
+        let mut epochs = Epochs { seed: 5, current: None };
+        let epoch = |epochs: &mut Epochs, e: u64| (0..7).map(|i| epochs.at(e * 7 + i, 7)).collect::<Vec<_>>();
+        let (first, second) = (epoch(&mut epochs, 0), epoch(&mut epochs, 1));
+        assert_ne!(first, second);
+        assert_eq!(first, epoch(&mut epochs, 0));
+        for mut order in [first, second] {
+            order.sort_unstable();
+            assert_eq!(order, [0, 1, 2, 3, 4, 5, 6]);
+        }
+    }
+}

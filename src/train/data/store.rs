@@ -1,0 +1,97 @@
+//! The selected images: decoded once, and kept as far as memory goes.
+
+use super::example::{Example, Shape};
+use super::select::{Pick, Selection};
+use crate::dataset::Set;
+use crate::train::classes::{Classes, Map};
+use crate::{Error, Result};
+use std::borrow::Cow;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Images of one or several sets, by place.
+pub struct Store {
+    sets: Vec<(Set, Map)>,
+    /// Set and number of each image.
+    images: Vec<(usize, u64)>,
+    shape: Shape,
+    with_plants: bool,
+    kept: Vec<OnceLock<Example>>,
+    /// Which image is the first of the same: repeated images are kept once.
+    same: Vec<usize>,
+    free: AtomicU64,
+}
+
+impl Store {
+    /// The images of the selections, in their order; at most `memory` bytes of them are kept decoded.
+    pub fn open(
+        selections: &[Selection],
+        otherwise: Pick,
+        seed: u64,
+        classes: &Classes,
+        shape: &Shape,
+        with_plants: bool,
+        memory: u64,
+    ) -> Result<Self> {
+        let (mut sets, mut images) = (Vec::new(), Vec::new());
+        for selection in selections {
+            let (set, numbers) = selection.open(otherwise, seed)?;
+            let map = classes.of(&set.recipe).map_err(|e| Error::Dataset(format!("{}: {e}", set.folder.display())))?;
+            images.extend(numbers.into_iter().map(|n| (sets.len(), n)));
+            sets.push((set, map));
+        }
+        let mut first = std::collections::BTreeMap::new();
+        let same = images.iter().enumerate().map(|(i, image)| *first.entry(*image).or_insert(i)).collect();
+        let kept = images.iter().map(|_| OnceLock::new()).collect();
+        Ok(Self { sets, images, shape: shape.clone(), with_plants, kept, same, free: AtomicU64::new(memory) })
+    }
+
+    /// How many images there are, repeated ones counted as often as they stand there.
+    pub fn len(&self) -> usize {
+        self.images.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.images.is_empty()
+    }
+
+    /// What each image is brought to.
+    pub fn shape(&self) -> &Shape {
+        &self.shape
+    }
+
+    /// The image at a place: from memory, or read.
+    pub fn get(&self, place: usize) -> Result<Cow<'_, Example>> {
+        let place = self.same[place];
+        if let Some(example) = self.kept[place].get() {
+            return Ok(Cow::Borrowed(example));
+        }
+        let (set, number) = self.images[place];
+        let (set, map) = &self.sets[set];
+        let example = Example::read(set, number, map, &self.shape, self.with_plants)?;
+        let bytes = example.bytes();
+        let takes = |free: u64| free.checked_sub(bytes);
+        if self.free.fetch_update(Ordering::Relaxed, Ordering::Relaxed, takes).is_ok() {
+            return Ok(Cow::Borrowed(self.kept[place].get_or_init(|| example)));
+        }
+        Ok(Cow::Owned(example))
+    }
+
+    /// What decides the images of a place: the set's fingerprint and the image's number.
+    pub fn fingerprints(&self) -> Result<Vec<(String, Vec<u64>)>> {
+        let of = |(i, (set, _)): (usize, &(Set, Map))| {
+            let numbers = self.images.iter().filter(|(s, _)| *s == i).map(|(_, n)| *n).collect();
+            Ok((set.recipe.fingerprint()?, numbers))
+        };
+        self.sets.iter().enumerate().map(of).collect()
+    }
+
+    /// What its first set's images are, for people: folders with the number of images of each.
+    pub fn told(&self) -> Vec<(String, usize)> {
+        let of = |(i, (set, _)): (usize, &(Set, Map))| {
+            (set.folder.display().to_string(), self.images.iter().filter(|(s, _)| *s == i).count())
+        };
+        self.sets.iter().enumerate().map(of).collect()
+    }
+}

@@ -1,0 +1,111 @@
+//! The networks, each written once as a walk over a handful of operations.
+//!
+//! Who walks decides what comes of it: [`parameters()`] lists what there is to learn, libtorch computes, an exporter writes the graph
+//! down. So parameter counts, forward passes and exported graphs cannot disagree. Nothing here needs libtorch.
+//!
+//! A new network is one file and one line in the table below.
+
+mod basic_segnet;
+mod parameters;
+mod segnet;
+mod unet;
+
+pub use parameters::{Parameter, Role, parameters};
+
+use serde::{Deserialize, Serialize};
+
+/// A convolution's numbers. Padding keeps the size at stride 1: (kernel − 1) / 2.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Conv {
+    /// Channels in.
+    pub inputs: usize,
+    /// Channels out.
+    pub outputs: usize,
+    /// Pixels across the square kernel; odd.
+    pub kernel: usize,
+    /// Pixels between two results.
+    pub stride: usize,
+    /// Whether a number is added to each channel.
+    pub bias: bool,
+}
+
+/// What networks are made of. Values are images × channels × height × width; parameters are found by name, as in
+/// `enc0_0.conv.weight`.
+pub trait Operations {
+    /// A value.
+    type Value;
+    /// Where the maxima of a pooling lay.
+    type Places;
+
+    /// A convolution with the parameters `name.weight` and `name.bias`.
+    fn conv(&mut self, x: &Self::Value, name: &str, conv: Conv) -> Self::Value;
+    /// Batch normalisation (Ioffe & Szegedy 2015), ε = 1e-5, with `name.weight`, `.bias`, `.running_mean`, `.running_var`.
+    fn norm(&mut self, x: &Self::Value, name: &str, channels: usize) -> Self::Value;
+    /// max(x, 0).
+    fn relu(&mut self, x: &Self::Value) -> Self::Value;
+    /// a + b.
+    fn add(&mut self, a: &Self::Value, b: &Self::Value) -> Self::Value;
+    /// The channels of a, then those of b.
+    fn concat(&mut self, a: &Self::Value, b: &Self::Value) -> Self::Value;
+    /// The largest of each 2 × 2 pixels, and where it lay; an odd row or column at the end is left out.
+    fn pool(&mut self, x: &Self::Value) -> (Self::Value, Self::Places);
+    /// Puts each value back to its place; zero elsewhere. The size is that before the pooling.
+    fn unpool(&mut self, x: &Self::Value, places: Self::Places) -> Self::Value;
+    /// The largest of each 3 × 3 pixels, two pixels apart.
+    fn pool3(&mut self, x: &Self::Value) -> Self::Value;
+    /// To the height and width of `like`, by the nearest pixel.
+    fn enlarge(&mut self, x: &Self::Value, like: &Self::Value) -> Self::Value;
+}
+
+/// One line a network: its variant, its file, its name on command lines, what it is.
+macro_rules! networks {
+    ($($variant:ident, $module:ident, $name:literal, $doc:literal;)*) => {
+        /// A network.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+        pub enum Network {
+            $(#[doc = $doc] #[serde(rename = $name)] $variant,)*
+        }
+
+        impl Network {
+            /// All networks.
+            pub const ALL: &'static [Self] = &[$(Self::$variant),*];
+
+            /// Name on command lines and in files.
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$variant => $name,)* }
+            }
+
+            /// What it is, in one sentence.
+            pub fn about(self) -> &'static str {
+                match self { $(Self::$variant => $doc,)* }
+            }
+
+            /// From images of `bands` channels to one value a class and pixel, the highest of which is the network's answer.
+            pub fn walk<O: Operations>(self, o: &mut O, x: &O::Value, bands: usize, classes: usize) -> O::Value {
+                match self { $(Self::$variant => $module::walk(o, x, bands, classes),)* }
+            }
+        }
+    };
+}
+
+networks! {
+    BasicSegnet, basic_segnet, "basic-segnet", "Basic SegNet of Kendall et al. 2015: four 7 × 7 convolutions of 64 channels down, four up.";
+    Segnet, segnet, "segnet", "SegNet of Badrinarayanan et al. 2017: the 13 convolutions of VGG16 with batch norm, and their mirror.";
+    Unet, unet, "unet", "U-Net (Ronneberger et al. 2015) with the residual encoder of ResNet-18 (He et al. 2016).";
+}
+
+impl Network {
+    /// Reads a name.
+    pub fn named(text: &str) -> Result<Self, String> {
+        let names: Vec<&str> = Self::ALL.iter().map(|n| n.name()).collect();
+        let found = Self::ALL.iter().copied().find(|n| n.name() == text);
+        found.ok_or_else(|| format!("there is no network `{text}`: networks are {}", names.join(", ")))
+    }
+}
+
+/// Convolution, batch norm and, where asked for, ReLU, with the names `name.conv` and `name.bn`.
+fn unit<O: Operations>(o: &mut O, x: &O::Value, name: &str, conv: Conv, relu: bool) -> O::Value {
+    let y = o.conv(x, &format!("{name}.conv"), conv);
+    let y = o.norm(&y, &format!("{name}.bn"), conv.outputs);
+    if relu { o.relu(&y) } else { y }
+}

@@ -1,0 +1,165 @@
+//! What there is to learn in a network: names, shapes and first values.
+
+use super::{Conv, Network, Operations};
+use crate::sampling::{Purpose, Stream};
+
+/// What a parameter does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// Weights of a convolution.
+    Weight,
+    /// What a convolution adds.
+    Bias,
+    /// What a batch norm multiplies by.
+    Gain,
+    /// What a batch norm adds.
+    Shift,
+    /// A batch norm's running mean; not learnt by gradients.
+    Mean,
+    /// Its running variance; not learnt by gradients.
+    Variance,
+}
+
+impl Role {
+    /// Whether gradients change it.
+    pub fn is_learnt(self) -> bool {
+        !matches!(self, Self::Mean | Self::Variance)
+    }
+}
+
+/// One parameter.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Parameter {
+    /// Its name, such as `enc0_0.conv.weight`.
+    pub name: String,
+    /// Its size along each axis: outputs × inputs × kernel × kernel, or channels.
+    pub shape: Vec<usize>,
+    /// What it does.
+    pub role: Role,
+}
+
+impl Parameter {
+    /// How many numbers it holds.
+    pub fn len(&self) -> usize {
+        self.shape.iter().product()
+    }
+
+    /// Whether it holds none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Its first values: weights normal with variance 2 / (inputs · kernel²), gains and variances one, the rest zero. Source: He
+    /// et al. 2015, "Delving deep into rectifiers", eq. 10. Each parameter draws from a stream of its own.
+    pub fn begin(&self, seed: u64, place: usize) -> Vec<f32> {
+        match self.role {
+            Role::Weight => {
+                let mut stream = Stream::of(seed, place as u64, Purpose::Training, 3);
+                let fan_in: usize = self.shape.iter().skip(1).product();
+                let sd = (2.0 / fan_in.max(1) as f64).sqrt();
+                (0..self.len()).map(|_| (sd * stream.normal()) as f32).collect()
+            }
+            Role::Gain | Role::Variance => vec![1.0; self.len()],
+            Role::Bias | Role::Shift | Role::Mean => vec![0.0; self.len()],
+        }
+    }
+}
+
+/// The parameters of a network, in the order in which an image meets them.
+pub fn parameters(network: Network, bands: usize, classes: usize) -> Vec<Parameter> {
+    let mut list = List(Vec::new());
+    network.walk(&mut list, &(), bands, classes);
+    list.0
+}
+
+struct List(Vec<Parameter>);
+
+impl List {
+    fn note(&mut self, name: String, shape: &[usize], role: Role) {
+        self.0.push(Parameter { name, shape: shape.to_vec(), role });
+    }
+}
+
+impl Operations for List {
+    type Value = ();
+    type Places = ();
+
+    fn conv(&mut self, (): &(), name: &str, conv: Conv) {
+        self.note(format!("{name}.weight"), &[conv.outputs, conv.inputs, conv.kernel, conv.kernel], Role::Weight);
+        if conv.bias {
+            self.note(format!("{name}.bias"), &[conv.outputs], Role::Bias);
+        }
+    }
+
+    fn norm(&mut self, (): &(), name: &str, channels: usize) {
+        let roles = [
+            ("weight", Role::Gain),
+            ("bias", Role::Shift),
+            ("running_mean", Role::Mean),
+            ("running_var", Role::Variance),
+        ];
+        for (what, role) in roles {
+            self.note(format!("{name}.{what}"), &[channels], role);
+        }
+    }
+
+    fn relu(&mut self, (): &()) {}
+    fn add(&mut self, (): &(), (): &()) {}
+    fn concat(&mut self, (): &(), (): &()) {}
+    fn pool(&mut self, (): &()) -> ((), ()) {
+        ((), ())
+    }
+    fn unpool(&mut self, (): &(), (): ()) {}
+    fn pool3(&mut self, (): &()) {}
+    fn enlarge(&mut self, (): &(), (): &()) {}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn learnt(network: Network) -> usize {
+        parameters(network, 3, 3).iter().filter(|p| p.role.is_learnt()).map(Parameter::len).sum()
+    }
+
+    #[test]
+    fn networks_have_the_published_convolutions() {
+        let convolutions = |network, kernel| {
+            parameters(network, 3, 3).iter().filter(|p| p.role == Role::Weight && p.shape[2] == kernel).count()
+        };
+        assert_eq!(convolutions(Network::Segnet, 3), 26);
+        assert_eq!(convolutions(Network::BasicSegnet, 7), 8);
+        // VGG16's thirteen convolutions hold 14 714 688 numbers.
+        let vgg: usize = parameters(Network::Segnet, 3, 3)
+            .iter()
+            .filter(|p| p.name.starts_with("enc") && p.name.contains("conv"))
+            .map(Parameter::len)
+            .sum();
+        assert_eq!(vgg, 14_714_688);
+        // 3·64·49 + 64 and seven times 64·64·49 + 64, eight batch norms, and the head.
+        assert_eq!(learnt(Network::BasicSegnet), 9472 + 7 * 200_768 + 8 * 128 + 195);
+        // ResNet-18 without its classifier holds 11 176 512.
+        let resnet: usize = parameters(Network::Unet, 3, 3)
+            .iter()
+            .filter(|p| p.role.is_learnt() && (p.name.starts_with("enc") || p.name.starts_with("stem")))
+            .map(Parameter::len)
+            .sum();
+        assert_eq!(resnet, 11_176_512);
+    }
+
+    #[test]
+    fn names_are_unique_and_first_values_have_their_deviation() {
+        for network in Network::ALL {
+            let all = parameters(*network, 4, 5);
+            let mut names: Vec<&str> = all.iter().map(|p| p.name.as_str()).collect();
+            names.sort_unstable();
+            names.dedup();
+            assert_eq!(names.len(), all.len());
+            assert_eq!(Network::named(network.name()).unwrap(), *network);
+        }
+        let weight = &parameters(Network::Segnet, 3, 3)[6];
+        let values = weight.begin(1, 6);
+        let variance = values.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>() / values.len() as f64;
+        assert!((variance * 576.0 / 2.0 - 1.0).abs() < 0.05, "{} {variance}", weight.name);
+    }
+}

@@ -1,0 +1,48 @@
+//! SegNet: 26 convolutions, maxima put back where they lay.
+//!
+//! Source: Badrinarayanan, Kendall & Cipolla 2017, "SegNet: a deep convolutional encoder-decoder architecture for image
+//! segmentation"; channels as VGG16's (Simonyan & Zisserman 2015).
+
+use super::{Conv, Operations, unit};
+
+/// Channels in and out of the encoder's convolutions, block by block; the first takes the bands.
+const ENCODER: [&[(usize, usize)]; 5] = [
+    &[(0, 64), (64, 64)],
+    &[(64, 128), (128, 128)],
+    &[(128, 256), (256, 256), (256, 256)],
+    &[(256, 512), (512, 512), (512, 512)],
+    &[(512, 512), (512, 512), (512, 512)],
+];
+
+/// The same of the decoder; the last convolution, to the classes, is the head.
+const DECODER: [&[(usize, usize)]; 5] = [
+    &[(512, 512), (512, 512), (512, 512)],
+    &[(512, 512), (512, 512), (512, 256)],
+    &[(256, 256), (256, 256), (256, 128)],
+    &[(128, 128), (128, 64)],
+    &[(64, 64)],
+];
+
+pub(super) fn walk<O: Operations>(o: &mut O, x: &O::Value, bands: usize, classes: usize) -> O::Value {
+    let conv = |inputs, outputs| Conv { inputs, outputs, kernel: 3, stride: 1, bias: true };
+    let mut stack = Vec::new();
+    let mut now = None;
+    for (level, block) in ENCODER.iter().enumerate() {
+        for (i, (inputs, outputs)) in block.iter().enumerate() {
+            let inputs = if *inputs == 0 { bands } else { *inputs };
+            now = Some(unit(o, now.as_ref().unwrap_or(x), &format!("enc{level}_{i}"), conv(inputs, *outputs), true));
+        }
+        let (smaller, places) = o.pool(now.as_ref().unwrap_or(x));
+        stack.push(places);
+        now = Some(smaller);
+    }
+    for (level, block) in DECODER.iter().enumerate() {
+        if let Some(places) = stack.pop() {
+            now = Some(o.unpool(now.as_ref().unwrap_or(x), places));
+        }
+        for (i, (inputs, outputs)) in block.iter().enumerate() {
+            now = Some(unit(o, now.as_ref().unwrap_or(x), &format!("dec{level}_{i}"), conv(*inputs, *outputs), true));
+        }
+    }
+    o.conv(now.as_ref().unwrap_or(x), "head.conv", conv(64, classes))
+}

@@ -1,0 +1,64 @@
+//! A U-Net with a residual encoder: what most would take today.
+//!
+//! Sources: Ronneberger, Fischer & Brox 2015 (skips from encoder to decoder); He, Zhang, Ren & Sun 2016 (ResNet-18: a 7 × 7 stem,
+//! then four stages of two blocks). Decoder of 256, 128, 64, 32 and 16 channels, each two 3 × 3 convolutions behind an
+//! enlargement by the nearest pixel. Weights begin at random: no photographs of everyday things went in.
+
+use super::{Conv, Operations, unit};
+
+/// Channels of the encoder's stages.
+const STAGES: [usize; 4] = [64, 128, 256, 512];
+/// Channels of the decoder's.
+const DECODER: [usize; 5] = [256, 128, 64, 32, 16];
+
+pub(super) fn walk<O: Operations>(o: &mut O, x: &O::Value, bands: usize, classes: usize) -> O::Value {
+    let stem = unit(o, x, "stem", Conv { inputs: bands, outputs: STAGES[0], kernel: 7, stride: 2, bias: false }, true);
+    let mut deepest = o.pool3(&stem);
+    let mut skips = vec![(stem, STAGES[0])];
+    let mut channels = STAGES[0];
+    for (stage, outputs) in STAGES.into_iter().enumerate() {
+        let stride = if stage == 0 { 1 } else { 2 };
+        let first = block(o, &deepest, &format!("enc{stage}_0"), channels, outputs, stride);
+        let second = block(o, &first, &format!("enc{stage}_1"), outputs, outputs, 1);
+        if stage > 0 {
+            skips.push((std::mem::replace(&mut deepest, second), channels));
+        } else {
+            deepest = second;
+        }
+        channels = outputs;
+    }
+    let mut now = deepest;
+    for (level, outputs) in DECODER.into_iter().enumerate() {
+        let conv = |inputs| Conv { inputs, outputs, kernel: 3, stride: 1, bias: false };
+        let (joined, inputs) = match skips.pop() {
+            Some((skip, more)) => {
+                let larger = o.enlarge(&now, &skip);
+                (o.concat(&larger, &skip), channels + more)
+            }
+            None => (o.enlarge(&now, x), channels),
+        };
+        let first = unit(o, &joined, &format!("dec{level}_0"), conv(inputs), true);
+        now = unit(o, &first, &format!("dec{level}_1"), conv(outputs), true);
+        channels = outputs;
+    }
+    o.conv(&now, "head.conv", Conv { inputs: channels, outputs: classes, kernel: 3, stride: 1, bias: true })
+}
+
+/// A residual block: two convolutions and the way past them, which has a convolution of its own where sizes differ.
+fn block<O: Operations>(o: &mut O, x: &O::Value, name: &str, inputs: usize, outputs: usize, stride: usize) -> O::Value {
+    let first = unit(o, x, &format!("{name}.0"), Conv { inputs, outputs, kernel: 3, stride, bias: false }, true);
+    let second = unit(
+        o,
+        &first,
+        &format!("{name}.1"),
+        Conv { inputs: outputs, outputs, kernel: 3, stride: 1, bias: false },
+        false,
+    );
+    let sum = if inputs == outputs && stride == 1 {
+        o.add(&second, x)
+    } else {
+        let past = unit(o, x, &format!("{name}.past"), Conv { inputs, outputs, kernel: 1, stride, bias: false }, false);
+        o.add(&second, &past)
+    };
+    o.relu(&sum)
+}

@@ -1,0 +1,120 @@
+//! Numbers in files that any trainer reads: safetensors, with one text of ours in the header and a hash over everything.
+
+use crate::output::write_atomically;
+use crate::{Error, Result};
+use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use sha2::{Digest, Sha256};
+use std::collections::HashMap;
+use std::path::Path;
+
+/// A tensor of single precision, row by row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Array {
+    /// Its name.
+    pub name: String,
+    /// Its size along each axis; none for a single number.
+    pub shape: Vec<usize>,
+    /// Its values.
+    pub values: Vec<f32>,
+}
+
+/// The only key of the header's words: with several, their order in the file would be that of a hash map.
+const KEY: &str = "furrow";
+
+/// Writes arrays with a text, atomically; equal content gives equal bytes.
+pub fn write(path: &Path, arrays: &[Array], text: &str) -> Result<()> {
+    let bytes: Vec<Vec<u8>> = arrays.iter().map(|a| a.values.iter().flat_map(|v| v.to_le_bytes()).collect()).collect();
+    let fault = |e: &dyn std::fmt::Display| unusable(path, &format!("it cannot be written: {e}"));
+    let mut views = Vec::new();
+    for (array, bytes) in arrays.iter().zip(&bytes) {
+        let view = TensorView::new(Dtype::F32, array.shape.clone(), bytes).map_err(|e| fault(&e))?;
+        views.push((array.name.as_str(), view));
+    }
+    let header = HashMap::from([(KEY.to_owned(), format!("{}\n{text}", seal(arrays, text)))]);
+    write_atomically(path, &safetensors::serialize(views, &Some(header)).map_err(|e| fault(&e))?)
+}
+
+/// Reads arrays, in the order of their names, and the text. An error where the file is damaged or is not ours.
+pub fn read(path: &Path) -> Result<(Vec<Array>, String)> {
+    let damaged = |e: &dyn std::fmt::Display| {
+        unusable(path, &format!("these are no weights of `train`, or they are damaged: {e}"))
+    };
+    let bytes = std::fs::read(path).map_err(Error::io(path))?;
+    let (_, header) = SafeTensors::read_metadata(&bytes).map_err(|e| damaged(&e))?;
+    let text =
+        header.metadata().as_ref().and_then(|m| m.get(KEY)).ok_or_else(|| damaged(&"words of ours are missing"))?;
+    let (sum, text) = text.split_once('\n').ok_or_else(|| damaged(&"its hash is missing"))?;
+    let mut arrays = Vec::new();
+    for (name, view) in SafeTensors::deserialize(&bytes).map_err(|e| damaged(&e))?.tensors() {
+        if view.dtype() != Dtype::F32 {
+            return Err(damaged(&format!("`{name}` is not of single precision")));
+        }
+        let values = view.data().as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
+        arrays.push(Array { name, shape: view.shape().to_vec(), values });
+    }
+    arrays.sort_by(|a, b| a.name.cmp(&b.name));
+    if sum != seal(&arrays, text) {
+        return Err(damaged(&"its numbers do not fit its hash"));
+    }
+    Ok((arrays, text.to_owned()))
+}
+
+/// SHA-256 over names, shapes and values, whatever the order of the arrays.
+pub fn hash(arrays: &[Array]) -> String {
+    let mut sorted: Vec<&Array> = arrays.iter().collect();
+    sorted.sort_by(|a, b| a.name.cmp(&b.name));
+    let mut sha = Sha256::new();
+    for array in sorted {
+        sha.update(format!("{} {:?}\n", array.name, array.shape));
+        for v in &array.values {
+            sha.update(v.to_le_bytes());
+        }
+    }
+    hex(sha.finalize().as_slice())
+}
+
+/// Over the arrays and the text beside them.
+fn seal(arrays: &[Array], text: &str) -> String {
+    hex(Sha256::new().chain_update(hash(arrays)).chain_update(text).finalize().as_slice())
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"))
+}
+
+fn unusable(path: &Path, what: &str) -> Error {
+    Error::Run { path: path.into(), what: what.into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn arrays() -> Vec<Array> {
+        let array = |name: &str, shape: &[usize], values: &[f32]| Array {
+            name: name.into(),
+            shape: shape.into(),
+            values: values.into(),
+        };
+        vec![array("a", &[2, 3], &[1.0, 2.0, 3.0, -4.0, 5.5, f32::MIN_POSITIVE]), array("b", &[], &[7.0])]
+    }
+
+    #[test]
+    fn weights_come_back_and_damage_is_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("w.safetensors");
+        write(&path, &arrays(), "{\"step\": 3}\nsecond line").unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        assert_eq!(read(&path).unwrap(), (arrays(), "{\"step\": 3}\nsecond line".to_owned()));
+        write(&path, &arrays(), "{\"step\": 3}\nsecond line").unwrap();
+        assert_eq!(bytes, std::fs::read(&path).unwrap());
+        for at in [0, 20, bytes.len() / 2, bytes.len() - 2] {
+            let mut broken = bytes.clone();
+            broken[at] ^= 4;
+            std::fs::write(&path, &broken).unwrap();
+            assert!(matches!(read(&path), Err(Error::Run { .. })), "byte {at}");
+        }
+        std::fs::write(&path, &bytes[..bytes.len() - 5]).unwrap();
+        assert!(read(&path).is_err());
+    }
+}
