@@ -8,7 +8,12 @@
 pub mod baseline;
 pub mod classes;
 pub mod data;
+#[cfg(feature = "train")]
+pub mod engine;
+pub mod fit;
 pub mod measure;
 pub mod net;
 pub mod run;
+#[cfg(feature = "train")]
+pub mod session;
 pub mod weights;

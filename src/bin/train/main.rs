@@ -1,1 +1,67 @@
-fn main() {}
+//! `train`: learns to tell crop from weed from datasets, and says how well.
+
+mod eval;
+mod fit;
+mod machine;
+
+use clap::{Parser, Subcommand};
+use furrow::cli::{self, signal};
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Trains networks on datasets, rendered or real, and judges them on real images.
+///
+/// A set is a folder that `trace dataset` made or imported. DIR@PICK chooses images of it: DIR@train, DIR@val, DIR@test, DIR@all,
+/// DIR@0..10, DIR@random:100; DIR@0..10*4 has them four times.
+#[derive(Parser)]
+#[command(name = "train", version, arg_required_else_help = true, after_help = EXAMPLES)]
+struct Cli {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  train fit --set data/d --out runs/d                     Basic SegNet on the training images of a set
+  train fit --set data/d --set data/real@0..10*4 --network unet --size 240x180 --out runs/augmented
+  train eval runs/d --set data/real@12..20                how well it does on real images
+
+A run that was stopped or killed goes on with the same command, and ends the same.
+Paths go to stdout, everything else to stderr.
+Exit codes: 0 done, 1 failed, 2 wrong input, 75 stopped cleanly (Ctrl-C, TERM, HUP, USR1).";
+
+#[derive(Subcommand)]
+enum Verb {
+    /// Train a network.
+    Fit(Box<fit::Args>),
+    /// Judge a trained network on images with labels.
+    Eval(eval::Args),
+}
+
+fn main() -> ExitCode {
+    let signals = signal::Signals::watch();
+    let done = match Cli::parse().verb {
+        Verb::Fit(args) => fit::run(&args, &signals),
+        Verb::Eval(args) => eval::run(&args, &signals),
+    };
+    match done {
+        Ok(paths) => print_paths(&paths),
+        Err(e @ furrow::Error::Interrupted) => {
+            eprintln!("stopped; the same command goes on with it");
+            ExitCode::from(e.exit_code())
+        }
+        Err(e) => cli::fail(&e),
+    }
+}
+
+/// Paths go to stdout, one a line, for the next program; a closed pipe is no failure.
+fn print_paths(paths: &[PathBuf]) -> ExitCode {
+    let mut out = std::io::stdout().lock();
+    for path in paths {
+        if writeln!(out, "{}", path.display()).is_err() {
+            break;
+        }
+    }
+    ExitCode::SUCCESS
+}

@@ -1,0 +1,76 @@
+//! A walk over a network that computes it.
+
+use super::Precision;
+use crate::train::net::{Conv, Operations};
+use std::collections::BTreeMap;
+use tch::{Kind, Tensor};
+
+/// Computes what it walks over. In bf16 convolutions take rounded copies of their weights, which themselves stay in single
+/// precision, as do the statistics of batch norms: what `torch.autocast` does, which tch has for CUDA alone.
+pub(super) struct Compute<'a> {
+    pub(super) tensors: &'a BTreeMap<String, Tensor>,
+    pub(super) precision: Precision,
+    pub(super) training: bool,
+}
+
+impl Compute<'_> {
+    fn rounded(&self, x: &Tensor) -> Tensor {
+        match self.precision {
+            Precision::Single => x.shallow_clone(),
+            Precision::Bf16 => x.to_kind(Kind::BFloat16),
+        }
+    }
+}
+
+impl Operations for Compute<'_> {
+    type Value = Tensor;
+    /// Places of the maxima, and the size before.
+    type Places = (Tensor, [i64; 2]);
+
+    fn conv(&mut self, x: &Tensor, name: &str, conv: Conv) -> Tensor {
+        let weight = self.rounded(&self.tensors[&format!("{name}.weight")]);
+        let bias = conv.bias.then(|| self.rounded(&self.tensors[&format!("{name}.bias")]));
+        let (stride, pad) = (conv.stride as i64, conv.kernel as i64 / 2);
+        self.rounded(x).conv2d(&weight, bias.as_ref(), [stride, stride], [pad, pad], [1, 1], 1)
+    }
+
+    fn norm(&mut self, x: &Tensor, name: &str, _: usize) -> Tensor {
+        let [gain, shift, mean, variance] = ["weight", "bias", "running_mean", "running_var"]
+            .map(|what| Some(&self.tensors[&format!("{name}.{what}")]));
+        x.batch_norm(gain, shift, mean, variance, self.training, 0.1, 1e-5, true)
+    }
+
+    fn relu(&mut self, x: &Tensor) -> Tensor {
+        x.relu()
+    }
+
+    fn add(&mut self, a: &Tensor, b: &Tensor) -> Tensor {
+        a + b
+    }
+
+    fn concat(&mut self, a: &Tensor, b: &Tensor) -> Tensor {
+        Tensor::cat(&[a, b], 1)
+    }
+
+    fn pool(&mut self, x: &Tensor) -> (Tensor, Self::Places) {
+        let (smaller, places) = x.max_pool2d_with_indices([2, 2], [2, 2], [0, 0], [1, 1], false);
+        (smaller, (places, size(x)))
+    }
+
+    fn unpool(&mut self, x: &Tensor, (places, size): Self::Places) -> Tensor {
+        x.max_unpool2d(&places, size)
+    }
+
+    fn pool3(&mut self, x: &Tensor) -> Tensor {
+        x.max_pool2d([3, 3], [2, 2], [1, 1], [1, 1], false)
+    }
+
+    fn enlarge(&mut self, x: &Tensor, like: &Tensor) -> Tensor {
+        x.upsample_nearest2d(size(like), None, None)
+    }
+}
+
+fn size(x: &Tensor) -> [i64; 2] {
+    let size = x.size();
+    [size[2], size[3]]
+}

@@ -1,0 +1,129 @@
+//! Networks computed by libtorch.
+//!
+//! Images lie as height × width × bands ("channels last"), in which convolutions are faster on CPUs and GPUs alike; weights follow.
+
+mod compute;
+pub mod device;
+
+use super::net::{Network, Parameter, parameters};
+use super::weights::Array;
+use crate::{Error, Result};
+use compute::Compute;
+use std::collections::BTreeMap;
+use tch::{Device, Kind, Tensor};
+
+pub use device::{Precision, Where};
+
+/// A network with its parameters, on a device.
+pub struct Model {
+    /// Which network.
+    pub network: Network,
+    /// Bands of its input.
+    pub bands: usize,
+    /// Its classes.
+    pub classes: usize,
+    /// Where and how it is computed.
+    pub place: Where,
+    list: Vec<Parameter>,
+    tensors: BTreeMap<String, Tensor>,
+}
+
+impl Model {
+    /// A network with its first values, which the seed decides.
+    pub fn new(network: Network, bands: usize, classes: usize, seed: u64, place: Where) -> Self {
+        let list = parameters(network, bands, classes);
+        let tensors =
+            list.iter().enumerate().map(|(i, p)| (p.name.clone(), tensor(p, &p.begin(seed, i), place.device)));
+        let tensors = tensors.collect();
+        Self { network, bands, classes, place, list, tensors }
+    }
+
+    /// A network with these values. An error that names what does not fit.
+    pub fn with(network: Network, bands: usize, classes: usize, arrays: &[Array], place: Where) -> Result<Self> {
+        let mut model = Self::new(network, bands, classes, 0, place);
+        model.load(arrays)?;
+        Ok(model)
+    }
+
+    /// Takes over values by name; all parameters must be there in their shapes, others may be there too.
+    pub fn load(&mut self, arrays: &[Array]) -> Result<()> {
+        for parameter in &self.list {
+            let wrong = |what: String| {
+                Error::Training(format!(
+                    "these weights are not those of {} with {} bands and {} classes: {what}",
+                    self.network.name(),
+                    self.bands,
+                    self.classes
+                ))
+            };
+            let array = arrays.iter().find(|a| a.name == parameter.name);
+            let array = array.ok_or_else(|| wrong(format!("`{}` is missing", parameter.name)))?;
+            if array.shape != parameter.shape {
+                return Err(wrong(format!("`{}` is {:?}, not {:?}", array.name, array.shape, parameter.shape)));
+            }
+            self.tensors.insert(parameter.name.clone(), tensor(parameter, &array.values, self.place.device));
+        }
+        Ok(())
+    }
+
+    /// All values, running means and variances among them, in the order of the network.
+    pub fn arrays(&self) -> Result<Vec<Array>> {
+        self.list
+            .iter()
+            .map(|p| {
+                Ok(Array { name: p.name.clone(), shape: p.shape.clone(), values: values(&self.tensors[&p.name])? })
+            })
+            .collect()
+    }
+
+    /// The parameters that gradients change, by name.
+    pub fn learnt(&self) -> impl Iterator<Item = (&Parameter, &Tensor)> {
+        self.list.iter().filter(|p| p.role.is_learnt()).map(|p| (p, &self.tensors[&p.name]))
+    }
+
+    /// From images × bands × height × width to images × classes × height × width. `training` uses and moves the statistics of
+    /// the batch.
+    pub fn forward(&self, x: &Tensor, training: bool) -> Tensor {
+        let mut compute = Compute { tensors: &self.tensors, precision: self.place.precision, training };
+        self.network.walk(&mut compute, x, self.bands, self.classes).to_kind(Kind::Float)
+    }
+
+    /// The class of each pixel of images that lie as `height × width × bands`, one after the other.
+    pub fn predict(&self, pixels: &[f32], (width, height): (u32, u32)) -> Result<Vec<u8>> {
+        let x = self.images(pixels, (width, height));
+        let classes =
+            tch::no_grad(|| self.forward(&x, false).argmax(1, false).to_kind(Kind::Uint8).to_device(Device::Cpu));
+        Vec::<u8>::try_from(classes.contiguous().view(-1)).map_err(|e| failed(&e))
+    }
+
+    /// Images that lie as `height × width × bands` as libtorch sees them: images × bands × height × width, on the device.
+    pub fn images(&self, pixels: &[f32], (width, height): (u32, u32)) -> Tensor {
+        let bands = self.bands as i64;
+        let images = pixels.len() as i64 / (bands * i64::from(width) * i64::from(height));
+        let lying = Tensor::from_slice(pixels).view([images, i64::from(height), i64::from(width), bands]);
+        lying.to_device(self.place.device).permute([0, 3, 1, 2])
+    }
+}
+
+/// A tensor's values in single precision, row by row.
+pub(super) fn values(tensor: &Tensor) -> Result<Vec<f32>> {
+    let flat = tensor.detach().to_device(Device::Cpu).to_kind(Kind::Float).contiguous().view(-1);
+    Vec::try_from(flat).map_err(|e| failed(&e))
+}
+
+/// An error of libtorch.
+pub(super) fn failed(e: &tch::TchError) -> Error {
+    Error::Training(format!("libtorch: {e}"))
+}
+
+fn tensor(parameter: &Parameter, values: &[f32], device: Device) -> Tensor {
+    let shape: Vec<i64> = parameter.shape.iter().map(|n| *n as i64).collect();
+    let plain = Tensor::from_slice(values).view(shape.as_slice()).to_device(device);
+    let laid = if shape.len() == 4 { channels_last(&plain) } else { plain };
+    laid.detach().set_requires_grad(parameter.role.is_learnt())
+}
+
+/// The same values, channels beside each other in memory; tch has no name for this.
+fn channels_last(x: &Tensor) -> Tensor {
+    x.permute([0, 2, 3, 1]).contiguous().permute([0, 3, 1, 2])
+}

@@ -1,0 +1,165 @@
+//! A training between two steps, in one file: values, the optimiser's memory, the best values so far, and what was seen.
+
+use crate::train::weights::{self, Array};
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Its file, below the run's folder.
+pub const FILE: &str = "checkpoint.safetensors";
+
+/// Loss at a step.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Loss {
+    /// The last of the steps that it is the mean of.
+    pub step: u64,
+    /// Mean loss.
+    pub loss: f64,
+    /// Learning rate at that step.
+    pub rate: f64,
+}
+
+/// A look at the validation images.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Look {
+    /// After which step.
+    pub step: u64,
+    /// Global accuracy, 0 to 1.
+    pub ga: f64,
+    /// Mean intersection over union, 0 to 1.
+    pub miou: f64,
+    /// That of each class; none where neither truth nor prediction has it.
+    pub iou: Vec<Option<f64>>,
+}
+
+/// What a training has seen of itself.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct History {
+    /// Losses, one for every so many steps.
+    pub losses: Vec<Loss>,
+    /// Looks at the validation images.
+    pub looks: Vec<Look>,
+}
+
+impl History {
+    /// The best look; the first of equals.
+    pub fn best(&self) -> Option<&Look> {
+        self.looks.iter().reduce(|best, look| if look.miou > best.miou { look } else { best })
+    }
+
+    /// Looks since the best one.
+    pub fn since_best(&self) -> u64 {
+        let best = self.best().map_or(0, |b| b.step);
+        self.looks.iter().filter(|look| look.step > best).count() as u64
+    }
+}
+
+/// A training between two steps.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Checkpoint {
+    /// Steps done.
+    pub step: u64,
+    /// Sum of the losses since the last of [`History::losses`], and how many.
+    pub pending: (f64, u64),
+    /// Seconds of work so far.
+    pub seconds: f64,
+    /// What was seen.
+    pub history: History,
+    /// The network's values.
+    pub values: Vec<Array>,
+    /// The optimiser's memory.
+    pub memory: Vec<Array>,
+    /// The values at the best look.
+    pub best: Vec<Array>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Words {
+    step: u64,
+    pending: (f64, u64),
+    seconds: f64,
+    history: History,
+    /// Hash of the plan: a checkpoint goes on with no other.
+    plan: String,
+}
+
+impl Checkpoint {
+    /// Writes it for a plan with this hash, atomically.
+    pub fn write(&self, folder: &Path, plan: &str) -> Result<()> {
+        let named = |prefix: &str, arrays: &[Array]| -> Vec<Array> {
+            arrays.iter().map(|a| Array { name: format!("{prefix}/{}", a.name), ..a.clone() }).collect()
+        };
+        let all = [named("values", &self.values), named("memory", &self.memory), named("best", &self.best)].concat();
+        let (step, pending, seconds, history) = (self.step, self.pending, self.seconds, self.history.clone());
+        let words = Words { step, pending, seconds, history, plan: plan.into() };
+        let text = serde_json::to_string(&words).map_err(|e| Error::Training(format!("cannot write JSON: {e}")))?;
+        weights::write(&folder.join(FILE), &all, &text)
+    }
+
+    /// Reads it, where there is one.
+    pub fn read(folder: &Path, plan: &str) -> Result<Option<Self>> {
+        let path = folder.join(FILE);
+        if !path.exists() {
+            return Ok(None);
+        }
+        let unusable = |what: &str| Error::Run {
+            path: path.clone(),
+            what: format!("{what}\n help: delete the file to begin this training again"),
+        };
+        let (arrays, text) = match weights::read(&path) {
+            Err(Error::Run { what, .. }) => return Err(unusable(&what)),
+            other => other?,
+        };
+        let words: Words = serde_json::from_str(&text).map_err(|e| unusable(&format!("this is no checkpoint: {e}")))?;
+        if words.plan != plan {
+            return Err(unusable("it belongs to another training"));
+        }
+        let of = |prefix: &str| -> Vec<Array> {
+            let strip =
+                |a: &Array| Some(Array { name: a.name.strip_prefix(prefix)?.strip_prefix('/')?.into(), ..a.clone() });
+            arrays.iter().filter_map(strip).collect()
+        };
+        let Words { step, pending, seconds, history, .. } = words;
+        Ok(Some(Self { step, pending, seconds, history, values: of("values"), memory: of("memory"), best: of("best") }))
+    }
+
+    /// Deletes it.
+    pub fn remove(folder: &Path) -> Result<()> {
+        let path = folder.join(FILE);
+        match std::fs::remove_file(&path) {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io(&path)(e)),
+            _ => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn checkpoints_come_back_and_belong_to_their_plan() {
+        let folder = tempfile::tempdir().unwrap();
+        let array = |name: &str, v: f32| Array { name: name.into(), shape: vec![2], values: vec![v, -v] };
+        let looks = [0.3, 0.5, 0.5, 0.4].iter().enumerate();
+        let looks = looks.map(|(i, m)| Look { step: i as u64, ga: 0.9, miou: *m, iou: vec![Some(*m), None] }).collect();
+        let checkpoint = Checkpoint {
+            step: 7,
+            pending: (0.1 + 0.2, 3),
+            seconds: 12.5,
+            history: History { losses: vec![Loss { step: 5, loss: 1.0 / 3.0, rate: 0.01 }], looks },
+            values: vec![array("a", 1.0), array("b", 2.0)],
+            memory: vec![array("a", 3.0)],
+            best: vec![array("a", 4.0)],
+        };
+        assert_eq!(Checkpoint::read(folder.path(), "x").unwrap(), None);
+        checkpoint.write(folder.path(), "x").unwrap();
+        assert_eq!(Checkpoint::read(folder.path(), "x").unwrap().unwrap(), checkpoint);
+        let error = Checkpoint::read(folder.path(), "y").unwrap_err().to_string();
+        assert!(error.contains("another training"), "{error}");
+        assert_eq!(checkpoint.history.best().unwrap().step, 1);
+        assert_eq!(checkpoint.history.since_best(), 2);
+        std::fs::write(folder.path().join(FILE), b"not at all").unwrap();
+        assert!(Checkpoint::read(folder.path(), "x").unwrap_err().to_string().contains("damaged"));
+    }
+}

@@ -1,0 +1,26 @@
+//! Training one network.
+//!
+//! | file | idea |
+//! |---|---|
+//! | `plan` | everything that decides what is learnt |
+//! | `balance` | rare classes weigh more |
+//! | `schedule` | how fast it learns, step by step |
+//! | `optimiser` | gradients to steps, with a memory that can be saved |
+//! | `checkpoint` | a training on disk, between two steps |
+//! | `teach` | the steps themselves |
+//!
+//! Only `optimiser` and `teach` need libtorch. On a CPU the same plan on the same number of threads gives the same bits, stopped
+//! and gone on with or not.
+
+pub mod balance;
+pub mod checkpoint;
+#[cfg(feature = "train")]
+pub mod optimiser;
+pub mod plan;
+pub mod schedule;
+#[cfg(feature = "train")]
+pub mod teach;
+
+pub use plan::Plan;
+#[cfg(feature = "train")]
+pub use teach::{Data, Outcome, Watch, teach};

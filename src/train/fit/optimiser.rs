@@ -1,0 +1,93 @@
+//! Gradients to steps. libtorch's own optimisers cannot be saved, and a training that goes on must have their memory.
+
+use super::plan::Method;
+use crate::Result;
+use crate::train::engine::{Model, values};
+use crate::train::weights::Array;
+use std::collections::BTreeMap;
+use tch::Tensor;
+
+/// An optimiser with its memory.
+pub struct Optimiser {
+    method: Method,
+    decay: f64,
+    /// Steps done, for Adam's correction of its first means.
+    steps: i32,
+    /// By `velocity/NAME`, `first/NAME` or `second/NAME`.
+    memory: BTreeMap<String, Tensor>,
+}
+
+const MOMENTUM: f64 = 0.9;
+const SECOND: f64 = 0.999;
+const EPSILON: f64 = 1e-8;
+
+impl Optimiser {
+    /// With an empty memory, or with that of a checkpoint after so many steps.
+    pub fn new(method: Method, decay: f64, steps: u64, memory: &[Array], model: &Model) -> Self {
+        let mut all = BTreeMap::new();
+        for array in memory {
+            let shape: Vec<i64> = array.shape.iter().map(|n| *n as i64).collect();
+            let tensor = Tensor::from_slice(&array.values).view(shape.as_slice()).to_device(model.place.device);
+            all.insert(array.name.clone(), tensor);
+        }
+        Self { method, decay, steps: steps as i32, memory: all }
+    }
+
+    /// Forgets the gradients of the last step.
+    pub fn clear(model: &Model) {
+        for (_, tensor) in model.learnt() {
+            let mut gradient = tensor.grad();
+            if gradient.defined() {
+                let _ = gradient.zero_();
+            }
+        }
+    }
+
+    /// One step of this learning rate along the gradients.
+    pub fn step(&mut self, model: &Model, rate: f64) {
+        self.steps += 1;
+        tch::no_grad(|| {
+            for (parameter, tensor) in model.learnt() {
+                let gradient = tensor.grad();
+                if gradient.defined() {
+                    self.update(&parameter.name, &mut tensor.shallow_clone(), &gradient, rate);
+                }
+            }
+        });
+    }
+
+    fn remembered(&mut self, what: &str, name: &str, like: &Tensor) -> Tensor {
+        self.memory.entry(format!("{what}/{name}")).or_insert_with(|| like.zeros_like()).shallow_clone()
+    }
+
+    fn update(&mut self, name: &str, weight: &mut Tensor, gradient: &Tensor, rate: f64) {
+        match self.method {
+            Method::Sgd => {
+                let mut velocity = self.remembered("velocity", name, weight);
+                let _ = velocity.g_mul_scalar_(MOMENTUM);
+                let _ = velocity.g_add_(&(gradient + &*weight * self.decay));
+                let _ = weight.g_sub_(&(velocity * rate));
+            }
+            Method::Adam => {
+                let mut first = self.remembered("first", name, weight);
+                let mut second = self.remembered("second", name, weight);
+                let _ = first.lerp_(gradient, 1.0 - MOMENTUM);
+                let _ = second.g_mul_scalar_(SECOND);
+                let _ = second.addcmul_(&(gradient * (1.0 - SECOND)), gradient);
+                let (c1, c2) = (1.0 - MOMENTUM.powi(self.steps), 1.0 - SECOND.powi(self.steps));
+                let _ = weight.g_mul_scalar_(1.0 - rate * self.decay);
+                let spread = (second / c2).sqrt() + EPSILON;
+                let _ = weight.g_sub_(&(first / spread * (rate / c1)));
+            }
+        }
+    }
+
+    /// The memory, by name.
+    pub fn arrays(&self) -> Result<Vec<Array>> {
+        let array = |(name, tensor): (&String, &Tensor)| {
+            let shape = tensor.size().iter().map(|n| *n as usize).collect();
+            Ok(Array { name: name.clone(), shape, values: values(tensor)? })
+        };
+        self.memory.iter().map(array).collect()
+    }
+}

@@ -1,0 +1,137 @@
+//! Everything that decides what a training learns.
+
+use super::balance::Balance;
+use super::schedule::Schedule;
+use crate::train::classes::Classes;
+use crate::train::data::{Augment, Selection, Shape};
+use crate::train::net::Network;
+use serde::{Deserialize, Serialize};
+
+/// How gradients become steps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Stochastic gradient descent with momentum 0.9; weight decay joins the gradient.
+    Sgd,
+    /// Adam with β = (0.9, 0.999); weight decay apart from the gradient (Loshchilov & Hutter 2019, "AdamW").
+    Adam,
+}
+
+impl Method {
+    /// Reads `sgd` or `adam`.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        match text {
+            "sgd" => Ok(Self::Sgd),
+            "adam" => Ok(Self::Adam),
+            _ => Err(format!("there is no optimiser `{text}`: write sgd or adam")),
+        }
+    }
+
+    /// A first learning rate that suits it.
+    pub fn usual_rate(self) -> f64 {
+        match self {
+            Self::Sgd => 0.05,
+            Self::Adam => 1e-3,
+        }
+    }
+}
+
+/// How bands are brought to mean 0 and deviation 1; see [`crate::train::data::Normalisation`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Exposure {
+    /// Each band of each image by its own.
+    Band,
+    /// Each image by its own, colours stay.
+    Image,
+    /// All images by those of the training images.
+    Fixed,
+}
+
+impl Exposure {
+    /// Reads `band`, `image` or `fixed`.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        match text {
+            "band" => Ok(Self::Band),
+            "image" => Ok(Self::Image),
+            "fixed" => Ok(Self::Fixed),
+            _ => Err(format!("images are not normalised by `{text}`: write band, image or fixed")),
+        }
+    }
+}
+
+/// A training.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Plan {
+    /// Which network.
+    pub network: Network,
+    /// What it tells apart.
+    pub classes: Classes,
+    /// What it takes in.
+    pub shape: Shape,
+    /// What it learns from.
+    pub train: Vec<Selection>,
+    /// What it is watched by; none for no early end.
+    pub val: Vec<Selection>,
+    /// Decides first values, order and variations.
+    pub seed: u64,
+    /// Most steps.
+    pub steps: u64,
+    /// Images a step; ≥ 1.
+    pub batch: usize,
+    /// How gradients become steps.
+    pub method: Method,
+    /// First learning rate.
+    pub rate: f64,
+    /// Share of each weight that is taken away, per step and learning rate.
+    pub decay: f64,
+    /// The learning rate over time.
+    pub schedule: Schedule,
+    /// What a pixel of each class weighs.
+    pub balance: Balance,
+    /// What is varied.
+    pub augment: Augment,
+    /// What is taken out.
+    pub exposure: Exposure,
+    /// Steps between two looks at the validation images, and between two checkpoints.
+    pub watch_every: u64,
+    /// Looks without a better result after which it ends.
+    pub patience: u64,
+    /// `f32` or `bf16`.
+    pub precision: String,
+    /// Threads that compute; they decide the last bits.
+    pub threads: usize,
+    /// SHA-256 of the values that it begins with, where they are another run's.
+    pub begin_with: Option<String>,
+    /// Most seconds; with it the end is where the clock says.
+    pub seconds: Option<u64>,
+}
+
+impl Default for Plan {
+    fn default() -> Self {
+        let method = Method::Adam;
+        Self {
+            network: Network::BasicSegnet,
+            classes: Classes::default(),
+            shape: Shape { bands: crate::train::data::Band::RGB.to_vec(), width: 480, height: 360 },
+            train: Vec::new(),
+            val: Vec::new(),
+            seed: 1,
+            steps: 2000,
+            batch: 4,
+            method,
+            rate: method.usual_rate(),
+            decay: 5e-4,
+            schedule: Schedule::Poly,
+            balance: Balance::Median,
+            augment: Augment::default(),
+            exposure: Exposure::Image,
+            watch_every: 100,
+            patience: 10,
+            precision: "f32".into(),
+            threads: 1,
+            begin_with: None,
+            seconds: None,
+        }
+    }
+}
