@@ -10,6 +10,7 @@ pub mod classes;
 pub mod data;
 #[cfg(feature = "train")]
 pub mod engine;
+pub mod figure;
 pub mod fit;
 pub mod measure;
 pub mod net;
