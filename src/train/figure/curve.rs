@@ -85,7 +85,7 @@ impl Chart {
         out.push_str(&legend);
         frame.draw(&mut out, self, ink);
         for (k, curve) in self.curves.iter().enumerate() {
-            let _ = writeln!(out, "<g data-curve=\"{}\">{}</g>", escape(&curve.name), frame.line(curve, color(k)));
+            let _ = writeln!(out, "<g data-curve=\"{}\">{}</g>", escape(&curve.name), frame.line(curve, &stroke(k)));
         }
         out
     }
@@ -99,12 +99,7 @@ impl Chart {
                 (x, row) = (LEFT, row + 1);
             }
             let y = TITLE + LEGEND * row as f64 + 10.0;
-            let _ = writeln!(
-                out,
-                "<path d=\"M{x:.1} {:.1}h20\" fill=\"none\" stroke=\"{}\" stroke-width=\"3\"/>",
-                y - 4.0,
-                color(k)
-            );
+            let _ = writeln!(out, "<path d=\"M{x:.1} {:.1}h20\" {} stroke-width=\"3\"/>", y - 4.0, stroke(k));
             text(&mut out, (x + 26.0, y), 12, ink.text, "start", &curve.name, "");
             x += wide;
         }
@@ -112,8 +107,11 @@ impl Chart {
     }
 }
 
-fn color(k: usize) -> &'static str {
-    COLORS[k % COLORS.len()]
+/// How a curve is drawn: colours begin again with broken lines.
+fn stroke(k: usize) -> String {
+    let color = COLORS[k % COLORS.len()];
+    let dashes = ["", " stroke-dasharray=\"7 4\"", " stroke-dasharray=\"2 3\""][k / COLORS.len() % 3];
+    format!("fill=\"none\" stroke=\"{color}\"{dashes}")
 }
 
 /// Where values lie in the chart.
@@ -194,13 +192,13 @@ impl Frame {
     }
 
     /// A curve; a point on its own is a dot.
-    fn line(&self, curve: &Curve, color: &str) -> String {
+    fn line(&self, curve: &Curve, stroke: &str) -> String {
         let (mut path, mut dots) = (String::new(), String::new());
         for run in curve.points.split(|p| !drawn(*p, self.logarithmic)).filter(|run| !run.is_empty()) {
             let place = |(x, y): (f64, f64)| (self.x(x), self.y(if self.logarithmic { y.log10() } else { y }));
             if let [one] = run {
                 let (x, y) = place(*one);
-                let _ = write!(dots, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\" fill=\"{color}\"/>");
+                let _ = write!(dots, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"2\" {stroke} stroke-width=\"3\"/>");
                 continue;
             }
             for (k, point) in thinned(run).into_iter().enumerate() {
@@ -209,9 +207,7 @@ impl Frame {
             }
         }
         if !path.is_empty() {
-            path = format!(
-                "<path d=\"{path}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"1.8\" stroke-linejoin=\"round\"/>"
-            );
+            path = format!("<path d=\"{path}\" {stroke} stroke-width=\"1.8\" stroke-linejoin=\"round\"/>");
         }
         path + &dots
     }

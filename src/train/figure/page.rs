@@ -207,7 +207,7 @@ fn scores(report: &Report) -> String {
         let _ = write!(classes, "<tr><th>{}</th>{cells}</tr>", escape(name));
     }
     format!(
-        "<div class=\"tables\"><div><table class=\"numbers\"><tbody>{all}</tbody></table></div></div>\
+        "<div class=\"wide\"><table class=\"numbers means\"><tbody>{all}</tbody></table></div>\
          <div class=\"wide\"><table class=\"numbers\"><thead><tr><th></th><td>I/U</td><td>P</td><td>R</td><td>F1</td></tr></thead>\
          <tbody>{classes}</tbody></table></div>\
          <p>Small numbers are where 95 % of resamples of {} lie. {}</p>",

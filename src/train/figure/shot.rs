@@ -9,8 +9,10 @@ const NO_LABEL: [u8; 3] = [128; 3];
 pub(super) const MISSED: [u8; 3] = [40, 120, 255];
 pub(super) const INVENTED: [u8; 3] = [255, 190, 0];
 pub(super) const CONFUSED: [u8; 3] = [230, 0, 200];
-/// How bright right soil and right plants stay beside them.
-const DIM: [f32; 2] = [0.35, 0.8];
+/// How bright the brightest right soil and right plants are beside them.
+const DIM: [f32; 2] = [90.0, 220.0];
+/// Share of pixels that the brightest stands above: a dark photograph is shown as well as a light one.
+const BRIGHT: f64 = 0.99;
 
 /// One image, small enough to be kept; its maps hold a class a pixel, row by row from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -52,17 +54,18 @@ impl Shot {
         }
     }
 
-    /// Where a prediction differs from the truth: right pixels as a dim photograph without colour, plants brighter than soil; errors in
+    /// Where a prediction differs from the truth: right pixels as a photograph without colour, plants brighter than soil; errors in
     /// colour. Class 0 is soil.
     pub fn errors(&self, prediction: usize) -> Vec<[u8; 3]> {
-        let pixels = self.rgb.iter().zip(&self.truth).zip(&self.predictions[prediction]);
+        let gray: Vec<f32> = self.rgb.iter().map(|rgb| rgb.iter().map(|v| f32::from(*v)).sum::<f32>() / 3.0).collect();
+        let mut sorted = gray.clone();
+        sorted.sort_by(f32::total_cmp);
+        let brightest = sorted.get((BRIGHT * sorted.len() as f64) as usize).map_or(1.0, |v| v.max(1.0));
+        let pixels = gray.iter().zip(&self.truth).zip(&self.predictions[prediction]);
         pixels
-            .map(|((rgb, truth), predicted)| match (*truth, *predicted) {
+            .map(|((gray, truth), predicted)| match (*truth, *predicted) {
                 (IGNORE, _) => NO_LABEL,
-                (t, p) if t == p => {
-                    let gray = rgb.iter().map(|v| f32::from(*v)).sum::<f32>() / 3.0;
-                    [(gray * DIM[usize::from(t > 0)]) as u8; 3]
-                }
+                (t, p) if t == p => [((gray / brightest).min(1.0) * DIM[usize::from(t > 0)]) as u8; 3],
                 (_, 0) => MISSED,
                 (0, _) => INVENTED,
                 _ => CONFUSED,
