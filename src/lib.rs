@@ -15,7 +15,7 @@
 //! | 6 | [`material`], [`scatter`] |
 //! | 5 | [`bsdf`], [`light`], [`sensor`], [`plant`], [`soil`], [`accel`], [`model`] |
 //! | 4 | [`texture`] |
-//! | 3 | [`optics`], [`film`], [`page`], [`cli`] |
+//! | 3 | [`optics`], [`film`], [`page`], [`html`], [`cli`] |
 //! | 2 | [`sampling`], [`geometry`] |
 //! | 1 | [`math`], [`error`] |
 //!
@@ -28,6 +28,7 @@ pub mod dataset;
 pub mod error;
 pub mod film;
 pub mod geometry;
+pub mod html;
 pub mod integrator;
 pub mod light;
 pub mod material;

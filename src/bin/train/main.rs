@@ -1,10 +1,13 @@
 //! `train`: learns to tell crop from weed from datasets, and says how well.
 
+mod baseline;
 mod eval;
 mod export;
 mod fit;
 mod machine;
 mod predict;
+mod report;
+mod table;
 
 use clap::{Parser, Subcommand};
 use furrow::cli::{self, signal};
@@ -30,6 +33,8 @@ Examples:
   train eval runs/d --set data/real@12..20                how well it does on real images
   train predict runs/d photos/ --out answers              masks of photographs, and masks over them
   train export runs/d --format onnx                       the network for a robot
+  train baseline exg-size --from data/real@0..10 --set data/real@12..20
+  train table scenes/experiments/paper.ron --real jai=DIR the paper's tables, from scenes and real folders
 
 A run that was stopped or killed goes on with the same command, and ends the same.
 Paths go to stdout, everything else to stderr.
@@ -45,6 +50,10 @@ enum Verb {
     Predict(predict::Args),
     /// Write a trained network for other programs.
     Export(export::Args),
+    /// Judge what colour alone can do: what a network must beat.
+    Baseline(baseline::Args),
+    /// Run an experiment of a page: sets, trainings, evaluations, tables.
+    Table(Box<table::Args>),
 }
 
 fn main() -> ExitCode {
@@ -54,6 +63,8 @@ fn main() -> ExitCode {
         Verb::Eval(args) => eval::run(&args, &signals),
         Verb::Predict(args) => predict::run(&args, &signals),
         Verb::Export(args) => export::run(&args),
+        Verb::Baseline(args) => baseline::run(&args, &signals),
+        Verb::Table(args) => table::run(&args, &signals),
     };
     match done {
         Ok(paths) => print_paths(&paths),

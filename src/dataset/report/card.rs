@@ -1,10 +1,10 @@
 //! The dataset card: what the images are, where they come from, how they are read, what they cannot be used for.
 
-use super::html::{count, escape, keyed, pairs, percent, whole};
 use super::statistics::{Species, Statistics};
 use crate::dataset::format;
 use crate::dataset::recipe::{Made, Recipe, Rendering};
 use crate::dataset::split::Split;
+use crate::html::{count, escape, keyed, pairs, percent, whole};
 use crate::scene::tag::Class;
 use std::fmt::Write;
 

@@ -1,7 +1,7 @@
 //! Charts as inline SVG. Colours are the style sheet's, so that they follow light and dark.
 
 use super::histogram::{Bar, Histogram};
-use super::html::{escape, number, whole};
+use crate::html::{escape, number, percent, step, whole};
 use std::fmt::Write;
 
 /// Width of a chart, in its own units; it grows with its place.
@@ -181,12 +181,6 @@ impl Axis {
     }
 }
 
-/// 1, 2 or 5 times a power of ten, not below `least`.
-fn step(least: f64) -> f64 {
-    let power = 10.0_f64.powf(least.max(1e-9).log10().floor());
-    [1.0, 2.0, 5.0, 10.0].map(|f| f * power).into_iter().find(|s| *s >= least * (1.0 - 1e-9)).unwrap_or(power * 10.0)
-}
-
 /// A power of two below a logarithmic axis.
 fn short(value: f64) -> String {
     if value >= 1_048_576.0 {
@@ -263,7 +257,7 @@ pub(super) fn shares(title: &str, unit: &str, rows: &[(String, &str, f64)]) -> S
             escape(name),
             WIDTH - RIGHT,
             y + 11.0,
-            super::html::percent(*share),
+            percent(*share),
             y + 16.0,
             WIDTH - 2.0 * RIGHT,
             y + 16.0,
@@ -295,11 +289,6 @@ pub(super) fn swatches(title: &str, unit: &str, colors: &[[u8; 3]]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn steps_are_round() {
-        assert_eq!([0.11, 0.2, 0.21, 1.0, 6.0, 51.0].map(step), [0.2, 0.2, 0.5, 1.0, 10.0, 100.0]);
-    }
 
     #[test]
     fn bars_lie_in_the_picture_and_ticks_below_it() {

@@ -8,12 +8,12 @@
 //! |---|---|
 //! | `statistics`, `histogram`, `photographs` | what the images say together |
 //! | `sheet`, `chart`, `card` | pictures, charts, words |
-//! | `html`, `style.css` | how text and numbers look |
+//!
+//! How text and numbers look is `html`'s.
 
 mod card;
 mod chart;
 mod histogram;
-mod html;
 mod photographs;
 mod sheet;
 mod statistics;
@@ -21,17 +21,15 @@ mod statistics;
 use super::set::{Set, Whole};
 use super::split::Split;
 use crate::Result;
+use crate::html::{document, escape, keyed, section, whole};
 use chart::{Series, histograms};
 use histogram::Histogram;
-use html::{escape, keyed, whole};
+
 use photographs::Photographs;
 use statistics::{PLANTS, Pair, Statistics};
-use std::fmt::Write;
 
 /// The report's file, below the dataset's folder.
 pub const FILE: &str = "report.html";
-
-const STYLE: &str = include_str!("style.css");
 
 /// Writes the report of a dataset whose images are all there.
 pub fn write(set: &Set, out: &mut Whole<'_>) -> Result<()> {
@@ -48,40 +46,29 @@ pub fn write(set: &Set, out: &mut Whole<'_>) -> Result<()> {
 /// The page.
 fn html(set: &Set, found: &Statistics, photographs: &Photographs, names: &[Vec<String>; 3], sheet: &str) -> String {
     let recipe = &set.recipe;
-    let title = escape(&card::title(recipe));
-    let mut page = format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<meta name=\"color-scheme\" content=\"light dark\">\n\
-         <title>Dataset {title}</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n\
-         <header><p class=\"kind\">Dataset</p><h1>{title}</h1><p class=\"lead\">{}</p></header>\n",
-        card::lead(recipe, found)
-    );
-    page.push_str(&figures(found));
-    page.push_str(&card::pixels(found));
-    let mut section = |title: &str, body: &str| {
-        if !body.is_empty() {
-            let _ = write!(page, "<section><h2>{title}</h2>\n{body}</section>\n");
-        }
-    };
     let switch = "<input type=\"checkbox\" id=\"labels\"><label for=\"labels\" class=\"switch\">Show labels on all</label>\
                   <span class=\"hint\">or point at one image, or tap it</span>";
-    section("Images", &format!("{switch}<div class=\"sheet\">{sheet}</div>"));
-    section("Labels", &grid(&labels(found)));
-    section("Plants", &(card::species(recipe, found) + &grid(&plants(found))));
-    section("Light", &grid(&light(found)));
-    section("Soil", &grid(&soil(found)));
-    section("Camera and photographs", &grid(&camera(found, photographs)));
     let card = format!(
         "<div class=\"two\"><div><h3>Where it comes from</h3>{}</div><div><h3>Splits</h3>{}</div></div>",
         card::provenance(recipe),
         card::splits(recipe, names, found.images)
     );
-    section("Dataset card", &card);
-    section("How to read it", &card::reading(recipe, photographs.nir.n() > 0));
-    section("Limits", &card::limits(recipe, found));
-    section("Sources", card::sources(recipe));
-    let _ = write!(page, "<footer>Written by Furrow {}</footer>\n</main>\n</body>\n</html>\n", escape(&recipe.furrow));
-    page
+    let body = [
+        figures(found),
+        card::pixels(found),
+        section("Images", &format!("{switch}<div class=\"sheet\">{sheet}</div>")),
+        section("Labels", &grid(&labels(found))),
+        section("Plants", &(card::species(recipe, found) + &grid(&plants(found)))),
+        section("Light", &grid(&light(found))),
+        section("Soil", &grid(&soil(found))),
+        section("Camera and photographs", &grid(&camera(found, photographs))),
+        section("Dataset card", &card),
+        section("How to read it", &card::reading(recipe, photographs.nir.n() > 0)),
+        section("Limits", &card::limits(recipe, found)),
+        section("Sources", card::sources(recipe)),
+    ];
+    let footer = format!("Written by Furrow {}", escape(&recipe.furrow));
+    document("Dataset", &card::title(recipe), &card::lead(recipe, found), "", &body.concat(), &footer)
 }
 
 /// The numbers at the top.

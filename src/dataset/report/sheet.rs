@@ -1,15 +1,13 @@
 //! The contact sheet: some images of each split, their labels over them.
 
-use super::html::{count, escape, percent};
 use crate::Result;
 use crate::dataset::record::Record;
 use crate::dataset::sample::{IGNORE, Sample};
 use crate::dataset::split::Split;
 use crate::dataset::{Set, native};
+use crate::html::{count, escape, inside, percent};
 use crate::output::{self, Picture};
 use crate::scene::tag::Class;
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
 use rayon::prelude::*;
 
 /// Most images.
@@ -48,13 +46,13 @@ fn chosen(sizes: [usize; Split::ALL.len()]) -> [Vec<usize>; Split::ALL.len()] {
 fn card(sample: &Sample) -> Result<String> {
     let Record { name, source, split, width, height, .. } = &sample.record;
     let (w, h, rgb) = output::shrink(*width, *height, &sample.rgb, SIDE);
-    let photograph = STANDARD.encode(output::encode_jpeg(w, h, &rgb, QUALITY)?);
-    let labels = STANDARD.encode(output::encode_png(w, h, &Picture::Rgba(&overlay(sample, w, h)), "")?);
+    let photograph = inside("jpeg", &output::encode_jpeg(w, h, &rgb, QUALITY)?);
+    let labels = inside("png", &output::encode_png(w, h, &Picture::Rgba(&overlay(sample, w, h)), "")?);
     let source = source.as_ref().map(|s| format!(" title=\"{}\"", escape(s))).unwrap_or_default();
     Ok(format!(
         "<figure class=\"shot\"><label{source}><input type=\"checkbox\"><span class=\"frame\">\
-         <img src=\"data:image/jpeg;base64,{photograph}\" width=\"{w}\" height=\"{h}\" alt=\"image {name}\">\
-         <img class=\"labels\" src=\"data:image/png;base64,{labels}\" width=\"{w}\" height=\"{h}\" alt=\"its labels\"></span></label>\
+         <img src=\"{photograph}\" width=\"{w}\" height=\"{h}\" alt=\"image {name}\">\
+         <img class=\"labels\" src=\"{labels}\" width=\"{w}\" height=\"{h}\" alt=\"its labels\"></span></label>\
          <figcaption><b>{name}</b> {} · {}</figcaption></figure>\n",
         split.name(),
         words(&sample.record)

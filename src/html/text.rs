@@ -1,7 +1,7 @@
 //! Text and numbers as a page shows them.
 
 /// Text that a page shows as it is.
-pub(super) fn escape(text: &str) -> String {
+pub fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
@@ -17,7 +17,7 @@ pub(super) fn escape(text: &str) -> String {
 }
 
 /// A whole number, its thousands apart.
-pub(super) fn whole(n: u64) -> String {
+pub fn whole(n: u64) -> String {
     let digits = n.to_string();
     let mut out = String::new();
     for (i, digit) in digits.chars().enumerate() {
@@ -31,7 +31,7 @@ pub(super) fn whole(n: u64) -> String {
 }
 
 /// A number to three digits, without an exponent.
-pub(super) fn number(x: f64) -> String {
+pub fn number(x: f64) -> String {
     if x.abs() >= 999.5 {
         let sign = if x < 0.0 { "−" } else { "" };
         return format!("{sign}{}", whole(x.abs().round() as u64));
@@ -46,22 +46,22 @@ pub(super) fn number(x: f64) -> String {
 }
 
 /// A share in percent.
-pub(super) fn percent(share: f64) -> String {
+pub fn percent(share: f64) -> String {
     format!("{}\u{202f}%", number(100.0 * share))
 }
 
 /// One thing or many.
-pub(super) fn count(n: u64, one: &str, many: &str) -> String {
+pub fn count(n: u64, one: &str, many: &str) -> String {
     format!("{} {}", whole(n), if n == 1 { one } else { many })
 }
 
 /// A number that the page's readers find by its key.
-pub(super) fn keyed(key: &str, value: impl std::fmt::Display, shown: &str) -> String {
+pub fn keyed(key: &str, value: impl std::fmt::Display, shown: &str) -> String {
     format!("<span data-key=\"{key}\" data-value=\"{value}\">{shown}</span>")
 }
 
 /// A table of what is what: `<dl>` with a row for each pair of a name and HTML.
-pub(super) fn pairs(rows: &[(&str, String)]) -> String {
+pub fn pairs(rows: &[(&str, String)]) -> String {
     let row = |(name, value): &(&str, String)| format!("<dt>{}</dt><dd>{value}</dd>", escape(name));
     format!("<dl class=\"pairs\">{}</dl>", rows.iter().map(row).collect::<String>())
 }
