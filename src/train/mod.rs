@@ -17,4 +17,5 @@ pub mod net;
 pub mod run;
 #[cfg(feature = "train")]
 pub mod session;
+pub mod table;
 pub mod weights;

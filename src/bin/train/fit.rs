@@ -182,7 +182,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
 }
 
 /// Trains one plan and shows how it goes.
-fn fit(
+pub(crate) fn fit(
     plan: &Plan,
     begin: Option<&Path>,
     machine: &MachineArgs,

@@ -3,6 +3,7 @@
 mod eval;
 mod fit;
 mod machine;
+mod table;
 
 use clap::{Parser, Subcommand};
 use furrow::cli::{self, signal};
@@ -26,6 +27,7 @@ Examples:
   train fit --set data/d --out runs/d                     Basic SegNet on the training images of a set
   train fit --set data/d --set data/real@0..10*4 --network unet --size 240x180 --out runs/augmented
   train eval runs/d --set data/real@12..20                how well it does on real images
+  train table scenes/experiments/paper.ron --real jai=DIR the paper's tables, from scenes and real folders
 
 A run that was stopped or killed goes on with the same command, and ends the same.
 Paths go to stdout, everything else to stderr.
@@ -37,6 +39,8 @@ enum Verb {
     Fit(Box<fit::Args>),
     /// Judge a trained network on images with labels.
     Eval(eval::Args),
+    /// Run an experiment of a page: sets, trainings, evaluations, tables.
+    Table(Box<table::Args>),
 }
 
 fn main() -> ExitCode {
@@ -44,6 +48,7 @@ fn main() -> ExitCode {
     let done = match Cli::parse().verb {
         Verb::Fit(args) => fit::run(&args, &signals),
         Verb::Eval(args) => eval::run(&args, &signals),
+        Verb::Table(args) => table::run(&args, &signals),
     };
     match done {
         Ok(paths) => print_paths(&paths),

@@ -1,0 +1,162 @@
+//! `train table`.
+
+use crate::fit;
+use crate::machine::MachineArgs;
+use furrow::cli::signal::Signals;
+use furrow::dataset::generate::Shard;
+use furrow::page::Page;
+use furrow::train::engine::{Precision, device};
+use furrow::train::fit::Plan;
+use furrow::train::session;
+use furrow::train::table::{self, Bound, Experiment, Hands, Only, Order, Real, State};
+use furrow::{Error, Result, cli};
+use indicatif::HumanDuration;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Runs an experiment as far as it is missing, and writes its tables.
+#[derive(clap::Args)]
+#[command(after_help = AFTER)]
+pub(crate) struct Args {
+    /// The experiment's page.
+    page: PathBuf,
+    /// Folder of its sets, runs and tables; `out/` and the page's name, with that of the scale, unless given.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Where a real set of the page lies: a dataset, or a folder with images/ and labels/. May be given several times.
+    #[arg(long, value_name = "NAME=DIR", value_parser = Real::parse)]
+    real: Vec<Real>,
+    /// Leave out what needs this set. May be given several times.
+    #[arg(long, value_name = "NAME")]
+    without: Vec<String>,
+    /// A scale of the page, which makes the same experiment larger or smaller.
+    #[arg(long, value_name = "NAME")]
+    scale: Option<String>,
+    /// Only the rows whose number leaves k when divided by N.
+    #[arg(long, value_name = "k/N", default_value = "0/1", value_parser = Shard::parse)]
+    row: Shard,
+    /// Only a part of the work.
+    #[arg(long, value_enum)]
+    only: Option<Part>,
+    /// Print the rows and how far they are, and do nothing.
+    #[arg(long)]
+    dry_run: bool,
+    /// Most time of a training, such as 30m; its end is then where the clock says, and the tables are not the same twice.
+    #[arg(long, value_name = "DURATION", value_parser = humantime::parse_duration)]
+    time: Option<Duration>,
+    /// The program that makes sets; `trace` beside this one unless given.
+    #[arg(long, value_name = "PATH")]
+    trace: Option<PathBuf>,
+    #[command(flatten)]
+    machine: MachineArgs,
+    /// Print nothing but errors, warnings and the paths of the tables.
+    #[arg(long)]
+    quiet: bool,
+}
+
+const AFTER: &str = "\
+Stopped or killed, the same command goes on and ends with the same tables. On several machines that share a folder, the sets first:
+  train table PAGE --out DIR --real NAME=DIR --only sets
+  sbatch --array=0-7 --wrap 'train table PAGE --out DIR --real NAME=DIR --row $SLURM_ARRAY_TASK_ID/8'
+  train table PAGE --out DIR --only tables";
+
+/// A part of the work.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Part {
+    /// Render and import the images.
+    Sets,
+    /// Write the tables of what is there.
+    Tables,
+}
+
+/// Does what is missing.
+pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
+    let page = Page::read(&args.page)?;
+    let experiment = Experiment::of(&page, args.scale.as_deref())?;
+    let out = args.out.clone().unwrap_or_else(|| usual_folder(&args.page, args.scale.as_deref()));
+    cli::check_folder(&out)?;
+    let bound = Bound::new(experiment, &args.real, &args.without, &out)?;
+    for name in &bound.left_out {
+        eprintln!("warning: `{name}` is left out: --without {}", args.without.join(" --without "));
+    }
+    if args.dry_run {
+        eprint!("{}", table::listing(&bound, &out)?.markdown());
+        return Ok(Vec::new());
+    }
+    let trace = match &args.trace {
+        Some(trace) => trace.clone(),
+        None => beside()?,
+    };
+    let machine = args.machine.machine();
+    // First of all: for a GPU the program replaces itself.
+    let precision = Precision::named(&args.machine.precision, device::find(&machine.device)?);
+    let precision = precision.map_err(Error::Training)?.name();
+    let scale = args.scale.as_ref().map(|s| format!("// At the scale \"{s}\".\n")).unwrap_or_default();
+    let order = Order {
+        bound: &bound,
+        out: &out,
+        page: &(scale + &page.text),
+        shard: args.row,
+        only: args.only.map(|part| match part {
+            Part::Sets => Only::Sets,
+            Part::Tables => Only::Tables,
+        }),
+        seconds: args.time.map(|t| t.as_secs()),
+        threads: args.machine.threads(),
+        precision,
+        trace: &trace,
+        quiet: args.quiet,
+    };
+    let stop = signals.heed();
+    let paths = table::run(
+        &order,
+        &Hands {
+            fit: &|plan: &Plan, folder: &Path| fit::fit(plan, None, &args.machine, folder, args.quiet, signals),
+            judge: &|learnt, on, precision, threads| {
+                session::evaluate(learnt, on, precision, threads, &machine, stop, &mut |_| Ok(()))
+            },
+            training: &|row: &str, state: &State| {
+                if !args.quiet {
+                    eprintln!("training {} of {}: {row}{}", state.number, state.of, left(state.left));
+                }
+            },
+            tell: &|words| {
+                if !args.quiet {
+                    eprintln!("{words}");
+                }
+            },
+            warn: &|words| eprintln!("warning: {words}"),
+            stop,
+        },
+    )?;
+    if !args.quiet {
+        let (tables, _) = table::tables(&bound, &out)?;
+        for (_, table) in tables.0.iter().filter(|(name, _)| *name != table::RUNS && args.only != Some(Part::Sets)) {
+            eprintln!("\n{}", table.markdown().trim_end());
+        }
+    }
+    Ok(paths)
+}
+
+fn left(seconds: Option<f64>) -> String {
+    let time = seconds.map(|s| HumanDuration(Duration::from_secs_f64(s.max(0.0))));
+    time.map(|t| format!("; {t} of training left")).unwrap_or_default()
+}
+
+fn usual_folder(page: &Path, scale: Option<&str>) -> PathBuf {
+    let name = page.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    Path::new("out").join(scale.map(|s| format!("{name}-{s}")).unwrap_or(name))
+}
+
+/// The program `trace` beside this one.
+fn beside() -> Result<PathBuf> {
+    let own = std::env::current_exe().map_err(Error::io("train".as_ref()))?;
+    let trace = own.with_file_name(format!("trace{}", std::env::consts::EXE_SUFFIX));
+    if trace.is_file() {
+        return Ok(trace);
+    }
+    Err(Error::Training(format!(
+        "{}: the program that makes sets is not there\n help: build it beside this one (`cargo build --release`), or name it with --trace PATH",
+        trace.display()
+    )))
+}

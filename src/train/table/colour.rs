@@ -1,0 +1,59 @@
+//! Colour baselines, fitted and judged on what networks see.
+
+use crate::Error;
+use crate::Result;
+use crate::train::baseline::{Baseline, Cut, Example, Kind};
+use crate::train::classes::Classes;
+use crate::train::data::{self, Band, Pick, Selection, Shape, Store};
+use crate::train::measure::{Answer, Evaluation, Report};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// The colours that a baseline sees, at a network's size.
+fn shape(like: &Shape) -> Shape {
+    Shape { bands: Band::RGB.to_vec(), ..like.clone() }
+}
+
+fn open(selections: &[Selection], otherwise: Pick, seed: u64, like: &Shape, with_plants: bool) -> Result<Store> {
+    Store::open(selections, otherwise, seed, &Classes::default(), &shape(like), with_plants, 0)
+}
+
+fn colours(example: &data::Example) -> Vec<[u8; 3]> {
+    let [red, green, blue] = [0, 1, 2].map(|band| &example.planes[band]);
+    red.iter().zip(green).zip(blue).map(|((r, g), b)| [*r, *g, *b]).collect()
+}
+
+/// Fits a baseline to the training images of a row.
+pub(super) fn fit(kind: Kind, from: &[Selection], seed: u64, like: &Shape, stop: &AtomicBool) -> Result<Baseline> {
+    let store = open(from, Pick::All, seed, like, false)?;
+    let (width, height) = (like.width, like.height);
+    let image = |place| {
+        if stop.load(Ordering::Relaxed) {
+            return Err(Error::Interrupted);
+        }
+        let example = store.get(place)?;
+        Ok(Example { width, height, rgb: colours(&example), truth: example.labels.clone() })
+    };
+    Baseline::fit(kind, Cut::Fitted, || (0..store.len()).map(image))
+}
+
+/// Judges a baseline on images of a set.
+pub(super) fn judge(baseline: &Baseline, on: &Selection, like: &Shape, stop: &AtomicBool) -> Result<Report> {
+    let store = open(std::slice::from_ref(on), Pick::All, 0, like, true)?;
+    let (width, height) = (like.width, like.height);
+    let mut evaluation = Evaluation::new(Classes::default().names());
+    for place in 0..store.len() {
+        if stop.load(Ordering::Relaxed) {
+            return Err(Error::Interrupted);
+        }
+        let example = store.get(place)?;
+        let rgb = colours(&example);
+        let begun = Instant::now();
+        let predicted = baseline.predict(width, height, &rgb);
+        let seconds = Some(begun.elapsed().as_secs_f64());
+        let plants = example.plants.iter().any(|p| *p > 0).then_some(example.plants.as_slice());
+        let (name, truth) = (example.name.as_str(), example.labels.as_slice());
+        evaluation.add(&Answer { name, width, height, truth, predicted: &predicted, plants, seconds })?;
+    }
+    Ok(evaluation.finish())
+}

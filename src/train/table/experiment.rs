@@ -1,0 +1,495 @@
+//! An experiment whose page was found right: names are what they name, numbers are in range.
+
+use super::desc::{ExperimentDesc, LearnDesc, Named, PartDesc, ScaleDesc, SetDesc};
+use super::names::{slug, unknown};
+use crate::dataset::split::Shares;
+use crate::page::Page;
+use crate::sampling::place::Step;
+use crate::sampling::{Sampler, fault};
+use crate::train::baseline::Kind;
+use crate::train::classes::Classes;
+use crate::train::data::{Augment, Band, Pick};
+use crate::train::fit::Plan;
+use crate::train::fit::balance::Balance;
+use crate::train::fit::plan::{Exposure, Method};
+use crate::train::fit::schedule::Schedule;
+use crate::train::net::Network;
+use crate::{Error, Result};
+use std::path::{Path, PathBuf};
+
+/// An experiment, ready to be planned.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Experiment {
+    /// Networks, each once; at least one.
+    pub networks: Vec<Network>,
+    /// Colour baselines.
+    pub baselines: Vec<Kind>,
+    /// Seeds, each once; at least one.
+    pub seeds: Vec<u64>,
+    /// How networks learn; network, images, seed and machine are the rows' own.
+    pub learn: Plan,
+    /// Sets by name.
+    pub sets: Vec<(String, Source)>,
+    /// What is learnt from, at least one.
+    pub train: Vec<TrainSet>,
+    /// What is judged on, at least one.
+    pub test: Vec<TestSet>,
+    /// The scale that was asked for.
+    pub scale: Option<String>,
+}
+
+/// Where images come from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// Rendered.
+    Scene {
+        /// The scene's page.
+        page: PathBuf,
+        /// Images.
+        count: u64,
+        /// Pixels across and down.
+        size: (u32, u32),
+        /// Samples a pixel.
+        spp: u32,
+        /// Seed, instead of the scene's.
+        seed: Option<u64>,
+        /// Shares of the splits.
+        split: Shares,
+    },
+    /// Brought in.
+    Real {
+        /// What it is.
+        about: String,
+    },
+}
+
+/// Images of a set.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// The set's place in [`Experiment::sets`].
+    pub set: usize,
+    /// Which of its images.
+    pub pick: Pick,
+    /// How often each.
+    pub repeat: u32,
+}
+
+/// What is learnt from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TrainSet {
+    /// Name in the tables.
+    pub name: String,
+    /// Name of its folder.
+    pub slug: String,
+    /// Images to learn from.
+    pub from: Vec<Part>,
+    /// Images to be watched by.
+    pub watch: Vec<Part>,
+}
+
+/// What is judged on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TestSet {
+    /// Name in the tables.
+    pub name: String,
+    /// Name of its files.
+    pub slug: String,
+    /// Its images.
+    pub part: Part,
+}
+
+impl Experiment {
+    /// Reads a page, at one of its scales.
+    pub fn read(path: &Path, scale: Option<&str>) -> Result<Self> {
+        Self::of(&Page::read(path)?, scale)
+    }
+
+    /// The same of a page that was read before.
+    pub fn of(page: &Page, scale: Option<&str>) -> Result<Self> {
+        let desc: ExperimentDesc = page.parse()?;
+        Checker { page, desc: &desc }.experiment(scale)
+    }
+
+    /// Which sets a training set needs, by place, each once.
+    pub fn sets_of(&self, train: &TrainSet) -> Vec<usize> {
+        let mut all: Vec<usize> = train.from.iter().chain(&train.watch).map(|p| p.set).collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+}
+
+type Words = Result<(), (&'static str, String, String)>;
+
+struct Checker<'a> {
+    page: &'a Page,
+    desc: &'a ExperimentDesc,
+}
+
+/// Where a value of the page is: the steps to it.
+type At<'a> = &'a [Step<'a>];
+
+impl Checker<'_> {
+    /// What is wrong with the value at a place, and what to do.
+    fn fault(&self, at: At<'_>, what: impl AsRef<str>, help: impl AsRef<str>) -> Error {
+        let words = format!("{}\n help: {}", what.as_ref(), help.as_ref());
+        self.page.blame(at, Error::Scene(words))
+    }
+
+    fn experiment(&self, scale: Option<&str>) -> Result<Experiment> {
+        let desc = self.desc;
+        self.names(&desc.sets, "sets", "set")?;
+        self.names(&desc.scales, "scales", "scale")?;
+        let chosen = scale.map(|name| self.scale(name)).transpose()?;
+        let other = chosen.map(|(_, s)| s);
+        let mut learn = Plan::default();
+        self.learn(&desc.learn, &[Step::Field("learn")], &mut learn)?;
+        for (i, (_, scale)) in desc.scales.0.iter().enumerate() {
+            // Scales that are not asked for are checked as well: their turn comes when hours have gone by.
+            let at = [Step::Field("scales"), Step::Item(i)];
+            let mut plan = learn.clone();
+            self.learn(&scale.learn, &[at[0], at[1], Step::Field("learn")], &mut plan)?;
+            self.at_scale(scale, &at)?;
+            if chosen.is_some_and(|(k, _)| k == i) {
+                learn = plan;
+            }
+        }
+        let networks = match other.and_then(|s| s.networks.as_ref()) {
+            Some(names) => names,
+            None => &desc.networks,
+        };
+        let at = |field: &'static str, own: bool| match chosen {
+            Some((i, _)) if own => vec![Step::Field("scales"), Step::Item(i), Step::Field(field)],
+            _ => vec![Step::Field(field)],
+        };
+        let networks = self.networks(networks, &at("networks", other.is_some_and(|s| s.networks.is_some())))?;
+        let seeds = other.and_then(|s| s.seeds.as_ref()).unwrap_or(&desc.seeds);
+        self.seeds(seeds, &at("seeds", other.is_some_and(|s| s.seeds.is_some())))?;
+        let sets = self.sets(other, (learn.shape.width, learn.shape.height))?;
+        Ok(Experiment {
+            networks,
+            baselines: self.baselines(&learn)?,
+            seeds: seeds.clone(),
+            learn,
+            train: self.train(&sets)?,
+            test: self.test(&sets)?,
+            sets,
+            scale: scale.map(str::to_owned),
+        })
+    }
+
+    fn scale(&self, name: &str) -> Result<(usize, &ScaleDesc)> {
+        let scales = &self.desc.scales;
+        match scales.find(name) {
+            Some(i) => Ok((i, &scales.0[i].1)),
+            None => Err(Error::Training(format!(
+                "{}: the page has no scale `{name}`\n help: {}",
+                self.page.path.display(),
+                fault::choose("its scales", &scales.names(), name)
+            ))),
+        }
+    }
+
+    /// Names of a table that become names of folders: each once, and no path.
+    fn names<T>(&self, named: &Named<T>, field: &str, what: &str) -> Result<()> {
+        for (i, name) in named.names().into_iter().enumerate() {
+            let at = [Step::Field(field), Step::Item(i)];
+            let good = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+            if name.is_empty() || name.starts_with('.') || !name.chars().all(good) {
+                return Err(self.fault(
+                    &at,
+                    format!("`{name}` is no name for a {what}"),
+                    "write letters, digits, - and _, as in \"synthetic-d\"",
+                ));
+            }
+            if named.find(name) != Some(i) {
+                return Err(self.fault(
+                    &at,
+                    format!("the {what} `{name}` is there twice"),
+                    "give each a name of its own",
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    fn networks(&self, names: &[String], at: At<'_>) -> Result<Vec<Network>> {
+        if names.is_empty() {
+            return Err(self.fault(at, "there is no network", "name one at least, such as [\"basic-segnet\"]"));
+        }
+        let known: Vec<&str> = Network::ALL.iter().map(|n| n.name()).collect();
+        let mut networks = Vec::new();
+        for (i, name) in names.iter().enumerate() {
+            let at = [at, &[Step::Item(i)]].concat();
+            let network = Network::named(name).map_err(|_| self.unknown(&at, "network", &known, name))?;
+            if networks.contains(&network) {
+                return Err(self.fault(&at, format!("the network `{name}` is there twice"), "keep one of them"));
+            }
+            networks.push(network);
+        }
+        Ok(networks)
+    }
+
+    fn baselines(&self, learn: &Plan) -> Result<Vec<Kind>> {
+        let at = [Step::Field("baselines")];
+        let fits = learn.classes == Classes::default() && learn.shape.bands.starts_with(&Band::RGB);
+        let Some(names) = &self.desc.baselines else { return Ok(if fits { Kind::ALL.to_vec() } else { Vec::new() }) };
+        if !fits && !names.is_empty() {
+            let help = "leave `baselines` out, or `classes` and `bands`";
+            return Err(self.fault(&at, "baselines know soil, crop and weed in colour images, nothing else", help));
+        }
+        let mut kinds = Vec::new();
+        for (i, name) in names.iter().enumerate() {
+            let at = [at[0], Step::Item(i)];
+            let known = Kind::ALL.map(Kind::name);
+            let kind = Kind::named(name).ok_or_else(|| self.unknown(&at, "baseline", &known, name))?;
+            if kinds.contains(&kind) {
+                return Err(self.fault(&at, format!("the baseline `{name}` is there twice"), "keep one of them"));
+            }
+            kinds.push(kind);
+        }
+        Ok(kinds)
+    }
+
+    fn seeds(&self, seeds: &[u64], at: At<'_>) -> Result<()> {
+        if seeds.is_empty() {
+            return Err(self.fault(at, "there is no seed", "write one at least, such as [1]"));
+        }
+        match seeds.iter().enumerate().find(|(i, seed)| seeds[..*i].contains(seed)) {
+            Some((i, seed)) => {
+                let at = [at, &[Step::Item(i)]].concat();
+                Err(self.fault(&at, format!("the seed {seed} is there twice"), "keep one of them"))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Puts what the page says into a plan.
+    fn learn(&self, desc: &LearnDesc, at: At<'_>, plan: &mut Plan) -> Result<()> {
+        set(desc, plan).map_err(|(field, what, help)| self.fault(&[at, &[Step::Field(field)]].concat(), what, help))
+    }
+
+    fn sets(&self, scale: Option<&ScaleDesc>, seen: (u32, u32)) -> Result<Vec<(String, Source)>> {
+        let mut sets = Vec::new();
+        for (i, (name, desc)) in self.desc.sets.0.iter().enumerate() {
+            let at = |field| [Step::Field("sets"), Step::Item(i), Step::Field(field)];
+            let source = match desc {
+                SetDesc::Real { about } => Source::Real { about: about.clone() },
+                SetDesc::Scene { page, count, size, spp, seed, split: (train, val, test) } => {
+                    self.page.need_file(page)?;
+                    self.count(*count, &at("count"))?;
+                    self.spp(*spp, &at("spp"))?;
+                    let split = Shares::parse(&format!("{train},{val},{test}"))
+                        .map_err(|help| self.fault(&at("split"), "these are no shares", help))?;
+                    if let Some(size) = size {
+                        self.image_size(*size, &at("size"))?;
+                    }
+                    let size = scale.and_then(|s| s.size).or(*size).unwrap_or(seen);
+                    let (count, spp) =
+                        (scale.and_then(|s| s.count).unwrap_or(*count), scale.and_then(|s| s.spp).unwrap_or(*spp));
+                    Source::Scene { page: self.page.resolve(page), count, size, spp, seed: *seed, split }
+                }
+            };
+            sets.push((name.clone(), source));
+        }
+        Ok(sets)
+    }
+
+    fn at_scale(&self, scale: &ScaleDesc, at: At<'_>) -> Result<()> {
+        let at = |field| [at, &[Step::Field(field)]].concat();
+        scale.count.map_or(Ok(()), |n| self.count(n, &at("count")))?;
+        scale.spp.map_or(Ok(()), |n| self.spp(n, &at("spp")))?;
+        scale.size.map_or(Ok(()), |s| self.image_size(s, &at("size")))?;
+        scale.networks.as_ref().map_or(Ok(()), |n| self.networks(n, &at("networks")).map(drop))?;
+        scale.seeds.as_ref().map_or(Ok(()), |s| self.seeds(s, &at("seeds")))
+    }
+
+    fn count(&self, count: u64, at: At<'_>) -> Result<()> {
+        if (1..=99_999_999).contains(&count) {
+            return Ok(());
+        }
+        Err(self.fault(at, format!("{count} images cannot be rendered"), "write a number from 1 to 99999999"))
+    }
+
+    fn spp(&self, spp: u32, at: At<'_>) -> Result<()> {
+        if (1..=Sampler::MAX_SAMPLES).contains(&spp) {
+            return Ok(());
+        }
+        let help = format!("write a number from 1 to {}", Sampler::MAX_SAMPLES);
+        Err(self.fault(at, format!("{spp} samples a pixel cannot be taken"), help))
+    }
+
+    fn image_size(&self, (width, height): (u32, u32), at: At<'_>) -> Result<()> {
+        if [width, height].iter().all(|n| (1..=16384).contains(n)) {
+            return Ok(());
+        }
+        Err(self.fault(at, format!("no image has {width} × {height} pixels"), "write sides from 1 to 16384"))
+    }
+
+    fn part(&self, desc: &PartDesc, otherwise: Pick, at: At<'_>, sets: &[(String, Source)]) -> Result<Part> {
+        let step = |field| [at, &[Step::Field(field)]].concat();
+        if desc.repeat == 0 {
+            return Err(self.fault(&step("repeat"), "images that are there 0 times teach nothing", "write 1 or more"));
+        }
+        let (set, pick) = self.images(&desc.set, desc.images.as_deref(), otherwise, at, sets)?;
+        Ok(Part { set, pick, repeat: desc.repeat })
+    }
+
+    /// A set and which of its images.
+    fn images(
+        &self,
+        name: &str,
+        images: Option<&str>,
+        otherwise: Pick,
+        at: At<'_>,
+        sets: &[(String, Source)],
+    ) -> Result<(usize, Pick)> {
+        let step = |field| [at, &[Step::Field(field)]].concat();
+        let names = self.desc.sets.names();
+        let set = self.desc.sets.find(name).ok_or_else(|| self.unknown(&step("set"), "set", &names, name))?;
+        let Some(images) = images else { return Ok((set, otherwise)) };
+        let pick = Pick::parse(images).map_err(|words| {
+            let (what, help) = words.split_once(": ").unwrap_or((&words, "write 0..10"));
+            self.fault(&step("images"), what, help)
+        })?;
+        if let (Source::Scene { count, .. }, Pick::Range(_, most) | Pick::Random(most)) = (&sets[set].1, pick)
+            && most > *count
+        {
+            let help = "ask for fewer here, or for more there; the last of a range is left out";
+            return Err(self.fault(&step("images"), format!("`{name}` has {count} images, too few for this"), help));
+        }
+        Ok((set, pick))
+    }
+
+    fn train(&self, sets: &[(String, Source)]) -> Result<Vec<TrainSet>> {
+        use crate::dataset::split::Split::{Train, Val};
+        let mut all: Vec<TrainSet> = Vec::new();
+        for (i, desc) in self.desc.train.iter().enumerate() {
+            let at = [Step::Field("train"), Step::Item(i)];
+            let step = |field| [at[0], at[1], Step::Field(field)];
+            let slug = self.title(&desc.name, all.iter().map(|t| t.slug.as_str()), &step("name"))?;
+            if desc.from.is_empty() {
+                return Err(self.fault(&step("from"), "nothing is learnt from", "name a set: [(set: \"NAME\")]"));
+            }
+            let parts = |parts: &[PartDesc], field: &'static str, otherwise| -> Result<Vec<Part>> {
+                let one = |(k, part): (usize, &PartDesc)| {
+                    let at = [at[0], at[1], Step::Field(field), Step::Item(k)];
+                    self.part(part, otherwise, &at, sets)
+                };
+                parts.iter().enumerate().map(one).collect()
+            };
+            let from = parts(&desc.from, "from", Pick::Split(Train))?;
+            let watch = match &desc.watch {
+                Some(watch) => parts(watch, "watch", Pick::Split(Val))?,
+                None => {
+                    let open = desc.from.iter().zip(&from).filter(|(desc, _)| desc.images.is_none());
+                    open.map(|(_, part)| Part { pick: Pick::Split(Val), repeat: 1, ..part.clone() }).collect()
+                }
+            };
+            all.push(TrainSet { name: desc.name.clone(), slug, from, watch });
+        }
+        if all.is_empty() {
+            let help = "name one at least: [(name: \"Real\", from: [(set: \"NAME\")])]";
+            return Err(self.fault(&[Step::Field("train")], "there is no training set", help));
+        }
+        Ok(all)
+    }
+
+    fn test(&self, sets: &[(String, Source)]) -> Result<Vec<TestSet>> {
+        let mut all: Vec<TestSet> = Vec::new();
+        for (i, desc) in self.desc.test.iter().enumerate() {
+            let at = [Step::Field("test"), Step::Item(i)];
+            let step = |field| [at[0], at[1], Step::Field(field)];
+            let slug = self.title(&desc.name, all.iter().map(|t| t.slug.as_str()), &step("name"))?;
+            let (set, pick) = self.images(&desc.set, desc.images.as_deref(), Pick::All, &at, sets)?;
+            all.push(TestSet { name: desc.name.clone(), slug, part: Part { set, pick, repeat: 1 } });
+        }
+        if all.is_empty() {
+            let help = "name one at least: [(name: \"Test\", set: \"NAME\")]";
+            return Err(self.fault(&[Step::Field("test")], "there is no test set", help));
+        }
+        Ok(all)
+    }
+
+    /// The folder's name of a title that no other has.
+    fn title<'a>(&self, name: &str, mut others: impl Iterator<Item = &'a str>, at: At<'_>) -> Result<String> {
+        let slug = slug(name);
+        if slug.is_empty() {
+            let help = "folders are named after it: write letters or digits";
+            return Err(self.fault(at, format!("`{name}` has no letter and no digit"), help));
+        }
+        if others.any(|other| other == slug) {
+            let help = "give each a name of its own; case and punctuation do not count";
+            return Err(self.fault(at, format!("there is another `{name}`"), help));
+        }
+        Ok(slug)
+    }
+
+    fn unknown(&self, at: At<'_>, what: &str, known: &[&str], found: &str) -> Error {
+        let (message, help) = unknown(what, known, found);
+        self.fault(at, message, help)
+    }
+}
+
+/// Puts what the page says into a plan, or tells field, fault and help.
+fn set(desc: &LearnDesc, plan: &mut Plan) -> Words {
+    fn word<T>(
+        field: &'static str,
+        text: Option<&String>,
+        to: &mut T,
+        parse: impl Fn(&str) -> Result<T, String>,
+    ) -> Words {
+        if let Some(text) = text {
+            *to = parse(text).map_err(|words| match words.split_once(": ") {
+                Some((what, help)) => (field, what.to_owned(), help.to_owned()),
+                None => (field, format!("`{text}` cannot stand here"), words),
+            })?;
+        }
+        Ok(())
+    }
+    fn number<T: Copy + std::fmt::Display, U>(
+        field: &'static str,
+        value: Option<T>,
+        to: &mut U,
+        good: impl Fn(T) -> bool,
+        help: &str,
+        into: impl Fn(T) -> U,
+    ) -> Words {
+        match value {
+            Some(v) if !good(v) => Err((field, format!("{v} is out of range"), help.into())),
+            Some(v) => {
+                *to = into(v);
+                Ok(())
+            }
+            None => Ok(()),
+        }
+    }
+    if let Some((width, height)) = desc.size {
+        if ![width, height].iter().all(|n| (32..=8192).contains(n)) {
+            return Err((
+                "size",
+                format!("networks do not see {width} × {height} pixels"),
+                "write sides from 32 to 8192".into(),
+            ));
+        }
+        (plan.shape.width, plan.shape.height) = (width, height);
+    }
+    word("optimiser", desc.optimiser.as_ref(), &mut plan.method, Method::parse)?;
+    if desc.optimiser.is_some() {
+        plan.rate = plan.method.usual_rate();
+    }
+    word("schedule", desc.schedule.as_ref(), &mut plan.schedule, Schedule::parse)?;
+    word("balance", desc.balance.as_ref(), &mut plan.balance, Balance::parse)?;
+    word("augment", desc.augment.as_ref(), &mut plan.augment, Augment::parse)?;
+    word("normalise", desc.normalise.as_ref(), &mut plan.exposure, Exposure::parse)?;
+    word("classes", desc.classes.as_ref(), &mut plan.classes, Classes::parse)?;
+    word("bands", desc.bands.as_ref(), &mut plan.shape.bands, Band::list)?;
+    let whole = "write a whole number above 0";
+    number("steps", desc.steps, &mut plan.steps, |n| (1..=100_000_000).contains(&n), whole, |n| n)?;
+    number("batch", desc.batch, &mut plan.batch, |n| (1..=1024).contains(&n), "write a number from 1 to 1024", |n| n)?;
+    number("rate", desc.rate, &mut plan.rate, |r| r > 0.0 && r < 100.0, "write a number above 0 such as 0.001", |r| r)?;
+    let help = "write a share from 0 to below 1";
+    number("decay", desc.decay, &mut plan.decay, |r| (0.0..1.0).contains(&r), help, |r| r)?;
+    number("watch_every", desc.watch_every, &mut plan.watch_every, |n| n > 0, whole, |n| n)?;
+    number("patience", desc.patience, &mut plan.patience, |n| n > 0, whole, |n| n)
+}

@@ -1,0 +1,54 @@
+//! An experiment from one page to the paper's tables.
+//!
+//! A page ([`ExperimentDesc`]) names networks, seeds, sets of images, what is learnt from and what is judged on. Every network (and
+//! every colour baseline) with every training set and every seed is a row ([`Row`]); [`run`] makes the sets, trains the rows, judges
+//! them on every test set, and [`tables`] prints what is there.
+//!
+//! ```text
+//! OUT/experiment.ron                           the page
+//! OUT/sets/NAME/                               rendered and imported images
+//! OUT/runs/NETWORK/TRAIN/seed-1/               one training, as `train fit` leaves it
+//! OUT/runs/NETWORK/TRAIN/seed-1/eval/TEST.json how well it does on a test set
+//! OUT/runs/NETWORK/TRAIN/seed-1/time/TEST.json how long that took
+//! OUT/runs/BASELINE/TRAIN/                     a colour baseline, with the same eval/
+//! OUT/table-1.md, .csv, .json                  GA, CA and mean I/U, as Table I of the paper
+//! OUT/table-2.*                                P and R of vegetation, as its Table II
+//! OUT/table-3.*                                I/U of each class that is a plant and of vegetation, with its spread over seeds
+//! OUT/runs.*                                   every run by itself
+//! OUT/times.*                                  how long networks take, as its Table III
+//! ```
+//!
+//! Whatever is there is not made again: an experiment that was stopped or killed goes on with the same command and ends with the same
+//! files, `time/`, `times.*` and what a run tells of its speed apart. An evaluation is believed only if it is of these weights and these
+//! images; one that is not, or that cannot be read, is told and made again. A training that cannot be read is an error: hours are
+//! not thrown away unasked. A page may get longer; a training whose plan has changed is refused.
+//!
+//! | file | idea |
+//! |---|---|
+//! | `desc`, `experiment` | what a page says; the same, checked |
+//! | `names` | names of folders |
+//! | `rows` | what is to be done, in which order, in which folder |
+//! | `sets` | images made by the program `trace` |
+//! | `judgement` | how well a row does on a test set, kept |
+//! | `colour` | baselines fitted and judged |
+//! | `work` | all of it, as far as it is missing |
+//! | `print` | tables |
+
+mod colour;
+mod desc;
+mod experiment;
+mod judgement;
+mod names;
+mod print;
+mod rows;
+mod sets;
+mod work;
+
+pub use desc::{ExperimentDesc, LearnDesc, Named, PartDesc, ScaleDesc, SetDesc, TestDesc, TrainDesc};
+pub use experiment::{Experiment, Part, Source, TestSet, TrainSet};
+pub use judgement::Judgement;
+pub use names::slug;
+pub use print::{RUNS, Tables, listing, tables};
+pub use rows::{Learner, Row, rows};
+pub use sets::{Bound, Real};
+pub use work::{Hands, Only, Order, State, run};

@@ -1,0 +1,315 @@
+//! The paper's tables, with the numbers that are there.
+
+use super::experiment::{Experiment, TestSet};
+use super::judgement::{self, Judgement, Known};
+use super::rows::{self, Learner, Row};
+use super::sets::Bound;
+use crate::Result;
+use crate::output::write_atomically;
+use crate::train::measure::{Cell, Report, Table};
+use crate::train::run::{self, Results};
+use std::path::{Path, PathBuf};
+
+/// Decimals of a percentage.
+const PERCENT: usize = 1;
+
+/// Name of the table of every run by itself.
+pub const RUNS: &str = "runs";
+
+/// Tables by the names of their files.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tables(pub Vec<(&'static str, Table)>);
+
+impl Tables {
+    /// Writes each as Markdown, CSV and JSON; returns the paths.
+    pub fn write(&self, out: &Path) -> Result<Vec<PathBuf>> {
+        let mut paths = Vec::new();
+        for (name, table) in &self.0 {
+            for (ending, text) in [("md", table.markdown()), ("csv", table.csv()), ("json", table.json())] {
+                let path = out.join(format!("{name}.{ending}"));
+                write_atomically(&path, text.as_bytes())?;
+                paths.push(path);
+            }
+        }
+        Ok(paths)
+    }
+}
+
+/// A row of the experiment, as far as it is.
+struct Seen {
+    row: Row,
+    results: Option<Results>,
+    /// One a test set.
+    reports: Vec<Option<Report>>,
+    /// Median seconds an image, one a test set.
+    seconds: Vec<Option<f64>>,
+}
+
+/// A line of the tables: all seeds of a learner and a training set.
+struct Line<'a> {
+    name: &'static str,
+    train: &'a str,
+    seen: Vec<&'a Seen>,
+}
+
+/// The tables of what is there, and what the user should know.
+pub fn tables(bound: &Bound, out: &Path) -> Result<(Tables, Vec<String>)> {
+    let experiment = &bound.experiment;
+    let mut told = Vec::new();
+    let seen = rows::rows(experiment)
+        .into_iter()
+        .map(|row| see(experiment, row, out, &mut told))
+        .collect::<Result<Vec<_>>>()?;
+    let lines = lines(experiment, &seen);
+    let all = vec![
+        ("table-1", segmentation(experiment, &lines)),
+        ("table-2", vegetation(experiment, &lines)),
+        ("table-3", classes(experiment, &lines)),
+        (RUNS, runs(experiment, &seen)),
+        ("times", times(experiment, &seen)),
+    ];
+    Ok((Tables(all), told))
+}
+
+fn see(experiment: &Experiment, row: Row, out: &Path, told: &mut Vec<String>) -> Result<Seen> {
+    let folder = row.folder(experiment, out);
+    let who = judgement::who(&folder)?;
+    let mut report = |test: &TestSet| {
+        let who = who.as_ref()?;
+        match Judgement::find(&judgement::path(&folder, &test.slug), who, test.part.pick, None) {
+            Known::Here(found) => Some(found.report),
+            Known::Missing => None,
+            Known::Wrong(why) => {
+                told.push(format!("{why}; the tables leave it out"));
+                None
+            }
+        }
+    };
+    let reports = experiment.test.iter().map(&mut report).collect();
+    let seconds = experiment.test.iter().map(|t| judgement::seconds(&folder, &t.slug).map(|s| s.median)).collect();
+    Ok(Seen { row, results: run::results(&folder)?, reports, seconds })
+}
+
+/// Networks, then baselines, as the page names them; each with the training sets in their order.
+fn lines<'a>(experiment: &'a Experiment, seen: &'a [Seen]) -> Vec<Line<'a>> {
+    let networks = experiment.networks.iter().map(|n| n.name());
+    let names = networks.chain(experiment.baselines.iter().map(|b| b.name()));
+    let line = |name: &'static str| {
+        experiment.train.iter().enumerate().map(move |(i, train)| Line {
+            name,
+            train: &train.name,
+            seen: seen.iter().filter(|s| s.row.learner.name() == name && s.row.train == i).collect(),
+        })
+    };
+    names.flat_map(line).collect()
+}
+
+impl Line<'_> {
+    /// What all seeds came to on a test set, as far as they are.
+    fn values(&self, test: usize, of: impl Fn(&Report) -> Option<f64>) -> Vec<f64> {
+        self.seen.iter().filter_map(|s| of(s.reports[test].as_ref()?)).collect()
+    }
+
+    /// Runs that were judged on every test set.
+    fn done(&self) -> u64 {
+        self.seen.iter().filter(|s| s.reports.iter().all(Option::is_some)).count() as u64
+    }
+
+    fn begin(&self) -> [Cell; 2] {
+        [Cell::text(self.name), Cell::text(self.train)]
+    }
+}
+
+fn mean(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
+
+/// Standard deviation with n − 1; none of fewer than two.
+fn spread(values: &[f64]) -> Option<f64> {
+    let middle = mean(values).filter(|_| values.len() > 1)?;
+    Some((values.iter().map(|v| (v - middle).powi(2)).sum::<f64>() / (values.len() - 1) as f64).sqrt())
+}
+
+/// A share of a report.
+type Score = (&'static str, fn(&Report) -> Option<f64>);
+
+/// Means over seeds of some scores, a group of columns a test set.
+fn means(title: String, experiment: &Experiment, lines: &[Line<'_>], scores: &[Score]) -> Table {
+    let heads = experiment.test.iter().flat_map(|t| scores.iter().map(move |(head, _)| format!("{} {head}", t.name)));
+    let columns = ["network", "trained on"].map(str::to_owned).into_iter().chain(heads).chain(["runs".to_owned()]);
+    let mut table = Table::new(title, columns);
+    for line in lines {
+        let cells = (0..experiment.test.len()).flat_map(|test| {
+            scores.iter().map(move |(_, score)| Cell::percent(mean(&line.values(test, score)), PERCENT))
+        });
+        table.push(line.begin().into_iter().chain(cells).chain([Cell::Count(line.done())]));
+    }
+    table
+}
+
+/// What tables are of, in words.
+fn scale(experiment: &Experiment) -> String {
+    let learn = &experiment.learn;
+    let scale = experiment.scale.as_ref().map(|s| format!("scale {s}, ")).unwrap_or_default();
+    format!(
+        "%, {scale}{} × {}, at most {} steps of {}",
+        learn.shape.width, learn.shape.height, learn.steps, learn.batch
+    )
+}
+
+/// Table I: GA, CA and mean I/U.
+fn segmentation(experiment: &Experiment, lines: &[Line<'_>]) -> Table {
+    let scores: [Score; 3] =
+        [("GA", |r| r.scores.global_accuracy), ("CA", |r| r.scores.class_accuracy), ("I/U", |r| r.scores.mean_iou)];
+    means(format!("Image segmentation ({})", scale(experiment)), experiment, lines, &scores)
+}
+
+/// Table II: precision and recall of vegetation.
+fn vegetation(experiment: &Experiment, lines: &[Line<'_>]) -> Table {
+    let scores: [Score; 2] = [("P", |r| r.scores.vegetation.precision), ("R", |r| r.scores.vegetation.recall)];
+    means(format!("Vegetation detection ({})", scale(experiment)), experiment, lines, &scores)
+}
+
+/// I/U of every class but the first, and of vegetation: means over seeds, and how far seeds stray.
+fn classes(experiment: &Experiment, lines: &[Line<'_>]) -> Table {
+    let names = experiment.learn.classes.names();
+    let iou = |report: &Report, class: Option<usize>| match class {
+        Some(class) => report.scores.classes.get(class)?.iou,
+        None => report.scores.vegetation.iou,
+    };
+    let kinds: Vec<(&str, Option<usize>)> =
+        names.iter().enumerate().skip(1).map(|(i, n)| (n.as_str(), Some(i))).collect();
+    let kinds = [kinds, vec![("vegetation", None)]].concat();
+    let heads = experiment.test.iter().flat_map(|t| {
+        kinds.iter().flat_map(move |(name, _)| [format!("{} {name}", t.name), format!("{} {name} ±", t.name)])
+    });
+    let columns = ["network", "trained on"].map(str::to_owned).into_iter().chain(heads).chain(["runs".to_owned()]);
+    let mut table =
+        Table::new(format!("I/U of plants, mean and standard deviation over seeds ({})", scale(experiment)), columns);
+    for line in lines {
+        let mut cells = line.begin().to_vec();
+        for test in 0..experiment.test.len() {
+            for (_, class) in &kinds {
+                let values = line.values(test, |r| iou(r, *class));
+                cells.extend([Cell::percent(mean(&values), PERCENT), Cell::percent(spread(&values), PERCENT)]);
+            }
+        }
+        cells.push(Cell::Count(line.done()));
+        table.push(cells);
+    }
+    table
+}
+
+/// All rows with their numbers and how far they are.
+pub fn listing(bound: &Bound, out: &Path) -> Result<Table> {
+    let experiment = &bound.experiment;
+    let mut table = Table::new("Rows", ["row", "network", "trained on", "seed", "training", "tests judged"]);
+    for (i, row) in rows::rows(experiment).into_iter().enumerate() {
+        let folder = row.folder(experiment, out);
+        let s = see(experiment, row, out, &mut Vec::new())?;
+        let state = match (judgement::who(&folder)?.is_some(), folder.join(run::PLAN).exists()) {
+            (true, _) => "done",
+            (false, true) => "begun",
+            (false, false) => "missing",
+        };
+        let judged = s.reports.iter().flatten().count();
+        table.push([
+            Cell::Count(i as u64),
+            Cell::text(row.learner.name()),
+            Cell::text(&experiment.train[row.train].name),
+            seed(&row),
+            Cell::text(state),
+            Cell::text(format!("{judged} of {}", s.reports.len())),
+        ]);
+    }
+    Ok(table)
+}
+
+fn seed(row: &Row) -> Cell {
+    match row.learner {
+        Learner::Network(_, seed) => Cell::Count(seed),
+        Learner::Baseline(_) => Cell::number(None, 0),
+    }
+}
+
+/// Every run on every test set, by itself.
+fn runs(experiment: &Experiment, seen: &[Seen]) -> Table {
+    let names = experiment.learn.classes.names();
+    let fixed =
+        ["network", "trained on", "seed", "steps", "best step", "tested on", "GA", "CA", "I/U"].map(str::to_owned);
+    let classes = names.iter().map(|n| format!("{n} I/U"));
+    let last = ["vegetation I/U", "vegetation P", "vegetation R"].map(str::to_owned);
+    let mut table = Table::new(format!("Runs ({})", scale(experiment)), fixed.into_iter().chain(classes).chain(last));
+    for s in seen {
+        let steps = |v: Option<u64>| Cell::number(v.map(|v| v as f64), 0);
+        for (test, report) in experiment.test.iter().zip(&s.reports) {
+            let begin = [
+                Cell::text(s.row.learner.name()),
+                Cell::text(&experiment.train[s.row.train].name),
+                seed(&s.row),
+                steps(s.results.as_ref().map(|r| r.steps)),
+                steps(s.results.as_ref().and_then(|r| r.best_step)),
+                Cell::text(&test.name),
+            ];
+            let score = |of: &dyn Fn(&Report) -> Option<f64>| Cell::percent(report.as_ref().and_then(of), PERCENT);
+            let means = [
+                score(&|r| r.scores.global_accuracy),
+                score(&|r| r.scores.class_accuracy),
+                score(&|r| r.scores.mean_iou),
+            ];
+            let classes = (0..names.len()).map(|k| score(&|r| r.scores.classes.get(k)?.iou));
+            let vegetation = [
+                score(&|r| r.scores.vegetation.iou),
+                score(&|r| r.scores.vegetation.precision),
+                score(&|r| r.scores.vegetation.recall),
+            ];
+            table.push(begin.into_iter().chain(means).chain(classes).chain(vegetation));
+        }
+    }
+    table
+}
+
+/// Table III: how long an answer takes, the median of the images of each test set and of all runs; and how long a training takes.
+fn times(experiment: &Experiment, seen: &[Seen]) -> Table {
+    let tests = experiment.test.iter().map(|t| format!("{}: seconds an image", t.name));
+    let columns = ["network".to_owned()].into_iter().chain(tests);
+    let columns = columns.chain(["images learnt a second", "minutes of a training"].map(str::to_owned));
+    let learn = &experiment.learn;
+    let title = format!("Times ({} × {})", learn.shape.width, learn.shape.height);
+    let mut table = Table::new(title, columns);
+    let networks = experiment.networks.iter().map(|n| n.name());
+    for name in networks.chain(experiment.baselines.iter().map(|b| b.name())) {
+        let of: Vec<&Seen> = seen.iter().filter(|s| s.row.learner.name() == name).collect();
+        let results: Vec<&Results> = of.iter().filter_map(|s| s.results.as_ref()).collect();
+        let answers = (0..experiment.test.len()).map(|test| {
+            let all: Vec<f64> = of.iter().filter_map(|s| s.seconds[test]).collect();
+            Cell::number(median(all), 3)
+        });
+        let rate = mean(&results.iter().map(|r| r.images_per_second).collect::<Vec<_>>());
+        let minutes = mean(&results.iter().map(|r| r.seconds / 60.0).collect::<Vec<_>>());
+        table.push(
+            [Cell::text(name)].into_iter().chain(answers).chain([Cell::number(rate, 2), Cell::number(minutes, 1)]),
+        );
+    }
+    table
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    (n > 0).then(|| f64::midpoint(values[(n - 1) / 2], values[n / 2]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seeds_have_a_mean_and_a_spread() {
+        assert_eq!(mean(&[]), None);
+        assert_eq!(spread(&[0.5]), None);
+        assert_eq!((mean(&[1.0, 2.0, 6.0]), spread(&[1.0, 2.0, 6.0])), (Some(3.0), Some(7.0_f64.sqrt())));
+        assert_eq!(median(vec![3.0, 1.0, 2.0, 9.0]), Some(2.5));
+        assert_eq!(median(Vec::new()), None);
+    }
+}

@@ -1,0 +1,329 @@
+//! All of an experiment, as far as it is missing: sets, then row after row training and evaluations, then tables.
+
+use super::colour;
+use super::experiment::TrainSet;
+use super::judgement::{self, BASELINE, Judged, Judgement, Known};
+use super::print::{self, Tables};
+use super::rows::{self, Learner, Row};
+use super::sets::Bound;
+use crate::dataset::generate::Shard;
+use crate::output::write_atomically;
+use crate::train::baseline::{Baseline, Kind};
+use crate::train::data::{Pick, Selection, Store};
+use crate::train::fit::Plan;
+use crate::train::measure::Report;
+use crate::train::net::Network;
+use crate::train::run::{self, Identity, Learnt, Results};
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// A part of the work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Only {
+    /// The sets.
+    Sets,
+    /// The tables, of what is there.
+    Tables,
+}
+
+/// What is to be done.
+#[derive(Clone, Copy, Debug)]
+pub struct Order<'a> {
+    /// The experiment and its images.
+    pub bound: &'a Bound,
+    /// Its folder.
+    pub out: &'a Path,
+    /// The page's text, to be kept beside the tables.
+    pub page: &'a str,
+    /// Every so many-th row.
+    pub shard: Shard,
+    /// A part of the work; all of it with none.
+    pub only: Option<Only>,
+    /// Most seconds of a training.
+    pub seconds: Option<u64>,
+    /// Threads that compute, for trainings that are not begun yet; others keep theirs.
+    pub threads: usize,
+    /// Precision, for the same.
+    pub precision: &'a str,
+    /// The program that makes sets.
+    pub trace: &'a Path,
+    /// Whether that shall be quiet.
+    pub quiet: bool,
+}
+
+/// Who does what needs libtorch, and who is told.
+pub struct Hands<'a> {
+    /// Trains a plan into a folder, or goes on with it.
+    pub fit: &'a dyn Fn(&Plan, &Path) -> Result<Results>,
+    /// Judges a network on images, with a precision and so many threads.
+    pub judge: &'a dyn Fn(&Learnt, &Selection, &str, usize) -> Result<Report>,
+    /// Told before each training what it is, and how far the experiment is.
+    pub training: &'a dyn Fn(&str, &State),
+    /// Told what is done else, in words.
+    pub tell: &'a dyn Fn(&str),
+    /// Told what was not as it should be, in words.
+    pub warn: &'a dyn Fn(&str),
+    /// Raised by whoever wants it to stop.
+    pub stop: &'a AtomicBool,
+}
+
+/// How far the trainings of a shard are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct State {
+    /// The training at hand, from 1.
+    pub number: usize,
+    /// Trainings of the shard.
+    pub of: usize,
+    /// Seconds that this one and those to come will take, by those of the experiment that are done.
+    pub left: Option<f64>,
+}
+
+/// Does what is missing; returns the paths of the tables.
+pub fn run(order: &Order<'_>, hands: &Hands<'_>) -> Result<Vec<PathBuf>> {
+    let Order { bound, out, .. } = *order;
+    if order.only == Some(Only::Tables) {
+        return tables(order, hands);
+    }
+    bound.check()?;
+    write_atomically(&out.join("experiment.ron"), order.page.as_bytes())?;
+    for set in bound.used() {
+        bound.make(set, order.trace, order.quiet, hands.tell, hands.stop)?;
+    }
+    if order.only == Some(Only::Sets) {
+        return Ok(bound.used().into_iter().map(|set| bound.folder(set).join(crate::dataset::recipe::FILE)).collect());
+    }
+    let rows = rows::of_shard(&bound.experiment, order.shard);
+    // Before hours are spent on the first row, the last one is checked.
+    let mut todo = Vec::new();
+    for (_, row) in &rows {
+        let work = Work { order, hands, row: *row, folder: row.folder(&bound.experiment, out) };
+        work.check()?;
+        todo.push(work);
+    }
+    let trainings: Vec<&Work<'_>> = todo.iter().filter(|w| w.network().is_some()).collect();
+    let mut number = 0;
+    for work in &todo {
+        if work.network().is_some() {
+            number += 1;
+        }
+        let made = work.train(number, &trainings)? | work.judge()?;
+        if made {
+            // What is left out of them is told once, at the end.
+            tables(order, &Hands { warn: &|_| (), ..*hands })?;
+        }
+    }
+    tables(order, hands)
+}
+
+/// Writes the tables of what is there.
+fn tables(order: &Order<'_>, hands: &Hands<'_>) -> Result<Vec<PathBuf>> {
+    let (tables, told) = print::tables(order.bound, order.out)?;
+    for words in told {
+        (hands.warn)(&words);
+    }
+    Tables::write(&tables, order.out)
+}
+
+/// One row's work.
+struct Work<'a> {
+    order: &'a Order<'a>,
+    hands: &'a Hands<'a>,
+    row: Row,
+    folder: PathBuf,
+}
+
+/// A baseline and what it is fitted to.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Fitted {
+    /// Fingerprint of each set, and the numbers of its images.
+    from: Vec<(String, Vec<u64>)>,
+    /// What they were brought to, pixels.
+    size: (u32, u32),
+    #[serde(flatten)]
+    baseline: Baseline,
+}
+
+impl Work<'_> {
+    fn network(&self) -> Option<(Network, u64)> {
+        match self.row.learner {
+            Learner::Network(network, seed) => Some((network, seed)),
+            Learner::Baseline(_) => None,
+        }
+    }
+
+    /// Seed of what is picked by chance.
+    fn seed(&self) -> u64 {
+        self.network().map_or(self.order.bound.experiment.seeds[0], |(_, seed)| seed)
+    }
+
+    fn set(&self) -> &TrainSet {
+        &self.order.bound.experiment.train[self.row.train]
+    }
+
+    fn told(&self) -> String {
+        self.row.told(&self.order.bound.experiment)
+    }
+
+    fn selections(&self) -> (Vec<Selection>, Vec<Selection>) {
+        let bound = self.order.bound;
+        let of = |parts: &[super::Part]| parts.iter().map(|p| bound.selection(p)).collect();
+        (of(&self.set().from), of(&self.set().watch))
+    }
+
+    /// The training of a network; one that was begun keeps what the machine gave it, which decides the last bits.
+    fn plan(&self, network: Network) -> Result<Plan> {
+        let path = self.folder.join(run::PLAN);
+        let before: Option<Identity> = path.exists().then(|| run::read_json(&path)).transpose()?;
+        let (train, val) = self.selections();
+        let Order { threads, precision, seconds, .. } = *self.order;
+        let (threads, precision) = match before {
+            Some(Identity { plan, .. }) => (plan.threads, plan.precision),
+            None => (threads, precision.to_owned()),
+        };
+        let learn = self.order.bound.experiment.learn.clone();
+        Ok(Plan { network, train, val, seed: self.seed(), threads, precision, seconds, ..learn })
+    }
+
+    /// Whether all that is needed is there, test images are no training images, and nothing else lies in the folder.
+    fn check(&self) -> Result<()> {
+        let bound = self.order.bound;
+        let (train, watch) = self.selections();
+        let mut seen = BTreeSet::new();
+        for selection in train.iter().chain(&watch) {
+            let (set, numbers) = selection.open(Pick::All, self.seed())?;
+            seen.extend(numbers.into_iter().map(|n| (set.folder.clone(), n)));
+        }
+        for test in &bound.experiment.test {
+            let (set, numbers) = bound.selection(&test.part).open(Pick::All, 0)?;
+            if let Some(n) = numbers.into_iter().find(|n| seen.contains(&(set.folder.clone(), *n))) {
+                return Err(Error::Training(format!(
+                    "`{}` is judged on image {n} of `{}`, which `{}` learns from or is watched by\n help: what was seen proves nothing; give them other images of the page",
+                    test.name,
+                    bound.experiment.sets[test.part.set].0,
+                    self.set().name
+                )));
+            }
+        }
+        let Some((network, _)) = self.network() else { return Ok(()) };
+        if !self.folder.join(run::PLAN).exists() {
+            return Ok(());
+        }
+        let plan = self.plan(network)?;
+        let open = |selections: &[Selection]| {
+            Store::open(selections, Pick::All, plan.seed, &plan.classes, &plan.shape, false, 0)
+        };
+        Identity::of(&plan, &open(&train)?, &open(&watch)?)?.claim(&self.folder)
+    }
+
+    /// Trains the row where it is not done; says whether it was not.
+    fn train(&self, number: usize, all: &[&Work<'_>]) -> Result<bool> {
+        match self.row.learner {
+            Learner::Baseline(kind) => self.fit_baseline(kind),
+            Learner::Network(..) if self.is_done() => Ok(false),
+            Learner::Network(network, _) => {
+                let state = State { number, of: all.len(), left: left(all, self.order)? };
+                (self.hands.training)(&self.told(), &state);
+                (self.hands.fit)(&self.plan(network)?, &self.folder)?;
+                Ok(true)
+            }
+        }
+    }
+
+    fn is_done(&self) -> bool {
+        self.folder.join(run::RESULT).exists()
+    }
+
+    fn fit_baseline(&self, kind: Kind) -> Result<bool> {
+        let like = &self.order.bound.experiment.learn.shape;
+        let (from, _) = self.selections();
+        let prints = |selection: &Selection| {
+            let (set, numbers) = selection.open(Pick::All, self.seed())?;
+            Ok((set.recipe.fingerprint()?, numbers))
+        };
+        let path = self.folder.join(BASELINE);
+        let size = (like.width, like.height);
+        let prints = from.iter().map(prints).collect::<Result<Vec<_>>>()?;
+        if path.exists() {
+            match run::read_json::<Fitted>(&path) {
+                Ok(there) if there.from == prints && there.size == size && there.baseline.kind == kind => {
+                    return Ok(false);
+                }
+                Ok(_) => self.again(&format!("{}: this was fitted to other images", path.display())),
+                Err(e) => self.again(&short(&e)),
+            }
+        }
+        let baseline = colour::fit(kind, &from, self.seed(), like, self.hands.stop)?;
+        run::write_json(&path, &Fitted { from: prints, size, baseline })?;
+        Ok(true)
+    }
+
+    /// Judges the row on the test sets where that is missing; says whether it was.
+    fn judge(&self) -> Result<bool> {
+        let Order { bound, .. } = *self.order;
+        let Some(of) = judgement::who(&self.folder)? else {
+            return Err(judgement::foreign(&self.folder, "there is no trained network in this folder"));
+        };
+        let mut learnt = None;
+        let mut made = false;
+        for test in &bound.experiment.test {
+            let selection = bound.selection(&test.part);
+            let on = judgement::images(&selection)?;
+            match Judgement::find(&judgement::path(&self.folder, &test.slug), &of, test.part.pick, Some(&on)) {
+                Known::Here(_) => continue,
+                Known::Wrong(why) => self.again(&why),
+                Known::Missing => {}
+            }
+            if self.hands.stop.load(Ordering::Relaxed) {
+                return Err(Error::Interrupted);
+            }
+            let report = match &of {
+                Judged::Baseline(baseline) => {
+                    colour::judge(baseline, &selection, &bound.experiment.learn.shape, self.hands.stop)?
+                }
+                Judged::Network { .. } => {
+                    let learnt = match learnt.take() {
+                        Some(open) => learnt.insert(open),
+                        None => learnt.insert(Learnt::open(&self.folder)?),
+                    };
+                    let Identity { plan, .. } = run::read_json(&self.folder.join(run::PLAN))?;
+                    (self.hands.judge)(learnt, &selection, &plan.precision, plan.threads)?
+                }
+            };
+            let judgement = Judgement { of: of.clone(), images: test.part.pick, on, report };
+            Judgement::keep(&self.folder, &test.slug, judgement)?;
+            made = true;
+        }
+        Ok(made)
+    }
+
+    fn again(&self, why: &str) {
+        (self.hands.warn)(&format!("{why}; it is made again"));
+    }
+}
+
+/// An error's first line.
+fn short(e: &Error) -> String {
+    e.to_string().lines().next().unwrap_or_default().to_owned()
+}
+
+/// Seconds that the trainings that are not done will take: each what those of its network took in the mean, or else what all did.
+/// None before the first is done.
+fn left(all: &[&Work<'_>], order: &Order<'_>) -> Result<Option<f64>> {
+    let mut known: Vec<(Network, f64)> = Vec::new();
+    for row in rows::rows(&order.bound.experiment) {
+        if let Learner::Network(network, _) = row.learner
+            && let Some(results) = run::results(&row.folder(&order.bound.experiment, order.out))?
+        {
+            known.push((network, results.seconds));
+        }
+    }
+    let mean = |of: &dyn Fn(Network) -> bool| {
+        let some: Vec<f64> = known.iter().filter(|(n, _)| of(*n)).map(|(_, s)| *s).collect();
+        (!some.is_empty()).then(|| some.iter().sum::<f64>() / some.len() as f64)
+    };
+    let open = all.iter().filter(|w| !w.is_done()).filter_map(|w| w.network());
+    Ok(open.map(|(network, _)| mean(&|n| n == network).or_else(|| mean(&|_| true))).sum())
+}
