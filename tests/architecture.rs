@@ -56,6 +56,8 @@ const DOORS: &[(&str, &str)] = &[
     ("noise", "texture/noise.rs"),
     // Labels need bits that stay, drawn textures need 16 bits and words inside.
     ("png", "output/png.rs texture/draw/"),
+    // ONNX files.
+    ("prost", "train/deploy/onnx/"),
     ("rand", "sampling/rng.rs"),
     ("rand_pcg", "sampling/rng.rs"),
     // Parallel at the top only.

@@ -10,3 +10,5 @@ pub mod program;
 pub mod python;
 pub mod scenes;
 pub mod stats;
+#[cfg(feature = "train")]
+pub mod training;

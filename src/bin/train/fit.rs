@@ -108,6 +108,7 @@ fn bands(text: &str) -> Result<Bands, String> {
     Band::list(text).map(Bands)
 }
 
+/// Reads `480x360`.
 pub(crate) fn size(text: &str) -> Result<(u32, u32), String> {
     let sides = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
     sides
