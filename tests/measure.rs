@@ -8,6 +8,7 @@ mod common;
 
 use common::python::python;
 use furrow::sampling::rng::{Purpose, Stream};
+use furrow::train::baseline::{Baseline, Cut, Example, Kind, SizeRule};
 use furrow::train::measure::bootstrap;
 use furrow::train::measure::boundary::{Boundary, TOLERANCE};
 use furrow::train::measure::components::Components;
@@ -42,9 +43,9 @@ fn random_map(stream: &mut Stream, width: usize, height: usize, ignore: bool) ->
         let (x, y) = (stream.range(0.0, width as f64), stream.range(0.0, height as f64));
         let radius = stream.range(0.5, width as f64 / 4.0);
         let class = if ignore && stream.chance(0.2) { 255 } else { 1 + stream.index(2) as u8 };
-        for at in 0..map.len() {
+        for (at, pixel) in map.iter_mut().enumerate() {
             if ((at % width) as f64 - x).hypot((at / width) as f64 - y) < radius {
-                map[at] = class;
+                *pixel = class;
             }
         }
     }
@@ -420,4 +421,116 @@ fn scikit_learn_and_scipy_find_the_same_numbers() {
     let (said, faults) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     assert!(output.status.success(), "{said}{faults}");
     assert!(said.contains("40 cases agree"), "{said}");
+}
+
+/// A picture of brown soil and green leaves by their classes, with noise of so many steps.
+fn field(stream: &mut Stream, truth: &[u8], noise: f64) -> Vec<[u8; 3]> {
+    truth
+        .iter()
+        .map(|class| {
+            let colour = if *class == 1 || *class == 2 { [60.0, 120.0, 50.0] } else { [120.0, 95.0, 70.0] };
+            colour.map(|v| (v + noise * stream.normal()).round().clamp(0.0, 255.0) as u8)
+        })
+        .collect()
+}
+
+/// Fields with squares of crop 12 pixels wide and of weed 4 pixels wide, on 80 × 60.
+fn fields(seed: u64, noise: f64) -> Vec<Example> {
+    let one = |k: u64| {
+        let mut stream = Stream::of(seed, k, Purpose::Test, 7);
+        let mut truth = vec![0; 80 * 60];
+        for row in 0..3 {
+            for column in 0..4 {
+                let (class, side) = if stream.chance(0.5) { (1, 12) } else { (2, 4) };
+                let (x, y) = (column * 20 + stream.index(8), row * 20 + stream.index(8));
+                for at in (0..side * side).map(|i| (y + i / side) * 80 + x + i % side) {
+                    truth[at] = class;
+                }
+            }
+        }
+        truth[stream.index(80)] = 255;
+        let rgb = field(&mut stream, &truth, noise);
+        Example { width: 80, height: 60, rgb, truth }
+    };
+    (0..6).map(one).collect()
+}
+
+fn fit(kind: Kind, cut: Cut, images: &[Example]) -> Baseline {
+    Baseline::fit(kind, cut, || images.iter().cloned().map(Ok)).unwrap()
+}
+
+/// Mean I/U and I/U of the vegetation.
+fn judged(baseline: &Baseline, images: &[Example]) -> (f64, f64) {
+    let mut matrix = Confusion::new(3);
+    for image in images {
+        matrix.add(&image.truth, &baseline.predict(image.width, image.height, &image.rgb)).unwrap();
+    }
+    let scores = Scores::of(&matrix, &PLANTS);
+    (scores.mean_iou.unwrap(), scores.vegetation.iou.unwrap())
+}
+
+#[test]
+fn colour_and_size_tell_clean_squares_apart() {
+    let (train, test) = (fields(1, 0.0), fields(2, 0.0));
+    for cut in [Cut::Otsu, Cut::Fitted] {
+        let colour = fit(Kind::Exg, cut, &train);
+        assert_eq!(judged(&colour, &test).1, 1.0, "{colour:?}");
+        assert!(judged(&colour, &test).0 < 0.67, "without sizes no weed is found");
+        let size = fit(Kind::ExgSize, cut, &train);
+        assert_eq!(judged(&size, &test), (1.0, 1.0), "{size:?}");
+        let rule = size.sizes.unwrap();
+        assert!(rule.weed_from <= 16.0 / 4800.0 && (16.0 / 4800.0..=144.0 / 4800.0).contains(&rule.crop_from));
+        let json = serde_json::to_string(&size).unwrap();
+        assert_eq!(serde_json::from_str::<Baseline>(&json).unwrap(), size, "{json}");
+    }
+    assert_eq!(Kind::ALL.map(|kind| Kind::named(kind.name())), Kind::ALL.map(Some));
+}
+
+#[test]
+fn what_is_fitted_beats_what_is_not_where_there_is_noise() {
+    let (train, test) = (fields(3, 28.0), fields(4, 28.0));
+    let [otsu, fitted] = [Cut::Otsu, Cut::Fitted].map(|cut| fit(Kind::Exg, cut, &train));
+    assert!(fitted.blur > 0.0, "noise is blurred: {fitted:?}");
+    let (without, with) = (judged(&otsu, &test).1, judged(&fitted, &test).1);
+    assert!(with > without + 0.05 && with > 0.6, "{with} against {without}");
+    // On its own images no threshold of the same index and blur is better.
+    let best = judged(&fitted, &train).1;
+    for step in -20..20 {
+        let threshold = fitted.threshold.map(|t| t + 0.01 * f64::from(step));
+        let other = Baseline { threshold, ..fitted.clone() };
+        assert!(judged(&other, &train).1 <= best + 1e-12, "{other:?}");
+    }
+    // Nor are other sizes.
+    let size = fit(Kind::ExgSize, Cut::Fitted, &train);
+    let best = judged(&size, &train).0;
+    for factor in [0.3, 0.5, 0.8, 1.25, 2.0, 3.0] {
+        let rule = size.sizes.unwrap();
+        for rule in [
+            SizeRule { crop_from: rule.crop_from * factor, ..rule },
+            SizeRule { weed_from: rule.weed_from * factor, ..rule },
+        ] {
+            assert!(judged(&Baseline { sizes: Some(rule), ..size.clone() }, &train).0 <= best + 1e-12, "{rule:?}");
+        }
+    }
+}
+
+#[test]
+fn baselines_say_what_they_cannot_learn_from() {
+    let bare = Example { width: 2, height: 1, rgb: vec![[90; 3]; 2], truth: vec![0, 255] };
+    let said = |kind, cut, images: &[Example]| {
+        Baseline::fit(kind, cut, || images.iter().cloned().map(Ok)).unwrap_err().to_string()
+    };
+    assert!(
+        said(Kind::Exg, Cut::Fitted, std::slice::from_ref(&bare))
+            .contains("no pixel of the training images is a plant")
+    );
+    assert!(said(Kind::ExgSize, Cut::Otsu, &[]).contains("no image"));
+    let strange = Example { truth: vec![0, 3], ..bare.clone() };
+    assert!(said(Kind::Exg, Cut::Fitted, &[strange]).contains("has the class 3"));
+    let short = Example { truth: vec![0], ..bare.clone() };
+    assert!(said(Kind::ExgSize, Cut::Otsu, &[short]).contains("2 × 1 pixels has 2 colours and 1 labels"));
+    // A flat picture holds nothing that stands out, and Otsu's threshold asks no image.
+    let never = || -> Vec<furrow::Result<Example>> { panic!("nothing is to be learned") };
+    let otsu = Baseline::fit(Kind::Exg, Cut::Otsu, never).unwrap();
+    assert_eq!(otsu.predict(2, 1, &bare.rgb), [0, 0]);
 }

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Installs what the build and the tests need, on Debian 12, as root or as a user who may sudo, and asks nothing: Embree and a C compiler; and the
-# programs that the tests ask for a second opinion (a browser, a batch system, Python clients in target/venv). What is there already is left alone.
+# programs that the tests ask for a second opinion (a browser, a batch system, Python clients in target/venv); libtorch for the feature `train`.
+# What is there already is left alone.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 packages="libembree-dev build-essential python3-venv libllvm19 chromium slurm-wlm munge iproute2 procps parallel"
@@ -15,3 +16,4 @@ if ! cmp -s tests/requirements.txt target/venv/installed; then
   target/venv/bin/pip install -q -r tests/requirements.txt
   cp tests/requirements.txt target/venv/installed
 fi
+sh .libtorch/get.sh

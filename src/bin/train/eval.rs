@@ -1,10 +1,10 @@
 //! `train eval`.
 
 use crate::machine::MachineArgs;
+use crate::report::{self, Shots};
 use furrow::cli::signal::Signals;
-use furrow::output::write_atomically;
-use furrow::train::data::Selection;
-use furrow::train::run::{self, Learnt};
+use furrow::train::data::{Band, Pick, Selection};
+use furrow::train::run::Learnt;
 use furrow::train::session;
 use furrow::{Result, cli};
 use std::path::PathBuf;
@@ -17,7 +17,7 @@ pub(crate) struct Args {
     /// Images with labels; all of the set unless it says DIR@PICK.
     #[arg(long = "set", value_name = "DIR[@PICK]", value_parser = Selection::parse)]
     set: Selection,
-    /// Folder for the tables; `eval/NAME` in the run's, after the set, unless given.
+    /// Folder for what comes out; `eval/NAME` in the run's, after the set, unless given.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -27,20 +27,30 @@ pub(crate) struct Args {
 /// Judges, and writes what came out.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let learnt = Learnt::open(&args.run)?;
-    let name = args.set.folder.file_name().unwrap_or_default();
-    let out = args.out.clone().unwrap_or_else(|| args.run.join("eval").join(name));
+    let set = args.set.folder.file_name().unwrap_or_default();
+    let out = args.out.clone().unwrap_or_else(|| args.run.join("eval").join(set));
     cli::check_folder(&out)?;
-    let machine = args.machine.machine();
-    let threads = args.machine.threads();
+    let (machine, threads) = (args.machine.machine(), args.machine.threads());
+    let card = &learnt.card;
+    let bands: Vec<&str> = card.input.bands.iter().map(Band::name).collect();
+    let (_, images) = args.set.open(Pick::All, 0)?;
+    let mut shots = Shots::new(images.len(), &bands);
+    let size = (card.input.width, card.input.height);
+    let mut see = |seen: &session::Seen<'_>| {
+        shots.see(seen.example, size, seen.predicted);
+        Ok(())
+    };
     let report =
-        session::evaluate(&learnt, &args.set, &args.machine.precision, threads, &machine, signals.heed(), &mut |_| {
-            Ok(())
-        })?;
-    let tables = report.tables();
-    let markdown: String = tables.iter().map(|t| t.markdown() + "\n").collect();
-    let [json, md] = [out.join("report.json"), out.join("report.md")];
-    run::write_json(&json, &report)?;
-    write_atomically(&md, markdown.as_bytes())?;
+        session::evaluate(&learnt, &args.set, &args.machine.precision, threads, &machine, signals.heed(), &mut see)?;
+    let title = format!("{} on {}", args.run.display(), args.set.folder.display());
+    let lead = format!(
+        "{}, {} parameters, at {} × {} pixels.",
+        card.network.about().trim_end_matches('.'),
+        card.parameters,
+        size.0,
+        size.1
+    );
+    let paths = report::write(&out, &title, &lead, &report, &shots.shots, &card.classes.colors())?;
     eprint!("{}", report.summary().markdown());
-    Ok(vec![json, md])
+    Ok(paths)
 }

@@ -1,6 +1,7 @@
 //! `train fit`.
 
 use crate::machine::MachineArgs;
+use crate::report;
 use furrow::cli::signal::Signals;
 use furrow::train::classes::Classes;
 use furrow::train::data::{Augment, Band, Selection, Shape};
@@ -107,7 +108,7 @@ fn bands(text: &str) -> Result<Bands, String> {
     Band::list(text).map(Bands)
 }
 
-fn size(text: &str) -> Result<(u32, u32), String> {
+pub(crate) fn size(text: &str) -> Result<(u32, u32), String> {
     let sides = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
     sides
         .filter(|(w, h)| (32..=8192).contains(w) && (32..=8192).contains(h))
@@ -177,6 +178,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
             eprintln!("{}: {}", folder.display(), told(&results));
         }
         paths.extend([folder.join(run::WEIGHTS), folder.join(run::MODEL)]);
+        paths.extend(report::write_training(&folder, &results, &plan.classes.names(), &facts(&plan, &results))?);
     }
     Ok(paths)
 }
@@ -240,4 +242,20 @@ fn told(results: &Results) -> String {
         "{} steps{why} in {:.0} s, {:.2} images a second{best}",
         results.steps, results.seconds, results.images_per_second
     )
+}
+
+/// What the run's page says of the plan.
+fn facts(plan: &Plan, results: &Results) -> Vec<(String, String)> {
+    let sets = |selections: &[Selection]| selections.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+    let bands: Vec<&str> = plan.shape.bands.iter().map(Band::name).collect();
+    let fact = |name: &str, value: String| (name.to_owned(), value);
+    vec![
+        fact("network", plan.network.about().into()),
+        fact("learnt from", sets(&plan.train)),
+        fact("watched by", sets(&plan.val)),
+        fact("input", format!("{} at {} × {} pixels", bands.join(", "), plan.shape.width, plan.shape.height)),
+        fact("steps", format!("{} of {} images", results.steps, plan.batch)),
+        fact("seed", plan.seed.to_string()),
+        fact("how it went", told(results)),
+    ]
 }

@@ -1,8 +1,10 @@
 //! `train`: learns to tell crop from weed from datasets, and says how well.
 
+mod baseline;
 mod eval;
 mod fit;
 mod machine;
+mod report;
 mod table;
 
 use clap::{Parser, Subcommand};
@@ -27,6 +29,7 @@ Examples:
   train fit --set data/d --out runs/d                     Basic SegNet on the training images of a set
   train fit --set data/d --set data/real@0..10*4 --network unet --size 240x180 --out runs/augmented
   train eval runs/d --set data/real@12..20                how well it does on real images
+  train baseline exg-size --from data/real@0..10 --set data/real@12..20
   train table scenes/experiments/paper.ron --real jai=DIR the paper's tables, from scenes and real folders
 
 A run that was stopped or killed goes on with the same command, and ends the same.
@@ -39,6 +42,8 @@ enum Verb {
     Fit(Box<fit::Args>),
     /// Judge a trained network on images with labels.
     Eval(eval::Args),
+    /// Judge what colour alone can do: what a network must beat.
+    Baseline(baseline::Args),
     /// Run an experiment of a page: sets, trainings, evaluations, tables.
     Table(Box<table::Args>),
 }
@@ -48,6 +53,7 @@ fn main() -> ExitCode {
     let done = match Cli::parse().verb {
         Verb::Fit(args) => fit::run(&args, &signals),
         Verb::Eval(args) => eval::run(&args, &signals),
+        Verb::Baseline(args) => baseline::run(&args, &signals),
         Verb::Table(args) => table::run(&args, &signals),
     };
     match done {

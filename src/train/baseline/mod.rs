@@ -16,6 +16,7 @@
 //!
 //! Classes are soil 0, crop 1, weed 2, and 255 in the truth no label.
 
+pub mod files;
 mod green;
 mod size;
 

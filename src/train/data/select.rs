@@ -5,6 +5,7 @@ use crate::dataset::split::Split;
 use crate::sampling::{Purpose, Stream};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
+use std::fmt;
 use std::path::PathBuf;
 
 /// Which images of a set.
@@ -66,6 +67,20 @@ impl Selection {
     }
 }
 
+impl fmt::Display for Selection {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.folder.display())?;
+        match self.pick {
+            None => {}
+            Some(Pick::All) => write!(f, "@all")?,
+            Some(Pick::Split(split)) => write!(f, "@{}", split.name())?,
+            Some(Pick::Range(from, to)) => write!(f, "@{from}..{to}")?,
+            Some(Pick::Random(n)) => write!(f, "@random:{n}")?,
+        }
+        if self.repeat == 1 { Ok(()) } else { write!(f, "*{}", self.repeat) }
+    }
+}
+
 impl Pick {
     /// Reads `all`, `train`, `val`, `test`, `0..10` or `random:100`.
     pub fn parse(text: &str) -> Result<Self, String> {
@@ -110,6 +125,9 @@ mod tests {
         );
         assert_eq!(read("d@random:7").pick, Some(Pick::Random(7)));
         assert_eq!(read("d@val").pick, Some(Pick::Split(Split::Val)));
+        for text in ["data/d", "a@b/c@0..10*4", "d@random:7", "d@val", "d@all*2"] {
+            assert_eq!(read(text).to_string(), text);
+        }
         for bad in ["d@", "d@5..5", "d@random:0", "d*0", "d*x", "d@most"] {
             assert!(Selection::parse(bad).is_err(), "{bad}");
         }

@@ -30,11 +30,9 @@
 //! | `rows` | what is to be done, in which order, in which folder |
 //! | `sets` | images made by the program `trace` |
 //! | `judgement` | how well a row does on a test set, kept |
-//! | `colour` | baselines fitted and judged |
 //! | `work` | all of it, as far as it is missing |
 //! | `print` | tables |
 
-mod colour;
 mod desc;
 mod experiment;
 mod judgement;

@@ -1,6 +1,5 @@
 //! All of an experiment, as far as it is missing: sets, then row after row training and evaluations, then tables.
 
-use super::colour;
 use super::experiment::TrainSet;
 use super::judgement::{self, BASELINE, Judged, Judgement, Known};
 use super::print::{self, Tables};
@@ -8,7 +7,7 @@ use super::rows::{self, Learner, Row};
 use super::sets::Bound;
 use crate::dataset::generate::Shard;
 use crate::output::write_atomically;
-use crate::train::baseline::{Baseline, Kind};
+use crate::train::baseline::{Baseline, Kind, files};
 use crate::train::data::{Pick, Selection, Store};
 use crate::train::fit::Plan;
 use crate::train::measure::Report;
@@ -255,7 +254,7 @@ impl Work<'_> {
                 Err(e) => self.again(&short(&e)),
             }
         }
-        let baseline = colour::fit(kind, &from, self.seed(), like, self.hands.stop)?;
+        let baseline = files::fit(kind, &from, self.seed(), like, self.hands.stop)?;
         run::write_json(&path, &Fitted { from: prints, size, baseline })?;
         Ok(true)
     }
@@ -281,7 +280,7 @@ impl Work<'_> {
             }
             let report = match &of {
                 Judged::Baseline(baseline) => {
-                    colour::judge(baseline, &selection, &bound.experiment.learn.shape, self.hands.stop)?
+                    files::judge(baseline, &selection, &bound.experiment.learn.shape, self.hands.stop, &mut |_, _| ())?
                 }
                 Judged::Network { .. } => {
                     let learnt = match learnt.take() {

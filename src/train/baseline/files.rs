@@ -1,11 +1,10 @@
-//! Colour baselines, fitted and judged on what networks see.
+//! Colour baselines from files to scores: fitted to images of sets and judged on them, at the size at which networks see them.
 
-use crate::Error;
-use crate::Result;
-use crate::train::baseline::{Baseline, Cut, Example, Kind};
+use super::{Baseline, Cut, Example, Kind};
 use crate::train::classes::Classes;
 use crate::train::data::{self, Band, Pick, Selection, Shape, Store};
 use crate::train::measure::{Answer, Evaluation, Report};
+use crate::{Error, Result};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -23,8 +22,8 @@ fn colours(example: &data::Example) -> Vec<[u8; 3]> {
     red.iter().zip(green).zip(blue).map(|((r, g), b)| [*r, *g, *b]).collect()
 }
 
-/// Fits a baseline to the training images of a row.
-pub(super) fn fit(kind: Kind, from: &[Selection], seed: u64, like: &Shape, stop: &AtomicBool) -> Result<Baseline> {
+/// Fits a baseline to the images of selections, all of a set unless they pick; both sizes of `like` count, its bands do not.
+pub fn fit(kind: Kind, from: &[Selection], seed: u64, like: &Shape, stop: &AtomicBool) -> Result<Baseline> {
     let store = open(from, Pick::All, seed, like, false)?;
     let (width, height) = (like.width, like.height);
     let image = |place| {
@@ -37,8 +36,14 @@ pub(super) fn fit(kind: Kind, from: &[Selection], seed: u64, like: &Shape, stop:
     Baseline::fit(kind, Cut::Fitted, || (0..store.len()).map(image))
 }
 
-/// Judges a baseline on images of a set.
-pub(super) fn judge(baseline: &Baseline, on: &Selection, like: &Shape, stop: &AtomicBool) -> Result<Report> {
+/// Judges a baseline on images of a set; each is shown to `seen` with what the baseline says.
+pub fn judge(
+    baseline: &Baseline,
+    on: &Selection,
+    like: &Shape,
+    stop: &AtomicBool,
+    seen: &mut dyn FnMut(&data::Example, &[u8]),
+) -> Result<Report> {
     let store = open(std::slice::from_ref(on), Pick::All, 0, like, true)?;
     let (width, height) = (like.width, like.height);
     let mut evaluation = Evaluation::new(Classes::default().names());
@@ -54,6 +59,7 @@ pub(super) fn judge(baseline: &Baseline, on: &Selection, like: &Shape, stop: &At
         let plants = example.plants.iter().any(|p| *p > 0).then_some(example.plants.as_slice());
         let (name, truth) = (example.name.as_str(), example.labels.as_slice());
         evaluation.add(&Answer { name, width, height, truth, predicted: &predicted, plants, seconds })?;
+        seen(&example, &predicted);
     }
     Ok(evaluation.finish())
 }

@@ -1,0 +1,134 @@
+"""Our training steps against Python's torch, turn by turn on one machine: images a second of each, and their ratio.
+
+    cargo bench --features train --bench learn --no-run
+    VENV/bin/python benches/learn.py --set DIR          # a venv with torch==2.11.0
+
+Both compute the same networks (SegNet and Basic SegNet; the U-Net's encoder needs torchvision's blocks, written out here), Adam, the same
+batch, precision and threads. Torch gets random numbers that lie ready in memory; ours reads, varies and normalises images as well.
+"""
+import argparse
+import os
+import statistics
+import subprocess
+import time
+
+import torch
+import torch.nn as nn
+import torch.nn.functional as F
+
+
+class Unit(nn.Sequential):
+    def __init__(self, a, b, k, stride=1, relu=True, bias=True):
+        layers = [nn.Conv2d(a, b, k, stride, k // 2, bias=bias), nn.BatchNorm2d(b)]
+        super().__init__(*layers, *([nn.ReLU()] if relu else []))
+
+
+class SegNet(nn.Module):
+    def __init__(self, encoder, decoder, kernel, head, relu):
+        super().__init__()
+        make = lambda blocks, relu: nn.ModuleList(nn.Sequential(*[Unit(a, b, kernel, relu=relu) for a, b in block]) for block in blocks)
+        self.encoder, self.decoder = make(encoder, True), make(decoder, relu)
+        self.head = nn.Conv2d(64, 3, head, padding=head // 2)
+
+    def forward(self, x):
+        stack = []
+        for block in self.encoder:
+            x = block(x)
+            size = x.shape[-2:]
+            x, places = F.max_pool2d(x, 2, 2, return_indices=True)
+            stack.append((places, size))
+        for block in self.decoder:
+            places, size = stack.pop()
+            x = block(F.max_unpool2d(x, places, 2, 2, output_size=size))
+        return self.head(x)
+
+
+class Residual(nn.Module):
+    def __init__(self, a, b, stride):
+        super().__init__()
+        self.first, self.second = Unit(a, b, 3, stride, bias=False), Unit(b, b, 3, relu=False, bias=False)
+        self.past = nn.Identity() if a == b and stride == 1 else Unit(a, b, 1, stride, relu=False, bias=False)
+
+    def forward(self, x):
+        return F.relu(self.second(self.first(x)) + self.past(x))
+
+
+class UNet(nn.Module):
+    def __init__(self):
+        super().__init__()
+        self.stem = Unit(3, 64, 7, 2, bias=False)
+        stages = [(64, 64, 1), (64, 128, 2), (128, 256, 2), (256, 512, 2)]
+        self.stages = nn.ModuleList(nn.Sequential(Residual(a, b, s), Residual(b, b, 1)) for a, b, s in stages)
+        inputs = [(512 + 256, 256), (256 + 128, 128), (128 + 64, 64), (64 + 64, 32), (32, 16)]
+        self.decoder = nn.ModuleList(nn.Sequential(Unit(a, b, 3, bias=False), Unit(b, b, 3, bias=False)) for a, b in inputs)
+        self.head = nn.Conv2d(16, 3, 3, padding=1)
+
+    def forward(self, x):
+        size, stem = x.shape[-2:], self.stem(x)
+        skips, y = [stem], F.max_pool2d(stem, 3, 2, 1)
+        for stage in self.stages:
+            y = stage(y)
+            skips.append(y)
+        skips.pop()
+        for block in self.decoder:
+            like = skips.pop() if skips else None
+            y = F.interpolate(y, size=size if like is None else like.shape[-2:])
+            y = block(y if like is None else torch.cat([y, like], 1))
+        return self.head(y)
+
+
+def network(name):
+    if name == "unet":
+        return UNet()
+    if name == "basic-segnet":
+        return SegNet([[(3, 64)]] + [[(64, 64)]] * 3, [[(64, 64)]] * 4, 7, 1, False)
+    encoder = [[(3, 64), (64, 64)], [(64, 128), (128, 128)], [(128, 256), (256, 256), (256, 256)], [(256, 512), (512, 512), (512, 512)], [(512, 512)] * 3]
+    decoder = [[(512, 512)] * 3, [(512, 512), (512, 512), (512, 256)], [(256, 256), (256, 256), (256, 128)], [(128, 128), (128, 64)], [(64, 64)]]
+    return SegNet(encoder, decoder, 3, 3, True)
+
+
+def theirs(name, a):
+    torch.manual_seed(1)
+    model = network(name).to(memory_format=torch.channels_last)
+    x = torch.randn(a.batch, 3, a.height, a.width).contiguous(memory_format=torch.channels_last)
+    y = torch.randint(0, 3, (a.batch, a.height, a.width))
+    optimiser = torch.optim.AdamW(model.parameters(), 1e-3, weight_decay=5e-4)
+    times = []
+    for _ in range(a.steps):
+        begun = time.perf_counter()
+        with torch.autocast("cpu", torch.bfloat16, enabled=a.precision == "bf16"):
+            scores = model(x)
+        loss = F.cross_entropy(scores.float(), y)
+        optimiser.zero_grad(set_to_none=False)
+        loss.backward()
+        optimiser.step()
+        loss.item()
+        times.append(time.perf_counter() - begun)
+    return a.batch / statistics.median(times)
+
+
+def ours(name, a):
+    words = ["cargo", "bench", "-q", "--features", "train", "--bench", "learn", "--", "--set", a.set, "--network", name, "--precision", a.precision]
+    words += ["--width", str(a.width), "--height", str(a.height), "--batch", str(a.batch), "--steps", str(a.steps)]
+    out = subprocess.run(words, check=True, capture_output=True, text=True).stdout
+    return float(out.strip().splitlines()[-1].split("|")[4])
+
+
+if __name__ == "__main__":
+    p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    p.add_argument("--set", required=True)
+    p.add_argument("--networks", default="basic-segnet,segnet,unet")
+    p.add_argument("--width", type=int, default=480)
+    p.add_argument("--height", type=int, default=360)
+    p.add_argument("--batch", type=int, default=4)
+    p.add_argument("--steps", type=int, default=9)
+    p.add_argument("--rounds", type=int, default=3)
+    p.add_argument("--precision", default="bf16", choices=["bf16", "f32"])
+    a = p.parse_args()
+    torch.set_num_threads(os.cpu_count())
+    print("| network | ours, images a second | torch | ratio |\n|---|---|---|---|")
+    for name in a.networks.split(","):
+        pairs = [(ours(name, a), theirs(name, a)) for _ in range(a.rounds)]
+        mine, torchs = (statistics.median(v) for v in zip(*pairs))
+        ratio = statistics.median(m / t for m, t in pairs)
+        print(f"| {name} | {mine:.2f} | {torchs:.2f} | {ratio:.2f} |", flush=True)

@@ -1,0 +1,87 @@
+//! Images learnt from in a second, by each network: `cargo bench --features train --bench learn -- --set DIR`.
+//!
+//! The whole of a training step counts: reading and varying images, the network forth and back, the optimiser. Told is the median over
+//! steps, so that the first ones, which set up kernels and decode images, do not count. `benches/learn.py` runs the same networks in
+//! Python's torch, turn by turn with this program.
+
+use furrow::train::data::{Selection, Shape};
+use furrow::train::engine::{Model, Precision, Where};
+use furrow::train::fit::{Plan, Watch};
+use furrow::train::net::Network;
+use furrow::train::session::{self, Machine};
+use std::cell::RefCell;
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+use tch::Device;
+
+struct Asked {
+    set: PathBuf,
+    size: (u32, u32),
+    batch: usize,
+    steps: u64,
+    precision: String,
+    networks: Vec<Network>,
+}
+
+/// `cargo bench` passes `--bench`, which nobody asked for.
+fn asked() -> Asked {
+    let words: Vec<String> = std::env::args().skip(1).filter(|w| w != "--bench").collect();
+    let of = |name: &str| words.iter().position(|w| w == name).and_then(|i| words.get(i + 1)).cloned();
+    let number = |name: &str, usual: u64| of(name).map_or(usual, |n| n.parse().expect("a number"));
+    let networks = of("--network").map_or(Network::ALL.to_vec(), |n| vec![Network::named(&n).expect("a network")]);
+    Asked {
+        set: of("--set").expect("--set DIR: a folder that `trace dataset` made").into(),
+        size: (number("--width", 480) as u32, number("--height", 360) as u32),
+        batch: number("--batch", 4) as usize,
+        steps: number("--steps", 9),
+        precision: of("--precision").unwrap_or_else(|| "auto".into()),
+        networks,
+    }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+fn main() {
+    let asked = asked();
+    let precision = Precision::named(&asked.precision, Device::Cpu).expect("a precision");
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let (width, height) = asked.size;
+    println!("| network | size | precision | images a second, learning | seconds an image, answering |");
+    println!("|---|---|---|---|---|");
+    for network in &asked.networks {
+        let folder = tempfile::tempdir().expect("a folder");
+        let plan = Plan {
+            network: *network,
+            shape: Shape { width, height, ..Plan::default().shape },
+            train: vec![Selection::parse(&format!("{}@all", asked.set.display())).expect("a set")],
+            steps: asked.steps,
+            batch: asked.batch,
+            watch_every: u64::MAX,
+            precision: precision.name().into(),
+            threads,
+            ..Plan::default()
+        };
+        let machine = Machine { device: "cpu".into(), loaders: 1, memory: 4 << 30 };
+        let times = RefCell::new(vec![Instant::now()]);
+        let step = |_, _| times.borrow_mut().push(Instant::now());
+        let stop = AtomicBool::new(false);
+        let watch = Watch { step: &step, look: &|_, _| (), stop: &stop };
+        session::fit(&plan, None, &machine, folder.path(), &watch).expect("a training");
+        let times = times.into_inner();
+        let learning = asked.batch as f64 / median(times.windows(2).map(|t| (t[1] - t[0]).as_secs_f64()).collect());
+        let model = Model::new(*network, 3, 3, 1, Where { device: Device::Cpu, precision });
+        let pixels = vec![0.5; 3 * width as usize * height as usize];
+        let answer = || {
+            let begun = Instant::now();
+            model.predict(&pixels, asked.size).expect("an answer");
+            begun.elapsed().as_secs_f64()
+        };
+        let answering = median((0..7).map(|_| answer()).collect());
+        let name = network.name();
+        println!("| {name} | {width} × {height} | {} | {learning:.2} | {answering:.3} |", precision.name());
+    }
+}

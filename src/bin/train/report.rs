@@ -1,0 +1,132 @@
+//! What an evaluation leaves for people and programs: tables, the figure, one page.
+
+use furrow::Result;
+use furrow::output::write_atomically;
+use furrow::train::data::Example;
+use furrow::train::figure::{Chart, Curve, Page, Shot, sheet, spread};
+use furrow::train::fit::checkpoint::History;
+use furrow::train::measure::Report;
+use furrow::train::run;
+use std::path::{Path, PathBuf};
+
+/// Images that the figure and the page show.
+const SHOWN: usize = 8;
+/// Pixels that they are wide and high at most.
+const LARGEST: u32 = 360;
+
+/// Images to look at, spread over a set.
+pub(crate) struct Shots {
+    places: Vec<usize>,
+    next: usize,
+    colours: Option<[usize; 3]>,
+    pub(crate) shots: Vec<Shot>,
+}
+
+impl Shots {
+    /// Of a set of `images` images, whose bands have these names.
+    pub(crate) fn new(images: usize, bands: &[&str]) -> Self {
+        let band = |name: &str| bands.iter().position(|b| *b == name);
+        let colours = match (band("red"), band("green"), band("blue")) {
+            (Some(r), Some(g), Some(b)) => Some([r, g, b]),
+            _ => None,
+        };
+        Self { places: spread(images, SHOWN), next: 0, colours, shots: Vec::new() }
+    }
+
+    /// Sees an image; keeps it if it is one of the chosen. Without red, green and blue the first band is shown as gray.
+    pub(crate) fn see(&mut self, example: &Example, size: (u32, u32), predicted: &[u8]) {
+        if self.places.contains(&self.next) {
+            let planes = self.colours.unwrap_or_default().map(|band| &example.planes[band]);
+            let rgb: Vec<[u8; 3]> = (0..example.labels.len()).map(|i| planes.map(|plane| plane[i])).collect();
+            self.shots.push(Shot::new(&example.name, size, &rgb, &example.labels, &[predicted], LARGEST));
+        }
+        self.next += 1;
+    }
+}
+
+/// Writes `report.json`, `report.md`, `figure.png` and `report.html`; returns their paths.
+pub(crate) fn write(
+    out: &Path,
+    title: &str,
+    lead: &str,
+    report: &Report,
+    shots: &[Shot],
+    palette: &[[u8; 3]],
+) -> Result<Vec<PathBuf>> {
+    let [html, figure, json, markdown] =
+        ["report.html", "figure.png", "report.json", "report.md"].map(|name| out.join(name));
+    let tables: String = report.tables().iter().map(|t| t.markdown() + "\n").collect();
+    let page = Page {
+        kind: "Evaluation",
+        title,
+        lead,
+        report: Some(report),
+        shots,
+        palette,
+        classes: &report.classes,
+        ..Page::default()
+    };
+    write_atomically(&html, page.html()?.as_bytes())?;
+    write_atomically(&figure, &sheet(shots, palette, true).png()?)?;
+    write_atomically(&markdown, tables.as_bytes())?;
+    run::write_json(&json, report)?;
+    Ok(vec![html, figure, json, markdown])
+}
+
+/// The curves of a training: its loss, and what the looks at the validation images saw.
+pub(crate) fn curves(history: &History, classes: &[String]) -> Vec<Chart> {
+    let chart = |title: &str, upwards: &str, curves: Vec<Curve>, logarithmic| Chart {
+        title: title.into(),
+        across: "steps".into(),
+        upwards: upwards.into(),
+        curves,
+        logarithmic,
+    };
+    let losses = history.losses.iter().map(|l| (l.step as f64, l.loss)).collect();
+    let mut charts =
+        vec![chart("Loss", "cross entropy", vec![Curve { name: "training".into(), points: losses }], true)];
+    if !history.looks.is_empty() {
+        let of = |name: &str, value: &dyn Fn(usize) -> Option<f64>| Curve {
+            name: name.into(),
+            points: history
+                .looks
+                .iter()
+                .enumerate()
+                .filter_map(|(i, l)| Some((l.step as f64, 100.0 * value(i)?)))
+                .collect(),
+        };
+        let mut all = vec![of("mean", &|i| Some(history.looks[i].miou))];
+        all.extend(classes.iter().enumerate().map(|(c, name)| of(name, &|i| history.looks[i].iou[c])));
+        charts.push(chart("Validation images", "I/U, %", all, false));
+    }
+    charts
+}
+
+/// Writes `report.html`, `loss.svg` and `log.csv` of a training.
+pub(crate) fn write_training(
+    out: &Path,
+    results: &run::Results,
+    classes: &[String],
+    facts: &[(String, String)],
+) -> Result<Vec<PathBuf>> {
+    let charts = curves(&results.history, classes);
+    let [html, svg, log] = ["report.html", "loss.svg", "log.csv"].map(|name| out.join(name));
+    let page = Page {
+        kind: "Training",
+        title: &out.display().to_string(),
+        facts,
+        charts: &charts,
+        classes,
+        ..Page::default()
+    };
+    write_atomically(&html, page.html()?.as_bytes())?;
+    write_atomically(&svg, charts[0].svg().as_bytes())?;
+    let mut lines = String::from("step,loss,rate,validation_mean_iou\n");
+    for loss in &results.history.losses {
+        let look = results.history.looks.iter().find(|look| look.step == loss.step);
+        let miou = look.map_or(String::new(), |look| look.miou.to_string());
+        lines += &format!("{},{},{},{miou}\n", loss.step, loss.loss, loss.rate);
+    }
+    write_atomically(&log, lines.as_bytes())?;
+    Ok(vec![html, svg, log])
+}

@@ -1,0 +1,282 @@
+//! Training: it learns, it says so, and stopping it changes nothing.
+//!
+//! Rationale: a training runs overnight and is judged by its last weights, so a kill that changed them, or a file of another training
+//! taken for its own, would falsify every table made of it. Expected: equal bytes of `weights.safetensors` stopped or not, killed or not,
+//! with any number of loading threads; one clear error, exit code 2, for what cannot be gone on with. Source: what `train fit --help` says.
+
+use furrow::output::{Picture, write_png};
+use furrow::sampling::{Purpose, Stream};
+use furrow::train::classes::Classes;
+use furrow::train::data::{Augment, Band, Loader, Normalisation, Order, Pick, Selection, Shape, Store};
+use furrow::train::run::{self, Learnt, Results};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+const W: u32 = 64;
+const H: u32 = 48;
+
+/// Images of brown ground with large green discs, the crop, and small ones of nearly the same green, the weeds; a set of them.
+fn set(folder: &Path, images: u64) -> PathBuf {
+    let (photos, masks, out) = (folder.join("images"), folder.join("masks"), folder.join("set"));
+    for k in 0..images {
+        let mut stream = Stream::of(5, k, Purpose::Test, 0);
+        let mut draw = |radius: f32| (stream.range32(0.0, W as f32), stream.range32(0.0, H as f32), radius);
+        let discs = [draw(11.0), draw(9.0), draw(3.0), draw(2.5), draw(3.0)];
+        let class = |x: u32, y: u32| {
+            let inside = |(cx, cy, r): &(f32, f32, f32)| (x as f32 - cx).hypot(y as f32 - cy) < *r;
+            discs.iter().find(|d| inside(d)).map_or(0, |d| if d.2 > 5.0 { 1 } else { 2 })
+        };
+        let labels: Vec<u8> = (0..W * H).map(|i| class(i % W, i / W)).collect();
+        let mut noise = |v: u8| (f32::from(v) + stream.range32(-12.0, 12.0)) as u8;
+        let colors = [[120, 95, 70], [70, 150, 50], [80, 150, 45]];
+        let rgb: Vec<[u8; 3]> = labels.iter().map(|c| colors[usize::from(*c)].map(&mut noise)).collect();
+        let name = format!("{k:03}.png");
+        write_png(&photos.join(&name), W, H, &Picture::Rgb(&rgb), "").unwrap();
+        write_png(&masks.join(&name), W, H, &Picture::Gray(&labels), "").unwrap();
+    }
+    let path = |p: &Path| p.to_str().unwrap().to_owned();
+    let made = Command::new(env!("CARGO_BIN_EXE_trace"))
+        .args(["dataset", "import", "--format", "masks", "--images", &path(&photos), "--masks", &path(&masks)])
+        .args(["--out", &path(&out)])
+        .output()
+        .unwrap();
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    out
+}
+
+fn train(arguments: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_train"));
+    command.args(arguments.split(' ')).stdin(Stdio::null());
+    command
+}
+
+/// `train fit` on the set, small and quick: one thread, single precision.
+fn fit(set: &Path, out: &Path, more: &str) -> Command {
+    let (set, out) = (set.display(), out.display());
+    train(&format!("fit --set {set}@all --out {out} --size {W}x{H} --threads 1 --precision f32 --batch 4 {more}"))
+}
+
+fn succeed(command: &mut Command) -> Output {
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    output
+}
+
+/// The program's error; it must have ended with `code`.
+fn refuse(command: &mut Command, code: i32) -> String {
+    let output = command.output().unwrap();
+    let words = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(code), "{words}");
+    words
+}
+
+fn weights(run: &Path) -> Vec<u8> {
+    fs::read(run.join(run::WEIGHTS)).unwrap()
+}
+
+fn results(run: &Path) -> Results {
+    run::results(run).unwrap().unwrap()
+}
+
+#[test]
+fn eight_images_are_learnt_by_every_network_and_judged_so() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path();
+    let set = set(folder, 8);
+    for (network, steps, rate) in [("basic-segnet", 60, "0.003"), ("unet", 80, "0.003"), ("segnet", 40, "0.001")] {
+        let out = folder.join(network);
+        let more = format!(
+            "--network {network} --steps {steps} --rate {rate} --augment none --balance none --watch-every 1000"
+        );
+        succeed(&mut fit(&set, &out, &more));
+        let losses = results(&out).history.losses;
+        let last = losses[losses.len() - 5..].iter().map(|l| l.loss).sum::<f64>() / 5.0;
+        // Soil everywhere costs 0.6 and more; what is left is edges and the smallest weeds.
+        assert!(losses[0].loss > 0.5 && last < 0.25, "{network}: {} to {last}", losses[0].loss);
+        succeed(&mut train(&format!("eval {} --set {} --threads 1 --precision f32", out.display(), set.display())));
+        let report: furrow::train::measure::Report = run::read_json(&out.join("eval/set/report.json")).unwrap();
+        assert!(report.scores.classes[1].iou.unwrap() > 0.6, "{network}: {:?}", report.scores);
+        for name in ["report.html", "figure.png", "report.md"] {
+            assert!(out.join("eval/set").join(name).is_file(), "{name}");
+        }
+        assert!(!out.join("checkpoint.safetensors").exists());
+    }
+}
+
+#[test]
+fn a_training_that_is_stopped_or_killed_ends_with_the_same_bytes() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path();
+    let set = set(folder, 8);
+    for (method, more) in [("adam", ""), ("sgd", " --normalise fixed")] {
+        let more = format!(
+            "--network unet --steps 40 --optimiser {method} --val {}@0..2 --watch-every 5 --patience 100{more}",
+            set.display()
+        );
+        let whole = folder.join(format!("{method}-whole"));
+        succeed(&mut fit(&set, &whole, &more));
+        for (name, signal) in [("stopped", "TERM"), ("killed", "KILL")] {
+            let out = folder.join(format!("{method}-{name}"));
+            let mut stops = 0;
+            for pause in [300, 900, 1500] {
+                let mut child = fit(&set, &out, &more).args(["--loaders", "3"]).stderr(Stdio::null()).spawn().unwrap();
+                std::thread::sleep(Duration::from_millis(pause));
+                let _ = Command::new("sh").arg("-c").arg(format!("kill -{signal} {}", child.id())).status();
+                let begin = Instant::now();
+                let status = child.wait().unwrap();
+                assert!(begin.elapsed() < Duration::from_secs(60));
+                stops += usize::from(!status.success());
+                if signal == "TERM" {
+                    assert!([Some(0), Some(75)].contains(&status.code()), "{status}");
+                }
+            }
+            assert!(stops > 0, "it was always done before it was {name}");
+            succeed(&mut fit(&set, &out, &more));
+            assert_eq!(weights(&out), weights(&whole), "{method} {name}");
+            assert_eq!(results(&out).history, results(&whole).history);
+            let again = succeed(&mut fit(&set, &out, &more));
+            assert!(again.status.success());
+            assert_eq!(weights(&out), weights(&whole));
+        }
+    }
+}
+
+#[test]
+fn seeds_decide_and_their_runs_lie_beside_each_other() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path();
+    let set = set(folder, 4);
+    let more = "--network unet --steps 3";
+    succeed(&mut fit(&set, &folder.join("both"), &format!("{more} --seed 1,2")));
+    succeed(&mut fit(&set, &folder.join("two"), &format!("{more} --seed 2")));
+    assert_eq!(weights(&folder.join("both/seed-2")), weights(&folder.join("two")));
+    assert_ne!(weights(&folder.join("both/seed-1")), weights(&folder.join("two")));
+    succeed(&mut fit(&set, &folder.join("on"), &format!("{more} --seed 2 --init {}", folder.join("two").display())));
+    assert_ne!(weights(&folder.join("on")), weights(&folder.join("two")));
+    // A budget of no time ends after no step.
+    succeed(&mut fit(&set, &folder.join("short"), "--network unet --steps 1000 --time 1s"));
+    let short = results(&folder.join("short"));
+    assert!(short.ended == "time" && short.steps < 1000, "{short:?}");
+}
+
+#[test]
+fn what_cannot_be_gone_on_with_is_told() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path();
+    let set = set(folder, 4);
+    let out = folder.join("run");
+    let more = "--network unet --steps 200 --watch-every 2";
+    let mut child = fit(&set, &out, more).stderr(Stdio::null()).spawn().unwrap();
+    let checkpoint = out.join("checkpoint.safetensors");
+    let begin = Instant::now();
+    while !checkpoint.exists() {
+        assert!(begin.elapsed() < Duration::from_secs(120));
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let error = refuse(&mut fit(&set, &out, "--network unet --steps 100 --watch-every 2"), 2);
+    assert!(
+        error.contains("another training lies in this folder") && error.contains("steps is 200 there and 100 here"),
+        "{error}"
+    );
+    let error = refuse(&mut train(&format!("eval {} --set {}", out.display(), set.display())), 2);
+    assert!(error.contains("this training is not done"), "{error}");
+    let good = fs::read(&checkpoint).unwrap();
+    let mut bad = good.clone();
+    let middle = bad.len() / 2;
+    bad[middle] ^= 1;
+    for bytes in [&bad[..], &good[..1000], b""] {
+        fs::write(&checkpoint, bytes).unwrap();
+        let error = refuse(&mut fit(&set, &out, more), 2);
+        assert!(
+            error.contains("checkpoint.safetensors") && error.contains("damaged") && error.contains("delete the file"),
+            "{error}"
+        );
+        assert_eq!(fs::read(&checkpoint).unwrap(), bytes, "a refused file stays as it is");
+    }
+    let error = refuse(&mut train(&format!("eval {} --set {}", folder.join("none").display(), set.display())), 2);
+    assert!(error.contains("no trained network"), "{error}");
+    let error = refuse(&mut fit(&set, &folder.join("a"), "").args(["--classes", "soil; galium=Galium aparine"]), 2);
+    assert!(error.contains("Galium aparine") && error.contains("knows no species"), "{error}");
+    let error = refuse(&mut fit(&set, &folder.join("b"), "--bands rgbn"), 2);
+    assert!(error.contains("no band `nir`"), "{error}");
+    let error = refuse(&mut fit(&set, &folder.join("c"), &format!("--val {}@3..9", set.display())), 2);
+    assert!(error.contains("the set has 4 images"), "{error}");
+    let error = refuse(&mut fit(&folder.join("nowhere"), &folder.join("d"), ""), 2);
+    assert!(error.contains("this is no dataset"), "{error}");
+    for name in ["a", "b", "c", "d"] {
+        assert!(!folder.join(name).exists(), "{name} was begun");
+    }
+}
+
+#[test]
+fn weights_of_other_classes_and_damaged_ones_are_refused() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path();
+    let set = set(folder, 4);
+    let (three, two) = (folder.join("three"), folder.join("two"));
+    succeed(&mut fit(&set, &three, "--network unet --steps 1"));
+    succeed(fit(&set, &two, "--network unet --steps 1").args(["--classes", "soil; plant=crop,weed"]));
+    assert_eq!(Learnt::open(&two).unwrap().card.classes.names(), ["soil", "plant"]);
+    fs::copy(two.join(run::WEIGHTS), three.join(run::WEIGHTS)).unwrap();
+    let eval = |run: &Path| train(&format!("eval {} --set {} --threads 1", run.display(), set.display()));
+    let error = refuse(&mut eval(&three), 2);
+    assert!(error.contains("not the weights that model.json beside them is about"), "{error}");
+    let error =
+        refuse(&mut fit(&set, &folder.join("on"), &format!("--network unet --steps 1 --init {}", two.display())), 2);
+    assert!(error.contains("not those of unet with 3 bands and 3 classes") && error.contains("head.conv"), "{error}");
+    let path = two.join(run::WEIGHTS);
+    let mut bytes = fs::read(&path).unwrap();
+    let last = bytes.len() - 1;
+    bytes[last] ^= 64;
+    fs::write(&path, &bytes).unwrap();
+    let error = refuse(&mut eval(&two), 2);
+    assert!(error.contains("weights.safetensors") && error.contains("damaged"), "{error}");
+}
+
+#[test]
+fn batches_do_not_depend_on_threads_or_on_where_a_training_goes_on() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path();
+    let set = set(folder, 5);
+    let shape = Shape { bands: Band::RGB.to_vec(), width: 40, height: 32 };
+    let store = |memory| {
+        let all = Selection { folder: set.clone(), pick: None, repeat: 2 };
+        Arc::new(Store::open(&[all], Pick::All, 1, &Classes::default(), &shape, false, memory).unwrap())
+    };
+    let order = Order { seed: 3, batch: 3, augment: Augment::default(), normalisation: Normalisation::Image };
+    let batches = |memory, from, threads| -> Vec<_> {
+        Loader::start(&store(memory), &order, from, 12, threads).map(|b| b.unwrap()).collect()
+    };
+    let plain = batches(1 << 30, 0, 1);
+    assert_eq!(plain.len(), 12);
+    assert!(plain.iter().all(|b| b.pixels.len() == 3 * 40 * 32 * 3 && b.labels.len() == 3 * 40 * 32));
+    assert_eq!(plain, batches(0, 0, 4));
+    assert_eq!(plain[7..], batches(1 << 30, 7, 3));
+    assert_ne!(plain[0], plain[1]);
+}
+
+#[test]
+fn the_size_of_green_regions_is_a_baseline_of_its_own() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path();
+    let set = set(folder, 6);
+    let mean = |kind: &str| {
+        let out = folder.join(kind);
+        let set = set.display();
+        succeed(&mut train(&format!(
+            "baseline {kind} --from {set}@0..4 --set {set}@4..6 --size {W}x{H} --out {}",
+            out.display()
+        )));
+        let report: furrow::train::measure::Report = run::read_json(&out.join("report.json")).unwrap();
+        report.scores
+    };
+    let (colour, size) = (mean("exg"), mean("exg-size"));
+    assert_eq!(colour.classes[2].iou, Some(0.0));
+    assert!(size.classes[2].iou.unwrap() > 0.5 && size.mean_iou > colour.mean_iou, "{size:?}");
+    assert!(size.vegetation.iou.unwrap() > 0.9);
+}
