@@ -11,6 +11,7 @@ use furrow::sampling::{Purpose, Stream};
 use furrow::scene::build::{self, Options};
 use furrow::scene::desc::{FieldDesc, SpeciesDesc};
 use furrow::texture::draw::Recipe;
+use furrow::train::table::{Experiment, ExperimentDesc};
 use furrow::{Error, Result};
 use proptest::prelude::*;
 use serde::Serialize;
@@ -38,8 +39,16 @@ fn is_species(path: &Path) -> bool {
     path.components().any(|c| c.as_os_str() == "species")
 }
 
+fn is_experiment(path: &Path) -> bool {
+    path.components().any(|c| c.as_os_str() == "experiments")
+}
+
 fn fields() -> Vec<PathBuf> {
-    pages("scenes").into_iter().filter(|p| !is_species(p)).collect()
+    pages("scenes").into_iter().filter(|p| !is_species(p) && !is_experiment(p)).collect()
+}
+
+fn experiments() -> Vec<PathBuf> {
+    pages("scenes").into_iter().filter(|p| is_experiment(p)).collect()
 }
 
 fn species() -> Vec<PathBuf> {
@@ -80,6 +89,18 @@ fn every_species_page_grows_at_every_stage() {
     }
 }
 
+#[test]
+fn every_experiment_page_reads_at_each_of_its_scales() {
+    assert!(!experiments().is_empty(), "experiment pages are missing");
+    for path in experiments() {
+        let page = Page::read(&path).unwrap();
+        let desc: ExperimentDesc = page.parse().unwrap_or_else(|e| panic!("{e}"));
+        for scale in [None].into_iter().chain(desc.scales.names().into_iter().map(Some)) {
+            Experiment::of(&page, scale).unwrap_or_else(|e| panic!("{e}"));
+        }
+    }
+}
+
 fn survives_printing<T: Debug + PartialEq + Serialize + DeserializeOwned>(path: &Path) {
     let first: T = Page::read(path).unwrap().parse().unwrap_or_else(|e| panic!("{e}"));
     let printed = Page::print(&first).unwrap();
@@ -95,6 +116,9 @@ fn a_printed_page_reads_the_same() {
     }
     for path in species() {
         survives_printing::<SpeciesDesc>(&path);
+    }
+    for path in experiments() {
+        survives_printing::<ExperimentDesc>(&path);
     }
     for path in pages("textures") {
         survives_printing::<Recipe>(&path);

@@ -1,6 +1,7 @@
 //! What several tests share.
 #![allow(dead_code, unreachable_pub, reason = "each test uses its part")]
 
+pub mod browser;
 pub mod chi2;
 pub mod dataset;
 pub mod layers;

@@ -379,12 +379,11 @@ impl Checker<'_> {
                 parts.iter().enumerate().map(one).collect()
             };
             let from = parts(&desc.from, "from", Pick::Split(Train))?;
-            let watch = match &desc.watch {
-                Some(watch) => parts(watch, "watch", Pick::Split(Val))?,
-                None => {
-                    let open = desc.from.iter().zip(&from).filter(|(desc, _)| desc.images.is_none());
-                    open.map(|(_, part)| Part { pick: Pick::Split(Val), repeat: 1, ..part.clone() }).collect()
-                }
+            let watch = if let Some(watch) = &desc.watch {
+                parts(watch, "watch", Pick::Split(Val))?
+            } else {
+                let open = desc.from.iter().zip(&from).filter(|(desc, _)| desc.images.is_none());
+                open.map(|(_, part)| Part { pick: Pick::Split(Val), repeat: 1, ..part.clone() }).collect()
             };
             all.push(TrainSet { name: desc.name.clone(), slug, from, watch });
         }

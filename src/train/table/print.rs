@@ -110,9 +110,10 @@ impl Line<'_> {
         self.seen.iter().filter_map(|s| of(s.reports[test].as_ref()?)).collect()
     }
 
-    /// Runs that were judged on every test set.
-    fn done(&self) -> u64 {
-        self.seen.iter().filter(|s| s.reports.iter().all(Option::is_some)).count() as u64
+    /// Runs that were judged, on the test set on which they are the fewest.
+    fn done(&self, tests: usize) -> u64 {
+        let judged = |test: usize| self.seen.iter().filter(|s| s.reports[test].is_some()).count() as u64;
+        (0..tests).map(judged).min().unwrap_or(0)
     }
 
     fn begin(&self) -> [Cell; 2] {
@@ -142,7 +143,7 @@ fn means(title: String, experiment: &Experiment, lines: &[Line<'_>], scores: &[S
         let cells = (0..experiment.test.len()).flat_map(|test| {
             scores.iter().map(move |(_, score)| Cell::percent(mean(&line.values(test, score)), PERCENT))
         });
-        table.push(line.begin().into_iter().chain(cells).chain([Cell::Count(line.done())]));
+        table.push(line.begin().into_iter().chain(cells).chain([Cell::Count(line.done(experiment.test.len()))]));
     }
     table
 }
@@ -194,7 +195,7 @@ fn classes(experiment: &Experiment, lines: &[Line<'_>]) -> Table {
                 cells.extend([Cell::percent(mean(&values), PERCENT), Cell::percent(spread(&values), PERCENT)]);
             }
         }
-        cells.push(Cell::Count(line.done()));
+        cells.push(Cell::Count(line.done(experiment.test.len())));
         table.push(cells);
     }
     table

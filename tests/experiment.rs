@@ -1,0 +1,488 @@
+//! Experiments: what a page may say, what is made of it, and that nothing is made twice. Networks are played by hands that need no
+//! libtorch; `tests/table.rs` runs the program itself.
+//!
+//! Rationale: an experiment takes hours on several machines that stop and start. Expected: wrong pages are refused with their place
+//! before anything is written; whatever the order and the interruptions, the files are the same; numbers of tables are means of the
+//! runs' numbers. Source: Di Cicco et al. 2017 for what the tables hold; equality is exact.
+
+mod common;
+
+use common::dataset::{make, same, succeed, tree};
+use furrow::dataset::generate::Shard;
+use furrow::page::Page;
+use furrow::train::classes::Classes;
+use furrow::train::data::{Normalisation, Pick, Selection, Shape, Store};
+use furrow::train::fit::Plan;
+use furrow::train::fit::checkpoint::History;
+use furrow::train::measure::{Answer, Evaluation, Report};
+use furrow::train::run::{self, Card, Identity, Learnt, Results};
+use furrow::train::table::{self, Bound, Experiment, Hands, Only, Order, Real};
+use furrow::train::weights::{self, Array};
+use furrow::{Error, Result};
+use std::cell::{Cell, RefCell};
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use std::sync::atomic::AtomicBool;
+use tempfile::TempDir;
+
+/// Eight labelled images, made once.
+fn frames() -> &'static Path {
+    static FRAMES: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
+    let made = FRAMES.get_or_init(|| {
+        let (keep, folder) = common::program::scratch();
+        succeed(make(&folder, 8, &[]));
+        (keep, folder)
+    });
+    &made.1
+}
+
+const PAGE: &str = r#"Experiment(
+    networks: ["basic-segnet", "unet"],
+    baselines: ["exg"],
+    seeds: [1, 2],
+    learn: (size: (48, 36), steps: 10, batch: 2),
+    sets: {
+        "frames": Real(about: "eight frames"),
+        "small": Scene(page: "tests/ref/small.ron", count: 6, size: (48, 36), spp: 1),
+    },
+    train: [
+        (name: "Few", from: [(set: "frames", images: "0..2")]),
+        (name: "More", from: [(set: "frames", images: "0..3", repeat: 2)], watch: [(set: "frames", images: "3..4")]),
+    ],
+    test: [(name: "Test A", set: "frames", images: "4..6"), (name: "Test B", set: "frames", images: "6..8")],
+    scales: {"less": (learn: (steps: 5), seeds: [7])},
+)"#;
+
+fn page(text: &str) -> Page {
+    // Paths count from the page's folder: the repository's, where tests run.
+    Page { path: "experiment.ron".into(), text: text.into() }
+}
+
+/// Who plays the networks: a run with an odd seed answers soil everywhere, one with an even seed the truth.
+#[derive(Default)]
+struct Players {
+    /// Calls so far, in words.
+    calls: RefCell<Vec<String>>,
+    /// What was warned of.
+    warned: RefCell<Vec<String>>,
+    /// After so many calls the next is interrupted.
+    patience: Cell<Option<usize>>,
+}
+
+impl Players {
+    fn call(&self, words: String) -> Result<()> {
+        if let Some(left) = self.patience.get() {
+            self.patience.set(left.checked_sub(1));
+            if left == 0 {
+                return Err(Error::Interrupted);
+            }
+        }
+        self.calls.borrow_mut().push(words);
+        Ok(())
+    }
+
+    fn fit(&self, plan: &Plan, folder: &Path) -> Result<Results> {
+        let open = |s: &[Selection]| Store::open(s, Pick::All, plan.seed, &plan.classes, &plan.shape, false, 0);
+        let identity = Identity::of(plan, &open(&plan.train)?, &open(&plan.val)?)?;
+        identity.claim(folder)?;
+        self.call(format!("fit {} {} {}", plan.network.name(), plan.train[0].repeat, plan.seed))?;
+        let values = vec![Array { name: "seed".into(), shape: vec![1], values: vec![plan.seed as f32] }];
+        let card = Card {
+            furrow: "test".into(),
+            network: plan.network,
+            parameters: 1,
+            input: plan.shape.clone(),
+            normalisation: Normalisation::Image,
+            classes: plan.classes.clone(),
+            weights: run::WEIGHTS.into(),
+            weights_sha256: weights::hash(&values),
+            plan_sha256: identity.hash()?,
+        };
+        Learnt { card, values }.write(folder)?;
+        let results = Results {
+            steps: plan.steps,
+            best_step: None,
+            ended: "steps".into(),
+            history: History::default(),
+            seconds: 60.0,
+            images_per_second: 3.0,
+        };
+        run::write_json(&folder.join(run::RESULT), &results)?;
+        Ok(results)
+    }
+
+    fn judge(&self, learnt: &Learnt, on: &Selection) -> Result<Report> {
+        let seed = learnt.values[0].values[0];
+        self.call(format!("judge {} {seed} {} {:?}", learnt.card.network.name(), learnt.card.plan_sha256, on.pick))?;
+        let shape: &Shape = &learnt.card.input;
+        let store = Store::open(std::slice::from_ref(on), Pick::All, 0, &Classes::default(), shape, false, 0)?;
+        let mut evaluation = Evaluation::new(Classes::default().names());
+        for place in 0..store.len() {
+            let example = store.get(place)?;
+            let predicted: Vec<u8> = example.labels.iter().map(|l| if seed % 2.0 == 0.0 { *l } else { 0 }).collect();
+            evaluation.add(&Answer {
+                name: &example.name,
+                width: shape.width,
+                height: shape.height,
+                truth: &example.labels,
+                predicted: &predicted,
+                plants: None,
+                seconds: Some(0.5),
+            })?;
+        }
+        Ok(evaluation.finish())
+    }
+
+    fn run(&self, text: &str, out: &Path, shard: Shard, only: Option<Only>) -> Result<Vec<PathBuf>> {
+        let page = page(text);
+        let experiment = Experiment::of(&page, None)?;
+        let real = [Real { name: "frames".into(), folder: frames().into() }];
+        let bound = Bound::new(experiment, &real, &[], out)?;
+        let trace = Path::new(env!("CARGO_BIN_EXE_trace"));
+        let order = Order {
+            bound: &bound,
+            out,
+            page: &page.text,
+            shard,
+            only,
+            seconds: None,
+            threads: 1,
+            precision: "f32",
+            trace,
+            quiet: true,
+        };
+        table::run(
+            &order,
+            &Hands {
+                fit: &|plan, folder| self.fit(plan, folder),
+                judge: &|learnt, on, _, _| self.judge(learnt, on),
+                training: &|_, _| (),
+                tell: &|_| (),
+                warn: &|words| self.warned.borrow_mut().push(words.into()),
+                stop: &AtomicBool::new(false),
+            },
+        )
+    }
+
+    fn took(&self) -> Vec<String> {
+        std::mem::take(&mut self.calls.borrow_mut())
+    }
+}
+
+/// Runs the page to its end in a folder that goes away with what is returned.
+fn whole(text: &str) -> (TempDir, PathBuf) {
+    let (keep, out) = common::program::scratch();
+    Players::default().run(text, &out, Shard::ALL, None).unwrap();
+    (keep, out)
+}
+
+/// All files but those of clock times and of locks.
+fn files(out: &Path) -> std::collections::BTreeMap<String, Vec<u8>> {
+    let clock = |name: &str| name.contains("/time/") || name.starts_with("times.") || name.contains("plan.json");
+    tree(out).into_iter().filter(|(name, _)| !clock(name)).collect()
+}
+
+/// The number in a column of the row that begins with these words.
+fn number(out: &Path, table: &str, begin: &[&str], column: &str) -> f64 {
+    let text = std::fs::read_to_string(out.join(format!("{table}.csv"))).unwrap();
+    let mut lines = text.lines().map(|l| l.split(',').collect::<Vec<_>>());
+    let heads = lines.next().unwrap();
+    let at = heads.iter().position(|h| *h == column).unwrap_or_else(|| panic!("no {column} among {heads:?}"));
+    let row = lines.find(|l| l.starts_with(begin)).unwrap_or_else(|| panic!("no {begin:?} in {text}"));
+    row[at].parse().unwrap_or(f64::NAN)
+}
+
+#[test]
+fn tables_hold_means_of_the_seeds_and_how_far_they_stray() {
+    let (_keep, out) = whole(PAGE);
+    let soil = number(&out, "runs", &["unet", "Few", "1", "10", "", "Test A"], "GA");
+    assert!(soil > 20.0 && soil < 99.9, "{soil}: the frames are neither all soil nor without any");
+    let close = |table: &str, column: &str, expected: f64| {
+        let found = number(&out, table, &["unet", "Few"], column);
+        assert!((found - expected).abs() < 1e-9, "{column}: {found}, not {expected}");
+    };
+    close("table-1", "Test A GA", f64::midpoint(soil, 100.0));
+    close("table-1", "runs", 2.0);
+    close("table-3", "Test A vegetation", 50.0);
+    // Of 0 and 100 with n − 1.
+    close("table-3", "Test A vegetation ±", 50.0 * 2.0_f64.sqrt());
+    close("table-2", "Test B R", 50.0);
+    // Soil alone claims no plant: its precision is of nothing, and the other seed's is all there is.
+    close("table-2", "Test A P", 100.0);
+    assert_eq!(number(&out, "times", &["unet"], "Test A: seconds an image"), 0.5);
+    assert_eq!(number(&out, "times", &["unet"], "minutes of a training"), 1.0);
+    // A colour baseline has learnt something on these frames, and no seed.
+    assert!(number(&out, "table-3", &["exg", "Few"], "Test A vegetation") > 20.0);
+    assert!(number(&out, "table-3", &["exg", "Few"], "Test A vegetation ±").is_nan());
+    assert_eq!(number(&out, "table-1", &["exg", "More"], "runs"), 1.0);
+}
+
+#[test]
+fn interrupted_before_every_step_it_ends_with_the_same_files() {
+    let (_keep, expected) = whole(PAGE);
+    let (_keep, out) = common::program::scratch();
+    let players = Players::default();
+    let mut sittings = 0;
+    loop {
+        players.patience.set(Some(1));
+        match players.run(PAGE, &out, Shard::ALL, None) {
+            Err(Error::Interrupted) => sittings += 1,
+            other => {
+                other.unwrap();
+                break;
+            }
+        }
+        assert!(sittings < 100, "no end");
+    }
+    // 8 trainings and 16 evaluations, one a sitting, and the last sitting ends it.
+    assert_eq!((sittings, players.took().len()), (23, 24));
+    same(&files(&out), &files(&expected));
+}
+
+#[test]
+fn shards_of_rows_make_the_whole_in_any_order() {
+    let (_keep, expected) = whole(PAGE);
+    let (_keep, out) = common::program::scratch();
+    let players = Players::default();
+    let mut all = Vec::new();
+    for number in [2, 0, 1] {
+        players.run(PAGE, &out, Shard { number, of: 3 }, None).unwrap();
+        all.extend(players.took());
+        if number == 2 {
+            // What the others have not done yet is shown as not known.
+            assert!(number_is_missing(&out));
+        }
+    }
+    let calls = all.len();
+    all.sort();
+    all.dedup();
+    assert_eq!((calls, all.len()), (24, 24), "each training and evaluation once");
+    same(&files(&out), &files(&expected));
+}
+
+fn number_is_missing(out: &Path) -> bool {
+    std::fs::read_to_string(out.join("table-1.md")).unwrap().contains('–')
+}
+
+#[test]
+fn what_is_there_is_not_made_again_and_a_page_may_get_longer() {
+    let (_keep, out) = whole(PAGE);
+    let before = files(&out);
+    let players = Players::default();
+    players.run(PAGE, &out, Shard::ALL, None).unwrap();
+    assert!(players.took().is_empty());
+    same(&files(&out), &before);
+    let longer = PAGE.replace("seeds: [1, 2]", "seeds: [1, 2, 4]");
+    players.run(&longer, &out, Shard::ALL, None).unwrap();
+    let took = players.took();
+    assert_eq!(took.len(), 4 + 8, "{took:?}");
+    assert!(took.iter().all(|c| c.contains('4')), "{took:?}");
+}
+
+#[test]
+fn a_page_whose_trainings_have_changed_is_refused_before_any_work() {
+    let (_keep, out) = common::program::scratch();
+    let players = Players::default();
+    players.run(PAGE, &out, Shard { number: 7, of: 10 }, None).unwrap();
+    players.took();
+    let other = PAGE.replace("steps: 10", "steps: 12");
+    let error = players.run(&other, &out, Shard::ALL, None).unwrap_err();
+    assert!(error.to_string().contains("steps is 10 there and 12 here"), "{error}");
+    assert_eq!(error.exit_code(), 2);
+    assert!(players.took().is_empty());
+}
+
+#[test]
+fn evaluations_that_cannot_be_believed_are_told_and_made_again() {
+    let (_keep, out) = whole(PAGE);
+    let before = files(&out);
+    let file = out.join("runs/unet/few/seed-2/eval/test-a.json");
+    let baseline = out.join("runs/exg/few/baseline.json");
+    let players = Players::default();
+    let spoil = |path: &Path, from: &str, to: &str| {
+        let text = std::fs::read_to_string(path).unwrap();
+        assert!(text.contains(from), "{from}");
+        std::fs::write(path, text.replace(from, to)).unwrap();
+    };
+    let spoils: [(&dyn Fn(), &str, usize); 4] = [
+        (&|| std::fs::write(&file, "{\"of\":").unwrap(), "cannot be read", 1),
+        (&|| spoil(&file, "\"weights\": \"", "\"weights\": \"0"), "other weights", 1),
+        (&|| spoil(&file, "\"Range\"", "\"Random\""), "cannot be read", 1),
+        (&|| std::fs::write(&baseline, "nonsense").unwrap(), "cannot be read", 0),
+    ];
+    for (spoil, words, judged) in spoils {
+        spoil();
+        players.run(PAGE, &out, Shard::ALL, None).unwrap();
+        let warned = players.warned.take().join("\n");
+        assert!(warned.contains(words) && warned.contains("made again"), "{warned}");
+        assert_eq!(players.took().len(), judged);
+        same(&files(&out), &before);
+    }
+    // Tables alone make nothing again: they leave it out.
+    std::fs::write(&file, "").unwrap();
+    players.run(PAGE, &out, Shard::ALL, Some(Only::Tables)).unwrap();
+    assert!(players.warned.take().join("\n").contains("leave it out"));
+    assert_eq!(number(&out, "table-1", &["unet", "Few"], "runs"), 1.0);
+    // That of the other seed alone, which is wrong.
+    assert!(
+        number(&out, "table-1", &["unet", "Few"], "Test A GA") < number(&out, "table-1", &["unet", "Few"], "Test B GA")
+    );
+    // Other test images: what is there is of others.
+    let other = PAGE.replace("4..6", "5..6");
+    players.run(&other, &out, Shard::ALL, None).unwrap();
+    assert!(players.warned.take().iter().filter(|w| w.contains("other images")).count() >= 8);
+    assert_eq!(players.took().len(), 8);
+}
+
+#[test]
+fn a_damaged_training_is_an_error_that_says_what_to_do() {
+    let (_keep, out) = whole(PAGE);
+    let file = out.join("runs/unet/few/seed-2/result.json");
+    std::fs::write(&file, "{").unwrap();
+    let players = Players::default();
+    let error = players.run(PAGE, &out, Shard::ALL, None).unwrap_err().to_string();
+    assert!(error.contains("unet/few/seed-2/result.json") && error.contains("delete it"), "{error}");
+    std::fs::remove_file(&file).unwrap();
+    players.run(PAGE, &out, Shard::ALL, None).unwrap();
+    assert_eq!(players.took(), ["fit unet 1 2"]);
+}
+
+#[test]
+fn nothing_is_judged_on_what_it_has_seen() {
+    for (from, to) in [("4..6", "1..6"), ("4..6", "2..6"), ("4..6", "all"), ("4..6", "3..4"), ("0..2", "random:8")] {
+        let (_keep, out) = common::program::scratch();
+        let error = Players::default().run(&PAGE.replace(from, to), &out, Shard::ALL, None).unwrap_err();
+        assert!(error.to_string().contains("learns from or is watched by"), "{from} → {to}: {error}");
+        assert_eq!(error.exit_code(), 2);
+        assert!(!out.join("runs").exists());
+    }
+}
+
+#[test]
+fn sets_are_bound_left_out_or_asked_for() {
+    let scratch = tempfile::tempdir().unwrap();
+    let experiment = |text: &str| Experiment::of(&page(text), None).unwrap();
+    let bind = |text: &str, real: &[&str], without: &[&str]| {
+        let real: Vec<Real> = real.iter().map(|r| Real::parse(r).unwrap()).collect();
+        let without: Vec<String> = without.iter().map(|w| (*w).to_owned()).collect();
+        let bound = Bound::new(experiment(text), &real, &without, scratch.path())?;
+        bound.check().map(|()| bound)
+    };
+    let here = format!("frames={}", frames().display());
+    let both = PAGE.replace("(set: \"frames\", images: \"0..2\")", "(set: \"small\")");
+    let bound = bind(&both, &[&here], &[]).unwrap();
+    assert_eq!((bound.folder(0), bound.folder(1)), (frames(), scratch.path().join("sets/small").as_path()));
+    let bound = bind(&both, &[&here], &["small"]).unwrap();
+    assert_eq!((bound.left_out, bound.experiment.train.len()), (vec!["Few".to_owned()], 1));
+    let empty = format!("frames={}", scratch.path().display());
+    let faults: [(&[&str], &[&str], &str); 8] = [
+        (&[], &[], "nobody has said where the images of `frames` (eight frames) lie\n help: --real frames=DIR"),
+        (&["frame=x"], &[], "there is no real set `frame`\n help: did you mean `frames`?"),
+        (&["small=x"], &[], "there is no real set `small`"),
+        (&[&here, &here], &[], "twice"),
+        (&["frames=nowhere"], &[], "there is no such folder"),
+        (&[&empty], &[], "in this folder are no labelled images"),
+        (&[], &["framse"], "there is no set `framse`\n help: did you mean `frames`?"),
+        (&[], &["frames"], "without frames there is no test set left"),
+    ];
+    for (real, without, words) in faults {
+        let error = bind(&both, real, without).unwrap_err();
+        assert!(error.to_string().contains(words), "{real:?} {without:?}: {error}");
+        assert_eq!(error.exit_code(), 2);
+    }
+    assert!(Real::parse("frames").is_err() && Real::parse("=x").is_err());
+}
+
+/// Expected: what is wrong is underlined, in its line; what it is; what to do.
+#[test]
+fn mistakes_in_a_page_are_shown_where_they_are() {
+    let frames = "(set: \"frames\", images: \"0..2\")";
+    let faults = [
+        ("networks:", "network:", "network", "unknown field `network`", "did you mean `networks`?"),
+        ("\"unet\"", "\"unett\"", "\"unett\"", "there is no network `unett`", "did you mean `unet`?"),
+        ("\"unet\"", "\"basic-segnet\"", "\"basic-segnet\"", "the network `basic-segnet` is there twice", "keep one"),
+        ("[\"basic-segnet\", \"unet\"]", "[]", "[]", "there is no network", "name one"),
+        ("\"exg\"", "\"exgreen\"", "\"exgreen\"", "there is no baseline `exgreen`", "exg-size"),
+        ("[1, 2]", "[]", "[]", "there is no seed", "such as [1]"),
+        ("[1, 2]", "[1, 2, 1]", "1", "the seed 1 is there twice", "keep one"),
+        ("steps: 10", "stepps: 10", "stepps", "unknown field `stepps` in Learn", "did you mean `steps`?"),
+        ("steps: 10", "steps: 0", "0", "0 is out of range", "above 0"),
+        ("batch: 2", "batch: 5000", "5000", "5000 is out of range", "from 1 to 1024"),
+        ("(48, 36), steps", "(48, 16), steps", "(48, 16)", "48 × 16 pixels", "from 32 to 8192"),
+        ("batch: 2", "optimiser: \"adm\"", "\"adm\"", "there is no optimiser `adm`", "sgd or adam"),
+        ("batch: 2", "augment: \"flip,spin\"", "\"flip,spin\"", "`spin` is not varied", "rotate"),
+        ("batch: 2", "rate: -1", "-1", "-1 is out of range", "above 0"),
+        ("batch: 2", "classes: \"soil; plant=crop,weed\"", "[\"exg\"]", "baselines know soil, crop and weed", "leave"),
+        ("\"frames\": Real", "\"fra/mes\": Real", "Real(about: \"eight frames\")", "`fra/mes` is no name", "letters"),
+        ("\"small\":", "\"frames\":", "Scene(", "the set `frames` is there twice", "of its own"),
+        (
+            "tests/ref/small.ron",
+            "tests/ref/smal.ron",
+            "\"tests/ref/smal.ron\"",
+            "there is no file",
+            "did you mean `small.ron`?",
+        ),
+        ("count: 6", "count: 0", "0", "0 images cannot be rendered", "from 1"),
+        ("spp: 1)", "spp: 0)", "0", "0 samples", "from 1"),
+        ("Scene(", "Scen(", "Scen", "unknown name `Scen`", "Scene"),
+        ("count: 6,", "count: 6, split: (0, 0, 0),", "(0, 0, 0)", "these are no shares", "train,val,test"),
+        ("name: \"More\"", "name: \"few!\"", "\"few!\"", "there is another `few!`", "of its own"),
+        ("name: \"More\"", "name: \"?\"", "\"?\"", "no letter and no digit", "letters"),
+        ("from: [(set: \"frames\", images: \"0..2\")]", "from: []", "[]", "nothing is learnt from", "name a set"),
+        (frames, "(set: \"frame\")", "\"frame\"", "there is no set `frame`", "did you mean `frames`?"),
+        ("\"0..2\"", "\"2..0\"", "\"2..0\"", "`2..0` picks no images", "0..10"),
+        ("\"0..2\"", "\"most\"", "\"most\"", "`most` picks no images", "train"),
+        (frames, "(set: \"small\", images: \"0..7\")", "\"0..7\"", "`small` has 6 images", "fewer"),
+        ("repeat: 2", "repeat: 0", "0", "0 times", "1 or more"),
+        (
+            "set: \"frames\", images: \"6..8\"",
+            "set: \"jai\"",
+            "\"jai\"",
+            "there is no set `jai`",
+            "sets are frames, small",
+        ),
+        ("name: \"Test B\"", "name: \"test-a\"", "\"test-a\"", "there is another `test-a`", "of its own"),
+        ("steps: 5", "steps: 0", "0", "0 is out of range", "above 0"),
+        ("seeds: [7]", "seeds: []", "[]", "there is no seed", "such as [1]"),
+    ];
+    for (from, to, underlined, what, help) in faults {
+        let at = PAGE.find(from).unwrap_or_else(|| panic!("{from}"));
+        let error = Experiment::of(&page(&PAGE.replacen(from, to, 1)), None).expect_err(to);
+        let Error::Page(place) = &error else { panic!("{to}: without a place: {error}") };
+        let under: String = place.text.chars().skip(place.column - 1).take(place.width).collect();
+        assert_eq!(under, underlined, "{error}");
+        if underlined != "[\"exg\"]" {
+            assert_eq!(place.line, PAGE[..at].matches('\n').count() + 1, "{error}");
+        }
+        assert!(place.message.contains(what) && place.help.contains(help), "{to}: {what} | {help}\n{error}");
+        assert_eq!(error.exit_code(), 2);
+    }
+    for list in ["train", "test"] {
+        let at = PAGE.find(&format!("    {list}: [")).unwrap();
+        let end = if list == "train" { PAGE.find("    test:").unwrap() } else { PAGE.find("    scales:").unwrap() };
+        let text = format!("{}    {list}: [],\n{}", &PAGE[..at], &PAGE[end..]);
+        let words = Experiment::of(&page(&text), None).unwrap_err().to_string();
+        assert!(words.contains(&format!("there is no {}", if list == "train" { "training set" } else { "test set" })));
+    }
+}
+
+#[test]
+fn a_scale_changes_what_it_names_and_nothing_else() {
+    let at = |scale: Option<&str>| Experiment::of(&page(PAGE), scale);
+    let (plain, less) = (at(None).unwrap(), at(Some("less")).unwrap());
+    assert_eq!((less.learn.steps, less.seeds.as_slice()), (5, &[7][..]));
+    let back = Experiment { learn: Plan { steps: 10, ..less.learn.clone() }, seeds: vec![1, 2], scale: None, ..less };
+    assert_eq!(back, plain);
+    let error = at(Some("les")).unwrap_err();
+    assert!(error.to_string().contains("no scale `les`\n help: did you mean `less`?"), "{error}");
+    assert_eq!(error.exit_code(), 2);
+    let paper = Path::new("scenes/experiments/paper.ron");
+    let (small, large) = (Experiment::read(paper, None).unwrap(), Experiment::read(paper, Some("paper")).unwrap());
+    let images = |e: &Experiment| match &e.sets[0].1 {
+        table::Source::Scene { count, size, .. } => (*count, *size),
+        table::Source::Real { .. } => unreachable!("synthetic A is rendered"),
+    };
+    assert_eq!(images(&large), (1300, (480, 360)));
+    assert!(images(&small).0 < 1300 && large.learn.steps > small.learn.steps);
+    assert_eq!((large.train, large.test), (small.train, small.test));
+}

@@ -1,0 +1,261 @@
+//! `train table`, from scenes and folders of images to tables: whole, in shards, killed and stopped.
+//!
+//! Rationale: the paper's tables take a night, and nights have power cuts. Expected: whatever kills the program, and whoever shares its
+//! rows, the same command ends with the same weights and tables, bit for bit, on one thread; wrong input is exit code 2 and leaves
+//! nothing. Source: none needed, equality is exact.
+
+mod common;
+
+use common::dataset::{fail, make, path, same, succeed, tree};
+use common::program::scratch;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// Two networks, two training sets, two seeds; a set is rendered and one is brought in.
+const PAGE: &str = r#"Experiment(
+    networks: ["basic-segnet", "unet"],
+    seeds: [1, 2],
+    learn: (size: (48, 32), steps: 2, batch: 2, watch_every: 1),
+    sets: {
+        "small": Scene(page: "SMALL", count: 6, size: (48, 36), spp: 2, seed: 5, split: (4, 2, 0)),
+        "frames": Real(about: "a few frames"),
+    },
+    train: [
+        (name: "Synthetic", from: [(set: "small")]),
+        (name: "Real-Augmented", from: [(set: "small"), (set: "frames", images: "0..2", repeat: 2)]),
+    ],
+    test: [(name: "Test A", set: "frames", images: "2..5")],
+)"#;
+
+/// A folder of frames with masks beside them, as people keep them, and a page.
+fn desk() -> &'static Path {
+    static DESK: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
+    let made = DESK.get_or_init(|| {
+        let (keep, folder) = scratch();
+        let set = keep.path().join("set");
+        succeed(make(&set, 5, &[]));
+        for (kind, file) in [("images", "rgb.png"), ("labels", "semantics.png")] {
+            let to = folder.join("frames").join(kind);
+            std::fs::create_dir_all(&to).expect("a folder");
+            for k in 0..5 {
+                std::fs::copy(set.join(format!("images/{k:06}/{file}")), to.join(format!("frame{k}.png")))
+                    .expect("a copy");
+            }
+        }
+        let small = Path::new(env!("CARGO_MANIFEST_DIR")).join(common::program::SMALL);
+        std::fs::write(folder.join("page.ron"), PAGE.replace("SMALL", path(&small))).expect("the page");
+        (keep, folder)
+    });
+    &made.1
+}
+
+/// `train table` on the page, on one thread.
+fn table(out: &Path, more: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_train"));
+    command.current_dir(desk()).args(["table", "page.ron", "--real", "frames=frames", "--threads", "1", "--quiet"]);
+    command.args(["--precision", "f32", "--out", path(out)]).args(more);
+    command
+}
+
+/// What the page comes to without any interruption, and how long it took.
+fn whole() -> &'static (TempDir, PathBuf, Duration) {
+    static WHOLE: OnceLock<(TempDir, PathBuf, Duration)> = OnceLock::new();
+    WHOLE.get_or_init(|| {
+        let (keep, out) = scratch();
+        let begin = Instant::now();
+        let output = succeed(table(&out, &[]));
+        let told: Vec<PathBuf> = String::from_utf8_lossy(&output.stdout).lines().map(PathBuf::from).collect();
+        assert!(told.len() >= 15 && told.iter().all(|p| p.is_file()), "{told:?}");
+        assert!(told.contains(&out.join("table-1.md")));
+        (keep, out, begin.elapsed())
+    })
+}
+
+/// All files but those that tell clock times or where folders lie.
+fn files(out: &Path) -> BTreeMap<String, Vec<u8>> {
+    let free = |name: &str| {
+        name.contains("/time/")
+            || name.starts_with("times.")
+            || name.ends_with("/plan.json")
+            || name.ends_with("/result.json") && name.starts_with("runs/")
+    };
+    tree(out).into_iter().filter(|(name, _)| !free(name)).collect()
+}
+
+fn spawn(mut command: Command) -> Child {
+    command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program")
+}
+
+#[test]
+fn one_command_makes_sets_trainings_and_tables() {
+    let (_, out, _) = whole();
+    let found = files(out);
+    for network in ["basic-segnet", "unet"] {
+        for train in ["synthetic", "real-augmented"] {
+            for seed in [1, 2] {
+                let run = format!("runs/{network}/{train}/seed-{seed}");
+                assert!(found.contains_key(&format!("{run}/weights.safetensors")), "{run}");
+                assert!(found.contains_key(&format!("{run}/eval/test-a.json")), "{run}");
+                assert!(!found.contains_key(&format!("{run}/checkpoint.safetensors")), "{run}");
+            }
+        }
+    }
+    let text = |name: &str| String::from_utf8(found[name].clone()).expect("UTF-8");
+    assert_eq!(text("experiment.ron"), std::fs::read_to_string(desk().join("page.ron")).expect("the page"));
+    let csv = text("table-1.csv");
+    // Heads, two networks and two baselines, each on two training sets.
+    assert_eq!(csv.lines().count(), 1 + 4 * 2, "{csv}");
+    assert!(csv.lines().skip(1).all(|l| l.split(',').skip(2).all(|n| n.parse::<f64>().is_ok())), "{csv}");
+    assert!(csv.contains("Real-Augmented") && text("table-3.md").contains("vegetation"));
+    assert!(found.keys().all(|name| !name.contains(".furrow-")));
+    // Twice is once.
+    let again = succeed(table(out, &[]));
+    assert!(again.stderr.is_empty(), "{}", String::from_utf8_lossy(&again.stderr));
+    same(&files(out), &found);
+}
+
+/// Where in the whole the kills fall is told by the fractions; sets are rendered first, so that early kills leave an orphaned renderer.
+#[test]
+fn killed_at_many_moments_it_ends_as_if_never_killed() {
+    let (_, expected, once) = whole();
+    let (_keep, out) = scratch();
+    let mut alive = 0;
+    for moment in [0.02, 0.05, 0.08, 0.12, 0.3, 0.1, 0.2, 0.07, 0.3, 0.15, 0.25] {
+        let mut child = spawn(table(&out, &[]));
+        std::thread::sleep(once.mul_f64(moment));
+        alive += u32::from(child.try_wait().expect("a child").is_none());
+        child.kill().expect("a kill");
+        child.wait().expect("an end");
+    }
+    assert!(alive > 5, "{alive} of 11 kills hit a running program");
+    succeed(table(&out, &[]));
+    same(&files(&out), &files(expected));
+}
+
+#[test]
+fn two_shards_at_the_same_time_make_the_whole() {
+    let (_, expected, _) = whole();
+    let (_keep, out) = scratch();
+    // Both find no sets: one makes them, the other waits.
+    let shards: Vec<Child> = ["0/2", "1/2"].iter().map(|row| spawn(table(&out, &["--row", row]))).collect();
+    for mut shard in shards {
+        assert!(shard.wait().expect("an end").success());
+    }
+    succeed(table(&out, &["--only", "tables"]));
+    same(&files(&out), &files(expected));
+}
+
+/// Expected: exit code 75 while sets are rendered and while a network learns; what is there is gone on with.
+#[test]
+fn signals_stop_it_cleanly() {
+    let (_keep, out) = scratch();
+    let until = |done: &dyn Fn() -> bool| {
+        let deadline = Instant::now() + Duration::from_secs(120);
+        while !done() && Instant::now() < deadline {
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        assert!(done(), "nothing begins");
+    };
+    let stop = |mut child: Child, signal: &str| {
+        let id = child.id().to_string();
+        assert!(Command::new("kill").args([signal, &id]).status().expect("kill").success());
+        assert_eq!(child.wait().expect("an end").code(), Some(75), "{signal}");
+    };
+    let page = std::fs::read_to_string(desk().join("page.ron")).expect("the page");
+    let long = page.replace("count: 6", "count: 5000").replace("steps: 2", "steps: 100000");
+    std::fs::write(desk().join("long.ron"), &long).expect("a page");
+    let mut command = table(&out, &[]);
+    command = renamed(command, "long.ron");
+    let child = spawn(command);
+    until(&|| out.join("sets/small/seals").is_dir());
+    stop(child, "-TERM");
+    // Fewer images than there are: into another folder.
+    std::fs::write(desk().join("long.ron"), long.replace("count: 5000", "count: 6")).expect("a page");
+    let (_keep, out) = scratch();
+    for signal in ["-TERM", "-USR1"] {
+        let child = spawn(renamed(table(&out, &[]), "long.ron"));
+        let folder = out.join("runs/basic-segnet/synthetic/seed-1");
+        let begun = || folder.join("checkpoint.safetensors").exists();
+        until(&begun);
+        stop(child, signal);
+        assert!(begun() && !folder.join("result.json").exists());
+    }
+    assert!(tree(&out).keys().all(|name| !name.contains(".furrow-")));
+}
+
+/// The same command about another page.
+fn renamed(command: Command, page: &str) -> Command {
+    let mut other = Command::new(command.get_program());
+    other.current_dir(desk());
+    other.args(command.get_args().map(|a| if a == "page.ron" { page.into() } else { a.to_owned() }));
+    other
+}
+
+#[test]
+fn wrong_input_is_one_clear_error_and_leaves_nothing() {
+    let (_keep, out) = scratch();
+    let page = std::fs::read_to_string(desk().join("page.ron")).expect("the page");
+    let pages = [
+        ("networks:", "networx:", "wrong.ron:2:5: unknown field `networx`"),
+        ("\"small\")]", "\"smal\")]", "wrong.ron:10:44: there is no set `smal`"),
+        ("\"2..5\"", "\"5..2\"", "wrong.ron:13:60: `5..2` picks no images"),
+        ("[1, 2]", "[1, 1]", "wrong.ron:3:16: the seed 1 is there twice"),
+    ];
+    for (from, to, words) in pages {
+        std::fs::write(desk().join("wrong.ron"), page.replacen(from, to, 1)).expect("a page");
+        let said = fail(renamed(table(&out, &[]), "wrong.ron"), 2);
+        assert!(said.starts_with("error: ") && said.matches("error").count() == 1, "{said}");
+        assert!(said.contains(words), "{words}: {said}");
+        assert!(!out.exists());
+    }
+    let arguments: [(&[&str], &str); 6] = [
+        (&["--scale", "huge"], "the page has no scale `huge`"),
+        (&["--without", "frames"], "no test set left"),
+        (&["--real", "small=frames"], "there is no real set `small`"),
+        (&["--row", "2/2"], "k/N"),
+        (&["--device", "gpu"], "there is no device `gpu`"),
+        (&["--precision", "f8"], "there is no precision `f8`"),
+    ];
+    for (more, words) in arguments {
+        let said = fail(table(&out, more), 2);
+        assert!(said.contains(words), "{words}: {said}");
+        assert!(!out.exists(), "{more:?}");
+    }
+    let said = fail(table(&out, &["--trace", "nowhere/trace"]), 2);
+    assert!(said.contains("nowhere/trace"), "{said}");
+    let mut unbound = Command::new(env!("CARGO_BIN_EXE_train"));
+    unbound.current_dir(desk()).args(["table", "page.ron", "--out", path(&out.join("new"))]);
+    let said = fail(unbound, 2);
+    assert!(said.contains("`frames` (a few frames)") && said.contains("--real frames=DIR"), "{said}");
+    assert!(!out.join("new").exists());
+}
+
+#[test]
+fn a_set_that_cannot_be_made_is_told_by_both_programs() {
+    let (_keep, out) = scratch();
+    let page = std::fs::read_to_string(desk().join("page.ron")).expect("the page");
+    let (at, end) = (page.find("page: \"").expect("a scene") + 7, page.find("\", count").expect("a scene"));
+    std::fs::write(desk().join("scene.ron"), "Field(seeed: 1)").expect("a page");
+    std::fs::write(desk().join("broken.ron"), format!("{}scene.ron{}", &page[..at], &page[end..])).expect("a page");
+    let said = fail(renamed(table(&out, &[]), "broken.ron"), 2);
+    assert!(said.contains("scene.ron:1:7: unknown field `seeed`"), "{said}");
+    assert!(said.contains("the set `small` cannot be made"), "{said}");
+    assert!(!out.join("runs").exists());
+}
+
+#[test]
+fn a_dry_run_tells_the_rows_and_does_nothing() {
+    let (_keep, out) = scratch();
+    let output = succeed(table(&out, &["--dry-run"]));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(said.lines().filter(|l| l.contains("missing")).count(), 4 + 8, "{said}");
+    assert!(!out.exists());
+    let (_, done, _) = whole();
+    let said = succeed(table(done, &["--dry-run"])).stderr;
+    let said = String::from_utf8_lossy(&said);
+    assert_eq!(said.lines().filter(|l| l.contains("done") && l.contains("1 of 1")).count(), 4 + 8, "{said}");
+}
