@@ -37,7 +37,7 @@ fn by_band(pixels: &[f32], bands: usize, area: usize) -> Vec<f32> {
 
 /// Writes weights, card and what the network makes of some pictures.
 fn record(learnt: &Learnt, folder: &Path) {
-    let (images, size) = (4, (47, 35));
+    let (images, size) = (6, (47, 35));
     let bands = learnt.card.input.bands.len();
     let pixels = normalised(learnt, &pictures(images, size, bands, 5), size);
     let scores = model(learnt, SINGLE).scores(&pixels, size).unwrap();
