@@ -57,15 +57,18 @@ fn model(learnt: &Learnt) -> Model {
     Model::with(card.network, card.input.bands.len(), card.classes.len(), &learnt.values, place).unwrap()
 }
 
-/// Number of pictures and size: the network's own, smaller and odd, larger.
-const CASES: [(usize, (u32, u32)); 4] = [(1, training::SIZE), (2, training::SIZE), (2, (47, 35)), (2, (81, 66))];
+/// Number of pictures and size: the network's own, nearly the smallest that it takes, odd, and a larger one.
+fn cases(network: Network) -> [(usize, (u32, u32)); 4] {
+    let least = network.least_side().max(16);
+    [(1, training::SIZE), (2, training::SIZE), (6, (least + 3, least + 1)), (2, (81, 66))]
+}
 
 /// Writes 8-bit pictures and what the network makes of them.
 fn record(learnt: &Learnt, file: &Path) {
     let bands = learnt.card.input.bands.len();
     let model = model(learnt);
     let mut arrays = Vec::new();
-    for (k, (images, size)) in CASES.into_iter().enumerate() {
+    for (k, (images, size)) in cases(learnt.card.network).into_iter().enumerate() {
         let pixels = pictures(images, size, bands, k as u64);
         let scores = model.scores(&normalised(learnt, &pixels, size), size).unwrap();
         let (w, h) = (size.0 as usize, size.1 as usize);
@@ -104,13 +107,16 @@ fn exported_networks_compute_what_ours_do() {
         onnx::write(&learnt, &out.join("network.onnx")).unwrap();
         let bytes = std::fs::read(out.join("network.onnx")).unwrap();
         onnx::write(&learnt, &out.join("network.onnx")).unwrap();
-        assert_eq!(bytes, std::fs::read(out.join("network.onnx")).unwrap(), "{} twice", network.name());
+        assert!(bytes == std::fs::read(out.join("network.onnx")).unwrap(), "{} twice", network.name());
         if let Some(python) = &onnx_python {
             ask(python, "train/check_onnx.py", &[path(&out)]);
         }
 
         let file = out.join("network.pt");
         torchscript::write(&learnt, training::SIZE, &file).unwrap();
+        let bytes = std::fs::read(&file).unwrap();
+        torchscript::write(&learnt, training::SIZE, &file).unwrap();
+        assert!(bytes == std::fs::read(&file).unwrap(), "{} twice", network.name());
         let module = CModule::load_on_device(&file, Device::Cpu).unwrap();
         let bands = learnt.card.input.bands.len() as i64;
         for images in [1, 2] {
@@ -153,9 +159,11 @@ fn export_writes_where_it_is_told() {
     assert_eq!(scores.size(), [3, 3, 33, 40]);
 
     let before = names(folder.path());
+    assert_eq!(before, ["new", "robot.pt", "robot.pt.json"]);
     for (arguments, words) in [
         (vec!["--size", "40x40"], "an ONNX graph takes pictures of any size"),
         (vec!["--out", path(folder.path())], "this is a folder"),
+        (vec!["--format", "torchscript", "--size", "4000x10"], "sides from 32 to 8192"),
         (vec!["--format", "coreml"], "invalid value 'coreml'"),
     ] {
         let mut all = vec!["export", path(&RGB)];
