@@ -16,8 +16,8 @@ import reference
 from reference import TOLERANCE, run_numpy
 from safetensors.numpy import load_file
 
-# ONNX Runtime folds batch norms into convolutions and sums in blocks of its own: more images are undecided than between two programs
-# that compute the same.
+# ONNX Runtime folds batch norms into convolutions and sums in blocks of its own: its rounding decides more often than that of two
+# programs that compute the same. So all decided pictures must agree, and of all pictures most.
 reference.GAP = 2e-5
 
 
@@ -47,7 +47,7 @@ def check(folder):
     weights, io = load_file(f"{folder}/weights.safetensors"), load_file(f"{folder}/io.safetensors")
     cases = sorted(k.removeprefix("images_") for k in io if k.startswith("images_"))
     assert len(cases) > 2, cases
-    decided_at_all = 0
+    decided_at_all = agree = all_pictures = 0
     for case in cases:
         images, ours = io[f"images_{case}"].astype(np.uint8), io[f"scores_{case}"]
         scores, classes = session.run(["scores", "classes"], {"image": images})
@@ -65,7 +65,11 @@ def check(folder):
             # A maximum in another place moves values near it; a wrong graph moves all.
             mean = np.abs(scores - other).mean(axis=(1, 2, 3)).max() / largest
             assert mean < 2e-3, f"{folder}: case {case}: {mean} from {name} in the mean"
-    assert decided_at_all > 3, f"{folder}: only {decided_at_all} images decide anything"
+        agree += (np.abs(scores - ours).max(axis=(1, 2, 3)) < TOLERANCE * largest).sum()
+        all_pictures += len(images)
+    print(f"{card['network']}: {decided_at_all} of {all_pictures} pictures decided, {agree} agree with the program")
+    assert decided_at_all > 0, f"{folder}: no picture decides anything"
+    assert agree * 4 >= all_pictures * 3, f"{folder}: only {agree} of {all_pictures} pictures agree with the program"
 
 
 if __name__ == "__main__":

@@ -8,6 +8,8 @@ import torch
 from safetensors.numpy import load_file
 
 module = torch.jit.load(sys.argv[1])
+# It follows its values to whatever device they are loaded on.
+assert "device" not in module.code, module.code
 facts = json.load(open(sys.argv[1] + ".json"))
 io = load_file(sys.argv[2])
 for case in [k.removeprefix("images_") for k in io if k.startswith("images_")]:

@@ -36,25 +36,46 @@ pub fn write(learnt: &Learnt, (width, height): (u32, u32), path: &Path) -> Resul
     let mut model = Model::with(card.network, bands, card.classes.len(), &learnt.values, place)?;
     model.freeze();
     let example = Tensor::zeros([1, i64::from(height), i64::from(width), bands as i64], (Kind::Uint8, Device::Cpu));
-    let mut forward = |x: &[Tensor]| vec![model.forward(&normalised(&x[0], &card.normalisation), false)];
+    let taken_out = TakenOut::of(&card.normalisation);
+    let mut forward = |x: &[Tensor]| vec![model.walk(&taken_out.from(&x[0]), false)];
     let module = tch::no_grad(|| CModule::create_by_tracing("furrow", "forward", &[example], &mut forward));
     let module = module.map_err(|e| failed(&e))?;
     place_atomically(path, |path| module.save(path).map_err(|e| failed(&e)))?;
     write_json(&facts_path(path), &Facts::of(card, (width, height)))
 }
 
-/// From 8-bit pixels, images × height × width × bands, to what the network takes; as [`Normalisation::apply`].
-fn normalised(image: &Tensor, how: &Normalisation) -> Tensor {
-    let x = image.to_kind(Kind::Float).permute([0, 3, 1, 2]) / 255.0;
-    let axes: &[i64] = match how {
-        Normalisation::Fixed { mean, sd } => {
-            let [mean, sd] = [mean, sd].map(|v| Tensor::from_slice(v).view([1, v.len() as i64, 1, 1]));
-            return (x - mean) / sd;
+/// What is taken out of a picture. Constants are tensors before the tracing begins: of one that is made meanwhile the trace keeps
+/// the shape, not the values.
+enum TakenOut<'a> {
+    /// Means and deviations of the bands.
+    Fixed(Tensor, Tensor),
+    /// The picture's own, over these axes.
+    Own(&'a [i64]),
+}
+
+impl TakenOut<'_> {
+    fn of(how: &Normalisation) -> Self {
+        match how {
+            Normalisation::Fixed { mean, sd } => {
+                let [mean, sd] = [mean, sd].map(|v| Tensor::from_slice(v).view([1, v.len() as i64, 1, 1]));
+                Self::Fixed(mean, sd)
+            }
+            Normalisation::Band => Self::Own(&[2, 3]),
+            Normalisation::Image => Self::Own(&[1, 2, 3]),
         }
-        Normalisation::Band => &[2, 3],
-        Normalisation::Image => &[1, 2, 3],
-    };
-    let less = &x - x.mean_dim(axes, true, Kind::Float);
-    let sd = (&less * &less).mean_dim(axes, true, Kind::Float).sqrt().clamp_min(f64::from(LEAST));
-    less / sd
+    }
+
+    /// From 8-bit pixels, images × height × width × bands, to what the network takes; as [`Normalisation::apply`]. Dividing makes
+    /// single precision of them; asking for it would write the device into the trace.
+    fn from(&self, image: &Tensor) -> Tensor {
+        let x = image.permute([0, 3, 1, 2]) / 255.0;
+        match self {
+            Self::Fixed(mean, sd) => (x - mean) / sd,
+            Self::Own(axes) => {
+                let less = &x - x.mean_dim(*axes, true, None);
+                let sd = (&less * &less).mean_dim(*axes, true, None).sqrt().clamp_min(f64::from(LEAST));
+                less / sd
+            }
+        }
+    }
 }

@@ -71,8 +71,13 @@ impl Model {
     /// From images × bands × height × width to images × classes × height × width. `training` uses and moves the statistics of
     /// the batch.
     pub fn forward(&self, x: &Tensor, training: bool) -> Tensor {
+        self.walk(x, training).to_kind(Kind::Float)
+    }
+
+    /// The same in the precision of the last convolution.
+    pub(super) fn walk(&self, x: &Tensor, training: bool) -> Tensor {
         let mut compute = Compute { tensors: &self.tensors, precision: self.place.precision, training };
-        self.network.walk(&mut compute, x, self.bands, self.classes).to_kind(Kind::Float)
+        self.network.walk(&mut compute, x, self.bands, self.classes)
     }
 
     /// The class of each pixel of images that lie as `height × width × bands`, one after the other.
