@@ -12,11 +12,12 @@ use common::program::names;
 use common::python::{ask, python, torch};
 use common::training::{self, learn, normalised, pictures, stirred};
 use furrow::output::{self, Picture};
+use furrow::train::deploy::pictures::Prediction;
 use furrow::train::deploy::{onnx, torchscript};
 use furrow::train::engine::{Model, Precision, Where, device};
 use furrow::train::fit::plan::Exposure;
 use furrow::train::net::Network;
-use furrow::train::run::Learnt;
+use furrow::train::run::{self, Learnt};
 use furrow::train::weights::{self, Array};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -27,7 +28,7 @@ use tch::{CModule, Device, Kind, Tensor};
 static SET: LazyLock<PathBuf> = LazyLock::new(|| training::set("deploy-set"));
 
 /// A run of Basic SegNet that sees these bands; stays until the next time.
-fn run(name: &str, bands: &str) -> PathBuf {
+fn trained(name: &str, bands: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     if folder.exists() {
         std::fs::remove_dir_all(&folder).unwrap();
@@ -36,8 +37,8 @@ fn run(name: &str, bands: &str) -> PathBuf {
     folder
 }
 
-static RGB: LazyLock<PathBuf> = LazyLock::new(|| run("deploy-rgb", "rgb"));
-static RGBN: LazyLock<PathBuf> = LazyLock::new(|| run("deploy-rgbn", "rgbn"));
+static RGB: LazyLock<PathBuf> = LazyLock::new(|| trained("deploy-rgb", "rgb"));
+static RGBN: LazyLock<PathBuf> = LazyLock::new(|| trained("deploy-rgbn", "rgbn"));
 
 /// `train` with these arguments, on one thread and in single precision where it computes.
 fn train(arguments: &[&str]) -> Command {
@@ -56,15 +57,18 @@ fn model(learnt: &Learnt) -> Model {
     Model::with(card.network, card.input.bands.len(), card.classes.len(), &learnt.values, place).unwrap()
 }
 
-/// Number of pictures and size: the network's own, smaller and odd, larger.
-const CASES: [(usize, (u32, u32)); 4] = [(1, training::SIZE), (2, training::SIZE), (2, (47, 35)), (2, (81, 66))];
+/// Number of pictures and size: the network's own, nearly the smallest that it takes, odd, and a larger one.
+fn cases(network: Network) -> [(usize, (u32, u32)); 4] {
+    let least = network.least_side().max(16);
+    [(1, training::SIZE), (2, training::SIZE), (6, (least + 3, least + 1)), (2, (81, 66))]
+}
 
 /// Writes 8-bit pictures and what the network makes of them.
 fn record(learnt: &Learnt, file: &Path) {
     let bands = learnt.card.input.bands.len();
     let model = model(learnt);
     let mut arrays = Vec::new();
-    for (k, (images, size)) in CASES.into_iter().enumerate() {
+    for (k, (images, size)) in cases(learnt.card.network).into_iter().enumerate() {
         let pixels = pictures(images, size, bands, k as u64);
         let scores = model.scores(&normalised(learnt, &pixels, size), size).unwrap();
         let (w, h) = (size.0 as usize, size.1 as usize);
@@ -93,8 +97,8 @@ fn exported_networks_compute_what_ours_do() {
     let torch_python = torch();
     for (network, bands, exposure) in KINDS {
         let folder = tempfile::tempdir().unwrap();
-        let trained = learn(network, bands, exposure, &SET, &folder.path().join("run"));
-        let learnt = stirred(&trained, 13);
+        let taught = learn(network, bands, exposure, &SET, &folder.path().join("run"));
+        let learnt = stirred(&taught, 13);
         let out = folder.path().join("out");
         learnt.write(&out).unwrap();
         let io = out.join("io.safetensors");
@@ -103,13 +107,16 @@ fn exported_networks_compute_what_ours_do() {
         onnx::write(&learnt, &out.join("network.onnx")).unwrap();
         let bytes = std::fs::read(out.join("network.onnx")).unwrap();
         onnx::write(&learnt, &out.join("network.onnx")).unwrap();
-        assert_eq!(bytes, std::fs::read(out.join("network.onnx")).unwrap(), "{} twice", network.name());
+        assert!(bytes == std::fs::read(out.join("network.onnx")).unwrap(), "{} twice", network.name());
         if let Some(python) = &onnx_python {
             ask(python, "train/check_onnx.py", &[path(&out)]);
         }
 
         let file = out.join("network.pt");
         torchscript::write(&learnt, training::SIZE, &file).unwrap();
+        let bytes = std::fs::read(&file).unwrap();
+        torchscript::write(&learnt, training::SIZE, &file).unwrap();
+        assert!(bytes == std::fs::read(&file).unwrap(), "{} twice", network.name());
         let module = CModule::load_on_device(&file, Device::Cpu).unwrap();
         let bands = learnt.card.input.bands.len() as i64;
         for images in [1, 2] {
@@ -152,9 +159,11 @@ fn export_writes_where_it_is_told() {
     assert_eq!(scores.size(), [3, 3, 33, 40]);
 
     let before = names(folder.path());
+    assert_eq!(before, ["new", "robot.pt", "robot.pt.json"]);
     for (arguments, words) in [
         (vec!["--size", "40x40"], "an ONNX graph takes pictures of any size"),
         (vec!["--out", path(folder.path())], "this is a folder"),
+        (vec!["--format", "torchscript", "--size", "4000x10"], "sides from 32 to 8192"),
         (vec!["--format", "coreml"], "invalid value 'coreml'"),
     ] {
         let mut all = vec!["export", path(&RGB)];
@@ -303,10 +312,7 @@ fn what_cannot_be_answered_is_refused_and_nothing_is_written_over() {
             assert!(said.contains(words), "`{words}` is not in: {said}");
         }
         let left = names(&out);
-        assert!(!left.iter().any(|name| name.ends_with(".png") || name.starts_with(output::UNFINISHED)), "{left:?}");
-        if out.exists() {
-            std::fs::remove_dir_all(&out).unwrap();
-        }
+        assert!(left.is_empty(), "{words:?}: {left:?}");
     };
     refuse(&at("none"), &[&photos], &[], &["there is no trained network in this folder", "train fit --out DIR"]);
     refuse(&RGB, &[&at("nothing.png")], &[], &["nothing.png: there is no such picture", "DIR@PICK"]);
@@ -331,6 +337,8 @@ fn what_cannot_be_answered_is_refused_and_nothing_is_written_over() {
         "{said}"
     );
     assert_eq!(names(&out).len(), 7, "{:?}", names(&out));
+    let told: Prediction = run::read_json(&out.join("prediction.json")).unwrap();
+    assert_eq!(told.pictures.keys().collect::<Vec<_>>(), ["large", "same", "small"]);
 
     // Answers beside the photographs would be written over them.
     let said = fail(train(&["predict", path(&RGB), path(&photos), "--out", path(&photos)]), 2);

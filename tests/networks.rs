@@ -37,7 +37,7 @@ fn by_band(pixels: &[f32], bands: usize, area: usize) -> Vec<f32> {
 
 /// Writes weights, card and what the network makes of some pictures.
 fn record(learnt: &Learnt, folder: &Path) {
-    let (images, size) = (4, (47, 35));
+    let (images, size) = (6, (47, 35));
     let bands = learnt.card.input.bands.len();
     let pixels = normalised(learnt, &pictures(images, size, bands, 5), size);
     let scores = model(learnt, SINGLE).scores(&pixels, size).unwrap();
@@ -73,10 +73,12 @@ fn networks_compute_what_an_independent_program_does() {
     }
 }
 
-/// The largest distance of values, as a share of the largest value.
-fn apart(a: &[f32], b: &[f32]) -> f32 {
-    let largest = b.iter().fold(0f32, |m, v| m.max(v.abs()));
-    a.iter().zip(b).fold(0f32, |m, (a, b)| m.max((a - b).abs())) / largest
+/// How far values are from others: the largest distance, and the mean one, as shares of the others' deviation.
+fn apart(a: &[f32], b: &[f32]) -> (f64, f64) {
+    let spread = Tensor::from_slice(b).std(false).double_value(&[]);
+    let distances: Vec<f64> = a.iter().zip(b).map(|(a, b)| f64::from((a - b).abs())).collect();
+    let mean = distances.iter().sum::<f64>() / distances.len() as f64;
+    (distances.iter().fold(0.0, |m: f64, d| m.max(*d)) / spread, mean / spread)
 }
 
 /// All networks, stirred, with four pictures at the size that they learnt at.
@@ -105,18 +107,17 @@ fn an_answer_depends_neither_on_precision_nor_batch_nor_layout() {
         let plain = single.images(&pixels, training::SIZE).contiguous();
         let plain = tch::no_grad(|| single.forward(&plain, false)).contiguous().view(-1);
         let layout = apart(&Vec::<f32>::try_from(plain).unwrap(), &scores);
-        // Eight bits of mantissa: 2⁻⁸ a rounding, some of which add up over the layers.
+        // Eight bits of mantissa: a rounding of 2⁻⁹ after each of up to 26 layers, and maxima that come to be equal and go back to
+        // another place.
         let half = model(&learnt, Where { device: Device::Cpu, precision: Precision::Bf16 });
         let half = half.scores(&pixels, training::SIZE).unwrap();
-        let mean = half.iter().zip(&scores).map(|(a, b)| (a - b).abs()).sum::<f32>() / scores.len() as f32;
-        let spread = Tensor::from_slice(&scores).std(false).double_value(&[]) as f32;
-        eprintln!(
-            "{}: batch {batch:.1e}, layout {layout:.1e}, bf16 {:.1e} of the deviation in the mean",
-            network.name(),
-            mean / spread
-        );
-        assert!(batch < 1e-4 && layout < 1e-4, "{}: {batch} {layout}", network.name());
-        assert!(mean < 0.1 * spread, "{}: {mean} of {spread}", network.name());
-        assert!(half.iter().all(|v| v.is_finite()), "{}", network.name());
+        let half = apart(&half, &scores);
+        eprintln!("{}: batch {batch:?}, layout {layout:?}, bf16 {half:?}", network.name());
+        if network == Network::Unet {
+            assert!(batch.0 < 1e-4 && layout.0 < 1e-4 && half.1 < 0.05, "{batch:?} {layout:?} {half:?}");
+        } else {
+            // One maximum in another place moves values near it by more than rounding does.
+            assert!(batch.1 < 1e-3 && layout.1 < 1e-3 && half.1 < 0.25, "{batch:?} {layout:?} {half:?}");
+        }
     }
 }

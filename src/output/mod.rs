@@ -109,22 +109,7 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
 
 /// The same for a file that is written piece by piece.
 pub fn stream_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
-    let mut buffer = std::io::BufWriter::with_capacity(1 << 16, unfinished(path)?);
-    write(&mut buffer)?;
-    let file = buffer.into_inner().map_err(|e| Error::Io { path: path.into(), source: e.into_error() })?;
-    finish(file, path)
-}
-
-/// The same for a file that somebody else writes, who is told its temporary name.
-pub fn place_atomically(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
-    let file = unfinished(path)?;
-    write(file.path())?;
-    finish(file, path)
-}
-
-/// A new file beside its target.
-fn unfinished(path: &Path) -> Result<tempfile::NamedTempFile> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = parent(path);
     std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
     let mut builder = tempfile::Builder::new();
     builder.prefix(UNFINISHED);
@@ -134,19 +119,36 @@ fn unfinished(path: &Path) -> Result<tempfile::NamedTempFile> {
         // As any other new file: the umask takes its part.
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    builder.tempfile_in(folder).map_err(Error::io(path))
-}
-
-fn finish(file: tempfile::NamedTempFile, path: &Path) -> Result<()> {
+    let file = builder.tempfile_in(folder).map_err(Error::io(path))?;
+    let mut buffer = std::io::BufWriter::with_capacity(1 << 16, file);
+    write(&mut buffer)?;
+    let file = buffer.into_inner().map_err(|e| Error::Io { path: path.into(), source: e.into_error() })?;
     file.as_file().sync_all().map_err(Error::io(path))?;
     file.persist(path).map_err(|e| Error::Io { path: path.into(), source: e.error })?;
     Ok(())
 }
 
+/// The same for a file that somebody else writes, who is told where. The file has its own name there, in a temporary folder beside
+/// its target: some formats keep the name.
+pub fn place_atomically(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+    let folder = parent(path);
+    std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
+    let within = tempfile::Builder::new().prefix(UNFINISHED).tempdir_in(folder).map_err(Error::io(path))?;
+    let unfinished = within.path().join(path.file_name().unwrap_or_default());
+    write(&unfinished)?;
+    std::fs::File::open(&unfinished).and_then(|file| file.sync_all()).map_err(Error::io(path))?;
+    std::fs::rename(&unfinished, path).map_err(Error::io(path))
+}
+
+/// The folder of a file.
+fn parent(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
 /// Gives a file that is there a second name, so that equal files take space once; `bytes` are what it holds, written anew where the file
 /// system has no links.
 pub fn link_atomically(there: &Path, path: &Path, bytes: &[u8]) -> Result<()> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = parent(path);
     std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
     let link = tempfile::Builder::new().prefix(UNFINISHED).make_in(folder, |name| std::fs::hard_link(there, name));
     match link {

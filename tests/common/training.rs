@@ -1,6 +1,7 @@
 //! Small trainings and pictures made of numbers.
 
-use super::dataset::{make, succeed};
+use super::dataset::{path, succeed};
+use super::program::{SMALL, trace};
 use furrow::sampling::{Purpose, Stream};
 use furrow::train::classes::Classes;
 use furrow::train::data::{Band, Pick, Selection, Shape};
@@ -27,7 +28,10 @@ pub fn set(name: &str) -> PathBuf {
     if folder.exists() {
         std::fs::remove_dir_all(&folder).expect("an old folder");
     }
-    succeed(make(&folder, 8, &["--width", "64"]));
+    let out = path(&folder);
+    succeed(trace(&[
+        "dataset", "--scene", SMALL, "--out", out, "--count", "8", "--width", "64", "--spp", "2", "--quiet",
+    ]));
     folder
 }
 

@@ -2,7 +2,7 @@
 
     check_onnx.py FOLDER...
 
-Each folder holds `network.onnx`, `model.json` and `weights.safetensors`, and `io.safetensors`: 8-bit pictures `images_K` (images x
+Where maxima are too close, nothing is decided, as told there. Each folder holds `network.onnx`, `model.json` and `weights.safetensors`, and `io.safetensors`: 8-bit pictures `images_K` (images x
 height x width x bands, as floats) and `scores_K`, what the program makes of them.
 """
 
@@ -12,8 +12,13 @@ import sys
 import numpy as np
 import onnx
 import onnxruntime
+import reference
 from reference import TOLERANCE, run_numpy
 from safetensors.numpy import load_file
+
+# ONNX Runtime folds batch norms into convolutions and sums in blocks of its own: more images are undecided than between two programs
+# that compute the same.
+reference.GAP = 2e-5
 
 
 def normalise(images, how):
@@ -48,15 +53,19 @@ def check(folder):
         scores, classes = session.run(["scores", "classes"], {"image": images})
         assert scores.dtype == np.float32 and classes.dtype == np.uint8 and classes.shape == images.shape[:3]
         assert (classes == scores.argmax(axis=1)).all()
-        reference, _, doubt, _ = run_numpy(card["network"], weights, normalise(images, card["normalisation"]), len(card["classes"]))
+        pixels = normalise(images, card["normalisation"])
+        exact, _, doubt, _ = run_numpy(card["network"], weights, pixels, len(card["classes"]))
         decided = np.ones(len(images), bool) if doubt is None else ~doubt
         decided_at_all += decided.sum()
-        largest = max(1.0, np.abs(reference).max())
-        for name, other in [("the program", ours), ("the reference", reference)]:
+        largest = max(1.0, np.abs(exact).max())
+        for name, other in [("the program", ours), ("the reference", exact)]:
             apart = np.abs(scores - other)[decided].max(initial=0) / largest
             print(f"{card['network']} {images.shape}: {decided.sum()} decided, apart from {name} by {apart:.1e} of {largest:.2f}")
             assert apart < TOLERANCE, f"{folder}: case {case}: {apart} from {name}"
-    assert decided_at_all > 2, f"{folder}: only {decided_at_all} images decide anything"
+            # A maximum in another place moves values near it; a wrong graph moves all.
+            mean = np.abs(scores - other).mean(axis=(1, 2, 3)).max() / largest
+            assert mean < 2e-3, f"{folder}: case {case}: {mean} from {name} in the mean"
+    assert decided_at_all > 3, f"{folder}: only {decided_at_all} images decide anything"
 
 
 if __name__ == "__main__":

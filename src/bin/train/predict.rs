@@ -3,7 +3,7 @@
 use crate::machine::MachineArgs;
 use furrow::cli::signal::Signals;
 use furrow::train::data::Band;
-use furrow::train::deploy::pictures::{self, Prediction};
+use furrow::train::deploy::pictures;
 use furrow::train::deploy::predict::{self, Answered, How};
 use furrow::train::run::Learnt;
 use furrow::{Error, Result, cli};
@@ -48,8 +48,6 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let learnt = Learnt::open(&args.run)?;
     cli::check_folder(&args.out)?;
     let pictures = pictures::find(&args.images, &learnt.card.input, &args.bands)?;
-    let stop = signals.heed();
-    let about = Prediction::claim(&args.out, &learnt.card, &pictures)?;
     let bar = if args.quiet { ProgressBar::hidden() } else { ProgressBar::new(pictures.len() as u64) };
     let style = ProgressStyle::with_template("{bar:30} {pos} of {len} pictures, {eta} left");
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
@@ -58,25 +56,22 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         threads: args.machine.threads(),
         batch: args.batch.into(),
         done: &|done| bar.set_position(done as u64),
-        stop,
+        stop: signals.heed(),
     };
     let answered = predict::predict(&learnt, &pictures, &args.out, &args.machine.machine(), &how);
     bar.finish_and_clear();
     let answered = answered?;
-    let done = answered.paths.len() / 2;
-    if !args.quiet && done > 0 {
-        eprintln!("{done} pictures, {:.3} s of the network for each", answered.seconds / done as f64);
+    if !args.quiet && answered.done > 0 {
+        let each = answered.seconds / answered.done as f64;
+        eprintln!("{} pictures, {each:.3} s of the network for each", answered.done);
     }
-    told(answered, about, pictures.len())
+    told(answered, pictures.len())
 }
 
 /// The files, or what kept pictures from being read.
-fn told(mut answered: Answered, about: PathBuf, asked: usize) -> Result<Vec<PathBuf>> {
+fn told(mut answered: Answered, asked: usize) -> Result<Vec<PathBuf>> {
     match answered.faults.len() {
-        0 => {
-            answered.paths.push(about);
-            Ok(answered.paths)
-        }
+        0 => Ok(answered.paths),
         1 if asked == 1 => Err(answered.faults.remove(0)),
         n => {
             let faults: Vec<String> = answered.faults.iter().map(ToString::to_string).collect();

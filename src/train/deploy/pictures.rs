@@ -289,7 +289,7 @@ pub const PREDICTION: &str = "prediction.json";
 impl Prediction {
     /// Takes a folder for the answers to these pictures. An error where another network's lie there, or files that are not answers
     /// to these pictures and would be written over.
-    pub fn claim(folder: &Path, card: &Card, pictures: &[Picture]) -> Result<PathBuf> {
+    pub fn claim(folder: &Path, card: &Card, pictures: &[Picture]) -> Result<Self> {
         let path = folder.join(PREDICTION);
         let refuse = |path: &Path, what: String| {
             Err(Error::Run { path: path.into(), what: what + "\n help: give another --out" })
@@ -330,6 +330,16 @@ impl Prediction {
             pictures: all,
         };
         run::write_json(&path, &prediction)?;
-        Ok(path)
+        Ok(prediction)
+    }
+
+    /// Leaves out pictures that came to nothing; the file goes where none is left.
+    pub fn forget(mut self, folder: &Path, names: &[&str]) -> Result<()> {
+        self.pictures.retain(|name, _| !names.contains(&name.as_str()) || folder.join(&answers(name)[0]).exists());
+        let path = folder.join(PREDICTION);
+        if self.pictures.is_empty() {
+            return std::fs::remove_file(&path).map_err(Error::io(&path));
+        }
+        run::write_json(&path, &self)
     }
 }

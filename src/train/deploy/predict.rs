@@ -3,7 +3,7 @@
 //! Threads of their own read ahead of the network and write behind it, so that it waits for neither. A picture that cannot be read
 //! keeps no other from its answer.
 
-use super::pictures::{Picture, answers};
+use super::pictures::{PREDICTION, Picture, Prediction, answers};
 use super::{enlarge, overlay};
 use crate::output::{self, Picture as Png};
 use crate::train::engine::{Model, device};
@@ -33,9 +33,11 @@ pub struct How<'a> {
 /// What came out.
 #[derive(Debug, Default)]
 pub struct Answered {
-    /// The files, two a picture, in the pictures' order.
+    /// The files, two a picture, in the pictures' order; last the one that tells what they are.
     pub paths: Vec<PathBuf>,
-    /// What kept pictures from being read.
+    /// Pictures with an answer.
+    pub done: usize,
+    /// What kept the others from being read.
     pub faults: Vec<Error>,
     /// Seconds of the network.
     pub seconds: f64,
@@ -55,6 +57,7 @@ struct Ready<'a> {
 const AHEAD: usize = 2;
 
 /// Answers pictures: for each, an indexed PNG of its classes and one of them over it, both at its own size.
+/// An error where files would be written over that are not answers to the same pictures.
 pub fn predict(
     learnt: &Learnt,
     pictures: &[Picture],
@@ -67,9 +70,11 @@ pub fn predict(
     device::set_threads(how.threads);
     let (bands, classes) = (card.input.bands.len(), card.classes.len());
     let model = Model::with(card.network, bands, classes, &learnt.values, place)?;
+    let prediction = Prediction::claim(out, card, pictures)?;
     let workers = machine.loaders.max(1);
     let failed = AtomicBool::new(false);
     let mut answered = Answered::default();
+    let mut unread = Vec::new();
     std::thread::scope(|scope| -> Result<()> {
         let readers: Vec<_> =
             (0..workers).map(|w| read(scope, card, pictures.iter().skip(w).step_by(workers))).collect();
@@ -81,7 +86,10 @@ pub fn predict(
             }
             match readers[number % workers].recv() {
                 Ok(Ok(ready)) => batch.push((number, ready)),
-                Ok(Err(fault)) => answered.faults.push(fault),
+                Ok(Err(fault)) => {
+                    unread.push(pictures[number].name.as_str());
+                    answered.faults.push(fault);
+                }
                 Err(_) => break,
             }
             if batch.len() == how.batch || number + 1 == pictures.len() {
@@ -95,10 +103,18 @@ pub fn predict(
             written.extend(handle.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?);
         }
         written.sort();
+        answered.done = written.len();
         answered.paths = written.into_iter().flat_map(|(_, paths)| paths).collect();
         Ok(())
     })?;
-    if how.stop.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(answered) }
+    if how.stop.load(Ordering::Relaxed) {
+        return Err(Error::Interrupted);
+    }
+    if !unread.is_empty() {
+        prediction.forget(out, &unread)?;
+    }
+    answered.paths.push(out.join(PREDICTION));
+    Ok(answered)
 }
 
 /// Begins to read pictures.

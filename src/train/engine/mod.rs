@@ -110,9 +110,10 @@ pub(super) fn values(tensor: &Tensor) -> Result<Vec<f32>> {
     Vec::try_from(flat).map_err(|e| failed(&e))
 }
 
-/// An error of libtorch.
+/// An error of libtorch, without the stack of its calls.
 pub(super) fn failed(e: &tch::TchError) -> Error {
-    Error::Training(format!("libtorch: {e}"))
+    let words = e.to_string();
+    Error::Training(format!("libtorch: {}", words.lines().next().unwrap_or_default()))
 }
 
 fn tensor(parameter: &Parameter, values: &[f32], device: Device) -> Tensor {
