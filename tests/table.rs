@@ -80,8 +80,8 @@ fn files(out: &Path) -> BTreeMap<String, Vec<u8>> {
     let free = |name: &str| {
         name.contains("/time/")
             || name.starts_with("times.")
-            || name.ends_with("/plan.json")
-            || name.ends_with("/result.json") && name.starts_with("runs/")
+            || name.starts_with("runs/")
+                && ["/plan.json", "/result.json", "/report.html"].iter().any(|n| name.ends_with(n))
     };
     tree(out).into_iter().filter(|(name, _)| !free(name)).collect()
 }
@@ -100,6 +100,8 @@ fn one_command_makes_sets_trainings_and_tables() {
                 let run = format!("runs/{network}/{train}/seed-{seed}");
                 assert!(found.contains_key(&format!("{run}/weights.safetensors")), "{run}");
                 assert!(found.contains_key(&format!("{run}/eval/test-a.json")), "{run}");
+                assert!(found.contains_key(&format!("{run}/eval/test-a.png")), "{run}");
+                assert!(out.join(&run).join("report.html").is_file(), "{run}");
                 assert!(!found.contains_key(&format!("{run}/checkpoint.safetensors")), "{run}");
             }
         }
@@ -111,6 +113,7 @@ fn one_command_makes_sets_trainings_and_tables() {
     assert_eq!(csv.lines().count(), 1 + 4 * 2, "{csv}");
     assert!(csv.lines().skip(1).all(|l| l.split(',').skip(2).all(|n| n.parse::<f64>().is_ok())), "{csv}");
     assert!(csv.contains("Real-Augmented") && text("table-3.md").contains("vegetation"));
+    assert!(text("results.html").contains("Real-Augmented"));
     assert!(found.keys().all(|name| !name.contains(".furrow-")));
     // Twice is once.
     let again = succeed(table(out, &[]));
