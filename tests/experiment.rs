@@ -422,7 +422,7 @@ fn mistakes_in_a_page_are_shown_where_they_are() {
         ("batch: 2", "rate: -1", "-1", "-1 is out of range", "above 0"),
         ("batch: 2", "classes: \"soil; plant=crop,weed\"", "[\"exg\"]", "baselines know soil, crop and weed", "leave"),
         ("\"frames\": Real", "\"fra/mes\": Real", "Real(about: \"eight frames\")", "`fra/mes` is no name", "letters"),
-        ("\"small\":", "\"frames\":", "Scene(", "the set `frames` is there twice", "of its own"),
+        ("\"small\":", "\"frames\":", "Scene", "the set `frames` is there twice", "of its own"),
         (
             "tests/ref/small.ron",
             "tests/ref/smal.ron",
