@@ -1,5 +1,6 @@
 //! Build script: with the feature `train`, programs remember where libtorch lies. `torch-sys` tells its direct dependants; written as
 //! `RUNPATH`, so that `LD_LIBRARY_PATH` still puts another libtorch of the same version (one with CUDA) before it.
+#![allow(clippy::print_stdout, reason = "so a build script speaks to Cargo")]
 
 fn main() {
     println!("cargo:rerun-if-changed=.libtorch/link.rs");

@@ -56,6 +56,8 @@ const DOORS: &[(&str, &str)] = &[
     ("noise", "texture/noise.rs"),
     // Labels need bits that stay, drawn textures need 16 bits and words inside.
     ("png", "output/png.rs texture/draw/"),
+    // ONNX files.
+    ("prost", "train/deploy/onnx/"),
     ("rand", "sampling/rng.rs"),
     ("rand_pcg", "sampling/rng.rs"),
     // Parallel at the top only.
@@ -81,6 +83,9 @@ const DOORS: &[(&str, &str)] = &[
     ("thiserror", "error.rs"),
     ("tobj", "model/obj.rs"),
 ];
+
+/// Dependencies that no source names: libtorch's place is told to the build script of whoever depends on it directly.
+const UNNAMED: &[&str] = &["torch_sys"];
 
 /// A source file without its comments, strings and tests.
 struct Source {
@@ -408,8 +413,13 @@ fn every_dependency_is_in_the_table_of_doors() {
     let section = manifest.split("[dependencies]").nth(1).unwrap().split("\n[").next().unwrap();
     let named: BTreeSet<String> =
         section.lines().filter_map(|l| l.split_once(" = ")).map(|(name, _)| name.replace('-', "_")).collect();
-    let listed: BTreeSet<String> = DOORS.iter().map(|(name, _)| (*name).to_owned()).collect();
+    let doors = DOORS.iter().map(|(name, _)| name);
+    let listed: BTreeSet<String> = doors.chain(UNNAMED).map(|name| (*name).to_owned()).collect();
     assert_eq!(named, listed);
+    for krate in UNNAMED {
+        let faults: Vec<String> = sources().iter().filter(|s| names(s, krate)).map(|s| s.path.clone()).collect();
+        assert!(faults.is_empty(), "{krate} is named in {faults:?}: give it a door");
+    }
 }
 
 /// The test must be able to fail.

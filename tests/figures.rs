@@ -6,12 +6,11 @@
 
 mod common;
 
+use common::browser::{browser, probe};
 use common::program::scratch;
 use common::python::python;
 use furrow::train::figure::{Chart, Curve, Page, Shot, sheet, spread};
 use furrow::train::measure::{Answer, Evaluation, Report};
-use serde_json::Value;
-use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const PALETTE: [[u8; 3]; 3] = [[0, 0, 0], [0, 255, 0], [255, 0, 0]];
@@ -210,18 +209,6 @@ fn numbers_of_a_page_are_those_of_the_report_and_it_asks_for_nothing() {
     assert_eq!(bare.matches("<section>").count(), 0);
 }
 
-/// Chromium by the names that systems have for it; `None`, and a word about it, where there is none.
-fn browser() -> Option<PathBuf> {
-    let works = |name: &&str| Command::new(name).arg("--version").output().is_ok_and(|o| o.status.success());
-    let found = ["chromium", "chromium-browser", "google-chrome"].into_iter().find(works).map(PathBuf::from);
-    if found.is_none() {
-        let required = std::env::var_os("FURROW_REQUIRE_PEERS").is_some_and(|v| v == "1");
-        assert!(!required, "no Chromium: apt-get install chromium");
-        eprintln!("skipped: no Chromium");
-    }
-    found
-}
-
 /// Looks at the page from inside and leaves what it sees in the document; no part of what is shipped.
 const PROBE: &str = r#"<script>addEventListener("load", () => {
   const inside = e => { const r = e.getBoundingClientRect(); return r.width > 0 && r.height > 0; };
@@ -236,24 +223,6 @@ const PROBE: &str = r#"<script>addEventListener("load", () => {
   });
 });</script></body>"#;
 
-fn seen(browser: &Path, folder: &Path, file: &Path, width: i64) -> Value {
-    let profile = folder.join(format!("profile-{width}"));
-    let output = Command::new(browser)
-        .args(["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--hide-scrollbars"])
-        .arg("--dump-dom")
-        .arg(format!("--user-data-dir={}", profile.display()))
-        .arg(format!("--window-size={width},900"))
-        .arg(format!("file://{}", file.display()))
-        .output()
-        .unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    let console: Vec<&str> = said.lines().filter(|l| l.contains("CONSOLE")).collect();
-    assert_eq!(console, Vec::<&str>::new(), "the browser's console");
-    let dom = String::from_utf8_lossy(&output.stdout);
-    let probe = dom.split("data-probe=\"").nth(1).and_then(|rest| rest.split('"').next());
-    serde_json::from_str(&probe.unwrap_or_else(|| panic!("{said}")).replace("&quot;", "\"")).unwrap()
-}
-
 #[test]
 fn a_browser_shows_the_page_in_wide_and_narrow_windows() {
     let Some(browser) = browser() else { return };
@@ -262,7 +231,7 @@ fn a_browser_shows_the_page_in_wide_and_narrow_windows() {
     let file = folder.join("page.html");
     std::fs::write(&file, page(&report(), &[shot("a"), shot("b")]).replace("</body>", PROBE)).unwrap();
     for width in [1280, 500] {
-        let seen = seen(&browser, &folder, &file, width);
+        let seen = probe(&browser, &folder, &file, width);
         assert_eq!((seen["images"].as_i64(), seen["decoded"].as_i64()), (Some(8), Some(8)), "{seen}");
         assert_eq!(seen["curves"], 6, "{seen}");
         assert_eq!((seen["width"].as_i64(), seen["over"].as_i64()), (Some(width), Some(0)), "{seen}");

@@ -6,10 +6,10 @@
 
 mod common;
 
+use common::browser::{browser, probe};
 use common::program::{SMALL, scratch, trace};
 use serde_json::Value;
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::Path;
 
 /// Images of the small dataset.
 const COUNT: u64 = 6;
@@ -118,18 +118,6 @@ fn equal_datasets_have_equal_reports_that_ask_for_nothing() {
     assert_eq!(manifest["files"]["report.html"]["bytes"], page.len());
 }
 
-/// Chromium by the names that systems have for it; `None`, and a word about it, where there is none.
-fn browser() -> Option<PathBuf> {
-    let works = |name: &&str| Command::new(name).arg("--version").output().is_ok_and(|o| o.status.success());
-    let found = ["chromium", "chromium-browser", "google-chrome"].into_iter().find(works).map(PathBuf::from);
-    if found.is_none() {
-        let required = std::env::var_os("FURROW_REQUIRE_PEERS").is_some_and(|v| v == "1");
-        assert!(!required, "no Chromium: apt-get install chromium");
-        eprintln!("skipped: no Chromium");
-    }
-    found
-}
-
 /// Looks at the page from inside and leaves what it sees in the document; no part of what is shipped.
 const PROBE: &str = r#"<script>addEventListener("load", () => {
   const opacity = () => getComputedStyle(document.querySelector(".frame .labels")).opacity;
@@ -154,31 +142,7 @@ fn a_browser_shows_the_report_in_wide_and_narrow_windows() {
     let file = out.join("probed.html");
     std::fs::write(&file, page).unwrap();
     for width in [1280, 500] {
-        let profile = out.join(format!("profile-{width}"));
-        let output = Command::new(&browser)
-            .args([
-                "--headless",
-                "--no-sandbox",
-                "--disable-gpu",
-                "--enable-logging=stderr",
-                "--hide-scrollbars",
-                "--dump-dom",
-            ])
-            .arg(format!("--user-data-dir={}", profile.display()))
-            .arg(format!("--window-size={width},900"))
-            .arg(format!("file://{}", file.display()))
-            .output()
-            .unwrap();
-        let said = String::from_utf8_lossy(&output.stderr);
-        let console: Vec<&str> = said.lines().filter(|l| l.contains("CONSOLE")).collect();
-        assert_eq!(console, Vec::<&str>::new(), "the browser's console");
-        let dom = String::from_utf8_lossy(&output.stdout);
-        let probe = dom
-            .split("data-probe=\"")
-            .nth(1)
-            .and_then(|rest| rest.split('"').next())
-            .unwrap_or_else(|| panic!("{said}"));
-        let seen: Value = serde_json::from_str(&probe.replace("&quot;", "\"")).unwrap();
+        let seen = probe(&browser, &out, &file, width);
         assert_eq!(seen["images"], 2 * COUNT, "{seen}");
         assert_eq!(seen["decoded"], seen["images"], "{seen}");
         assert_eq!((seen["width"].as_i64(), seen["over"].as_i64()), (Some(width), Some(0)), "{seen}");

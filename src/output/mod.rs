@@ -22,7 +22,7 @@ pub use self::png::{
     Map, Picture, encode as encode_png, read_gray, read_gray16, read_indexed, read_map, read_rgb, write_png,
 };
 pub use denoise::Denoiser;
-pub use photo::{encode_jpeg, read_gray_photo, read_photo, resize_gray, shrink, shrunk};
+pub use photo::{encode_jpeg, read_color_photo, read_gray_photo, read_photo, resize_gray, shrink, shrunk};
 
 /// How many samples the pixels of an image have.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -109,6 +109,21 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
 
 /// The same for a file that is written piece by piece.
 pub fn stream_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
+    let mut buffer = std::io::BufWriter::with_capacity(1 << 16, unfinished(path)?);
+    write(&mut buffer)?;
+    let file = buffer.into_inner().map_err(|e| Error::Io { path: path.into(), source: e.into_error() })?;
+    finish(file, path)
+}
+
+/// The same for a file that somebody else writes, who is told its temporary name.
+pub fn place_atomically(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+    let file = unfinished(path)?;
+    write(file.path())?;
+    finish(file, path)
+}
+
+/// A new file beside its target.
+fn unfinished(path: &Path) -> Result<tempfile::NamedTempFile> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
     let mut builder = tempfile::Builder::new();
@@ -119,10 +134,10 @@ pub fn stream_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> Resu
         // As any other new file: the umask takes its part.
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    let file = builder.tempfile_in(folder).map_err(Error::io(path))?;
-    let mut buffer = std::io::BufWriter::with_capacity(1 << 16, file);
-    write(&mut buffer)?;
-    let file = buffer.into_inner().map_err(|e| Error::Io { path: path.into(), source: e.into_error() })?;
+    builder.tempfile_in(folder).map_err(Error::io(path))
+}
+
+fn finish(file: tempfile::NamedTempFile, path: &Path) -> Result<()> {
     file.as_file().sync_all().map_err(Error::io(path))?;
     file.persist(path).map_err(|e| Error::Io { path: path.into(), source: e.error })?;
     Ok(())

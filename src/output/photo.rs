@@ -12,6 +12,21 @@ pub fn read_photo(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
     Ok((w, h, photo.into_raw().as_chunks::<3>().0.to_vec()))
 }
 
+/// The same; an error for a picture in gray, in which colours cannot be told from each other.
+pub fn read_color_photo(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
+    let photo = decode(path)?;
+    if !photo.color().has_color() {
+        return Err(Error::Image {
+            path: path.into(),
+            what: "this picture is gray, and the network sees colours\n help: give photographs in red, green and blue"
+                .into(),
+        });
+    }
+    let photo = photo.into_rgb8();
+    let (w, h) = photo.dimensions();
+    Ok((w, h, photo.into_raw().as_chunks::<3>().0.to_vec()))
+}
+
 /// Reads one as 8-bit gray: width, height, values.
 pub fn read_gray_photo(path: &Path) -> Result<(u32, u32, Vec<u8>)> {
     let photo = decode(path)?.into_luma8();

@@ -1,6 +1,7 @@
 //! What several tests share.
 #![allow(dead_code, unreachable_pub, reason = "each test uses its part")]
 
+pub mod browser;
 pub mod chi2;
 pub mod dataset;
 pub mod layers;
@@ -9,3 +10,5 @@ pub mod program;
 pub mod python;
 pub mod scenes;
 pub mod stats;
+#[cfg(feature = "train")]
+pub mod training;

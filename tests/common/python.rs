@@ -27,3 +27,30 @@ pub fn python(probe: &str) -> Option<PathBuf> {
     eprintln!("skipped: {words}");
     None
 }
+
+/// A Python with PyTorch: `$FURROW_TORCH_PYTHON`, then `target/venv/bin/python`. `None`, and a word about it, where there is none: it is
+/// three gigabytes, so nothing installs it unasked.
+pub fn torch() -> Option<PathBuf> {
+    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/venv/bin/python");
+    let named = std::env::var_os("FURROW_TORCH_PYTHON").map(PathBuf::from);
+    let runs = |p: &PathBuf| {
+        let probe = Command::new(p).args(["-c", "import torch, numpy, safetensors"]).output();
+        probe.is_ok_and(|output| output.status.success())
+    };
+    let found = [named, Some(own)].into_iter().flatten().find(runs);
+    if found.is_none() {
+        eprintln!("skipped: no Python has torch; FURROW_TORCH_PYTHON may name one");
+    }
+    found
+}
+
+/// Runs a script of `tests/` and expects it to be content; shows what it says.
+pub fn ask(python: &Path, script: &str, arguments: &[&str]) {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests").join(script);
+    let mut command = Command::new(python);
+    // No stray files in the sources; single threads, as many tests run at once.
+    command.arg(script).args(arguments).env("PYTHONDONTWRITEBYTECODE", "1").env("OMP_NUM_THREADS", "1");
+    let output = command.output().expect("Python");
+    eprint!("{}", String::from_utf8_lossy(&output.stdout));
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+}

@@ -84,13 +84,13 @@ pub(crate) struct LearnArgs {
     #[arg(long, value_name = "NAME", default_value = "poly", value_parser = Schedule::parse)]
     schedule: Schedule,
     /// What makes up for rare classes: median (frequency), its root, or none.
-    #[arg(long, value_name = "NAME", default_value = "median", value_parser = Balance::parse)]
+    #[arg(long, value_name = "NAME", default_value = "none", value_parser = Balance::parse)]
     balance: Balance,
     /// What is varied: all, none, or some of flip, rotate, scale, crop, colour, blur, noise.
     #[arg(long, value_name = "NAMES", default_value = "all", value_parser = Augment::parse)]
     augment: Augment,
     /// What is taken out of each image: band (exposure and white balance), image (exposure), fixed (nothing).
-    #[arg(long, value_name = "NAME", default_value = "image", value_parser = Exposure::parse)]
+    #[arg(long, value_name = "NAME", default_value = "band", value_parser = Exposure::parse)]
     normalise: Exposure,
     /// Steps between two looks at the validation images, each with a checkpoint.
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..))]
@@ -108,6 +108,7 @@ fn bands(text: &str) -> Result<Bands, String> {
     Band::list(text).map(Bands)
 }
 
+/// Reads `480x360`.
 pub(crate) fn size(text: &str) -> Result<(u32, u32), String> {
     let sides = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
     sides

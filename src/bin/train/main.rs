@@ -2,8 +2,10 @@
 
 mod baseline;
 mod eval;
+mod export;
 mod fit;
 mod machine;
+mod predict;
 mod report;
 mod table;
 
@@ -29,6 +31,8 @@ Examples:
   train fit --set data/d --out runs/d                     Basic SegNet on the training images of a set
   train fit --set data/d --set data/real@0..10*4 --network unet --size 240x180 --out runs/augmented
   train eval runs/d --set data/real@12..20                how well it does on real images
+  train predict runs/d photos/ --out answers              masks of photographs, and masks over them
+  train export runs/d --format onnx                       the network for a robot
   train baseline exg-size --from data/real@0..10 --set data/real@12..20
   train table scenes/experiments/paper.ron --real jai=DIR the paper's tables, from scenes and real folders
 
@@ -42,6 +46,10 @@ enum Verb {
     Fit(Box<fit::Args>),
     /// Judge a trained network on images with labels.
     Eval(eval::Args),
+    /// Answer on pictures without labels: masks, and masks over the pictures.
+    Predict(predict::Args),
+    /// Write a trained network for other programs.
+    Export(export::Args),
     /// Judge what colour alone can do: what a network must beat.
     Baseline(baseline::Args),
     /// Run an experiment of a page: sets, trainings, evaluations, tables.
@@ -53,6 +61,8 @@ fn main() -> ExitCode {
     let done = match Cli::parse().verb {
         Verb::Fit(args) => fit::run(&args, &signals),
         Verb::Eval(args) => eval::run(&args, &signals),
+        Verb::Predict(args) => predict::run(&args, &signals),
+        Verb::Export(args) => export::run(&args),
         Verb::Baseline(args) => baseline::run(&args, &signals),
         Verb::Table(args) => table::run(&args, &signals),
     };

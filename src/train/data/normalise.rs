@@ -22,7 +22,7 @@ pub enum Normalisation {
 }
 
 /// What a deviation is at least, in values from 0 to 1: a picture of one colour stays finite. A step of 8 bits.
-const LEAST: f32 = 1.0 / 255.0;
+pub(crate) const LEAST: f32 = 1.0 / 255.0;
 
 impl Normalisation {
     /// [`Self::Fixed`] to what the images of a store have.

@@ -5,7 +5,7 @@
 mod compute;
 pub mod device;
 
-use super::net::{Network, Parameter, parameters};
+use super::net::{Network, Parameter, fitting, parameters};
 use super::weights::Array;
 use crate::{Error, Result};
 use compute::Compute;
@@ -47,20 +47,7 @@ impl Model {
 
     /// Takes over values by name; all parameters must be there in their shapes, others may be there too.
     pub fn load(&mut self, arrays: &[Array]) -> Result<()> {
-        for parameter in &self.list {
-            let wrong = |what: String| {
-                Error::Training(format!(
-                    "these weights are not those of {} with {} bands and {} classes: {what}",
-                    self.network.name(),
-                    self.bands,
-                    self.classes
-                ))
-            };
-            let array = arrays.iter().find(|a| a.name == parameter.name);
-            let array = array.ok_or_else(|| wrong(format!("`{}` is missing", parameter.name)))?;
-            if array.shape != parameter.shape {
-                return Err(wrong(format!("`{}` is {:?}, not {:?}", array.name, array.shape, parameter.shape)));
-            }
+        for (parameter, array) in self.list.iter().zip(fitting(self.network, self.bands, self.classes, arrays)?) {
             self.tensors.insert(parameter.name.clone(), tensor(parameter, &array.values, self.place.device));
         }
         Ok(())
@@ -94,6 +81,18 @@ impl Model {
         let classes =
             tch::no_grad(|| self.forward(&x, false).argmax(1, false).to_kind(Kind::Uint8).to_device(Device::Cpu));
         Vec::<u8>::try_from(classes.contiguous().view(-1)).map_err(|e| failed(&e))
+    }
+
+    /// The values of the classes: images × classes × height × width; images lie as in [`Self::predict`].
+    pub fn scores(&self, pixels: &[f32], size: (u32, u32)) -> Result<Vec<f32>> {
+        values(&tch::no_grad(|| self.forward(&self.images(pixels, size), false)))
+    }
+
+    /// Has gradients change nothing any more: only so can its values become constants of a graph.
+    pub(super) fn freeze(&mut self) {
+        for tensor in self.tensors.values_mut() {
+            *tensor = tensor.detach();
+        }
     }
 
     /// Images that lie as `height × width × bands` as libtorch sees them: images × bands × height × width, on the device.

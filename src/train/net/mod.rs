@@ -10,7 +10,7 @@ mod parameters;
 mod segnet;
 mod unet;
 
-pub use parameters::{Parameter, Role, parameters};
+pub use parameters::{Parameter, Role, fitting, parameters};
 
 use serde::{Deserialize, Serialize};
 
@@ -95,6 +95,15 @@ networks! {
 }
 
 impl Network {
+    /// Pixels that an image must have down and across: SegNets halve it once a block and keep nothing of what is odd.
+    pub fn least_side(self) -> u32 {
+        match self {
+            Self::BasicSegnet => 16,
+            Self::Segnet => 32,
+            Self::Unet => 1,
+        }
+    }
+
     /// Reads a name.
     pub fn named(text: &str) -> Result<Self, String> {
         let names: Vec<&str> = Self::ALL.iter().map(|n| n.name()).collect();

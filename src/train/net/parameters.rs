@@ -2,6 +2,8 @@
 
 use super::{Conv, Network, Operations};
 use crate::sampling::{Purpose, Stream};
+use crate::train::weights::Array;
+use crate::{Error, Result};
 
 /// What a parameter does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,6 +72,26 @@ pub fn parameters(network: Network, bands: usize, classes: usize) -> Vec<Paramet
     let mut list = List(Vec::new());
     network.walk(&mut list, &(), bands, classes);
     list.0
+}
+
+/// The values of a network's parameters among `arrays`, in the order of [`parameters()`]: found by name, others may be there too.
+/// An error that names what is missing or has another shape.
+pub fn fitting(network: Network, bands: usize, classes: usize, arrays: &[Array]) -> Result<Vec<&Array>> {
+    let fit = |parameter: &Parameter| {
+        let wrong = |what: String| {
+            Error::Training(format!(
+                "these weights are not those of {} with {bands} bands and {classes} classes: {what}",
+                network.name(),
+            ))
+        };
+        let array = arrays.iter().find(|a| a.name == parameter.name);
+        let array = array.ok_or_else(|| wrong(format!("`{}` is missing", parameter.name)))?;
+        if array.shape != parameter.shape {
+            return Err(wrong(format!("`{}` is {:?}, not {:?}", array.name, array.shape, parameter.shape)));
+        }
+        Ok(array)
+    };
+    parameters(network, bands, classes).iter().map(fit).collect()
 }
 
 struct List(Vec<Parameter>);

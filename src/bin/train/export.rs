@@ -1,0 +1,64 @@
+//! `train export`.
+
+use clap::ValueEnum;
+use furrow::train::deploy::{onnx, torchscript};
+use furrow::train::run::Learnt;
+use furrow::{Error, Result};
+use std::path::PathBuf;
+
+/// Which network, as what.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Folder of the run.
+    run: PathBuf,
+    /// What is written.
+    #[arg(long, value_name = "NAME", default_value = "onnx")]
+    format: Format,
+    /// The file; network.onnx or network.pt in the run's folder unless given.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Size of the pictures that a TorchScript is for; the network's own unless given. ONNX takes any.
+    #[arg(long, value_name = "WxH", value_parser = crate::fit::size)]
+    size: Option<(u32, u32)>,
+}
+
+/// A way to write a network down.
+#[derive(Clone, Copy, ValueEnum)]
+enum Format {
+    /// ONNX, for ONNX Runtime and others.
+    Onnx,
+    /// TorchScript, for libtorch and PyTorch; a JSON file beside it tells bands, classes and size.
+    Torchscript,
+}
+
+/// Writes the network.
+pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
+    let learnt = Learnt::open(&args.run)?;
+    let usual = match args.format {
+        Format::Onnx => "network.onnx",
+        Format::Torchscript => "network.pt",
+    };
+    let out = args.out.clone().unwrap_or_else(|| args.run.join(usual));
+    if out.is_dir() {
+        return Err(Error::Training(format!(
+            "{}: this is a folder\n help: give --out a file, such as {}",
+            out.display(),
+            out.join(usual).display()
+        )));
+    }
+    match (args.format, args.size) {
+        (Format::Onnx, Some(_)) => {
+            Err(Error::Training("an ONNX graph takes pictures of any size\n help: leave --size out".into()))
+        }
+        (Format::Onnx, None) => {
+            onnx::write(&learnt, &out)?;
+            Ok(vec![out])
+        }
+        (Format::Torchscript, size) => {
+            let input = &learnt.card.input;
+            torchscript::write(&learnt, size.unwrap_or((input.width, input.height)), &out)?;
+            let facts = torchscript::facts_path(&out);
+            Ok(vec![out, facts])
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! `train predict`.
+
+use crate::machine::MachineArgs;
+use furrow::cli::signal::Signals;
+use furrow::train::data::Band;
+use furrow::train::deploy::pictures::{self, Prediction};
+use furrow::train::deploy::predict::{self, Answered, How};
+use furrow::train::run::Learnt;
+use furrow::{Error, Result, cli};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::path::PathBuf;
+
+/// Which network, about which pictures.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Folder of the run.
+    run: PathBuf,
+    /// PNG or JPEG files of any size, folders of them, or images of a set: DIR, DIR@PICK.
+    #[arg(required = true, value_name = "IMAGES")]
+    images: Vec<PathBuf>,
+    /// Folder for the answers: NAME.png, classes by number, NAME.overlay.png, and prediction.json, which tells what they are.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Where another band than red, green and blue lies: gray pictures of the photographs' names. Without it, that of a.jpg is
+    /// a.nir.png beside it, and that of rgb_1.png nir_1.png.
+    #[arg(long = "band", value_name = "NAME=DIR", value_parser = band)]
+    bands: Vec<(Band, PathBuf)>,
+    /// Pictures that are answered at once.
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    batch: u16,
+    #[command(flatten)]
+    machine: MachineArgs,
+    /// Print nothing but errors and the paths of the files.
+    #[arg(long)]
+    quiet: bool,
+}
+
+fn band(text: &str) -> Result<(Band, PathBuf), String> {
+    let (name, folder) = text.split_once('=').ok_or("write it as nir=DIR")?;
+    match Band::parse(name)? {
+        band if band.is_color() => Err(format!("`{}` is the photograph's own", band.name())),
+        band => Ok((band, folder.into())),
+    }
+}
+
+/// Answers.
+pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
+    let learnt = Learnt::open(&args.run)?;
+    cli::check_folder(&args.out)?;
+    let pictures = pictures::find(&args.images, &learnt.card.input, &args.bands)?;
+    let stop = signals.heed();
+    let about = Prediction::claim(&args.out, &learnt.card, &pictures)?;
+    let bar = if args.quiet { ProgressBar::hidden() } else { ProgressBar::new(pictures.len() as u64) };
+    let style = ProgressStyle::with_template("{bar:30} {pos} of {len} pictures, {eta} left");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let how = How {
+        precision: &args.machine.precision,
+        threads: args.machine.threads(),
+        batch: args.batch.into(),
+        done: &|done| bar.set_position(done as u64),
+        stop,
+    };
+    let answered = predict::predict(&learnt, &pictures, &args.out, &args.machine.machine(), &how);
+    bar.finish_and_clear();
+    let answered = answered?;
+    let done = answered.paths.len() / 2;
+    if !args.quiet && done > 0 {
+        eprintln!("{done} pictures, {:.3} s of the network for each", answered.seconds / done as f64);
+    }
+    told(answered, about, pictures.len())
+}
+
+/// The files, or what kept pictures from being read.
+fn told(mut answered: Answered, about: PathBuf, asked: usize) -> Result<Vec<PathBuf>> {
+    match answered.faults.len() {
+        0 => {
+            answered.paths.push(about);
+            Ok(answered.paths)
+        }
+        1 if asked == 1 => Err(answered.faults.remove(0)),
+        n => {
+            let faults: Vec<String> = answered.faults.iter().map(ToString::to_string).collect();
+            Err(Error::Training(format!(
+                "{n} of {asked} pictures could not be read, the others are answered:\n{}",
+                faults.join("\n")
+            )))
+        }
+    }
+}

@@ -1,0 +1,335 @@
+//! Which pictures are asked about, where their bands lie, and what their answers are called.
+//!
+//! A picture is a PNG or JPEG file of any size, every one directly in a folder, or the images of a set (`DIR`, `DIR@PICK`). Red, green and
+//! blue are the photograph's. Another band, such as nir, is a gray picture of the same size: of `a.jpg`, the file `a.nir.png` beside
+//! it; of a photograph with `rgb` in its name, the file with `nir` instead; or the file of the photograph's name, `a.png`, in a
+//! folder that is named for the band. Files that are another's band are no pictures of their own.
+
+use crate::dataset::{Set, native};
+use crate::output;
+use crate::train::classes::Classes;
+use crate::train::data::{Band, Pick, Selection, Shape};
+use crate::train::run::{self, Card};
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+
+/// What pictures' names end with.
+const ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];
+
+/// A picture without labels.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Picture {
+    /// What its answer is called.
+    pub name: String,
+    /// The photograph.
+    pub photo: PathBuf,
+    /// Where each band of the network lies.
+    planes: Vec<Plane>,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Plane {
+    /// A channel of the photograph.
+    Channel(usize),
+    /// The photograph itself, in gray.
+    Photo,
+    /// A gray picture.
+    File(PathBuf),
+}
+
+/// A picture in memory.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pixels {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// 8-bit sRGB.
+    pub rgb: Vec<[u8; 3]>,
+    /// One 8-bit plane for each band of the network.
+    pub planes: Vec<Vec<u8>>,
+}
+
+impl Pixels {
+    /// At a network's size, antialiased: bands side by side, values from 0 to 1.
+    pub fn at(&self, (width, height): (u32, u32)) -> Vec<f32> {
+        let resized = self.planes.iter().map(|p| output::resize_gray(self.width, self.height, p, (width, height)));
+        let planes: Vec<Vec<u8>> = resized.collect();
+        let pixels = width as usize * height as usize;
+        (0..pixels).flat_map(|i| planes.iter().map(move |p| f32::from(p[i]) / 255.0)).collect()
+    }
+}
+
+impl Picture {
+    /// Reads it. An error where it is no picture, is gray to a network that sees colours, or where bands differ in size.
+    pub fn read(&self) -> Result<Pixels> {
+        let colored = self.planes.iter().any(|p| matches!(p, Plane::Channel(_)));
+        let read = if colored { output::read_color_photo } else { output::read_photo };
+        let (width, height, rgb) = read(&self.photo)?;
+        let plane = |plane: &Plane| {
+            let path = match plane {
+                Plane::Channel(c) => return Ok(rgb.iter().map(|p| p[*c]).collect()),
+                Plane::Photo => &self.photo,
+                Plane::File(path) => path,
+            };
+            let (w, h, values) = output::read_gray_photo(path)?;
+            if (w, h) != (width, height) {
+                return Err(Error::Image {
+                    path: path.clone(),
+                    what: format!(
+                        "it is {w} × {h} pixels, the photograph {} is {width} × {height}",
+                        self.photo.display()
+                    ),
+                });
+            }
+            Ok(values)
+        };
+        let planes = self.planes.iter().map(plane).collect::<Result<_>>()?;
+        Ok(Pixels { width, height, rgb, planes })
+    }
+}
+
+/// The pictures that files, folders and sets hold, in their order, the files of a folder by name; each once. `elsewhere` names folders of
+/// bands. An error where there is none, where a band is missing, or where two pictures have one name.
+pub fn find(inputs: &[PathBuf], shape: &Shape, elsewhere: &[(Band, PathBuf)]) -> Result<Vec<Picture>> {
+    for (band, folder) in elsewhere {
+        if !shape.bands.contains(band) {
+            let names: Vec<&str> = shape.bands.iter().map(Band::name).collect();
+            return Err(Error::Training(format!(
+                "the network does not see the band `{}`\n help: its bands are {}",
+                band.name(),
+                names.join(", ")
+            )));
+        }
+        std::fs::read_dir(folder).map_err(Error::io(folder))?;
+    }
+    let mut pictures: Vec<Picture> = Vec::new();
+    let mut add = |name: String, photo: PathBuf, planes: Vec<Plane>| {
+        if !pictures.iter().any(|p| p.photo == photo) {
+            pictures.push(Picture { name, photo, planes });
+        }
+    };
+    for input in inputs {
+        if let Some(selection) = selection(input)? {
+            for (name, folder) in images(&selection)? {
+                let photo = folder.join("rgb.png");
+                let beside = |band: &Band| Some(folder.join(format!("{}.png", band.name()))).filter(|p| p.is_file());
+                let planes = planes(&photo, shape, &beside)?;
+                add(name, photo, planes);
+            }
+            continue;
+        }
+        for photo in photos(input, shape)? {
+            let named = |band: &Band| elsewhere.iter().find(|(b, _)| b == band).map(|(_, folder)| folder);
+            let beside = |band: &Band| match named(band) {
+                Some(folder) => same_name(&photo, folder),
+                None => companion(&photo, band.name()),
+            };
+            let planes = planes(&photo, shape, &beside)?;
+            add(stem(&photo), photo, planes);
+        }
+    }
+    one_name_each(&pictures)?;
+    Ok(pictures)
+}
+
+/// A set's images, where the input is a set or picks images of one.
+fn selection(input: &Path) -> Result<Option<Selection>> {
+    let whole = |folder: &Path| Selection { folder: folder.into(), pick: None, repeat: 1 };
+    if input.is_dir() {
+        return Ok(input.join(crate::dataset::recipe::FILE).is_file().then(|| whole(input)));
+    }
+    match input.to_str() {
+        Some(text) if !input.exists() && text.contains('@') => Selection::parse(text).map(Some).map_err(Error::Dataset),
+        _ => Ok(None),
+    }
+}
+
+/// Names and folders of a set's images.
+fn images(selection: &Selection) -> Result<Vec<(String, PathBuf)>> {
+    let (set, numbers) = selection.open(Pick::All, 0)?;
+    let image = |number: u64| {
+        let name = Set::name(number);
+        let folder = set.folder.join(native::folder(&name));
+        if folder.is_dir() {
+            return Ok((name, folder));
+        }
+        Err(Error::Dataset(format!(
+            "{}: this image is not there yet\n help: the command that began the set makes it",
+            folder.display()
+        )))
+    };
+    numbers.into_iter().map(image).collect()
+}
+
+/// A photograph, or all in a folder.
+fn photos(input: &Path, shape: &Shape) -> Result<Vec<PathBuf>> {
+    if !input.exists() {
+        return Err(Error::Image {
+            path: input.into(),
+            what:
+                "there is no such picture\n help: name PNG or JPEG files, folders of them, or images of a set: DIR@PICK"
+                    .into(),
+        });
+    }
+    if !input.is_dir() {
+        return Ok(vec![input.into()]);
+    }
+    let mut photos = Vec::new();
+    for entry in std::fs::read_dir(input).map_err(Error::io(input))? {
+        let path = entry.map_err(Error::io(input))?.path();
+        let ending = path.extension().and_then(OsStr::to_str).map(str::to_ascii_lowercase);
+        if path.is_file() && ending.is_some_and(|e| ENDINGS.contains(&e.as_str())) {
+            photos.push(path);
+        }
+    }
+    photos.sort();
+    // Near infrared is known for what it is by networks that do not see it, too.
+    let bands: BTreeSet<&str> = shape.bands.iter().filter(|b| !b.is_color()).map(Band::name).chain(["nir"]).collect();
+    let others: BTreeSet<PathBuf> =
+        photos.iter().flat_map(|photo| bands.iter().filter_map(|band| companion(photo, band))).collect();
+    photos.retain(|photo| !others.contains(photo));
+    if photos.is_empty() {
+        return Err(Error::Image {
+            path: input.into(),
+            what: format!(
+                "there is no picture in this folder\n help: pictures are PNG or JPEG files directly in it; a set has a {}",
+                crate::dataset::recipe::FILE
+            ),
+        });
+    }
+    Ok(photos)
+}
+
+/// Where each band lies; `beside` finds those that are not the photograph's own.
+fn planes(photo: &Path, shape: &Shape, beside: &dyn Fn(&Band) -> Option<PathBuf>) -> Result<Vec<Plane>> {
+    let plane = |band: &Band| match band {
+        Band::Red => Ok(Plane::Channel(0)),
+        Band::Green => Ok(Plane::Channel(1)),
+        Band::Blue => Ok(Plane::Channel(2)),
+        Band::Gray(name) => match beside(band) {
+            Some(path) => Ok(Plane::File(path)),
+            None if shape.bands.len() == 1 => Ok(Plane::Photo),
+            None => Err(Error::Image {
+                path: photo.into(),
+                what: format!(
+                    "the network sees the band `{name}`, which this picture lacks\n help: put {}.{name}.png beside it, or name the folder of such pictures with --band {name}=DIR",
+                    stem(photo)
+                ),
+            }),
+        },
+    };
+    shape.bands.iter().map(plane).collect()
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// The picture of a band beside its photograph.
+fn companion(photo: &Path, band: &str) -> Option<PathBuf> {
+    let stem = stem(photo);
+    let names = [Some(format!("{stem}.{band}")), stem.contains("rgb").then(|| stem.replace("rgb", band))];
+    let beside = |name: &String| picture(photo.parent()?, name);
+    names.iter().flatten().find_map(beside)
+}
+
+/// The picture of the photograph's name in another folder.
+fn same_name(photo: &Path, folder: &Path) -> Option<PathBuf> {
+    picture(folder, &stem(photo))
+}
+
+fn picture(folder: &Path, stem: &str) -> Option<PathBuf> {
+    let endings = ENDINGS.iter().flat_map(|e| [(*e).to_owned(), e.to_ascii_uppercase()]);
+    endings.map(|ending| folder.join(format!("{stem}.{ending}"))).find(|path| path.is_file())
+}
+
+/// The files of a picture's answer: classes, and classes over the picture.
+pub fn answers(name: &str) -> [String; 2] {
+    [format!("{name}.png"), format!("{name}.overlay.png")]
+}
+
+fn one_name_each(pictures: &[Picture]) -> Result<()> {
+    let mut taken: BTreeMap<String, &Picture> = BTreeMap::new();
+    for picture in pictures {
+        for file in answers(&picture.name) {
+            if let Some(other) = taken.insert(file.clone(), picture) {
+                return Err(Error::Training(format!(
+                    "{} and {} would both become {file}\n help: ask about them one after the other, each with its own --out",
+                    other.photo.display(),
+                    picture.photo.display()
+                )));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// What the answers in a folder are: `prediction.json`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Prediction {
+    /// The program's version.
+    pub furrow: String,
+    /// The network.
+    pub network: String,
+    /// SHA-256 of its weights.
+    pub weights_sha256: String,
+    /// Classes in the order of their numbers, with their sRGB colours.
+    pub classes: Vec<(String, [u8; 3])>,
+    /// The photograph of each answer, by name.
+    pub pictures: BTreeMap<String, String>,
+}
+
+/// The file that says what the answers in a folder are.
+pub const PREDICTION: &str = "prediction.json";
+
+impl Prediction {
+    /// Takes a folder for the answers to these pictures. An error where another network's lie there, or files that are not answers
+    /// to these pictures and would be written over.
+    pub fn claim(folder: &Path, card: &Card, pictures: &[Picture]) -> Result<PathBuf> {
+        let path = folder.join(PREDICTION);
+        let refuse = |path: &Path, what: String| {
+            Err(Error::Run { path: path.into(), what: what + "\n help: give another --out" })
+        };
+        let there: Option<Self> = path.exists().then(|| run::read_json(&path)).transpose()?;
+        if there.as_ref().is_some_and(|t| t.weights_sha256 != card.weights_sha256) {
+            return refuse(&path, "answers of another network lie in this folder".into());
+        }
+        let mut all = there.map(|t| t.pictures).unwrap_or_default();
+        for picture in pictures {
+            let photo = std::fs::canonicalize(&picture.photo).map_err(Error::io(&picture.photo))?;
+            let photo = photo.to_string_lossy().into_owned();
+            match all.get(&picture.name) {
+                Some(other) if *other == photo => {}
+                Some(other) => {
+                    let answer = folder.join(&answers(&picture.name)[0]);
+                    return refuse(&answer, format!("this is the answer to {other}, and would be written over"));
+                }
+                None => {
+                    let files = answers(&picture.name).map(|file| folder.join(file));
+                    if let Some(file) = files.iter().find(|file| file.exists()) {
+                        return refuse(
+                            file,
+                            format!("this is no answer of ours, and that to {photo} would be written over it"),
+                        );
+                    }
+                    all.insert(picture.name.clone(), photo);
+                }
+            }
+        }
+        let Classes(classes) = &card.classes;
+        let classes = classes.iter().map(|c| c.name.clone()).zip(card.classes.colors()).collect();
+        let prediction = Self {
+            furrow: env!("CARGO_PKG_VERSION").into(),
+            network: card.network.name().into(),
+            weights_sha256: card.weights_sha256.clone(),
+            classes,
+            pictures: all,
+        };
+        run::write_json(&path, &prediction)?;
+        Ok(path)
+    }
+}

@@ -1,0 +1,60 @@
+//! A network as TorchScript: what libtorch and PyTorch run, on CPUs and GPUs, without this program's source.
+//!
+//! The network is traced: what it does to one picture is written down. Height and width are thereby frozen, the number of images is
+//! not. Input as of all exports ([`super`]); the output is the first of ONNX's: one value a class and pixel, images × classes ×
+//! height × width, single precision. What an ONNX file says about itself stands in a JSON file beside ([`super::Facts`]).
+
+use super::Facts;
+use crate::output::place_atomically;
+use crate::train::data::Normalisation;
+use crate::train::data::normalise::LEAST;
+use crate::train::engine::{Model, Precision, Where, failed};
+use crate::train::run::{Learnt, write_json};
+use crate::{Error, Result};
+use std::path::{Path, PathBuf};
+use tch::{CModule, Device, Kind, Tensor};
+
+/// The file with the words about a traced network.
+pub fn facts_path(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".json");
+    name.into()
+}
+
+/// Writes the network for pictures of so many pixels across and down, atomically, and the words about it.
+pub fn write(learnt: &Learnt, (width, height): (u32, u32), path: &Path) -> Result<()> {
+    let card = &learnt.card;
+    let bands = card.input.bands.len();
+    let least = card.network.least_side();
+    if width.min(height) < least {
+        return Err(Error::Training(format!(
+            "{} needs pictures of {least} pixels at least, down and across, not {width} × {height}",
+            card.network.name()
+        )));
+    }
+    let place = Where { device: Device::Cpu, precision: Precision::Single };
+    let mut model = Model::with(card.network, bands, card.classes.len(), &learnt.values, place)?;
+    model.freeze();
+    let example = Tensor::zeros([1, i64::from(height), i64::from(width), bands as i64], (Kind::Uint8, Device::Cpu));
+    let mut forward = |x: &[Tensor]| vec![model.forward(&normalised(&x[0], &card.normalisation), false)];
+    let module = tch::no_grad(|| CModule::create_by_tracing("furrow", "forward", &[example], &mut forward));
+    let module = module.map_err(|e| failed(&e))?;
+    place_atomically(path, |path| module.save(path).map_err(|e| failed(&e)))?;
+    write_json(&facts_path(path), &Facts::of(card, (width, height)))
+}
+
+/// From 8-bit pixels, images × height × width × bands, to what the network takes; as [`Normalisation::apply`].
+fn normalised(image: &Tensor, how: &Normalisation) -> Tensor {
+    let x = image.to_kind(Kind::Float).permute([0, 3, 1, 2]) / 255.0;
+    let axes: &[i64] = match how {
+        Normalisation::Fixed { mean, sd } => {
+            let [mean, sd] = [mean, sd].map(|v| Tensor::from_slice(v).view([1, v.len() as i64, 1, 1]));
+            return (x - mean) / sd;
+        }
+        Normalisation::Band => &[2, 3],
+        Normalisation::Image => &[1, 2, 3],
+    };
+    let less = &x - x.mean_dim(axes, true, Kind::Float);
+    let sd = (&less * &less).mean_dim(axes, true, Kind::Float).sqrt().clamp_min(f64::from(LEAST));
+    less / sd
+}

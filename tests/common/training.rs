@@ -1,0 +1,110 @@
+//! Small trainings and pictures made of numbers.
+
+use super::dataset::{make, succeed};
+use furrow::sampling::{Purpose, Stream};
+use furrow::train::classes::Classes;
+use furrow::train::data::{Band, Pick, Selection, Shape};
+use furrow::train::fit::plan::Exposure;
+use furrow::train::fit::{Plan, Watch};
+use furrow::train::net::{Network, Role, parameters};
+use furrow::train::run::Learnt;
+use furrow::train::session::{self, Machine};
+use furrow::train::weights;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+/// The size that small networks learn at.
+pub const SIZE: (u32, u32) = (64, 48);
+
+/// A CPU with one thread that loads.
+pub fn machine() -> Machine {
+    Machine { device: "cpu".into(), loaders: 1, memory: 1 << 28 }
+}
+
+/// Renders eight images of the small page into a folder that stays until the next time.
+pub fn set(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    if folder.exists() {
+        std::fs::remove_dir_all(&folder).expect("an old folder");
+    }
+    succeed(make(&folder, 8, &["--width", "64"]));
+    folder
+}
+
+/// Trains a network for six steps on a set.
+pub fn learn(network: Network, bands: &str, exposure: Exposure, set: &Path, out: &Path) -> Learnt {
+    let selection = Selection { folder: set.into(), pick: Some(Pick::All), repeat: 1 };
+    let shape = Shape { bands: Band::list(bands).expect("bands"), width: SIZE.0, height: SIZE.1 };
+    let plan = Plan {
+        network,
+        shape,
+        classes: Classes::default(),
+        train: vec![selection],
+        steps: 6,
+        batch: 2,
+        exposure,
+        ..Plan::default()
+    };
+    let watch = Watch { step: &|_, _| (), look: &|_, _| (), stop: &AtomicBool::new(false) };
+    session::fit(&plan, None, &machine(), out, &watch).expect("a training");
+    Learnt::open(out).expect("what was learnt")
+}
+
+/// The same network as nobody trained it: first values, but biases, gains, shifts and statistics that are not the usual ones.
+pub fn stirred(learnt: &Learnt, seed: u64) -> Learnt {
+    let card = &learnt.card;
+    let list = parameters(card.network, card.input.bands.len(), card.classes.len());
+    let values: Vec<weights::Array> = list
+        .iter()
+        .enumerate()
+        .map(|(place, p)| {
+            let mut stream = Stream::of(seed, place as u64, Purpose::Training, 9);
+            let values = match p.role {
+                Role::Weight => p.begin(seed, place),
+                Role::Bias | Role::Shift | Role::Mean => (0..p.len()).map(|_| 0.2 * stream.normal() as f32).collect(),
+                Role::Gain | Role::Variance => (0..p.len()).map(|_| stream.range32(0.6, 1.6)).collect(),
+            };
+            weights::Array { name: p.name.clone(), shape: p.shape.clone(), values }
+        })
+        .collect();
+    let mut card = card.clone();
+    card.weights_sha256 = weights::hash(&values);
+    Learnt { card, values }
+}
+
+/// Pictures of 8-bit numbers, images × height × width × bands: waves and noise, no two alike.
+pub fn pictures(images: usize, (width, height): (u32, u32), bands: usize, seed: u64) -> Vec<u8> {
+    let mut pixels = Vec::new();
+    for image in 0..images {
+        let mut stream = Stream::of(seed, image as u64, Purpose::Training, 8);
+        let waves: Vec<[f32; 4]> = (0..bands)
+            .map(|_| {
+                [
+                    stream.range32(0.1, 0.5),
+                    stream.range32(0.1, 0.5),
+                    stream.range32(0.0, 6.0),
+                    stream.range32(60.0, 160.0),
+                ]
+            })
+            .collect();
+        for y in 0..height {
+            for x in 0..width {
+                for [fx, fy, phase, level] in &waves {
+                    let wave = (fx * x as f32 + fy * y as f32 + phase).sin();
+                    pixels.push((level + 40.0 * wave + 12.0 * stream.normal() as f32).clamp(0.0, 255.0) as u8);
+                }
+            }
+        }
+    }
+    pixels
+}
+
+/// What a network takes of such pictures: from 0 to 1 and normalised, lying as they did.
+pub fn normalised(learnt: &Learnt, pictures: &[u8], (width, height): (u32, u32)) -> Vec<f32> {
+    let bands = learnt.card.input.bands.len();
+    let mut pixels: Vec<f32> = pictures.iter().map(|v| f32::from(*v) / 255.0).collect();
+    for image in pixels.chunks_exact_mut(width as usize * height as usize * bands) {
+        learnt.card.normalisation.apply(image, bands);
+    }
+    pixels
+}

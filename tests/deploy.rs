@@ -1,0 +1,366 @@
+//! What was learnt, in other programs and on pictures without labels.
+//!
+//! Rationale: a robot runs an exported file, not us; whoever asks about photographs has them in all sizes and folders, and must not lose
+//! files by it. Expected: ONNX Runtime and TorchScript give our values to 1e-4 of the largest, for one and two pictures, at even and odd
+//! sizes, whatever is taken out of the pictures; masks are what the network says; what cannot be done is refused with words and code
+//! 2, and leaves nothing. Source: `tests/train/check_onnx.py`, the programs named in `tests/requirements.txt`.
+
+mod common;
+
+use common::dataset::{fail, path, succeed};
+use common::program::names;
+use common::python::{ask, python, torch};
+use common::training::{self, learn, normalised, pictures, stirred};
+use furrow::output::{self, Picture};
+use furrow::train::deploy::{onnx, torchscript};
+use furrow::train::engine::{Model, Precision, Where, device};
+use furrow::train::fit::plan::Exposure;
+use furrow::train::net::Network;
+use furrow::train::run::Learnt;
+use furrow::train::weights::{self, Array};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::LazyLock;
+use tch::{CModule, Device, Kind, Tensor};
+
+static SET: LazyLock<PathBuf> = LazyLock::new(|| training::set("deploy-set"));
+
+/// A run of Basic SegNet that sees these bands; stays until the next time.
+fn run(name: &str, bands: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    if folder.exists() {
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+    learn(Network::BasicSegnet, bands, Exposure::Image, &SET, &folder);
+    folder
+}
+
+static RGB: LazyLock<PathBuf> = LazyLock::new(|| run("deploy-rgb", "rgb"));
+static RGBN: LazyLock<PathBuf> = LazyLock::new(|| run("deploy-rgbn", "rgbn"));
+
+/// `train` with these arguments, on one thread and in single precision where it computes.
+fn train(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_train"));
+    command.current_dir(env!("CARGO_MANIFEST_DIR")).args(arguments);
+    if arguments[0] == "predict" {
+        command.args(["--precision", "f32", "--threads", "1"]);
+    }
+    command
+}
+
+fn model(learnt: &Learnt) -> Model {
+    device::set_threads(1);
+    let place = Where { device: Device::Cpu, precision: Precision::Single };
+    let card = &learnt.card;
+    Model::with(card.network, card.input.bands.len(), card.classes.len(), &learnt.values, place).unwrap()
+}
+
+/// Number of pictures and size: the network's own, smaller and odd, larger.
+const CASES: [(usize, (u32, u32)); 4] = [(1, training::SIZE), (2, training::SIZE), (2, (47, 35)), (2, (81, 66))];
+
+/// Writes 8-bit pictures and what the network makes of them.
+fn record(learnt: &Learnt, file: &Path) {
+    let bands = learnt.card.input.bands.len();
+    let model = model(learnt);
+    let mut arrays = Vec::new();
+    for (k, (images, size)) in CASES.into_iter().enumerate() {
+        let pixels = pictures(images, size, bands, k as u64);
+        let scores = model.scores(&normalised(learnt, &pixels, size), size).unwrap();
+        let (w, h) = (size.0 as usize, size.1 as usize);
+        let values = pixels.iter().map(|v| f32::from(*v)).collect();
+        arrays.push(Array { name: format!("images_{k}"), shape: vec![images, h, w, bands], values });
+        arrays.push(Array {
+            name: format!("scores_{k}"),
+            shape: vec![images, learnt.card.classes.len(), h, w],
+            values: scores,
+        });
+    }
+    weights::write(file, &arrays, "").unwrap();
+}
+
+/// Networks of all kinds, normalised in all ways.
+const KINDS: [(Network, &str, Exposure); 4] = [
+    (Network::BasicSegnet, "rgbn", Exposure::Band),
+    (Network::BasicSegnet, "rgb", Exposure::Image),
+    (Network::Segnet, "rgb", Exposure::Image),
+    (Network::Unet, "rgbn", Exposure::Fixed),
+];
+
+#[test]
+fn exported_networks_compute_what_ours_do() {
+    let onnx_python = python("import onnx, onnxruntime, safetensors, numpy");
+    let torch_python = torch();
+    for (network, bands, exposure) in KINDS {
+        let folder = tempfile::tempdir().unwrap();
+        let trained = learn(network, bands, exposure, &SET, &folder.path().join("run"));
+        let learnt = stirred(&trained, 13);
+        let out = folder.path().join("out");
+        learnt.write(&out).unwrap();
+        let io = out.join("io.safetensors");
+        record(&learnt, &io);
+
+        onnx::write(&learnt, &out.join("network.onnx")).unwrap();
+        let bytes = std::fs::read(out.join("network.onnx")).unwrap();
+        onnx::write(&learnt, &out.join("network.onnx")).unwrap();
+        assert_eq!(bytes, std::fs::read(out.join("network.onnx")).unwrap(), "{} twice", network.name());
+        if let Some(python) = &onnx_python {
+            ask(python, "train/check_onnx.py", &[path(&out)]);
+        }
+
+        let file = out.join("network.pt");
+        torchscript::write(&learnt, training::SIZE, &file).unwrap();
+        let module = CModule::load_on_device(&file, Device::Cpu).unwrap();
+        let bands = learnt.card.input.bands.len() as i64;
+        for images in [1, 2] {
+            let pixels = pictures(images, training::SIZE, bands as usize, 21);
+            let (w, h) = training::SIZE;
+            let lying = Tensor::from_slice(&pixels).view([images as i64, i64::from(h), i64::from(w), bands]);
+            let scores = module.forward_ts(&[lying]).unwrap().to_kind(Kind::Float).contiguous().view(-1);
+            let ours = model(&learnt).scores(&normalised(&learnt, &pixels, training::SIZE), training::SIZE).unwrap();
+            let scores = Vec::<f32>::try_from(scores).unwrap();
+            assert_eq!(scores.len(), ours.len());
+            let largest = ours.iter().fold(1f32, |m, v| m.max(v.abs()));
+            let apart = ours.iter().zip(&scores).fold(0f32, |m, (a, b)| m.max((a - b).abs())) / largest;
+            eprintln!("{} TorchScript, {images} pictures: apart by {apart:.1e}", network.name());
+            assert!(apart < 1e-4, "{} {images}: {apart}", network.name());
+        }
+        if let Some(python) = &torch_python {
+            ask(python, "train/check_torchscript.py", &[path(&file), path(&io)]);
+        }
+    }
+}
+
+#[test]
+fn export_writes_where_it_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("new/robot.onnx");
+    let done = succeed(train(&["export", path(&RGB), "--out", path(&out)]));
+    assert_eq!(String::from_utf8(done.stdout).unwrap(), format!("{}\n", out.display()));
+    assert!(std::fs::metadata(&out).unwrap().len() > 1_000_000);
+
+    let out = folder.path().join("robot.pt");
+    let done =
+        succeed(train(&["export", path(&RGB), "--format", "torchscript", "--size", "40x33", "--out", path(&out)]));
+    assert_eq!(String::from_utf8(done.stdout).unwrap(), format!("{0}\n{0}.json\n", out.display()));
+    let facts: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(folder.path().join("robot.pt.json")).unwrap()).unwrap();
+    assert_eq!((facts["width"].as_u64(), facts["height"].as_u64()), (Some(40), Some(33)));
+    assert_eq!(facts["bands"], serde_json::json!(["red", "green", "blue"]));
+    let module = CModule::load(&out).unwrap();
+    let scores = module.forward_ts(&[Tensor::zeros([3, 33, 40, 3], (Kind::Uint8, Device::Cpu))]).unwrap();
+    assert_eq!(scores.size(), [3, 3, 33, 40]);
+
+    let before = names(folder.path());
+    for (arguments, words) in [
+        (vec!["--size", "40x40"], "an ONNX graph takes pictures of any size"),
+        (vec!["--out", path(folder.path())], "this is a folder"),
+        (vec!["--format", "coreml"], "invalid value 'coreml'"),
+    ] {
+        let mut all = vec!["export", path(&RGB)];
+        all.extend(arguments);
+        let said = fail(train(&all), 2);
+        assert!(said.contains(words), "{said}");
+    }
+    assert_eq!(before, names(folder.path()));
+}
+
+/// Photographs of three kinds and sizes, from the waves of [`pictures`].
+fn photographs(folder: &Path) -> BTreeMap<&'static str, (u32, u32)> {
+    let sizes = [("large", (150, 101)), ("small", (33, 70)), ("same", training::SIZE)];
+    for (k, (name, (w, h))) in sizes.into_iter().enumerate() {
+        let pixels = pictures(1, (w, h), 3, k as u64);
+        let rgb = pixels.as_chunks::<3>().0;
+        if name == "large" {
+            std::fs::create_dir_all(folder).unwrap();
+            std::fs::write(folder.join("large.JPG"), output::encode_jpeg(w, h, rgb, 90).unwrap()).unwrap();
+        } else {
+            output::write_png(&folder.join(format!("{name}.png")), w, h, &Picture::Rgb(rgb), "").unwrap();
+        }
+        let nir = pictures(1, (w, h), 1, 50 + k as u64);
+        output::write_png(&folder.join(format!("{name}.nir.png")), w, h, &Picture::Gray(&nir), "").unwrap();
+    }
+    std::fs::write(folder.join("notes.txt"), "no picture").unwrap();
+    sizes.into()
+}
+
+#[test]
+fn photographs_of_any_size_get_masks_of_their_size() {
+    let folder = tempfile::tempdir().unwrap();
+    let photos = folder.path().join("photos");
+    let sizes = photographs(&photos);
+    let out = folder.path().join("answers");
+    let arguments = ["predict", path(&RGB), path(&photos), "--out", path(&out), "--batch", "2"];
+    let done = succeed(train(&arguments));
+    let files = ["large", "same", "small"].iter().flat_map(|n| [format!("{n}.png"), format!("{n}.overlay.png")]);
+    let files: Vec<String> = files.chain(["prediction.json".into()]).collect();
+    let told: Vec<String> = files.iter().map(|f| out.join(f).display().to_string()).collect();
+    assert_eq!(String::from_utf8(done.stdout).unwrap().lines().collect::<Vec<_>>(), told);
+    let mut sorted = files.clone();
+    sorted.sort();
+    assert_eq!(names(&out), sorted);
+
+    let learnt = Learnt::open(&RGB).unwrap();
+    for (name, size) in &sizes {
+        let (w, h, map) = output::read_map(&out.join(format!("{name}.png"))).unwrap();
+        let output::Map::Indexed(classes, palette) = map else { panic!("{name}: no indices") };
+        assert_eq!(((w, h), classes.len()), (*size, (size.0 * size.1) as usize));
+        assert!(classes.iter().all(|c| *c < 3));
+        assert_eq!(palette, learnt.card.classes.colors());
+        let (w, h, over) = output::read_rgb(&out.join(format!("{name}.overlay.png"))).unwrap();
+        assert_eq!((w, h), *size);
+        // The ground is as it was, plants are not.
+        if *name != "large" {
+            let (_, _, rgb) = output::read_rgb(&photos.join(format!("{name}.png"))).unwrap();
+            for ((class, a), b) in classes.iter().zip(&rgb).zip(&over) {
+                assert!(*class != 0 || a == b);
+            }
+        }
+    }
+    // At its own size the mask is the network's answer, pixel for pixel.
+    let (_, _, rgb) = output::read_rgb(&photos.join("same.png")).unwrap();
+    let pixels = normalised(&learnt, rgb.as_flattened(), training::SIZE);
+    let answer = model(&learnt).predict(&pixels, training::SIZE).unwrap();
+    let (_, _, mask) = output::read_indexed(&out.join("same.png")).unwrap();
+    let differ = mask.iter().zip(&answer).filter(|(a, b)| a != b).count();
+    assert!(differ * 1000 <= mask.len(), "{differ} of {} pixels differ", mask.len());
+
+    // The same command once more gives the same bytes.
+    let read = || files.iter().map(|f| std::fs::read(out.join(f)).unwrap()).collect::<Vec<_>>();
+    let before = read();
+    succeed(train(&arguments));
+    assert!(before == read());
+}
+
+#[test]
+fn images_of_a_set_are_asked_about_by_name_and_bands_are_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("answers");
+    let some = format!("{}@2..4", path(&SET));
+    succeed(train(&["predict", path(&RGBN), &some, "--out", path(&out)]));
+    let answers = ["000002.overlay.png", "000002.png", "000003.overlay.png", "000003.png", "prediction.json"];
+    assert_eq!(names(&out), answers);
+    // Di Cicco's evaluation sees the same picture: its answer is the same map.
+    let learnt = Learnt::open(&RGBN).unwrap();
+    let image = SET.join("images/000002");
+    let (w, h, rgb) = output::read_rgb(&image.join("rgb.png")).unwrap();
+    let (_, _, nir) = output::read_gray(&image.join("nir.png")).unwrap();
+    assert_eq!((w, h), training::SIZE);
+    let four: Vec<u8> = rgb.iter().zip(&nir).flat_map(|(p, n)| [p[0], p[1], p[2], *n]).collect();
+    let answer = model(&learnt).predict(&normalised(&learnt, &four, (w, h)), (w, h)).unwrap();
+    let mask = |out: &Path, name: &str| output::read_indexed(&out.join(name)).unwrap().2;
+    let differ = mask(&out, "000002.png").iter().zip(&answer).filter(|(a, b)| a != b).count();
+    assert!(differ * 1000 <= answer.len(), "{differ}");
+
+    // Beside the photograph, in its own folder, by another name: the same band, the same answer.
+    for (k, photo, band, more) in
+        [(0, "a.png", "a.nir.png", false), (1, "rgb_7.png", "nir_7.png", false), (2, "a.png", "elsewhere/a.png", true)]
+    {
+        let photos = folder.path().join(format!("photos{k}"));
+        std::fs::create_dir_all(photos.join("elsewhere")).unwrap();
+        std::fs::copy(image.join("rgb.png"), photos.join(photo)).unwrap();
+        std::fs::copy(image.join("nir.png"), photos.join(band)).unwrap();
+        let answers = folder.path().join(format!("answers{k}"));
+        let named = format!("nir={}", photos.join("elsewhere").display());
+        let mut arguments = vec!["predict", path(&RGBN), path(&photos), "--out", path(&answers), "--quiet"];
+        if more {
+            arguments.extend(["--band", &named]);
+        }
+        succeed(train(&arguments));
+        assert_eq!(mask(&answers, photo), mask(&out, "000002.png"), "{band}");
+        assert_eq!(names(&answers).len(), 3, "{band} is no picture of its own");
+    }
+}
+
+#[test]
+fn what_cannot_be_answered_is_refused_and_nothing_is_written_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let photos = at("photos");
+    photographs(&photos);
+    let write = |file: &Path, value: u8| {
+        output::write_png(file, 40, 40, &Picture::Rgb(&[[value, 90, 60]; 1600]), "").unwrap();
+    };
+    write(&at("more/small.png"), 40);
+    write(&at("plain/a.png"), 40);
+    std::fs::create_dir_all(at("empty")).unwrap();
+    std::fs::write(at("empty/notes.txt"), "").unwrap();
+    output::write_png(&at("gray.png"), 40, 40, &Picture::Gray(&[7; 1600]), "").unwrap();
+    let whole = std::fs::read(photos.join("small.png")).unwrap();
+    std::fs::write(at("cut.png"), &whole[..whole.len() / 2]).unwrap();
+    std::fs::write(at("words.png"), "no picture at all").unwrap();
+    output::write_png(&at("odd/a.png"), 40, 40, &Picture::Rgb(&[[9; 3]; 1600]), "").unwrap();
+    output::write_png(&at("odd/a.nir.png"), 20, 40, &Picture::Gray(&[9; 800]), "").unwrap();
+
+    let refuse = |run: &Path, images: &[&Path], more: &[&str], words: &[&str]| {
+        let out = at("refused");
+        let mut arguments = vec!["predict", path(run)];
+        arguments.extend(images.iter().map(|i| path(i)));
+        arguments.extend(["--out", path(&out)]);
+        arguments.extend(more);
+        let said = fail(train(&arguments), 2);
+        for words in words {
+            assert!(said.contains(words), "`{words}` is not in: {said}");
+        }
+        let left = names(&out);
+        assert!(!left.iter().any(|name| name.ends_with(".png") || name.starts_with(output::UNFINISHED)), "{left:?}");
+        if out.exists() {
+            std::fs::remove_dir_all(&out).unwrap();
+        }
+    };
+    refuse(&at("none"), &[&photos], &[], &["there is no trained network in this folder", "train fit --out DIR"]);
+    refuse(&RGB, &[&at("nothing.png")], &[], &["nothing.png: there is no such picture", "DIR@PICK"]);
+    refuse(&RGB, &[&at("empty")], &[], &["empty: there is no picture in this folder"]);
+    refuse(&RGB, &[&at("cut.png")], &[], &["cut.png: this image cannot be read"]);
+    refuse(&RGB, &[&at("words.png")], &[], &["words.png: this image cannot be read"]);
+    refuse(&RGB, &[&at("gray.png")], &[], &["gray.png: this picture is gray", "red, green and blue"]);
+    refuse(&RGB, &[&photos, &at("more")], &[], &["photos/small.png and", "more/small.png would both become small.png"]);
+    refuse(&RGB, &[&photos], &["--band", "nir=x"], &["the network does not see the band `nir`", "red, green, blue"]);
+    refuse(&RGB, &[&photos], &["--band", "red=x"], &["`red` is the photograph's own"]);
+    refuse(&RGBN, &[&at("plain")], &[], &["a.png: the network sees the band `nir`", "a.nir.png", "--band nir=DIR"]);
+    refuse(&RGBN, &[&at("odd")], &[], &["a.nir.png: it is 20 × 40 pixels", "is 40 × 40"]);
+    let few = PathBuf::from(format!("{}@5..99", path(&SET)));
+    refuse(&RGB, &[&few], &[], &["the set has 8 images"]);
+    refuse(&RGB, &[&PathBuf::from(format!("{}@most", path(&SET)))], &[], &["`most` picks no images"]);
+
+    // One that cannot be read keeps no other from its answer.
+    let out = at("others");
+    let said = fail(train(&["predict", path(&RGB), path(&at("cut.png")), path(&photos), "--out", path(&out)]), 2);
+    assert!(
+        said.contains("1 of 4 pictures could not be read, the others are answered:") && said.contains("cut.png: "),
+        "{said}"
+    );
+    assert_eq!(names(&out).len(), 7, "{:?}", names(&out));
+
+    // Answers beside the photographs would be written over them.
+    let said = fail(train(&["predict", path(&RGB), path(&photos), "--out", path(&photos)]), 2);
+    assert!(
+        said.contains("small.png: this is no answer of ours") || said.contains("same.png: this is no answer of ours"),
+        "{said}"
+    );
+    assert_eq!(std::fs::read(photos.join("small.png")).unwrap(), whole);
+    // Answers to other photographs of the same name, or of another network.
+    let before = std::fs::read(out.join("small.png")).unwrap();
+    let said = fail(train(&["predict", path(&RGB), path(&at("more")), "--out", path(&out)]), 2);
+    assert!(said.contains("small.png: this is the answer to") && said.contains("photos/small.png"), "{said}");
+    let said = fail(train(&["predict", path(&RGBN), path(&photos), "--out", path(&out)]), 2);
+    assert!(said.contains("answers of another network lie in this folder"), "{said}");
+    assert_eq!(std::fs::read(out.join("small.png")).unwrap(), before);
+
+    // Weights that are damaged, or not those of the card.
+    let broken = at("broken");
+    std::fs::create_dir_all(&broken).unwrap();
+    for file in ["model.json", "weights.safetensors"] {
+        std::fs::copy(RGB.join(file), broken.join(file)).unwrap();
+    }
+    let mut bytes = std::fs::read(broken.join("weights.safetensors")).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(broken.join("weights.safetensors"), &bytes).unwrap();
+    refuse(&broken, &[&photos], &[], &["weights.safetensors: these are no weights of `train`, or they are damaged"]);
+    let said = fail(train(&["export", path(&broken)]), 2);
+    assert!(said.contains("they are damaged"), "{said}");
+    std::fs::copy(RGBN.join("weights.safetensors"), broken.join("weights.safetensors")).unwrap();
+    refuse(&broken, &[&photos], &[], &["these are not the weights that model.json beside them is about"]);
+    assert_eq!(names(&broken), ["model.json", "weights.safetensors"]);
+}

@@ -1,0 +1,122 @@
+//! Networks: what ours compute is what an independent program computes from the same weights.
+//!
+//! Rationale: a network with a stride, a skip or a statistic in the wrong place still learns, only worse, and is not the one of its paper.
+//! Expected: the published numbers of parameters, and values equal to 1e-4 of the largest, for trained weights and for random ones with
+//! statistics that are not the initial ones, on pictures of odd size. Source: `tests/train/reference.py`, written from the papers, in
+//! NumPy (double precision) and, where a Python has it, in PyTorch.
+
+mod common;
+
+use common::python::{ask, python, torch};
+use common::training::{self, learn, normalised, pictures, stirred};
+use furrow::train::engine::{Model, Precision, Where, device};
+use furrow::train::fit::plan::Exposure;
+use furrow::train::net::Network;
+use furrow::train::run::Learnt;
+use furrow::train::weights::{self, Array};
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+use tch::{Device, Tensor};
+
+static SET: LazyLock<PathBuf> = LazyLock::new(|| training::set("networks-set"));
+
+const SINGLE: Where = Where { device: Device::Cpu, precision: Precision::Single };
+
+/// A network with what was learnt.
+fn model(learnt: &Learnt, place: Where) -> Model {
+    device::set_threads(1);
+    let card = &learnt.card;
+    Model::with(card.network, card.input.bands.len(), card.classes.len(), &learnt.values, place).unwrap()
+}
+
+/// Images × height × width × bands as images × bands × height × width.
+fn by_band(pixels: &[f32], bands: usize, area: usize) -> Vec<f32> {
+    let image = |image: &[f32]| (0..bands * area).map(|i| image[i % area * bands + i / area]).collect::<Vec<_>>();
+    pixels.chunks_exact(bands * area).flat_map(image).collect()
+}
+
+/// Writes weights, card and what the network makes of some pictures.
+fn record(learnt: &Learnt, folder: &Path) {
+    let (images, size) = (4, (47, 35));
+    let bands = learnt.card.input.bands.len();
+    let pixels = normalised(learnt, &pictures(images, size, bands, 5), size);
+    let scores = model(learnt, SINGLE).scores(&pixels, size).unwrap();
+    learnt.write(folder).unwrap();
+    let array = |name: &str, channels: usize, values: Vec<f32>| Array {
+        name: name.into(),
+        shape: vec![images, channels, size.1 as usize, size.0 as usize],
+        values,
+    };
+    let area = (size.0 * size.1) as usize;
+    let images = array("images", bands, by_band(&pixels, bands, area));
+    let scores = array("scores", learnt.card.classes.len(), scores);
+    weights::write(&folder.join("io.safetensors"), &[images, scores], "").unwrap();
+}
+
+#[test]
+fn networks_compute_what_an_independent_program_does() {
+    let engines = [("numpy", python("import numpy, safetensors")), ("torch", torch())];
+    for network in Network::ALL {
+        for bands in ["rgb", "rgbn"] {
+            let folder = tempfile::tempdir().unwrap();
+            let trained = learn(*network, bands, Exposure::Image, &SET, &folder.path().join("trained"));
+            for (name, learnt) in [("stirred", &stirred(&trained, 3)), ("trained", &trained)] {
+                let folder = folder.path().join(name);
+                record(learnt, &folder);
+                for (engine, python) in &engines {
+                    if let Some(python) = python {
+                        ask(python, "train/reference.py", &["--engine", engine, folder.to_str().unwrap()]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The largest distance of values, as a share of the largest value.
+fn apart(a: &[f32], b: &[f32]) -> f32 {
+    let largest = b.iter().fold(0f32, |m, v| m.max(v.abs()));
+    a.iter().zip(b).fold(0f32, |m, (a, b)| m.max((a - b).abs())) / largest
+}
+
+/// All networks, stirred, with four pictures at the size that they learnt at.
+fn examples() -> Vec<(Network, Learnt, Vec<f32>)> {
+    let example = |network: &Network| {
+        let folder = tempfile::tempdir().unwrap();
+        let learnt = stirred(&learn(*network, "rgb", Exposure::Image, &SET, folder.path()), 7);
+        let pixels = normalised(&learnt, &pictures(4, training::SIZE, 3, 11), training::SIZE);
+        (*network, learnt, pixels)
+    };
+    Network::ALL.iter().map(example).collect()
+}
+
+#[test]
+fn an_answer_depends_neither_on_precision_nor_batch_nor_layout() {
+    for (network, learnt, pixels) in examples() {
+        let single = model(&learnt, SINGLE);
+        let scores = single.scores(&pixels, training::SIZE).unwrap();
+        // One picture at a time: kernels for other batches may sum in another order.
+        let each: Vec<f32> = pixels
+            .chunks_exact(pixels.len() / 4)
+            .flat_map(|picture| single.scores(picture, training::SIZE).unwrap())
+            .collect();
+        let batch = apart(&each, &scores);
+        // Channel by channel in memory, instead of channels beside each other.
+        let plain = single.images(&pixels, training::SIZE).contiguous();
+        let plain = tch::no_grad(|| single.forward(&plain, false)).contiguous().view(-1);
+        let layout = apart(&Vec::<f32>::try_from(plain).unwrap(), &scores);
+        // Eight bits of mantissa: 2⁻⁸ a rounding, some of which add up over the layers.
+        let half = model(&learnt, Where { device: Device::Cpu, precision: Precision::Bf16 });
+        let half = half.scores(&pixels, training::SIZE).unwrap();
+        let mean = half.iter().zip(&scores).map(|(a, b)| (a - b).abs()).sum::<f32>() / scores.len() as f32;
+        let spread = Tensor::from_slice(&scores).std(false).double_value(&[]) as f32;
+        eprintln!(
+            "{}: batch {batch:.1e}, layout {layout:.1e}, bf16 {:.1e} of the deviation in the mean",
+            network.name(),
+            mean / spread
+        );
+        assert!(batch < 1e-4 && layout < 1e-4, "{}: {batch} {layout}", network.name());
+        assert!(mean < 0.1 * spread, "{}: {mean} of {spread}", network.name());
+        assert!(half.iter().all(|v| v.is_finite()), "{}", network.name());
+    }
+}

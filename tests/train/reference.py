@@ -1,0 +1,358 @@
+"""The networks, written once more from their papers and independently of `src/train`: parameter counts and values must agree.
+
+    reference.py [--engine numpy|torch] FOLDER...
+
+Each folder holds `model.json` and `weights.safetensors` as `train fit` leaves them, and `io.safetensors`: `images` (images x bands x
+height x width, normalised) and `scores`, what the program makes of them. Two engines:
+
+numpy   convolutions as sums over shifted pictures, everything in double precision.
+torch   `torch.nn` modules named as in the papers' public implementations (SegNet's encoder as torchvision's `vgg16_bn`, the
+        U-Net's as torchvision's `resnet18`, its decoder as segmentation_models_pytorch's `UnetDecoder`), in double precision.
+
+A pooling that puts maxima back where they lay is discontinuous: where the two largest of four values are nearly equal, rounding
+decides. Images in which that happens (a gap below GAP of the layer's deviation, in double precision) decide nothing and are counted
+apart; half of the images at least must decide.
+"""
+
+import json
+import sys
+
+import numpy as np
+from safetensors.numpy import load_file
+
+TOLERANCE = 1e-4  # of the largest value, which is at least 1
+GAP = 3e-6
+
+
+# --- numpy -------------------------------------------------------------------------------------------------------------------
+
+
+class Arrays:
+    """The operations in numpy; `learnt` counts the numbers that were asked for, `doubt` the images with close maxima."""
+
+    def __init__(self, weights):
+        self.weights, self.used, self.doubt = weights, {}, None
+
+    def get(self, name):
+        self.used[name] = self.weights[name].size
+        return self.weights[name].astype(np.float64)
+
+    def conv(self, x, name, stride=1, bias=True):
+        w = self.get(name + ".weight")
+        k = w.shape[2]
+        x = np.pad(x, [(0, 0), (0, 0), (k // 2, k // 2), (k // 2, k // 2)])
+        h, v = (x.shape[2] - k) // stride + 1, (x.shape[3] - k) // stride + 1
+        y = np.zeros((x.shape[0], w.shape[0], h, v))
+        for i in range(k):
+            for j in range(k):
+                part = x[:, :, i : i + stride * h : stride, j : j + stride * v : stride]
+                y += np.einsum("oc,nchw->nohw", w[:, :, i, j], part, optimize=True)
+        return y + self.get(name + ".bias")[:, None, None] if bias else y
+
+    def norm(self, x, name):
+        gain, shift, mean, variance = (
+            self.get(f"{name}.{part}")[:, None, None] for part in ("weight", "bias", "running_mean", "running_var")
+        )
+        return gain * (x - mean) / np.sqrt(variance + 1e-5) + shift
+
+    def unit(self, x, name, relu=True, **conv):
+        y = self.norm(self.conv(x, name + ".conv", **conv), name + ".bn")
+        return np.maximum(y, 0) if relu else y
+
+    def pool(self, x):
+        n, c, h, w = x.shape
+        windows = x[:, :, : h // 2 * 2, : w // 2 * 2].reshape(n, c, h // 2, 2, w // 2, 2)
+        windows = windows.transpose(0, 1, 2, 4, 3, 5).reshape(n, c, h // 2, w // 2, 4)
+        ordered = np.sort(windows, axis=-1)
+        gap = ordered[..., 3] - ordered[..., 2]
+        # Equal values that are no zeros of a ReLU would be as bad; zeros are the same wherever they lie.
+        close = ((gap < GAP * x.std()) & (ordered[..., 3] > 0)).any(axis=(1, 2, 3))
+        self.doubt = close if self.doubt is None else self.doubt | close
+        return ordered[..., 3], (windows.argmax(axis=-1), h, w)
+
+    def unpool(self, x, places):
+        at, h, w = places
+        n, c, a, b = x.shape
+        out = np.zeros((n, c, h, w))
+        i, j = np.arange(a)[:, None] * 2 + at // 2, np.arange(b)[None, :] * 2 + at % 2
+        out[np.arange(n)[:, None, None, None], np.arange(c)[None, :, None, None], i, j] = x
+        return out
+
+    def pool3(self, x):
+        n, c, h, w = x.shape
+        x = np.pad(x, [(0, 0), (0, 0), (1, 1), (1, 1)], constant_values=-np.inf)
+        a, b = (h - 1) // 2 + 1, (w - 1) // 2 + 1
+        shifted = [x[:, :, i : i + 2 * a - 1 : 2, j : j + 2 * b - 1 : 2] for i in range(3) for j in range(3)]
+        return np.max(shifted, axis=0)
+
+    def nearest(self, x, h, w):
+        rows, columns = np.arange(h) * x.shape[2] // h, np.arange(w) * x.shape[3] // w
+        return x[:, :, rows][:, :, :, columns]
+
+
+def numpy_segnet(o, x):
+    stack = []
+    for block, convolutions in enumerate([2, 2, 3, 3, 3]):
+        for i in range(convolutions):
+            x = o.unit(x, f"enc{block}_{i}")
+        x, places = o.pool(x)
+        stack.append(places)
+    for block, convolutions in enumerate([3, 3, 3, 2, 1]):
+        x = o.unpool(x, stack.pop())
+        for i in range(convolutions):
+            x = o.unit(x, f"dec{block}_{i}")
+    return o.conv(x, "head.conv")
+
+
+def numpy_basic_segnet(o, x):
+    stack = []
+    for block in range(4):
+        x, places = o.pool(o.unit(x, f"enc{block}_0"))
+        stack.append(places)
+    for block in range(4):
+        x = o.unit(o.unpool(x, stack.pop()), f"dec{block}_0", relu=False)
+    return o.conv(x, "head.conv")
+
+
+def numpy_unet(o, x):
+    size = x.shape[2:]
+    x = o.unit(x, "stem", stride=2, bias=False)
+    skips = [x]
+    x = o.pool3(x)
+    for stage in range(4):
+        for block in range(2):
+            name, stride = f"enc{stage}_{block}", 2 if stage > 0 and block == 0 else 1
+            y = o.unit(x, name + ".0", stride=stride, bias=False)
+            y = o.unit(y, name + ".1", relu=False, bias=False)
+            past = o.unit(x, name + ".past", relu=False, stride=stride, bias=False) if stride == 2 else x
+            x = np.maximum(y + past, 0)
+        skips.append(x)
+    skips.pop()
+    for level in range(5):
+        skip = skips.pop() if skips else None
+        x = o.nearest(x, *(size if skip is None else skip.shape[2:]))
+        if skip is not None:
+            x = np.concatenate([x, skip], axis=1)
+        for i in range(2):
+            x = o.unit(x, f"dec{level}_{i}", bias=False)
+    return o.conv(x, "head.conv")
+
+
+def run_numpy(network, weights, images, classes):
+    o = Arrays(weights)
+    walk = {"segnet": numpy_segnet, "basic-segnet": numpy_basic_segnet, "unet": numpy_unet}[network]
+    scores = walk(o, images.astype(np.float64))
+    learnt = sum(size for name, size in o.used.items() if "running" not in name)
+    return scores, learnt, o.doubt, set(o.used)
+
+
+# --- torch -------------------------------------------------------------------------------------------------------------------
+
+
+def torch_networks():
+    import torch
+    from torch import nn
+    from torch.nn import functional as F
+
+    class Base(nn.Module):
+        doubt = None
+
+        def pool(self, x):
+            n, c, h, w = x.shape
+            top = F.unfold(x[:, :, : h // 2 * 2, : w // 2 * 2].reshape(n * c, 1, h // 2 * 2, w // 2 * 2), 2, stride=2)
+            top = top.topk(2, dim=1).values
+            close = ((top[:, 0] - top[:, 1] < GAP * x.std()) & (top[:, 0] > 0)).any(dim=1).view(n, c).any(dim=1)
+            self.doubt = close if self.doubt is None else self.doubt | close
+            return F.max_pool2d(x, 2, 2, return_indices=True)
+
+    class SegNet(Base):
+        def __init__(self, bands, classes):
+            super().__init__()
+            # torchvision.models.vgg: cfgs["D"].
+            cfg = [[64, 64], [128, 128], [256, 256, 256], [512, 512, 512], [512, 512, 512]]
+            self.down, inputs = nn.ModuleList(), bands
+            for block in cfg:
+                layers = []
+                for outputs in block:
+                    layers += [nn.Conv2d(inputs, outputs, 3, padding=1), nn.BatchNorm2d(outputs), nn.ReLU()]
+                    inputs = outputs
+                self.down.append(nn.Sequential(*layers))
+            # The mirror: each block ends with the width of the block before it.
+            self.up = nn.ModuleList()
+            for i, block in reversed(list(enumerate(cfg))):
+                last = cfg[i - 1][-1] if i else classes
+                layers = []
+                for outputs in block[1:] + [last]:
+                    layers += [nn.Conv2d(inputs, outputs, 3, padding=1), nn.BatchNorm2d(outputs), nn.ReLU()]
+                    inputs = outputs
+                self.up.append(nn.Sequential(*(layers if i else layers[:-2])))
+
+        def forward(self, x):
+            stack = []
+            for block in self.down:
+                x = block(x)
+                size = x.shape[2:]
+                x, places = self.pool(x)
+                stack.append((places, size))
+            for block in self.up:
+                places, size = stack.pop()
+                x = block(F.max_unpool2d(x, places, 2, 2, output_size=size))
+            return x
+
+        def names(self):
+            """Our name of each module that has parameters, in their order."""
+            convolutions = [f"enc{b}_{i}" for b, n in enumerate([2, 2, 3, 3, 3]) for i in range(n)]
+            convolutions += [f"dec{b}_{i}" for b, n in enumerate([3, 3, 3, 2, 1]) for i in range(n)]
+            return [f"{c}.{part}" for c in convolutions for part in ("conv", "bn")] + ["head.conv"]
+
+    class BasicSegNet(Base):
+        def __init__(self, bands, classes):
+            super().__init__()
+            def layer(inputs, relu):
+                layers = [nn.Conv2d(inputs, 64, 7, padding=3), nn.BatchNorm2d(64)]
+                return nn.Sequential(*layers, *([nn.ReLU()] if relu else []))
+
+            self.down = nn.ModuleList([layer(bands if i == 0 else 64, True) for i in range(4)])
+            self.up = nn.ModuleList([layer(64, False) for _ in range(4)])
+            self.classifier = nn.Conv2d(64, classes, 1)
+
+        def forward(self, x):
+            stack = []
+            for block in self.down:
+                x = block(x)
+                size = x.shape[2:]
+                x, places = self.pool(x)
+                stack.append((places, size))
+            for block in self.up:
+                places, size = stack.pop()
+                x = block(F.max_unpool2d(x, places, 2, 2, output_size=size))
+            return self.classifier(x)
+
+        def names(self):
+            blocks = [f"enc{i}_0" for i in range(4)] + [f"dec{i}_0" for i in range(4)]
+            return [f"{b}.{part}" for b in blocks for part in ("conv", "bn")] + ["head.conv"]
+
+    class BasicBlock(nn.Module):
+        """torchvision.models.resnet.BasicBlock."""
+
+        def __init__(self, inplanes, planes, stride):
+            super().__init__()
+            self.conv1 = nn.Conv2d(inplanes, planes, 3, stride, 1, bias=False)
+            self.bn1 = nn.BatchNorm2d(planes)
+            self.conv2 = nn.Conv2d(planes, planes, 3, 1, 1, bias=False)
+            self.bn2 = nn.BatchNorm2d(planes)
+            self.downsample = None
+            if stride != 1 or inplanes != planes:
+                self.downsample = nn.Sequential(
+                    nn.Conv2d(inplanes, planes, 1, stride, bias=False), nn.BatchNorm2d(planes)
+                )
+
+        def forward(self, x):
+            out = F.relu(self.bn1(self.conv1(x)))
+            out = self.bn2(self.conv2(out))
+            return F.relu(out + (x if self.downsample is None else self.downsample(x)))
+
+    class DecoderBlock(nn.Module):
+        """segmentation_models_pytorch.decoders.unet: UnetDecoderBlock without attention, at any size."""
+
+        def __init__(self, inputs, skip, outputs):
+            super().__init__()
+            def unit(n):
+                return nn.Sequential(nn.Conv2d(n, outputs, 3, padding=1, bias=False), nn.BatchNorm2d(outputs), nn.ReLU())
+
+            self.conv1, self.conv2 = unit(inputs + skip), unit(outputs)
+
+        def forward(self, x, skip, size):
+            x = F.interpolate(x, size=size, mode="nearest")
+            return self.conv2(self.conv1(x if skip is None else torch.cat([x, skip], dim=1)))
+
+    class UNet(Base):
+        def __init__(self, bands, classes):
+            super().__init__()
+            self.conv1, self.bn1 = nn.Conv2d(bands, 64, 7, 2, 3, bias=False), nn.BatchNorm2d(64)
+            widths = [64, 64, 128, 256, 512]
+            self.stages = nn.ModuleList(
+                nn.Sequential(BasicBlock(widths[i], widths[i + 1], 2 if i else 1), BasicBlock(widths[i + 1], widths[i + 1], 1))
+                for i in range(4)
+            )
+            decoder, skips, inputs = [256, 128, 64, 32, 16], [256, 128, 64, 64, 0], [512, 256, 128, 64, 32]
+            self.decoder = nn.ModuleList(DecoderBlock(*sizes) for sizes in zip(inputs, skips, decoder))
+            self.segmentation_head = nn.Conv2d(16, classes, 3, padding=1)
+
+        def forward(self, x):
+            size = x.shape[2:]
+            x = F.relu(self.bn1(self.conv1(x)))
+            features = [x]
+            x = F.max_pool2d(x, 3, 2, 1)
+            for stage in self.stages:
+                x = stage(x)
+                features.append(x)
+            features = features[:-1][::-1] + [None]
+            for block, skip in zip(self.decoder, features):
+                x = block(x, skip, size if skip is None else skip.shape[2:])
+            return self.segmentation_head(x)
+
+        def names(self):
+            names = ["stem.conv", "stem.bn"]
+            for s in range(4):
+                for b in range(2):
+                    parts = ["0", "1"] + (["past"] if s > 0 and b == 0 else [])
+                    names += [f"enc{s}_{b}.{part}.{what}" for part in parts for what in ("conv", "bn")]
+            names += [f"dec{d}_{i}.{what}" for d in range(5) for i in range(2) for what in ("conv", "bn")]
+            return names + ["head.conv"]
+
+    return {"segnet": SegNet, "basic-segnet": BasicSegNet, "unet": UNet}
+
+
+def run_torch(network, weights, images, classes):
+    import torch
+
+    net = torch_networks()[network](images.shape[1], classes)
+    holders = [m for m in net.modules() if isinstance(m, (torch.nn.Conv2d, torch.nn.BatchNorm2d))]
+    names = net.names()
+    assert len(holders) == len(names), f"{len(holders)} modules, {len(names)} names"
+    used = set()
+    for holder, name in zip(holders, names):
+        state = {k: torch.tensor(weights[f"{name}.{k}"]) for k in holder.state_dict() if k != "num_batches_tracked"}
+        used |= {f"{name}.{k}" for k in state}
+        holder.load_state_dict(state, strict=False)
+    net = net.double().eval()
+    with torch.no_grad():
+        scores = net(torch.tensor(images, dtype=torch.float64)).numpy()
+    learnt = sum(p.numel() for p in net.parameters())
+    doubt = None if net.doubt is None else net.doubt.numpy()
+    return scores, learnt, doubt, used
+
+
+# --- comparison --------------------------------------------------------------------------------------------------------------
+
+
+def check(folder, engine):
+    card = json.load(open(f"{folder}/model.json"))
+    weights = load_file(f"{folder}/weights.safetensors")
+    io = load_file(f"{folder}/io.safetensors")
+    run = {"numpy": run_numpy, "torch": run_torch}[engine]
+    scores, learnt, doubt, used = run(card["network"], weights, io["images"], len(card["classes"]))
+    assert used == set(weights), f"{folder}: not used {set(weights) - used}, not there {used - set(weights)}"
+    assert learnt == card["parameters"], f"{folder}: {learnt} parameters, the program says {card['parameters']}"
+    assert scores.shape == io["scores"].shape, f"{folder}: {scores.shape} values, the program gives {io['scores'].shape}"
+    apart = np.abs(scores - io["scores"]).max(axis=(1, 2, 3))
+    largest = max(1.0, np.abs(scores).max())
+    decided = np.ones(len(apart), bool) if doubt is None else ~doubt
+    assert decided.sum() * 2 >= len(decided), f"{folder}: only {decided.sum()} of {len(decided)} images decide anything"
+    worst = apart[decided].max() / largest
+    print(
+        f"{engine} {card['network']} {len(card['input']['bands'])} bands: {learnt} parameters, "
+        f"{decided.sum()} of {len(decided)} images, apart by {worst:.1e} of {largest:.2f} (all images {apart.max() / largest:.1e})"
+    )
+    assert np.abs(scores).std() > 1e-3, f"{folder}: the values say nothing"
+    assert worst < TOLERANCE, f"{folder}: values differ by {worst} of the largest"
+
+
+if __name__ == "__main__":
+    arguments = sys.argv[1:]
+    engine = "numpy"
+    if arguments[0] == "--engine":
+        engine, arguments = arguments[1], arguments[2:]
+    for folder in arguments:
+        check(folder, engine)
