@@ -174,7 +174,7 @@ fn judge(
             (report, shots, Classes::default().colors())
         }
     };
-    write_atomically(picture, &sheet(&shots.shots, &palette, true).png()?)?;
+    write_atomically(picture, &sheet(&shots.kept, &palette, true).png()?)?;
     Ok(report)
 }
 
