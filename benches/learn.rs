@@ -4,6 +4,8 @@
 //! steps, so that the first ones, which set up kernels and decode images, do not count. `benches/learn.py` runs the same networks in
 //! Python's torch, turn by turn with this program.
 
+#![allow(clippy::print_stdout, reason = "a program that prints a table")]
+
 use furrow::train::data::{Selection, Shape};
 use furrow::train::engine::{Model, Precision, Where};
 use furrow::train::fit::{Plan, Watch};

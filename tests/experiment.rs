@@ -10,13 +10,14 @@ mod common;
 use common::dataset::{make, same, succeed, tree};
 use furrow::dataset::generate::Shard;
 use furrow::page::Page;
+use furrow::train::baseline::files;
 use furrow::train::classes::Classes;
 use furrow::train::data::{Normalisation, Pick, Selection, Shape, Store};
 use furrow::train::fit::Plan;
 use furrow::train::fit::checkpoint::History;
 use furrow::train::measure::{Answer, Evaluation, Report};
 use furrow::train::run::{self, Card, Identity, Learnt, Results};
-use furrow::train::table::{self, Bound, Experiment, Hands, Only, Order, Real};
+use furrow::train::table::{self, Answerer, Bound, Experiment, Hands, Only, Order, Real};
 use furrow::train::weights::{self, Array};
 use furrow::{Error, Result};
 use std::cell::{Cell, RefCell};
@@ -111,7 +112,13 @@ impl Players {
         Ok(results)
     }
 
-    fn judge(&self, learnt: &Learnt, on: &Selection) -> Result<Report> {
+    fn judge(&self, answerer: &Answerer<'_>, on: &Selection) -> Result<Report> {
+        let learnt = match answerer {
+            Answerer::Network(learnt, ..) => learnt,
+            Answerer::Baseline(baseline, shape) => {
+                return files::judge(baseline, on, shape, &AtomicBool::new(false), &mut |_, _| ());
+            }
+        };
         let seed = learnt.values[0].values[0];
         self.call(format!("judge {} {seed} {} {:?}", learnt.card.network.name(), learnt.card.plan_sha256, on.pick))?;
         let shape: &Shape = &learnt.card.input;
@@ -155,7 +162,8 @@ impl Players {
             &order,
             &Hands {
                 fit: &|plan, folder| self.fit(plan, folder),
-                judge: &|learnt, on, _, _| self.judge(learnt, on),
+                page: &|folder| furrow::output::write_atomically(&folder.join(table::PAGE), b"a page"),
+                judge: &|answerer, on, _| self.judge(answerer, on),
                 training: &|_, _| (),
                 tell: &|_| (),
                 warn: &|words| self.warned.borrow_mut().push(words.into()),
@@ -414,7 +422,7 @@ fn mistakes_in_a_page_are_shown_where_they_are() {
         ("batch: 2", "rate: -1", "-1", "-1 is out of range", "above 0"),
         ("batch: 2", "classes: \"soil; plant=crop,weed\"", "[\"exg\"]", "baselines know soil, crop and weed", "leave"),
         ("\"frames\": Real", "\"fra/mes\": Real", "Real(about: \"eight frames\")", "`fra/mes` is no name", "letters"),
-        ("\"small\":", "\"frames\":", "Scene(", "the set `frames` is there twice", "of its own"),
+        ("\"small\":", "\"frames\":", "Scene", "the set `frames` is there twice", "of its own"),
         (
             "tests/ref/small.ron",
             "tests/ref/smal.ron",

@@ -200,7 +200,7 @@ fn what_cannot_be_gone_on_with_is_told() {
     }
     let error = refuse(&mut train(&format!("eval {} --set {}", folder.join("none").display(), set.display())), 2);
     assert!(error.contains("no trained network"), "{error}");
-    let error = refuse(&mut fit(&set, &folder.join("a"), "").args(["--classes", "soil; galium=Galium aparine"]), 2);
+    let error = refuse(fit(&set, &folder.join("a"), "").args(["--classes", "soil; galium=Galium aparine"]), 2);
     assert!(error.contains("Galium aparine") && error.contains("knows no species"), "{error}");
     let error = refuse(&mut fit(&set, &folder.join("b"), "--bands rgbn"), 2);
     assert!(error.contains("no band `nir`"), "{error}");

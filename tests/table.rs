@@ -79,9 +79,10 @@ fn whole() -> &'static (TempDir, PathBuf, Duration) {
 fn files(out: &Path) -> BTreeMap<String, Vec<u8>> {
     let free = |name: &str| {
         name.contains("/time/")
+            || name.contains("/ledger/")
             || name.starts_with("times.")
-            || name.ends_with("/plan.json")
-            || name.ends_with("/result.json") && name.starts_with("runs/")
+            || name.starts_with("runs/")
+                && ["/plan.json", "/result.json", "/report.html"].iter().any(|n| name.ends_with(n))
     };
     tree(out).into_iter().filter(|(name, _)| !free(name)).collect()
 }
@@ -100,6 +101,8 @@ fn one_command_makes_sets_trainings_and_tables() {
                 let run = format!("runs/{network}/{train}/seed-{seed}");
                 assert!(found.contains_key(&format!("{run}/weights.safetensors")), "{run}");
                 assert!(found.contains_key(&format!("{run}/eval/test-a.json")), "{run}");
+                assert!(found.contains_key(&format!("{run}/eval/test-a.png")), "{run}");
+                assert!(out.join(&run).join("report.html").is_file(), "{run}");
                 assert!(!found.contains_key(&format!("{run}/checkpoint.safetensors")), "{run}");
             }
         }
@@ -111,6 +114,7 @@ fn one_command_makes_sets_trainings_and_tables() {
     assert_eq!(csv.lines().count(), 1 + 4 * 2, "{csv}");
     assert!(csv.lines().skip(1).all(|l| l.split(',').skip(2).all(|n| n.parse::<f64>().is_ok())), "{csv}");
     assert!(csv.contains("Real-Augmented") && text("table-3.md").contains("vegetation"));
+    assert!(text("results.html").contains("Real-Augmented"));
     assert!(found.keys().all(|name| !name.contains(".furrow-")));
     // Twice is once.
     let again = succeed(table(out, &[]));
@@ -153,42 +157,42 @@ fn two_shards_at_the_same_time_make_the_whole() {
 #[test]
 fn signals_stop_it_cleanly() {
     let (_keep, out) = scratch();
-    let until = |done: &dyn Fn() -> bool| {
-        let deadline = Instant::now() + Duration::from_secs(120);
+    let until = |child: &mut Child, done: &dyn Fn() -> bool| {
+        let deadline = Instant::now() + Duration::from_secs(300);
         while !done() && Instant::now() < deadline {
+            assert_eq!(child.try_wait().expect("a child"), None, "it has ended before it was asked to");
             std::thread::sleep(Duration::from_millis(10));
         }
         assert!(done(), "nothing begins");
     };
-    let stop = |mut child: Child, signal: &str| {
+    let stop = |child: &mut Child, signal: &str| {
         let id = child.id().to_string();
         assert!(Command::new("kill").args([signal, &id]).status().expect("kill").success());
         assert_eq!(child.wait().expect("an end").code(), Some(75), "{signal}");
     };
     let page = std::fs::read_to_string(desk().join("page.ron")).expect("the page");
-    let long = page.replace("count: 6", "count: 5000").replace("steps: 2", "steps: 100000");
+    let long = page.replace("count: 6", "count: 5000").replace("steps: 2", "steps: 100000, patience: 100000");
     std::fs::write(desk().join("long.ron"), &long).expect("a page");
-    let mut command = table(&out, &[]);
-    command = renamed(command, "long.ron");
-    let child = spawn(command);
-    until(&|| out.join("sets/small/seals").is_dir());
-    stop(child, "-TERM");
+    let mut child = spawn(renamed(&table(&out, &[]), "long.ron"));
+    until(&mut child, &|| out.join("sets/small/seals").is_dir());
+    stop(&mut child, "-TERM");
     // Fewer images than there are: into another folder.
     std::fs::write(desk().join("long.ron"), long.replace("count: 5000", "count: 6")).expect("a page");
     let (_keep, out) = scratch();
     for signal in ["-TERM", "-USR1"] {
-        let child = spawn(renamed(table(&out, &[]), "long.ron"));
         let folder = out.join("runs/basic-segnet/synthetic/seed-1");
-        let begun = || folder.join("checkpoint.safetensors").exists();
-        until(&begun);
-        stop(child, signal);
-        assert!(begun() && !folder.join("result.json").exists());
+        let written = || std::fs::metadata(folder.join("checkpoint.safetensors")).and_then(|m| m.modified()).ok();
+        let before = written();
+        let mut child = spawn(renamed(&table(&out, &[]), "long.ron"));
+        until(&mut child, &|| written() > before);
+        stop(&mut child, signal);
+        assert!(written() > before && !folder.join("result.json").exists());
     }
     assert!(tree(&out).keys().all(|name| !name.contains(".furrow-")));
 }
 
 /// The same command about another page.
-fn renamed(command: Command, page: &str) -> Command {
+fn renamed(command: &Command, page: &str) -> Command {
     let mut other = Command::new(command.get_program());
     other.current_dir(desk());
     other.args(command.get_args().map(|a| if a == "page.ron" { page.into() } else { a.to_owned() }));
@@ -201,13 +205,13 @@ fn wrong_input_is_one_clear_error_and_leaves_nothing() {
     let page = std::fs::read_to_string(desk().join("page.ron")).expect("the page");
     let pages = [
         ("networks:", "networx:", "wrong.ron:2:5: unknown field `networx`"),
-        ("\"small\")]", "\"smal\")]", "wrong.ron:10:44: there is no set `smal`"),
-        ("\"2..5\"", "\"5..2\"", "wrong.ron:13:60: `5..2` picks no images"),
+        ("\"small\")]", "\"smal\")]", "wrong.ron:10:42: there is no set `smal`"),
+        ("\"2..5\"", "\"5..2\"", "wrong.ron:13:52: `5..2` picks no images"),
         ("[1, 2]", "[1, 1]", "wrong.ron:3:16: the seed 1 is there twice"),
     ];
     for (from, to, words) in pages {
         std::fs::write(desk().join("wrong.ron"), page.replacen(from, to, 1)).expect("a page");
-        let said = fail(renamed(table(&out, &[]), "wrong.ron"), 2);
+        let said = fail(renamed(&table(&out, &[]), "wrong.ron"), 2);
         assert!(said.starts_with("error: ") && said.matches("error").count() == 1, "{said}");
         assert!(said.contains(words), "{words}: {said}");
         assert!(!out.exists());
@@ -241,7 +245,7 @@ fn a_set_that_cannot_be_made_is_told_by_both_programs() {
     let (at, end) = (page.find("page: \"").expect("a scene") + 7, page.find("\", count").expect("a scene"));
     std::fs::write(desk().join("scene.ron"), "Field(seeed: 1)").expect("a page");
     std::fs::write(desk().join("broken.ron"), format!("{}scene.ron{}", &page[..at], &page[end..])).expect("a page");
-    let said = fail(renamed(table(&out, &[]), "broken.ron"), 2);
+    let said = fail(renamed(&table(&out, &[]), "broken.ron"), 2);
     assert!(said.contains("scene.ron:1:7: unknown field `seeed`"), "{said}");
     assert!(said.contains("the set `small` cannot be made"), "{said}");
     assert!(!out.join("runs").exists());

@@ -52,7 +52,7 @@ impl Identity {
         for selection in plan.train.iter_mut().chain(&mut plan.val) {
             selection.folder = "".into();
         }
-        let text = serde_json::to_string(&Self { plan, ..self.clone() }).map_err(failed)?;
+        let text = serde_json::to_string(&Self { plan, ..self.clone() }).map_err(|e| failed(&e))?;
         Ok(Sha256::digest(text).iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}")))
     }
 
@@ -83,7 +83,7 @@ impl Identity {
 
 /// The plan's values by name, as text.
 fn fields(identity: &Identity) -> Result<std::collections::BTreeMap<String, String>> {
-    let value = serde_json::to_value(&identity.plan).map_err(failed)?;
+    let value = serde_json::to_value(&identity.plan).map_err(|e| failed(&e))?;
     Ok(value.as_object().into_iter().flatten().map(|(k, v)| (k.clone(), v.to_string())).collect())
 }
 
@@ -164,7 +164,7 @@ impl Learnt {
 
     /// Writes weights and card.
     pub fn write(&self, folder: &Path) -> Result<()> {
-        let text = serde_json::to_string(&self.card).map_err(failed)?;
+        let text = serde_json::to_string(&self.card).map_err(|e| failed(&e))?;
         weights::write(&folder.join(&self.card.weights), &self.values, &text)?;
         write_json(&folder.join(MODEL), &self.card)
     }
@@ -188,11 +188,11 @@ pub fn read_json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T> {
 
 /// Writes a JSON file, atomically.
 pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
-    let mut bytes = serde_json::to_vec_pretty(value).map_err(failed)?;
+    let mut bytes = serde_json::to_vec_pretty(value).map_err(|e| failed(&e))?;
     bytes.push(b'\n');
     write_atomically(path, &bytes)
 }
 
-fn failed(e: serde_json::Error) -> Error {
+fn failed(e: &serde_json::Error) -> Error {
     Error::Training(format!("cannot write JSON: {e}"))
 }

@@ -5,7 +5,7 @@ use super::engine::{Model, Precision, Where, device};
 use super::fit::checkpoint::Checkpoint;
 use super::fit::{self, Data, Plan, Watch};
 use super::measure::{Answer, Evaluation, Report};
-use super::net::parameters;
+use super::net::{Parameter, parameters};
 use super::run::{self, Card, Identity, Learnt, Results};
 use super::weights;
 use crate::dataset::split::Split;
@@ -64,7 +64,7 @@ pub fn fit(plan: &Plan, begin: Option<&Path>, machine: &Machine, folder: &Path, 
     let card = Card {
         furrow: env!("CARGO_PKG_VERSION").into(),
         network: plan.network,
-        parameters: learnt.iter().filter(|p| p.role.is_learnt()).map(|p| p.len()).sum(),
+        parameters: learnt.iter().filter(|p| p.role.is_learnt()).map(Parameter::len).sum(),
         input: plan.shape.clone(),
         normalisation: outcome.normalisation,
         classes: plan.classes.clone(),

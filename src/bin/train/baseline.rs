@@ -44,13 +44,13 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let rule = files::fit(args.kind, &args.from, 0, &shape, stop)?;
     let mut shots = Shots::new(images.len(), &["red", "green", "blue"]);
     let report = files::judge(&rule, &args.set, &shape, stop, &mut |example, predicted| {
-        shots.see(example, args.size, predicted)
+        shots.see(example, args.size, predicted);
     })?;
     let json = args.out.join("baseline.json");
     run::write_json(&json, &rule)?;
     let title = format!("{} on {}", args.kind.name(), args.set.folder.display());
     let lead = "What colour alone can do; a network below this has learnt nothing of shape.";
-    let mut paths = report::write(&args.out, &title, lead, &report, &shots.shots, &Classes::default().colors())?;
+    let mut paths = report::write(&args.out, &title, lead, &report, &shots.kept, &Classes::default().colors())?;
     paths.push(json);
     eprint!("{}", report.summary().markdown());
     Ok(paths)

@@ -50,7 +50,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         size.0,
         size.1
     );
-    let paths = report::write(&out, &title, &lead, &report, &shots.shots, &card.classes.colors())?;
+    let paths = report::write(&out, &title, &lead, &report, &shots.kept, &card.classes.colors())?;
     eprint!("{}", report.summary().markdown());
     Ok(paths)
 }

@@ -179,7 +179,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
             eprintln!("{}: {}", folder.display(), told(&results));
         }
         paths.extend([folder.join(run::WEIGHTS), folder.join(run::MODEL)]);
-        paths.extend(report::write_training(&folder, &results, &plan.classes.names(), &facts(&plan, &results))?);
+        paths.extend(write_page(&folder)?);
     }
     Ok(paths)
 }
@@ -243,6 +243,13 @@ fn told(results: &Results) -> String {
         "{} steps{why} in {:.0} s, {:.2} images a second{best}",
         results.steps, results.seconds, results.images_per_second
     )
+}
+
+/// Writes what people look at of a training that is done, from what lies in its folder.
+pub(crate) fn write_page(folder: &Path) -> Result<Vec<PathBuf>> {
+    let Identity { plan, .. } = run::read_json(&folder.join(run::PLAN))?;
+    let results: Results = run::read_json(&folder.join(run::RESULT))?;
+    report::write_training(folder, &results, &plan.classes.names(), &facts(&plan, &results))
 }
 
 /// What the run's page says of the plan.

@@ -18,7 +18,7 @@ use std::process::ExitCode;
 /// Trains networks on datasets, rendered or real, and judges them on real images.
 ///
 /// A set is a folder that `trace dataset` made or imported. DIR@PICK chooses images of it: DIR@train, DIR@val, DIR@test, DIR@all,
-/// DIR@0..10, DIR@random:100; DIR@0..10*4 has them four times.
+/// DIR@0..10, DIR@1/2 (every second from number 1 on), DIR@random:100; DIR@0..10*4 has them four times.
 #[derive(Parser)]
 #[command(name = "train", version, arg_required_else_help = true, after_help = EXAMPLES)]
 struct Cli {

@@ -7,6 +7,7 @@ use furrow::train::figure::{Chart, Curve, Page, Shot, sheet, spread};
 use furrow::train::fit::checkpoint::History;
 use furrow::train::measure::Report;
 use furrow::train::run;
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 /// Images that the figure and the page show.
@@ -19,7 +20,7 @@ pub(crate) struct Shots {
     places: Vec<usize>,
     next: usize,
     colours: Option<[usize; 3]>,
-    pub(crate) shots: Vec<Shot>,
+    pub(crate) kept: Vec<Shot>,
 }
 
 impl Shots {
@@ -30,7 +31,7 @@ impl Shots {
             (Some(r), Some(g), Some(b)) => Some([r, g, b]),
             _ => None,
         };
-        Self { places: spread(images, SHOWN), next: 0, colours, shots: Vec::new() }
+        Self { places: spread(images, SHOWN), next: 0, colours, kept: Vec::new() }
     }
 
     /// Sees an image; keeps it if it is one of the chosen. Without red, green and blue the first band is shown as gray.
@@ -38,7 +39,7 @@ impl Shots {
         if self.places.contains(&self.next) {
             let planes = self.colours.unwrap_or_default().map(|band| &example.planes[band]);
             let rgb: Vec<[u8; 3]> = (0..example.labels.len()).map(|i| planes.map(|plane| plane[i])).collect();
-            self.shots.push(Shot::new(&example.name, size, &rgb, &example.labels, &[predicted], LARGEST));
+            self.kept.push(Shot::new(&example.name, size, &rgb, &example.labels, &[predicted], LARGEST));
         }
         self.next += 1;
     }
@@ -125,7 +126,7 @@ pub(crate) fn write_training(
     for loss in &results.history.losses {
         let look = results.history.looks.iter().find(|look| look.step == loss.step);
         let miou = look.map_or(String::new(), |look| look.miou.to_string());
-        lines += &format!("{},{},{},{miou}\n", loss.step, loss.loss, loss.rate);
+        let _ = writeln!(lines, "{},{},{},{miou}", loss.step, loss.loss, loss.rate);
     }
     write_atomically(&log, lines.as_bytes())?;
     Ok(vec![html, svg, log])

@@ -2,16 +2,24 @@
 
 use crate::fit;
 use crate::machine::MachineArgs;
+use crate::report::Shots;
 use furrow::cli::signal::Signals;
 use furrow::dataset::generate::Shard;
+use furrow::output::write_atomically;
 use furrow::page::Page;
+use furrow::train::baseline::files;
+use furrow::train::classes::Classes;
+use furrow::train::data::{Band, Pick, Selection};
 use furrow::train::engine::{Precision, device};
+use furrow::train::figure::sheet;
 use furrow::train::fit::Plan;
-use furrow::train::session;
-use furrow::train::table::{self, Bound, Experiment, Hands, Only, Order, Real, State};
+use furrow::train::measure::Report;
+use furrow::train::session::{self, Machine};
+use furrow::train::table::{self, Answerer, Bound, Experiment, Hands, Only, Order, Real, State};
 use furrow::{Error, Result, cli};
 use indicatif::HumanDuration;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 /// Runs an experiment as far as it is missing, and writes its tables.
@@ -112,9 +120,8 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         &order,
         &Hands {
             fit: &|plan: &Plan, folder: &Path| fit::fit(plan, None, &args.machine, folder, args.quiet, signals),
-            judge: &|learnt, on, precision, threads| {
-                session::evaluate(learnt, on, precision, threads, &machine, stop, &mut |_| Ok(()))
-            },
+            page: &|folder| fit::write_page(folder).map(drop),
+            judge: &|answerer, on, picture| judge(answerer, on, picture, &machine, stop),
             training: &|row: &str, state: &State| {
                 if !args.quiet {
                     eprintln!("training {} of {}: {row}{}", state.number, state.of, left(state.left));
@@ -136,6 +143,39 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         }
     }
     Ok(paths)
+}
+
+/// Judges a network or a baseline; some of the images go to a picture, beside truth, prediction and errors.
+fn judge(
+    answerer: &Answerer<'_>,
+    on: &Selection,
+    picture: &Path,
+    machine: &Machine,
+    stop: &AtomicBool,
+) -> Result<Report> {
+    let (_, images) = on.open(Pick::All, 0)?;
+    let (report, shots, palette) = match answerer {
+        Answerer::Network(learnt, precision, threads) => {
+            let input = &learnt.card.input;
+            let bands: Vec<&str> = input.bands.iter().map(Band::name).collect();
+            let mut shots = Shots::new(images.len(), &bands);
+            let mut see = |seen: &session::Seen<'_>| {
+                shots.see(seen.example, (input.width, input.height), seen.predicted);
+                Ok(())
+            };
+            let report = session::evaluate(learnt, on, precision, *threads, machine, stop, &mut see)?;
+            (report, shots, learnt.card.classes.colors())
+        }
+        Answerer::Baseline(baseline, shape) => {
+            let mut shots = Shots::new(images.len(), &["red", "green", "blue"]);
+            let size = (shape.width, shape.height);
+            let mut see = |example: &_, predicted: &[u8]| shots.see(example, size, predicted);
+            let report = files::judge(baseline, on, shape, stop, &mut see)?;
+            (report, shots, Classes::default().colors())
+        }
+    };
+    write_atomically(picture, &sheet(&shots.kept, &palette, true).png()?)?;
+    Ok(report)
 }
 
 fn left(seconds: Option<f64>) -> String {

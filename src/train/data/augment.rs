@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 /// What is varied; each may be left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of its own, none a state")]
 pub struct Augment {
     /// Mirrored left to right, half of the time.
     pub flip: bool,
@@ -72,7 +73,7 @@ impl Augment {
         colour: &[bool],
         stream: &mut Stream,
     ) -> (Vec<f32>, Vec<u8>) {
-        let (mut pixels, labels) = match Placement::draw(self, size, stream) {
+        let (mut pixels, labels) = match Placement::draw(*self, size, stream) {
             Some(placement) => placement.read(example, size),
             None => (interleave(example), example.labels.clone()),
         };
@@ -109,7 +110,7 @@ struct Placement {
 }
 
 impl Placement {
-    fn draw(augment: &Augment, size: (u32, u32), stream: &mut Stream) -> Option<Self> {
+    fn draw(augment: Augment, size: (u32, u32), stream: &mut Stream) -> Option<Self> {
         if !(augment.flip || augment.rotate || augment.scale || augment.crop) {
             return None;
         }
@@ -188,7 +189,9 @@ fn blur(pixels: &mut Vec<f32>, bands: usize, (w, h): (u32, u32), sigma: f32) {
     let radius = (3.0 * sigma).ceil() as i64;
     let mut kernel: Vec<f32> = (-radius..=radius).map(|i| (-0.5 * (i as f32 / sigma).powi(2)).exp()).collect();
     let sum: f32 = kernel.iter().sum();
-    kernel.iter_mut().for_each(|k| *k /= sum);
+    for k in &mut kernel {
+        *k /= sum;
+    }
     let (w, h) = (w as i64, h as i64);
     for (dx, dy) in [(1, 0), (0, 1)] {
         let mut out = vec![0.0; pixels.len()];

@@ -93,23 +93,22 @@ pub(super) fn read(folder: &Path, bands: &[Band]) -> Result<(u32, u32, Vec<Vec<u
             Band::Blue => Some(2),
             Band::Gray(_) => None,
         };
-        planes.push(match (channel, &rgb) {
-            (Some(channel), Some((_, _, pixels))) => pixels.iter().map(|p| p[channel]).collect(),
-            _ => {
-                let path = folder.join(format!("{}.png", band.name()));
-                if !path.is_file() {
-                    return Err(Error::Dataset(format!(
-                        "{}: this image has no band `{}`\n help: choose bands that all sets have, such as --bands rgb",
-                        path.display(),
-                        band.name()
-                    )));
-                }
-                let (w, h, values) = output::read_gray(&path)?;
-                if *size.get_or_insert((w, h)) != (w, h) {
-                    return Err(Error::Image { path, what: format!("it is {w} × {h} pixels, the others are not") });
-                }
-                values
+        planes.push(if let (Some(channel), Some((_, _, pixels))) = (channel, &rgb) {
+            pixels.iter().map(|p| p[channel]).collect()
+        } else {
+            let path = folder.join(format!("{}.png", band.name()));
+            if !path.is_file() {
+                return Err(Error::Dataset(format!(
+                    "{}: this image has no band `{}`\n help: choose bands that all sets have, such as --bands rgb",
+                    path.display(),
+                    band.name()
+                )));
             }
+            let (w, h, values) = output::read_gray(&path)?;
+            if *size.get_or_insert((w, h)) != (w, h) {
+                return Err(Error::Image { path, what: format!("it is {w} × {h} pixels, the others are not") });
+            }
+            values
         });
     }
     let (w, h) = size.ok_or_else(|| Error::Dataset("no band was named\n help: --bands rgb".into()))?;

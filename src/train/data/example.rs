@@ -53,34 +53,27 @@ impl Example {
             )));
         }
         let (w, h, planes) = bands::read(&folder, &shape.bands)?;
-        let same = |path: &Path, found: (u32, u32)| match found == (w, h) {
-            true => Ok(()),
-            false => Err(Error::Image {
-                path: path.into(),
-                what: format!("it is {} × {} pixels, the photograph {w} × {h}", found.0, found.1),
-            }),
+        let same = |path: &Path, found: (u32, u32)| {
+            let what = || format!("it is {} × {} pixels, the photograph {w} × {h}", found.0, found.1);
+            if found == (w, h) { Ok(()) } else { Err(Error::Image { path: path.into(), what: what() }) }
         };
         let path = folder.join("semantics.png");
         let (lw, lh, semantics) = output::read_indexed(&path)?;
         same(&path, (lw, lh))?;
-        let species = match map.needs_species() {
-            false => Vec::new(),
-            true => {
-                let path = folder.join("species.png");
-                let (lw, lh, species) = output::read_gray(&path)?;
-                same(&path, (lw, lh))?;
-                species
-            }
-        };
-        let plants = match with_plants {
-            false => Vec::new(),
-            true => {
-                let path = folder.join("plants.png");
-                let (lw, lh, plants) = output::read_gray16(&path)?;
-                same(&path, (lw, lh))?;
-                nearest((w, h), &plants, (shape.width, shape.height))
-            }
-        };
+        let mut species = Vec::new();
+        if map.needs_species() {
+            let path = folder.join("species.png");
+            let (lw, lh, numbers) = output::read_gray(&path)?;
+            same(&path, (lw, lh))?;
+            species = numbers;
+        }
+        let mut plants = Vec::new();
+        if with_plants {
+            let path = folder.join("plants.png");
+            let (lw, lh, numbers) = output::read_gray16(&path)?;
+            same(&path, (lw, lh))?;
+            plants = nearest((w, h), &numbers, (shape.width, shape.height));
+        }
         let to = (shape.width, shape.height);
         Ok(Self {
             name,

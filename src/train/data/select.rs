@@ -1,4 +1,4 @@
-//! Which images of which set: `DIR`, `DIR@val`, `DIR@0..10`, `DIR@random:100`, each with `*4` to have them four times.
+//! Which images of which set: `DIR`, `DIR@val`, `DIR@0..10`, `DIR@1/2`, `DIR@random:100`, each with `*4` to have them four times.
 
 use crate::dataset::Set;
 use crate::dataset::split::Split;
@@ -17,6 +17,8 @@ pub enum Pick {
     Split(Split),
     /// By number, from the first to before the second.
     Range(u64, u64),
+    /// Those whose number leaves the first when divided by the second: every so many, from there on.
+    Every(u64, u64),
     /// So many by chance, the same under the same seed whatever the set's name.
     Random(u64),
 }
@@ -54,6 +56,7 @@ impl Selection {
             Pick::All => (0..count).collect(),
             Pick::Split(wanted) => (0..count).filter(|k| split.of(*k) == wanted).collect(),
             Pick::Range(from, to) if to <= count => (from..to).collect(),
+            Pick::Every(first, of) => (first..count).step_by(of as usize).collect(),
             Pick::Random(n) if n <= count => sample(count, n, seed),
             Pick::Range(..) | Pick::Random(_) => {
                 return Err(Error::Dataset(format!(
@@ -75,6 +78,7 @@ impl fmt::Display for Selection {
             Some(Pick::All) => write!(f, "@all")?,
             Some(Pick::Split(split)) => write!(f, "@{}", split.name())?,
             Some(Pick::Range(from, to)) => write!(f, "@{from}..{to}")?,
+            Some(Pick::Every(first, of)) => write!(f, "@{first}/{of}")?,
             Some(Pick::Random(n)) => write!(f, "@random:{n}")?,
         }
         if self.repeat == 1 { Ok(()) } else { write!(f, "*{}", self.repeat) }
@@ -82,18 +86,22 @@ impl fmt::Display for Selection {
 }
 
 impl Pick {
-    /// Reads `all`, `train`, `val`, `test`, `0..10` or `random:100`.
+    /// Reads `all`, `train`, `val`, `test`, `0..10`, `1/2` or `random:100`.
     pub fn parse(text: &str) -> Result<Self, String> {
         if let Some(split) = Split::ALL.into_iter().find(|s| s.name() == text) {
             return Ok(Self::Split(split));
         }
         let range = text.split_once("..").and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
+        let every = text.split_once('/').and_then(|(k, n)| Some((k.parse().ok()?, n.parse().ok()?)));
         let random = text.strip_prefix("random:").and_then(|n| n.parse().ok());
-        match (text, range, random) {
-            ("all", _, _) => Ok(Self::All),
-            (_, Some((from, to)), _) if from < to => Ok(Self::Range(from, to)),
-            (_, _, Some(n)) if n > 0 => Ok(Self::Random(n)),
-            _ => Err(format!("`{text}` picks no images: write all, train, val, test, 0..10 or random:100")),
+        match (text, range, every, random) {
+            ("all", _, _, _) => Ok(Self::All),
+            (_, Some((from, to)), _, _) if from < to => Ok(Self::Range(from, to)),
+            (_, _, Some((first, of)), _) if first < of => Ok(Self::Every(first, of)),
+            (_, _, _, Some(n)) if n > 0 => Ok(Self::Random(n)),
+            _ => Err(format!(
+                "`{text}` picks no images: write all, train, val, test, 0..10, 1/2 (every second from number 1 on) or random:100"
+            )),
         }
     }
 }
@@ -125,10 +133,10 @@ mod tests {
         );
         assert_eq!(read("d@random:7").pick, Some(Pick::Random(7)));
         assert_eq!(read("d@val").pick, Some(Pick::Split(Split::Val)));
-        for text in ["data/d", "a@b/c@0..10*4", "d@random:7", "d@val", "d@all*2"] {
+        for text in ["data/d", "a@b/c@0..10*4", "d@random:7", "d@val", "d@all*2", "d@1/2"] {
             assert_eq!(read(text).to_string(), text);
         }
-        for bad in ["d@", "d@5..5", "d@random:0", "d*0", "d*x", "d@most"] {
+        for bad in ["d@", "d@5..5", "d@2/2", "d@random:0", "d*0", "d*x", "d@most"] {
             assert!(Selection::parse(bad).is_err(), "{bad}");
         }
     }

@@ -20,10 +20,9 @@ impl Precision {
     /// Reads `f32`, `bf16` or `auto`, which is bf16 where the device multiplies it.
     pub fn named(text: &str, device: Device) -> Result<Self, String> {
         match text {
-            "f32" => Ok(Self::Single),
             "bf16" => Ok(Self::Bf16),
             "auto" if device.is_cuda() || std::is_x86_feature_detected!("avx512bf16") => Ok(Self::Bf16),
-            "auto" => Ok(Self::Single),
+            "f32" | "auto" => Ok(Self::Single),
             _ => Err(format!("there is no precision `{text}`: write auto, f32 or bf16")),
         }
     }

@@ -170,7 +170,8 @@ pub struct TrainDesc {
 pub struct PartDesc {
     /// The set.
     pub set: String,
-    /// Which of its images: `all`, `train`, `val`, `test`, by number as `0..10` (without the last), or by chance as `random:100`.
+    /// Which of its images: `all`, `train`, `val`, `test`, by number as `0..10` (without the last) or `1/2` (every second from
+    /// number 1 on), or by chance as `random:100`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub images: Option<String>,
     /// How often each is there, 1 or more: few real images beside many rendered ones must be repeated to be heard.

@@ -9,6 +9,7 @@
 //! OUT/sets/NAME/                               rendered and imported images
 //! OUT/runs/NETWORK/TRAIN/seed-1/               one training, as `train fit` leaves it
 //! OUT/runs/NETWORK/TRAIN/seed-1/eval/TEST.json how well it does on a test set
+//! OUT/runs/NETWORK/TRAIN/seed-1/eval/TEST.png  images, truth, prediction, errors
 //! OUT/runs/NETWORK/TRAIN/seed-1/time/TEST.json how long that took
 //! OUT/runs/BASELINE/TRAIN/                     a colour baseline, with the same eval/
 //! OUT/table-1.md, .csv, .json                  GA, CA and mean I/U, as Table I of the paper
@@ -16,10 +17,11 @@
 //! OUT/table-3.*                                I/U of each class that is a plant and of vegetation, with its spread over seeds
 //! OUT/runs.*                                   every run by itself
 //! OUT/times.*                                  how long networks take, as its Table III
+//! OUT/results.html                             all but times on one page
 //! ```
 //!
 //! Whatever is there is not made again: an experiment that was stopped or killed goes on with the same command and ends with the same
-//! files, `time/`, `times.*` and what a run tells of its speed apart. An evaluation is believed only if it is of these weights and these
+//! files, `time/`, `times.*` and what a run tells of its speed (`result.json`, `report.html`) apart. An evaluation is believed only if it is of these weights and these
 //! images; one that is not, or that cannot be read, is told and made again. A training that cannot be read is an error: hours are
 //! not thrown away unasked. A page may get longer; a training whose plan has changed is refused.
 //!
@@ -46,7 +48,7 @@ pub use desc::{ExperimentDesc, LearnDesc, Named, PartDesc, ScaleDesc, SetDesc, T
 pub use experiment::{Experiment, Part, Source, TestSet, TrainSet};
 pub use judgement::Judgement;
 pub use names::slug;
-pub use print::{RUNS, Tables, listing, tables};
+pub use print::{RUNS, TIMES, Tables, listing, tables};
 pub use rows::{Learner, Row, rows};
 pub use sets::{Bound, Real};
-pub use work::{Hands, Only, Order, State, run};
+pub use work::{Answerer, Hands, Only, Order, PAGE, State, run};

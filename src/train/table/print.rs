@@ -6,6 +6,7 @@ use super::rows::{self, Learner, Row};
 use super::sets::Bound;
 use crate::Result;
 use crate::output::write_atomically;
+use crate::train::figure;
 use crate::train::measure::{Cell, Report, Table};
 use crate::train::run::{self, Results};
 use std::path::{Path, PathBuf};
@@ -15,6 +16,9 @@ const PERCENT: usize = 1;
 
 /// Name of the table of every run by itself.
 pub const RUNS: &str = "runs";
+
+/// Name of the table of times, the only one that is not the same twice.
+pub const TIMES: &str = "times";
 
 /// Tables by the names of their files.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,7 +70,7 @@ pub fn tables(bound: &Bound, out: &Path) -> Result<(Tables, Vec<String>)> {
         ("table-2", vegetation(experiment, &lines)),
         ("table-3", classes(experiment, &lines)),
         (RUNS, runs(experiment, &seen)),
-        ("times", times(experiment, &seen)),
+        (TIMES, times(experiment, &seen)),
     ];
     Ok((Tables(all), told))
 }
@@ -199,6 +203,34 @@ fn classes(experiment: &Experiment, lines: &[Line<'_>]) -> Table {
         table.push(cells);
     }
     table
+}
+
+/// Writes all but times on one page for people, `results.html`; returns its path.
+pub(super) fn page(experiment: &Experiment, tables: &Tables, out: &Path) -> Result<PathBuf> {
+    let learn = &experiment.learn;
+    let fact = |name: &str, value: String| (name.to_owned(), value);
+    let names = |all: Vec<&str>| all.join(", ");
+    let facts = [
+        fact("networks", names(experiment.networks.iter().map(|n| n.about()).collect())),
+        fact("seeds", experiment.seeds.iter().map(u64::to_string).collect::<Vec<_>>().join(", ")),
+        fact("images", format!("{} × {} pixels", learn.shape.width, learn.shape.height)),
+        fact("steps", format!("at most {} of {} images", learn.steps, learn.batch)),
+        fact("classes", learn.classes.names().join(", ")),
+        fact("scale", experiment.scale.clone().unwrap_or_else(|| "that of the page".into())),
+        fact("sets", names(experiment.sets.iter().map(|(name, _)| name.as_str()).collect())),
+    ];
+    let shown: Vec<Table> = tables.0.iter().filter(|(name, _)| *name != TIMES).map(|(_, t)| t.clone()).collect();
+    let page = figure::Page {
+        kind: "Experiment",
+        title: "Trained on rendered and real images, judged on real ones",
+        lead: "Means over seeds; a network below the colour baselines has learnt nothing of shape.",
+        facts: &facts,
+        tables: &shown,
+        ..figure::Page::default()
+    };
+    let path = out.join("results.html");
+    write_atomically(&path, page.html()?.as_bytes())?;
+    Ok(path)
 }
 
 /// All rows with their numbers and how far they are.

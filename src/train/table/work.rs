@@ -2,13 +2,13 @@
 
 use super::experiment::TrainSet;
 use super::judgement::{self, BASELINE, Judged, Judgement, Known};
-use super::print::{self, Tables};
+use super::print;
 use super::rows::{self, Learner, Row};
 use super::sets::Bound;
 use crate::dataset::generate::Shard;
 use crate::output::write_atomically;
 use crate::train::baseline::{Baseline, Kind, files};
-use crate::train::data::{Pick, Selection, Store};
+use crate::train::data::{Pick, Selection, Shape, Store};
 use crate::train::fit::Plan;
 use crate::train::measure::Report;
 use crate::train::net::Network;
@@ -18,6 +18,9 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What people look at of a training, below its folder.
+pub const PAGE: &str = "report.html";
 
 /// A part of the work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,8 +60,10 @@ pub struct Order<'a> {
 pub struct Hands<'a> {
     /// Trains a plan into a folder, or goes on with it.
     pub fit: &'a dyn Fn(&Plan, &Path) -> Result<Results>,
-    /// Judges a network on images, with a precision and so many threads.
-    pub judge: &'a dyn Fn(&Learnt, &Selection, &str, usize) -> Result<Report>,
+    /// Writes what people look at of a training, from what lies in its folder.
+    pub page: &'a dyn Fn(&Path) -> Result<()>,
+    /// Judges one who has learnt on images, and leaves a picture of some of them.
+    pub judge: &'a dyn Fn(&Answerer<'_>, &Selection, &Path) -> Result<Report>,
     /// Told before each training what it is, and how far the experiment is.
     pub training: &'a dyn Fn(&str, &State),
     /// Told what is done else, in words.
@@ -67,6 +72,14 @@ pub struct Hands<'a> {
     pub warn: &'a dyn Fn(&str),
     /// Raised by whoever wants it to stop.
     pub stop: &'a AtomicBool,
+}
+
+/// One who has learnt.
+pub enum Answerer<'a> {
+    /// A network, to be computed with a precision and so many threads.
+    Network(&'a Learnt, &'a str, usize),
+    /// A colour baseline, on images of this shape.
+    Baseline(&'a Baseline, &'a Shape),
 }
 
 /// How far the trainings of a shard are.
@@ -123,7 +136,9 @@ fn tables(order: &Order<'_>, hands: &Hands<'_>) -> Result<Vec<PathBuf>> {
     for words in told {
         (hands.warn)(&words);
     }
-    Tables::write(&tables, order.out)
+    let mut paths = tables.write(order.out)?;
+    paths.push(print::page(&order.bound.experiment, &tables, order.out)?);
+    Ok(paths)
 }
 
 /// One row's work.
@@ -219,16 +234,20 @@ impl Work<'_> {
 
     /// Trains the row where it is not done; says whether it was not.
     fn train(&self, number: usize, all: &[&Work<'_>]) -> Result<bool> {
-        match self.row.learner {
-            Learner::Baseline(kind) => self.fit_baseline(kind),
-            Learner::Network(..) if self.is_done() => Ok(false),
-            Learner::Network(network, _) => {
-                let state = State { number, of: all.len(), left: left(all, self.order)? };
-                (self.hands.training)(&self.told(), &state);
-                (self.hands.fit)(&self.plan(network)?, &self.folder)?;
-                Ok(true)
-            }
+        let network = match self.row.learner {
+            Learner::Baseline(kind) => return self.fit_baseline(kind),
+            Learner::Network(network, _) => network,
+        };
+        let missing = !self.is_done();
+        if missing {
+            let state = State { number, of: all.len(), left: left(all, self.order)? };
+            (self.hands.training)(&self.told(), &state);
+            (self.hands.fit)(&self.plan(network)?, &self.folder)?;
         }
+        if missing || !self.folder.join(PAGE).exists() {
+            (self.hands.page)(&self.folder)?;
+        }
+        Ok(missing)
     }
 
     fn is_done(&self) -> bool {
@@ -278,19 +297,19 @@ impl Work<'_> {
             if self.hands.stop.load(Ordering::Relaxed) {
                 return Err(Error::Interrupted);
             }
-            let report = match &of {
-                Judged::Baseline(baseline) => {
-                    files::judge(baseline, &selection, &bound.experiment.learn.shape, self.hands.stop, &mut |_, _| ())?
-                }
+            let answerer = match &of {
+                Judged::Baseline(baseline) => Answerer::Baseline(baseline, &bound.experiment.learn.shape),
                 Judged::Network { .. } => {
-                    let learnt = match learnt.take() {
-                        Some(open) => learnt.insert(open),
-                        None => learnt.insert(Learnt::open(&self.folder)?),
-                    };
-                    let Identity { plan, .. } = run::read_json(&self.folder.join(run::PLAN))?;
-                    (self.hands.judge)(learnt, &selection, &plan.precision, plan.threads)?
+                    if learnt.is_none() {
+                        let Identity { plan, .. } = run::read_json(&self.folder.join(run::PLAN))?;
+                        learnt = Some((Learnt::open(&self.folder)?, plan));
+                    }
+                    let Some((learnt, plan)) = &learnt else { continue };
+                    Answerer::Network(learnt, &plan.precision, plan.threads)
                 }
             };
+            let picture = judgement::path(&self.folder, &test.slug).with_extension("png");
+            let report = (self.hands.judge)(&answerer, &selection, &picture)?;
             let judgement = Judgement { of: of.clone(), images: test.part.pick, on, report };
             Judgement::keep(&self.folder, &test.slug, judgement)?;
             made = true;
