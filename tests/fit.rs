@@ -49,7 +49,7 @@ fn set(folder: &Path, images: u64) -> PathBuf {
 
 fn train(arguments: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_train"));
-    command.args(arguments.split(' ')).stdin(Stdio::null());
+    command.args(arguments.split_whitespace()).stdin(Stdio::null());
     command
 }
 
@@ -130,7 +130,8 @@ fn a_training_that_is_stopped_or_killed_ends_with_the_same_bytes() {
                 assert!(begin.elapsed() < Duration::from_secs(60));
                 stops += usize::from(!status.success());
                 if signal == "TERM" {
-                    assert!([Some(0), Some(75)].contains(&status.code()), "{status}");
+                    // None: it came while the program was still being loaded, before it can watch for signals.
+                    assert!([Some(0), Some(75), None].contains(&status.code()), "{status}");
                 }
             }
             assert!(stops > 0, "it was always done before it was {name}");
