@@ -53,6 +53,11 @@ pub fn fit(plan: &Plan, begin: Option<&Path>, machine: &Machine, folder: &Path, 
     let begin = begin.map(Learnt::open).transpose()?.map(|l| l.values).unwrap_or_default();
     let plan = Plan { begin_with: (!begin.is_empty()).then(|| weights::hash(&begin)), ..plan.clone() };
     let identity = Identity::of(&plan, &train, &val)?;
+    // A set without the bands is told before a folder is taken for it.
+    train.get(0)?;
+    if !val.is_empty() {
+        val.get(0)?;
+    }
     identity.claim(folder)?;
     if let Some(results) = run::results(folder)? {
         return Ok(results);
