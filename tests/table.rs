@@ -57,7 +57,10 @@ fn desk() -> &'static Path {
 fn table(out: &Path, more: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_train"));
     command.current_dir(desk()).args(["table", "page.ron", "--real", "frames=frames", "--threads", "1", "--quiet"]);
-    command.args(["--precision", "f32", "--out", path(out)]).args(more);
+    if !more.contains(&"--precision") {
+        command.args(["--precision", "f32"]);
+    }
+    command.args(["--out", path(out)]).args(more);
     command
 }
 

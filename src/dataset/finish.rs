@@ -5,7 +5,7 @@ use super::recipe::{FILE, Recipe, hex};
 use super::seal::{Print, Seal};
 use super::set::{Set, Stream, Whole};
 use super::{format, report};
-use crate::output::UNFINISHED;
+use crate::output::remove_unfinished;
 use crate::{Error, Result};
 use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, BTreeSet};
@@ -28,7 +28,7 @@ pub fn finish(set: &Set, shards: Option<u64>) -> Result<Vec<PathBuf>> {
     if !missing.is_empty() {
         return Err(Error::Damaged(lacks(set, &missing, shards)));
     }
-    sweep(folder)?;
+    remove_unfinished(folder)?;
     let mut whole = Whole::new(folder);
     for (_, format) in format::all(recipe)? {
         format.whole(set, &mut whole)?;
@@ -136,23 +136,6 @@ fn manifest(set: &Set, files: &BTreeMap<String, Print>, out: &mut Stream<'_>) ->
     out.put("],\n\"content_sha256\": ")?;
     out.json(&hex(&content.finalize()))?;
     out.put("\n}\n")
-}
-
-/// Removes what a killed run has left half-written.
-fn sweep(folder: &Path) -> Result<()> {
-    let mut todo = vec![folder.to_path_buf()];
-    while let Some(path) = todo.pop() {
-        for entry in std::fs::read_dir(&path).map_err(Error::io(&path))? {
-            let entry = entry.map_err(Error::io(&path))?;
-            let kind = entry.file_type().map_err(Error::io(&path))?;
-            if kind.is_dir() {
-                todo.push(entry.path());
-            } else if entry.file_name().to_string_lossy().starts_with(UNFINISHED) {
-                std::fs::remove_file(entry.path()).map_err(Error::io(&entry.path()))?;
-            }
-        }
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -100,7 +100,7 @@ impl Provenance {
 }
 
 /// Prefix of the names that files have until they are whole.
-pub const UNFINISHED: &str = ".furrow-";
+const UNFINISHED: &str = ".furrow-";
 
 /// Writes a file under a temporary name beside its target, flushes it, then renames: a reader never sees half a file.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
@@ -143,6 +143,25 @@ pub fn place_atomically(path: &Path, write: impl FnOnce(&Path) -> Result<()>) ->
 /// The folder of a file.
 fn parent(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Removes what a killed program has left half-written in a folder and below; nobody else may be writing there.
+pub fn remove_unfinished(folder: &Path) -> Result<()> {
+    let mut todo = vec![folder.to_path_buf()];
+    while let Some(folder) = todo.pop() {
+        for entry in std::fs::read_dir(&folder).map_err(Error::io(&folder))? {
+            let entry = entry.map_err(Error::io(&folder))?;
+            let path = entry.path();
+            let unfinished = entry.file_name().to_string_lossy().starts_with(UNFINISHED);
+            match (entry.file_type().map_err(Error::io(&path))?.is_dir(), unfinished) {
+                (true, true) => std::fs::remove_dir_all(&path).map_err(Error::io(&path))?,
+                (true, false) => todo.push(path),
+                (false, true) => std::fs::remove_file(&path).map_err(Error::io(&path))?,
+                (false, false) => {}
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Gives a file that is there a second name, so that equal files take space once; `bytes` are what it holds, written anew where the file

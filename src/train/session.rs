@@ -9,6 +9,7 @@ use super::net::{Parameter, parameters};
 use super::run::{self, Card, Identity, Learnt, Results};
 use super::weights;
 use crate::dataset::split::Split;
+use crate::output::remove_unfinished;
 use crate::{Error, Result};
 use std::path::Path;
 use std::sync::Arc;
@@ -59,6 +60,7 @@ pub fn fit(plan: &Plan, begin: Option<&Path>, machine: &Machine, folder: &Path, 
         val.get(0)?;
     }
     identity.claim(folder)?;
+    remove_unfinished(folder)?;
     if let Some(results) = run::results(folder)? {
         return Ok(results);
     }

@@ -6,7 +6,7 @@ use super::print;
 use super::rows::{self, Learner, Row};
 use super::sets::Bound;
 use crate::dataset::generate::Shard;
-use crate::output::write_atomically;
+use crate::output::{remove_unfinished, write_atomically};
 use crate::train::baseline::{Baseline, Kind, files};
 use crate::train::data::{Pick, Selection, Shape, Store};
 use crate::train::fit::Plan;
@@ -120,6 +120,9 @@ pub fn run(order: &Order<'_>, hands: &Hands<'_>) -> Result<Vec<PathBuf>> {
     for work in &todo {
         if work.network().is_some() {
             number += 1;
+        }
+        if work.folder.exists() {
+            remove_unfinished(&work.folder)?;
         }
         let made = work.train(number, &trainings)? | work.judge()?;
         if made {
