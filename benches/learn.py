@@ -99,7 +99,7 @@ def theirs(name, a):
         with torch.autocast("cpu", torch.bfloat16, enabled=a.precision == "bf16"):
             scores = model(x)
         loss = F.cross_entropy(scores.float(), y)
-        optimiser.zero_grad(set_to_none=False)
+        optimiser.zero_grad()
         loss.backward()
         optimiser.step()
         loss.item()

@@ -249,7 +249,8 @@ fn batches_do_not_depend_on_threads_or_on_where_a_training_goes_on() {
         let all = Selection { folder: set.clone(), pick: None, repeat: 2 };
         Arc::new(Store::open(&[all], Pick::All, 1, &Classes::default(), &shape, false, memory).unwrap())
     };
-    let order = Order { seed: 3, batch: 3, augment: Augment::default(), normalisation: Normalisation::Image };
+    let (seed, batch, window) = (3, 3, (40, 32));
+    let order = Order { seed, batch, window, augment: Augment::default(), normalisation: Normalisation::Image };
     let batches = |memory, from, threads| -> Vec<_> {
         Loader::start(&store(memory), &order, from, 12, threads).map(|b| b.unwrap()).collect()
     };

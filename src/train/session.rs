@@ -125,7 +125,7 @@ pub fn evaluate(
             return Err(Error::Interrupted);
         }
         let example = store.get(place)?;
-        let mut pixels = augment::interleave(&example);
+        let mut pixels = augment::interleave(&example, 1);
         card.normalisation.apply(&mut pixels, card.input.bands.len());
         let begun = Instant::now();
         let predicted = model.predict(&pixels, (width, height))?;

@@ -8,7 +8,7 @@ use furrow::train::data::{Augment, Band, Selection, Shape};
 use furrow::train::engine::{Precision, device};
 use furrow::train::fit::balance::Balance;
 use furrow::train::fit::checkpoint::Look;
-use furrow::train::fit::plan::{Exposure, Method};
+use furrow::train::fit::plan::{Exposure, Method, Objective};
 use furrow::train::fit::schedule::Schedule;
 use furrow::train::fit::{Plan, Watch};
 use furrow::train::net::Network;
@@ -65,6 +65,10 @@ pub(crate) struct LearnArgs {
     /// The size that images are brought to.
     #[arg(long, value_name = "WxH", default_value = "480x360", value_parser = size)]
     size: (u32, u32),
+    /// The part of each image that a step learns from, at another place each time; all of it unless given. Small windows make
+    /// steps cheap and keep small plants as large as they are.
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    window: Option<(u32, u32)>,
     /// Most steps.
     #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
     steps: u64,
@@ -83,6 +87,9 @@ pub(crate) struct LearnArgs {
     /// The learning rate over time: poly, cosine or constant.
     #[arg(long, value_name = "NAME", default_value = "poly", value_parser = Schedule::parse)]
     schedule: Schedule,
+    /// What is made small: the cross-entropy, or with dice that and what classes lack of a full overlap, which serves rare ones.
+    #[arg(long, value_name = "NAME", default_value = "dice", value_parser = Objective::parse)]
+    loss: Objective,
     /// What makes up for rare classes: median (frequency), its root, or none.
     #[arg(long, value_name = "NAME", default_value = "none", value_parser = Balance::parse)]
     balance: Balance,
@@ -141,6 +148,11 @@ impl Args {
         let threads =
             self.machine.threads_asked().or(before.map(|b| b.plan.threads)).unwrap_or_else(|| self.machine.threads());
         let (width, height) = learn.size;
+        if learn.window.is_some_and(|(w, h)| w > width || h > height) {
+            return Err(Error::Training(format!(
+                "--window is larger than the images, which are brought to {width}x{height}\n help: a larger --size, or a smaller window"
+            )));
+        }
         Ok(Plan {
             network: learn.network,
             classes: learn.classes.clone(),
@@ -150,10 +162,12 @@ impl Args {
             seed,
             steps: learn.steps,
             batch: learn.batch.into(),
+            window: learn.window,
             method: learn.optimiser,
             rate: learn.rate.unwrap_or(learn.optimiser.usual_rate()),
             decay: learn.decay,
             schedule: learn.schedule,
+            loss: learn.loss,
             balance: learn.balance,
             augment: learn.augment,
             exposure: learn.normalise,
@@ -262,7 +276,7 @@ fn facts(plan: &Plan, results: &Results) -> Vec<(String, String)> {
         fact("learnt from", sets(&plan.train)),
         fact("watched by", sets(&plan.val)),
         fact("input", format!("{} at {} × {} pixels", bands.join(", "), plan.shape.width, plan.shape.height)),
-        fact("steps", format!("{} of {} images", results.steps, plan.batch)),
+        fact("steps", format!("{} of {}", results.steps, plan.batch_told())),
         fact("seed", plan.seed.to_string()),
         fact("how it went", told(results)),
     ]

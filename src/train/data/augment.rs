@@ -5,6 +5,8 @@
 //! change what is drawn.
 
 use super::example::Example;
+use super::normalise::{self, Normalisation};
+use crate::dataset::sample::IGNORE;
 use crate::sampling::Stream;
 use serde::{Deserialize, Serialize};
 
@@ -21,7 +23,8 @@ pub struct Augment {
     pub scale: bool,
     /// Another part of the picture: shifted by up to a tenth, and by what an enlargement leaves over.
     pub crop: bool,
-    /// Exposure (log-normal, 0.25), white balance (0.1 a band), gamma (0.2) and saturation (0.5 to 1.5).
+    /// Exposure (log-normal, 0.25), white balance (0.1 a band), gamma (0.2) and saturation (0.5 to 1.5), and lamps that tint the
+    /// edges: gains that fall or climb across the image, 0.08 a band and axis.
     pub colour: bool,
     /// Half of the images blurred by a Gaussian of up to 1.2 pixels.
     pub blur: bool,
@@ -64,54 +67,87 @@ impl Augment {
         Ok(augment)
     }
 
-    /// An image as the network will see it: `bands` values a pixel side by side, in 0 to 1 before noise, and its labels.
-    /// `colour[b]` says whether band b belongs to the photograph in colour.
+    /// An image of `size` as the network will see it, or the part of it that `window` holds: `bands` values a pixel side by side,
+    /// normalised, and its labels. `colour[b]` says whether band b belongs to the photograph in colour. A window is as large as
+    /// the image, or lies somewhere in it, a third of the time on a plant; it is normalised by the whole image, as a network will see whole images later.
     pub fn apply(
         &self,
         example: &Example,
         size: (u32, u32),
+        window: (u32, u32),
         colour: &[bool],
+        normalisation: &Normalisation,
         stream: &mut Stream,
     ) -> (Vec<f32>, Vec<u8>) {
-        let (mut pixels, labels) = match Placement::draw(*self, size, stream) {
-            Some(placement) => placement.read(example, size),
-            None => (interleave(example), example.labels.clone()),
+        let placement = Placement::draw(*self, &example.labels, size, window, stream);
+        let (mut pixels, labels) = match &placement {
+            Some(placement) => placement.read(example, size, window),
+            None => (interleave(example, 1), example.labels.clone()),
         };
-        if self.colour {
-            recolour(&mut pixels, colour, stream);
+        let light = self.colour.then(|| Light::draw(colour, stream));
+        let centred = |i: usize, (w, h): (u32, u32)| {
+            let (x, y) = (i as u32 % w, i as u32 / w);
+            [x as f32 + 0.5 - w as f32 / 2.0, y as f32 + 0.5 - h as f32 / 2.0]
+        };
+        if let Some(light) = &light {
+            let at = |i| placement.as_ref().map_or_else(|| centred(i, size), |p| p.map(centred(i, window)));
+            light.apply(&mut pixels, colour, size, at);
         }
         if self.blur && stream.chance(0.5) {
-            blur(&mut pixels, colour.len(), size, stream.range32(0.3, 1.2));
+            blur(&mut pixels, colour.len(), window, stream.range32(0.3, 1.2));
         }
         if self.noise {
             let sd = stream.range32(0.0, 0.03);
             add_noise(&mut pixels, sd, stream);
         }
+        let scales = if window == size {
+            normalisation.scales(&pixels, colour.len())
+        } else {
+            let mut whole = interleave(example, THINNED);
+            if let Some(light) = &light {
+                light.apply(&mut whole, colour, size, |i| centred(i * THINNED, size));
+            }
+            normalisation.scales(&whole, colour.len())
+        };
+        normalise::scale(&mut pixels, &scales);
         (pixels, labels)
     }
 }
 
-/// Bands side by side, in 0 to 1.
-pub fn interleave(example: &Example) -> Vec<f32> {
+/// Share of the windows that hold a pixel of a plant for certain; weeds would else be in few of them. Source: Isensee et al. 2021
+/// (nnU-Net), which lays a third of its patches on what is looked for.
+const ON_PLANTS: f64 = 1.0 / 3.0;
+
+/// Of so many pixels one tells what a whole image has for mean and deviation: a prime, so that columns take turns.
+const THINNED: usize = 13;
+
+/// Bands side by side, in 0 to 1, of every `step`-th pixel.
+pub fn interleave(example: &Example, step: usize) -> Vec<f32> {
     let bands = example.planes.len();
-    let mut pixels = vec![0.0; example.labels.len() * bands];
+    let mut pixels = vec![0.0; example.labels.len().div_ceil(step) * bands];
     for (b, plane) in example.planes.iter().enumerate() {
-        for (pixel, v) in pixels.iter_mut().skip(b).step_by(bands).zip(plane) {
+        for (pixel, v) in pixels.iter_mut().skip(b).step_by(bands).zip(plane.iter().step_by(step)) {
             *pixel = f32::from(*v) / 255.0;
         }
     }
     pixels
 }
 
-/// Where each pixel of the result lies in the picture: a linear map about the centres, then a shift.
+/// Where each pixel of the window lies in the picture: a linear map about the centres, then a shift.
 struct Placement {
     matrix: [f32; 4],
     shift: [f32; 2],
 }
 
 impl Placement {
-    fn draw(augment: Augment, size: (u32, u32), stream: &mut Stream) -> Option<Self> {
-        if !(augment.flip || augment.rotate || augment.scale || augment.crop) {
+    fn draw(
+        augment: Augment,
+        labels: &[u8],
+        size: (u32, u32),
+        window: (u32, u32),
+        stream: &mut Stream,
+    ) -> Option<Self> {
+        if window == size && !(augment.flip || augment.rotate || augment.scale || augment.crop) {
             return None;
         }
         let mirror = if augment.flip && stream.chance(0.5) { -1.0 } else { 1.0 };
@@ -120,21 +156,41 @@ impl Placement {
         let reach = if augment.crop { 0.1 + (0.5 - 0.5 / zoom).max(0.0) } else { 0.0 };
         let (sin, cos) = angle.sin_cos();
         let matrix = [mirror * cos / zoom, -sin / zoom, mirror * sin / zoom, cos / zoom];
-        let shift = [size.0, size.1].map(|n| stream.range32(-reach, reach) * n as f32);
-        Some(Self { matrix, shift })
+        let shift = [(size.0, window.0), (size.1, window.1)].map(|(n, part)| {
+            let reach = reach * n as f32 + 0.5 * (n - part) as f32;
+            stream.range32(-reach, reach)
+        });
+        let mut placement = Self { matrix, shift };
+        if window != size && stream.chance(ON_PLANTS) {
+            let within = [window.0, window.1].map(|n| n as f32 * stream.range32(-0.5, 0.5));
+            if let Some(plant) = plant(labels, stream) {
+                let (x, y) = (plant as u32 % size.0, plant as u32 / size.0);
+                let centred = [x as f32 + 0.5 - size.0 as f32 / 2.0, y as f32 + 0.5 - size.1 as f32 / 2.0];
+                placement.shift = [0.0; 2];
+                let at = placement.map(within);
+                placement.shift = [centred[0] - at[0], centred[1] - at[1]];
+            }
+        }
+        Some(placement)
     }
 
-    fn read(&self, example: &Example, (w, h): (u32, u32)) -> (Vec<f32>, Vec<u8>) {
+    /// A point of the window in the picture; both from their centres.
+    fn map(&self, [x, y]: [f32; 2]) -> [f32; 2] {
+        let [a, b, c, d] = self.matrix;
+        [a * x + b * y + self.shift[0], c * x + d * y + self.shift[1]]
+    }
+
+    fn read(&self, example: &Example, (w, h): (u32, u32), window: (u32, u32)) -> (Vec<f32>, Vec<u8>) {
         let bands = example.planes.len();
         let (cx, cy) = (w as f32 / 2.0, h as f32 / 2.0);
-        let mut pixels = Vec::with_capacity(example.labels.len() * bands);
-        let mut labels = Vec::with_capacity(example.labels.len());
-        let [a, b, c, d] = self.matrix;
-        for y in 0..h {
-            for x in 0..w {
-                let (px, py) = (x as f32 + 0.5 - cx, y as f32 + 0.5 - cy);
-                let sx = mirrored(a * px + b * py + cx + self.shift[0], w);
-                let sy = mirrored(c * px + d * py + cy + self.shift[1], h);
+        let (wx, wy) = (window.0 as f32 / 2.0, window.1 as f32 / 2.0);
+        let count = window.0 as usize * window.1 as usize;
+        let mut pixels = Vec::with_capacity(count * bands);
+        let mut labels = Vec::with_capacity(count);
+        for y in 0..window.1 {
+            for x in 0..window.0 {
+                let [sx, sy] = self.map([x as f32 + 0.5 - wx, y as f32 + 0.5 - wy]);
+                let (sx, sy) = (mirrored(sx + cx, w), mirrored(sy + cy, h));
                 labels.push(
                     example.labels[(sy as usize).min(h as usize - 1) * w as usize + (sx as usize).min(w as usize - 1)],
                 );
@@ -152,6 +208,21 @@ impl Placement {
     }
 }
 
+/// A pixel of a plant: of one of the classes but the first that there are, each as likely, one of its pixels.
+fn plant(labels: &[u8], stream: &mut Stream) -> Option<usize> {
+    let mut counts = [0usize; 256];
+    for label in labels {
+        counts[usize::from(*label)] += 1;
+    }
+    let held: Vec<u8> = (1..IGNORE).filter(|class| counts[usize::from(*class)] > 0).collect();
+    if held.is_empty() {
+        return None;
+    }
+    let class = held[stream.index(held.len())];
+    let nth = stream.index(counts[usize::from(class)]);
+    labels.iter().enumerate().filter(|(_, l)| **l == class).nth(nth).map(|(i, _)| i)
+}
+
 /// A coordinate folded into 0 to n at mirrors on both edges.
 fn mirrored(x: f32, n: u32) -> f32 {
     let n = n as f32;
@@ -166,20 +237,40 @@ fn between(x: f32, n: u32) -> (usize, usize, f32) {
     (low, (low + 1).min(n as usize - 1), at - low as f32)
 }
 
-fn recolour(pixels: &mut [f32], colour: &[bool], stream: &mut Stream) {
-    let mut log_normal = |sigma: f64| (sigma * stream.normal()).exp() as f32;
-    let exposure = log_normal(0.25);
-    let gamma = log_normal(0.2);
-    let gains: Vec<f32> = colour.iter().map(|_| exposure * log_normal(0.1)).collect();
-    let saturation = stream.range32(0.5, 1.5);
-    let colours = colour.iter().filter(|c| **c).count().max(1) as f32;
-    for pixel in pixels.chunks_exact_mut(colour.len()) {
-        for (v, gain) in pixel.iter_mut().zip(&gains) {
-            *v = gain * v.powf(gamma);
-        }
-        let gray = pixel.iter().zip(colour).filter(|(_, c)| **c).map(|(v, _)| *v).sum::<f32>() / colours;
-        for (v, _) in pixel.iter_mut().zip(colour).filter(|(_, c)| **c) {
-            *v = (gray + saturation * (*v - gray)).clamp(0.0, 1.0);
+/// Another exposure, white balance, tone curve and saturation, and what lamps at the sides do.
+struct Light {
+    gamma: f32,
+    /// Of each band: its gain, and by how much of it that grows from the centre to the right and to the lower edge.
+    gains: Vec<[f32; 3]>,
+    saturation: f32,
+}
+
+impl Light {
+    fn draw(colour: &[bool], stream: &mut Stream) -> Self {
+        let mut log_normal = |sigma: f64| (sigma * stream.normal()).exp() as f32;
+        let exposure = log_normal(0.25);
+        let gamma = log_normal(0.2);
+        let gains: Vec<f32> = colour.iter().map(|_| exposure * log_normal(0.1)).collect();
+        let saturation = stream.range32(0.5, 1.5);
+        let mut slope = || (0.08 * stream.normal()) as f32;
+        Self { gamma, gains: gains.into_iter().map(|g| [g, slope(), slope()]).collect(), saturation }
+    }
+
+    /// `at` tells where a pixel lies in an image of `size`, from its centre.
+    fn apply(&self, pixels: &mut [f32], colour: &[bool], size: (u32, u32), at: impl Fn(usize) -> [f32; 2]) {
+        let colours = colour.iter().filter(|c| **c).count().max(1) as f32;
+        let (right, down) = (2.0 / size.0 as f32, 2.0 / size.1 as f32);
+        for (i, pixel) in pixels.chunks_exact_mut(colour.len()).enumerate() {
+            let [x, y] = at(i);
+            // Beyond the edges, where pictures are mirrored, it grows no further.
+            let (x, y) = ((x * right).clamp(-1.0, 1.0), (y * down).clamp(-1.0, 1.0));
+            for (v, [gain, along, across]) in pixel.iter_mut().zip(&self.gains) {
+                *v = gain * (1.0 + along * x + across * y).max(0.0) * v.powf(self.gamma);
+            }
+            let gray = pixel.iter().zip(colour).filter(|(_, c)| **c).map(|(v, _)| *v).sum::<f32>() / colours;
+            for (v, _) in pixel.iter_mut().zip(colour).filter(|(_, c)| **c) {
+                *v = (gray + self.saturation * (*v - gray)).clamp(0.0, 1.0);
+            }
         }
     }
 }
@@ -227,6 +318,10 @@ mod tests {
     use super::*;
     use crate::sampling::Purpose;
 
+    fn as_it_is() -> Normalisation {
+        Normalisation::Fixed { mean: vec![0.0; 3], sd: vec![1.0; 3] }
+    }
+
     fn example(w: u32, h: u32) -> Example {
         let pixel = |i: u32| if i % w > w / 2 { 200 } else { 40 };
         let plane: Vec<u8> = (0..w * h).map(pixel).collect();
@@ -240,10 +335,14 @@ mod tests {
         let augment = Augment { colour: false, blur: false, noise: false, ..Augment::default() };
         for seed in 0..50 {
             let mut stream = Stream::of(seed, 0, Purpose::Test, 0);
-            let (pixels, labels) = augment.apply(&example(w, h), (w, h), &[true; 3], &mut stream);
-            let wrong =
-                pixels.chunks_exact(3).zip(&labels).filter(|(p, l)| (p[0] > 120.0 / 255.0) != (**l == 1)).count();
-            assert!(wrong <= 8, "{wrong} pixels of seed {seed}");
+            for window in [(w, h), (17, 21)] {
+                let (pixels, labels) =
+                    augment.apply(&example(w, h), (w, h), window, &[true; 3], &as_it_is(), &mut stream);
+                assert_eq!(labels.len(), (window.0 * window.1) as usize);
+                let wrong =
+                    pixels.chunks_exact(3).zip(&labels).filter(|(p, l)| (p[0] > 120.0 / 255.0) != (**l == 1)).count();
+                assert!(wrong <= 8, "{wrong} pixels of seed {seed}");
+            }
         }
     }
 
@@ -251,9 +350,33 @@ mod tests {
     fn nothing_asked_nothing_changed() {
         let picture = example(8, 6);
         let mut stream = Stream::of(1, 0, Purpose::Test, 0);
-        let (pixels, labels) = Augment::NONE.apply(&picture, (8, 6), &[true; 3], &mut stream);
+        let (pixels, labels) = Augment::NONE.apply(&picture, (8, 6), (8, 6), &[true; 3], &as_it_is(), &mut stream);
         assert_eq!(labels, picture.labels);
-        assert_eq!(pixels, interleave(&picture));
+        assert_eq!(pixels, interleave(&picture, 1));
+    }
+
+    /// Rationale: a window of bare ground must not look like a whole image of it. Expected: bright is +1 and dark −1, as in the
+    /// whole image, of which each is a half, also in windows that hold one of them alone. Source: the picture.
+    #[test]
+    fn a_window_lies_in_its_image_and_is_normalised_by_all_of_it() {
+        let (w, h) = (41, 30);
+        let picture = example(w, h);
+        let mut pure = [0, 0];
+        for seed in 0..60 {
+            let mut stream = Stream::of(seed, 0, Purpose::Test, 0);
+            let (pixels, labels) =
+                Augment::NONE.apply(&picture, (w, h), (8, 8), &[true; 3], &Normalisation::Band, &mut stream);
+            let ones: usize = labels.iter().map(|l| usize::from(*l)).sum();
+            for (side, all) in pure.iter_mut().zip([0, labels.len()]) {
+                *side += u32::from(ones == all);
+            }
+            let expected = if ones == 0 { -1.0 } else { 1.0 };
+            let close = |pixel: &[f32]| pixel.iter().all(|v| (v - expected).abs() < 0.1);
+            let strayed = pixels.chunks_exact(3).filter(|pixel| !close(pixel)).count();
+            // A column beside the edge is a mixture.
+            assert!(strayed <= 8 || (ones > 0 && ones < labels.len()), "{strayed} of {ones}");
+        }
+        assert!(pure.iter().all(|n| *n > 10), "{pure:?}");
     }
 
     #[test]

@@ -19,6 +19,8 @@ pub struct Order {
     pub seed: u64,
     /// Images of a batch; ≥ 1.
     pub batch: usize,
+    /// Pixels of each image that are learnt from: width, height.
+    pub window: (u32, u32),
     /// What is varied.
     pub augment: Augment,
     /// What is taken out after that.
@@ -30,7 +32,7 @@ pub struct Order {
 pub struct Batch {
     /// How many.
     pub images: usize,
-    /// `images × height × width × bands`, normalised.
+    /// `images × height × width × bands`, normalised; of windows.
     pub pixels: Vec<f32>,
     /// `images × height × width` classes; 255 for none.
     pub labels: Vec<u8>,
@@ -110,8 +112,9 @@ fn make(store: &Store, order: &Order, step: u64, epochs: &mut Epochs) -> Result<
         let place = step * order.batch as u64 + slot;
         let example = store.get(epochs.at(place, store.len()))?;
         let mut stream = Stream::of(order.seed, place, Purpose::Training, 2);
-        let (mut pixels, labels) = order.augment.apply(&example, (shape.width, shape.height), &colour, &mut stream);
-        order.normalisation.apply(&mut pixels, colour.len());
+        let size = (shape.width, shape.height);
+        let (pixels, labels) =
+            order.augment.apply(&example, size, order.window, &colour, &order.normalisation, &mut stream);
         batch.pixels.extend(pixels);
         batch.labels.extend(labels);
     }

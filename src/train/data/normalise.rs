@@ -50,15 +50,25 @@ impl Normalisation {
 
     /// Normalises an image in place: `pixels` holds `bands` values a pixel, side by side.
     pub fn apply(&self, pixels: &mut [f32], bands: usize) {
-        let scales: Vec<(f32, f32)> = match self {
+        let scales = self.scales(pixels, bands);
+        scale(pixels, &scales);
+    }
+
+    /// Mean and deviation that are taken out of each band of an image with these pixels, or with some of them.
+    pub(super) fn scales(&self, pixels: &[f32], bands: usize) -> Vec<(f32, f32)> {
+        match self {
             Self::Fixed { mean, sd } => mean.iter().copied().zip(sd.iter().copied()).collect(),
             Self::Band => (0..bands).map(|b| moments(pixels.iter().skip(b).step_by(bands))).collect(),
             Self::Image => vec![moments(pixels.iter()); bands],
-        };
-        for pixel in pixels.chunks_exact_mut(bands) {
-            for (v, (mean, sd)) in pixel.iter_mut().zip(&scales) {
-                *v = (*v - mean) / sd;
-            }
+        }
+    }
+}
+
+/// Takes mean and deviation out of each band.
+pub(super) fn scale(pixels: &mut [f32], scales: &[(f32, f32)]) {
+    for pixel in pixels.chunks_exact_mut(scales.len()) {
+        for (v, (mean, sd)) in pixel.iter_mut().zip(scales) {
+            *v = (*v - mean) / sd;
         }
     }
 }

@@ -4,16 +4,19 @@
 //! |---|---|
 //! | `plan` | everything that decides what is learnt |
 //! | `balance` | rare classes weigh more |
+//! | `objective` | what is made small |
 //! | `schedule` | how fast it learns, step by step |
 //! | `optimiser` | gradients to steps, with a memory that can be saved |
 //! | `checkpoint` | a training on disk, between two steps |
 //! | `teach` | the steps themselves |
 //!
-//! Only `optimiser` and `teach` need libtorch. On a CPU the same plan on the same number of threads gives the same bits, stopped
+//! Only `objective`, `optimiser` and `teach` need libtorch. On a CPU the same plan on the same number of threads gives the same bits, stopped
 //! and gone on with or not.
 
 pub mod balance;
 pub mod checkpoint;
+#[cfg(feature = "train")]
+mod objective;
 #[cfg(feature = "train")]
 pub mod optimiser;
 pub mod plan;

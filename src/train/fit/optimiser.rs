@@ -13,7 +13,7 @@ pub struct Optimiser {
     decay: f64,
     /// Steps done, for Adam's correction of its first means.
     steps: i32,
-    /// By `velocity/NAME`, `first/NAME` or `second/NAME`.
+    /// By `velocity/NAME`, `first/NAME` or `squares/NAME`.
     memory: BTreeMap<String, Tensor>,
 }
 
@@ -33,24 +33,15 @@ impl Optimiser {
         Self { method, decay, steps: steps as i32, memory: all }
     }
 
-    /// Forgets the gradients of the last step.
-    pub fn clear(model: &Model) {
-        for (_, tensor) in model.learnt() {
-            let mut gradient = tensor.grad();
-            if gradient.defined() {
-                let _ = gradient.zero_();
-            }
-        }
-    }
-
-    /// One step of this learning rate along the gradients.
-    pub fn step(&mut self, model: &Model, rate: f64) {
+    /// One step of this learning rate along the gradients of a loss.
+    pub fn step(&mut self, model: &Model, loss: &Tensor, rate: f64) {
+        let (parameters, mut tensors): (Vec<_>, Vec<_>) = model.learnt().map(|(p, t)| (p, t.shallow_clone())).unzip();
+        let gradients = Tensor::run_backward(&[loss], &tensors, false, false);
         self.steps += 1;
         tch::no_grad(|| {
-            for (parameter, tensor) in model.learnt() {
-                let gradient = tensor.grad();
+            for ((parameter, tensor), gradient) in parameters.iter().zip(&mut tensors).zip(&gradients) {
                 if gradient.defined() {
-                    self.update(&parameter.name, &mut tensor.shallow_clone(), &gradient, rate);
+                    self.update(&parameter.name, tensor, gradient, rate);
                 }
             }
         });
@@ -60,24 +51,31 @@ impl Optimiser {
         self.memory.entry(format!("{what}/{name}")).or_insert_with(|| like.zeros_like()).shallow_clone()
     }
 
+    /// Memory is read and written once a line, and it is the memory that takes the time.
     fn update(&mut self, name: &str, weight: &mut Tensor, gradient: &Tensor, rate: f64) {
         match self.method {
             Method::Sgd => {
                 let mut velocity = self.remembered("velocity", name, weight);
                 let _ = velocity.g_mul_scalar_(MOMENTUM);
-                let _ = velocity.g_add_(&(gradient + &*weight * self.decay));
+                let _ = velocity.g_add_(gradient);
+                let _ = velocity.g_add_(&(&*weight * self.decay));
                 let _ = weight.g_sub_(&(velocity * rate));
             }
             Method::Adam => {
                 let mut first = self.remembered("first", name, weight);
-                let mut second = self.remembered("second", name, weight);
+                // Σ SECOND^age · gradient²: the second mean but for its factor 1 − SECOND.
+                let mut squares = self.remembered("squares", name, weight);
                 let _ = first.lerp_(gradient, 1.0 - MOMENTUM);
-                let _ = second.g_mul_scalar_(SECOND);
-                let _ = second.addcmul_(&(gradient * (1.0 - SECOND)), gradient);
+                let _ = squares.g_mul_scalar_(SECOND);
+                let _ = squares.addcmul_(gradient, gradient);
                 let (c1, c2) = (1.0 - MOMENTUM.powi(self.steps), 1.0 - SECOND.powi(self.steps));
+                let root = ((1.0 - SECOND) / c2).sqrt();
+                // −(c1 / rate) · (√second mean + EPSILON)
+                let mut divisor = squares.sqrt();
+                let _ = divisor.g_add_scalar_(EPSILON / root);
+                let _ = divisor.g_mul_scalar_(-root * c1 / rate);
                 let _ = weight.g_mul_scalar_(1.0 - rate * self.decay);
-                let spread = (second / c2).sqrt() + EPSILON;
-                let _ = weight.g_sub_(&(first / spread * (rate / c1)));
+                let _ = weight.addcdiv_(&first, &divisor);
             }
         }
     }

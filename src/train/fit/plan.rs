@@ -36,6 +36,28 @@ impl Method {
     }
 }
 
+/// What is made small.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Objective {
+    /// Cross-entropy of the pixels.
+    Entropy,
+    /// That and what each class lacks of a full Dice overlap, rare classes as much as frequent ones. Source: Isensee et al. 2021
+    /// (nnU-Net).
+    Dice,
+}
+
+impl Objective {
+    /// Reads `entropy` or `dice`.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        match text {
+            "entropy" => Ok(Self::Entropy),
+            "dice" => Ok(Self::Dice),
+            _ => Err(format!("there is no loss `{text}`: write entropy or dice")),
+        }
+    }
+}
+
 /// How bands are brought to mean 0 and deviation 1; see [`crate::train::data::Normalisation`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -79,6 +101,9 @@ pub struct Plan {
     pub steps: u64,
     /// Images a step; ≥ 1.
     pub batch: usize,
+    /// Width and height of the part of each image that a step learns from, somewhere in it; all of it with none. Small windows
+    /// make a step as cheap as small images would, and what is seen stays sharp.
+    pub window: Option<(u32, u32)>,
     /// How gradients become steps.
     pub method: Method,
     /// First learning rate.
@@ -87,6 +112,8 @@ pub struct Plan {
     pub decay: f64,
     /// The learning rate over time.
     pub schedule: Schedule,
+    /// What is made small.
+    pub loss: Objective,
     /// What a pixel of each class weighs.
     pub balance: Balance,
     /// What is varied.
@@ -107,6 +134,23 @@ pub struct Plan {
     pub seconds: Option<u64>,
 }
 
+impl Plan {
+    /// Pixels that a step sees of an image: width, height.
+    pub fn window(&self) -> (u32, u32) {
+        let Shape { width, height, .. } = self.shape;
+        self.window.map_or((width, height), |(w, h)| (w.min(width), h.min(height)))
+    }
+
+    /// What a step sees, in words.
+    pub fn batch_told(&self) -> String {
+        let (width, height) = self.window();
+        if (width, height) == (self.shape.width, self.shape.height) {
+            return format!("{} images", self.batch);
+        }
+        format!("{} windows of {width} × {height}", self.batch)
+    }
+}
+
 impl Default for Plan {
     fn default() -> Self {
         let method = Method::Adam;
@@ -119,10 +163,12 @@ impl Default for Plan {
             seed: 1,
             steps: 2000,
             batch: 4,
+            window: None,
             method,
             rate: method.usual_rate(),
             decay: 5e-4,
             schedule: Schedule::Poly,
+            loss: Objective::Dice,
             balance: Balance::None,
             augment: Augment::default(),
             exposure: Exposure::Band,

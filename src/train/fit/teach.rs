@@ -1,6 +1,7 @@
 //! The steps of a training: a batch, its loss, its gradients, a step; now and then a look at the validation images.
 
 use super::checkpoint::{Checkpoint, History, Look, Loss};
+use super::objective;
 use super::optimiser::Optimiser;
 use super::plan::{Exposure, Plan};
 use crate::dataset::sample::IGNORE;
@@ -13,7 +14,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
-use tch::{Kind, Reduction, Tensor};
+use tch::{Kind, Tensor};
 
 /// What a training reads.
 pub struct Data {
@@ -80,8 +81,13 @@ pub fn teach(
     }
     let mut optimiser = Optimiser::new(plan.method, plan.decay, at.step, &at.memory, &model);
     let weights = Tensor::from_slice(&plan.balance.weights(&data.train, classes)?).to_device(place.device);
-    let order =
-        Order { seed: plan.seed, batch: plan.batch, augment: plan.augment, normalisation: normalisation.clone() };
+    let order = Order {
+        seed: plan.seed,
+        batch: plan.batch,
+        window: plan.window(),
+        augment: plan.augment,
+        normalisation: normalisation.clone(),
+    };
     let mut loader = Loader::start(&data.train, &order, at.step, plan.steps, data.loaders);
     let (begun, before) = (Instant::now(), at.seconds);
     let every = (plan.steps / POINTS).max(1);
@@ -104,7 +110,7 @@ pub fn teach(
         let batch = loader.next().unwrap_or_else(|| Err(Error::Training("the loading threads have ended".into())))?;
         let in_time = plan.seconds.map_or(0.0, |most| at.seconds / most as f64);
         let rate = plan.rate * plan.schedule.share(in_time.max(at.step as f64 / plan.steps as f64));
-        let loss = step(&model, &mut optimiser, &batch, (plan.shape.width, plan.shape.height), &weights, rate)?;
+        let loss = step(&model, &mut optimiser, &batch, plan, &weights, rate)?;
         if !loss.is_finite() {
             return Err(Error::Training(format!(
                 "the loss of step {} is no number any more\n help: a smaller --rate than {} (this training lies in {})",
@@ -149,20 +155,19 @@ fn step(
     model: &Model,
     optimiser: &mut Optimiser,
     batch: &Batch,
-    size: (u32, u32),
+    plan: &Plan,
     weights: &Tensor,
     rate: f64,
 ) -> Result<f64> {
     if batch.labels.iter().all(|l| *l == IGNORE) {
         return Ok(0.0);
     }
+    let size = plan.window();
     let x = model.images(&batch.pixels, size);
     let y = Tensor::from_slice(&batch.labels).to_device(model.place.device).to_kind(Kind::Int64);
     let y = y.view([batch.images as i64, i64::from(size.1), i64::from(size.0)]);
-    let loss = model.forward(&x, true).cross_entropy_loss(&y, Some(weights), Reduction::Mean, i64::from(IGNORE), 0.0);
-    Optimiser::clear(model);
-    loss.backward();
-    optimiser.step(model, rate);
+    let loss = objective::loss(plan.loss, &model.forward(&x, true), &y, weights);
+    optimiser.step(model, &loss, rate);
     f64::try_from(loss).map_err(|e| failed(&e))
 }
 
@@ -172,7 +177,7 @@ fn look(model: &Model, val: &Store, normalisation: &Normalisation, step: u64) ->
     let mut confusion = Confusion::new(model.classes);
     for place in 0..val.len() {
         let example = val.get(place)?;
-        let mut pixels = augment::interleave(&example);
+        let mut pixels = augment::interleave(&example, 1);
         normalisation.apply(&mut pixels, shape.bands.len());
         confusion.add(&example.labels, &model.predict(&pixels, (shape.width, shape.height))?)?;
     }

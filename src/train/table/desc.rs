@@ -69,6 +69,9 @@ pub struct LearnDesc {
     /// What networks see images at, pixels: width, height; each from 32 to 8192.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size: Option<(u32, u32)>,
+    /// Width and height of the part of each image that a step learns from; all of it unless given. Not larger than `size`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub window: Option<(u32, u32)>,
     /// Most steps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub steps: Option<u64>,
@@ -87,6 +90,9 @@ pub struct LearnDesc {
     /// `poly`, `cosine` or `constant`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub schedule: Option<String>,
+    /// What is made small: `entropy` or `dice`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub loss: Option<String>,
     /// What makes up for rare classes: `median`, `root` or `none`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub balance: Option<String>,

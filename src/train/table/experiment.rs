@@ -11,7 +11,7 @@ use crate::train::classes::Classes;
 use crate::train::data::{Augment, Band, Pick};
 use crate::train::fit::Plan;
 use crate::train::fit::balance::Balance;
-use crate::train::fit::plan::{Exposure, Method};
+use crate::train::fit::plan::{Exposure, Method, Objective};
 use crate::train::fit::schedule::Schedule;
 use crate::train::net::Network;
 use crate::{Error, Result};
@@ -463,21 +463,25 @@ fn set(desc: &LearnDesc, plan: &mut Plan) -> Words {
             None => Ok(()),
         }
     }
-    if let Some((width, height)) = desc.size {
-        if ![width, height].iter().all(|n| (32..=8192).contains(n)) {
-            return Err((
-                "size",
-                format!("networks do not see {width} × {height} pixels"),
-                "write sides from 32 to 8192".into(),
-            ));
+    let pixels = |field, (width, height): (u32, u32)| {
+        if [width, height].iter().all(|n| (32..=8192).contains(n)) {
+            return Ok((width, height));
         }
-        (plan.shape.width, plan.shape.height) = (width, height);
+        let what = format!("networks do not see {width} × {height} pixels");
+        Err((field, what, "write sides from 32 to 8192".to_owned()))
+    };
+    if let Some(size) = desc.size {
+        (plan.shape.width, plan.shape.height) = pixels("size", size)?;
+    }
+    if let Some(window) = desc.window {
+        plan.window = Some(pixels("window", window)?);
     }
     word("optimiser", desc.optimiser.as_ref(), &mut plan.method, Method::parse)?;
     if desc.optimiser.is_some() {
         plan.rate = plan.method.usual_rate();
     }
     word("schedule", desc.schedule.as_ref(), &mut plan.schedule, Schedule::parse)?;
+    word("loss", desc.loss.as_ref(), &mut plan.loss, Objective::parse)?;
     word("balance", desc.balance.as_ref(), &mut plan.balance, Balance::parse)?;
     word("augment", desc.augment.as_ref(), &mut plan.augment, Augment::parse)?;
     word("normalise", desc.normalise.as_ref(), &mut plan.exposure, Exposure::parse)?;

@@ -158,7 +158,10 @@ fn scale(experiment: &Experiment) -> String {
     let scale = experiment.scale.as_ref().map(|s| format!("scale {s}, ")).unwrap_or_default();
     format!(
         "%, {scale}{} × {}, at most {} steps of {}",
-        learn.shape.width, learn.shape.height, learn.steps, learn.batch
+        learn.shape.width,
+        learn.shape.height,
+        learn.steps,
+        learn.batch_told()
     )
 }
 
