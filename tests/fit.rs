@@ -94,8 +94,8 @@ fn eight_images_are_learnt_by_every_network_and_judged_so() {
         succeed(&mut fit(&set, &out, &more));
         let losses = results(&out).history.losses;
         let last = losses[losses.len() - 5..].iter().map(|l| l.loss).sum::<f64>() / 5.0;
-        // Soil everywhere costs 0.6 and more; what is left is edges and the smallest weeds.
-        assert!(losses[0].loss > 0.5 && last < 0.25, "{network}: {} to {last}", losses[0].loss);
+        // Soil everywhere costs 0.6 of entropy and two classes' overlap, 0.67; what is left is edges and the smallest weeds.
+        assert!(losses[0].loss > 1.0 && last < 0.35, "{network}: {} to {last}", losses[0].loss);
         succeed(&mut train(&format!("eval {} --set {} --threads 1 --precision f32", out.display(), set.display())));
         let report: furrow::train::measure::Report = run::read_json(&out.join("eval/set/report.json")).unwrap();
         assert!(report.scores.classes[1].iou.unwrap() > 0.6, "{network}: {:?}", report.scores);
@@ -111,7 +111,7 @@ fn a_training_that_is_stopped_or_killed_ends_with_the_same_bytes() {
     let scratch = tempfile::tempdir().unwrap();
     let folder = scratch.path();
     let set = set(folder, 8);
-    for (method, more) in [("adam", ""), ("sgd", " --normalise fixed")] {
+    for (method, more) in [("adam", " --window 40x32"), ("sgd", " --normalise fixed --loss entropy --balance median")] {
         let more = format!(
             "--network unet --steps 40 --optimiser {method} --val {}@0..2 --watch-every 5 --patience 100{more}",
             set.display()
@@ -209,7 +209,9 @@ fn what_cannot_be_gone_on_with_is_told() {
     assert!(error.contains("the set has 4 images"), "{error}");
     let error = refuse(&mut fit(&folder.join("nowhere"), &folder.join("d"), ""), 2);
     assert!(error.contains("this is no dataset"), "{error}");
-    for name in ["a", "b", "c", "d"] {
+    let error = refuse(&mut fit(&set, &folder.join("e"), &format!("--window {}x{H}", W + 1)), 2);
+    assert!(error.contains("--window is larger than the images"), "{error}");
+    for name in ["a", "b", "c", "d", "e"] {
         assert!(!folder.join(name).exists(), "{name} was begun");
     }
 }

@@ -6,7 +6,6 @@
 
 use super::example::Example;
 use super::normalise::{self, Normalisation};
-use crate::dataset::sample::IGNORE;
 use crate::sampling::Stream;
 use serde::{Deserialize, Serialize};
 
@@ -69,7 +68,7 @@ impl Augment {
 
     /// An image of `size` as the network will see it, or the part of it that `window` holds: `bands` values a pixel side by side,
     /// normalised, and its labels. `colour[b]` says whether band b belongs to the photograph in colour. A window is as large as
-    /// the image, or lies somewhere in it, a third of the time on a plant; it is normalised by the whole image, as a network will see whole images later.
+    /// the image, or lies somewhere in it; it is normalised by the whole image, as a network will see whole images later.
     pub fn apply(
         &self,
         example: &Example,
@@ -79,7 +78,7 @@ impl Augment {
         normalisation: &Normalisation,
         stream: &mut Stream,
     ) -> (Vec<f32>, Vec<u8>) {
-        let placement = Placement::draw(*self, &example.labels, size, window, stream);
+        let placement = Placement::draw(*self, size, window, stream);
         let (mut pixels, labels) = match &placement {
             Some(placement) => placement.read(example, size, window),
             None => (interleave(example, 1), example.labels.clone()),
@@ -114,10 +113,6 @@ impl Augment {
     }
 }
 
-/// Share of the windows that hold a pixel of a plant for certain; weeds would else be in few of them. Source: Isensee et al. 2021
-/// (nnU-Net), which lays a third of its patches on what is looked for.
-const ON_PLANTS: f64 = 1.0 / 3.0;
-
 /// Of so many pixels one tells what a whole image has for mean and deviation: a prime, so that columns take turns.
 const THINNED: usize = 13;
 
@@ -140,13 +135,7 @@ struct Placement {
 }
 
 impl Placement {
-    fn draw(
-        augment: Augment,
-        labels: &[u8],
-        size: (u32, u32),
-        window: (u32, u32),
-        stream: &mut Stream,
-    ) -> Option<Self> {
+    fn draw(augment: Augment, size: (u32, u32), window: (u32, u32), stream: &mut Stream) -> Option<Self> {
         if window == size && !(augment.flip || augment.rotate || augment.scale || augment.crop) {
             return None;
         }
@@ -157,21 +146,13 @@ impl Placement {
         let (sin, cos) = angle.sin_cos();
         let matrix = [mirror * cos / zoom, -sin / zoom, mirror * sin / zoom, cos / zoom];
         let shift = [(size.0, window.0), (size.1, window.1)].map(|(n, part)| {
-            let reach = reach * n as f32 + 0.5 * (n - part) as f32;
-            stream.range32(-reach, reach)
+            let rest = 0.5 * (n - part) as f32;
+            let reach = reach * n as f32 + rest;
+            let shift = stream.range32(-reach, reach);
+            // Neither turned nor scaled, pixels fall on pixels, so that the picture stays as sharp as it is.
+            if augment.rotate || augment.scale { shift } else { (shift + rest).round() - rest }
         });
-        let mut placement = Self { matrix, shift };
-        if window != size && stream.chance(ON_PLANTS) {
-            let within = [window.0, window.1].map(|n| n as f32 * stream.range32(-0.5, 0.5));
-            if let Some(plant) = plant(labels, stream) {
-                let (x, y) = (plant as u32 % size.0, plant as u32 / size.0);
-                let centred = [x as f32 + 0.5 - size.0 as f32 / 2.0, y as f32 + 0.5 - size.1 as f32 / 2.0];
-                placement.shift = [0.0; 2];
-                let at = placement.map(within);
-                placement.shift = [centred[0] - at[0], centred[1] - at[1]];
-            }
-        }
-        Some(placement)
+        Some(Self { matrix, shift })
     }
 
     /// A point of the window in the picture; both from their centres.
@@ -206,21 +187,6 @@ impl Placement {
         }
         (pixels, labels)
     }
-}
-
-/// A pixel of a plant: of one of the classes but the first that there are, each as likely, one of its pixels.
-fn plant(labels: &[u8], stream: &mut Stream) -> Option<usize> {
-    let mut counts = [0usize; 256];
-    for label in labels {
-        counts[usize::from(*label)] += 1;
-    }
-    let held: Vec<u8> = (1..IGNORE).filter(|class| counts[usize::from(*class)] > 0).collect();
-    if held.is_empty() {
-        return None;
-    }
-    let class = held[stream.index(held.len())];
-    let nth = stream.index(counts[usize::from(class)]);
-    labels.iter().enumerate().filter(|(_, l)| **l == class).nth(nth).map(|(i, _)| i)
 }
 
 /// A coordinate folded into 0 to n at mirrors on both edges.
@@ -343,6 +309,20 @@ mod tests {
                     pixels.chunks_exact(3).zip(&labels).filter(|(p, l)| (p[0] > 120.0 / 255.0) != (**l == 1)).count();
                 assert!(wrong <= 8, "{wrong} pixels of seed {seed}");
             }
+        }
+    }
+
+    #[test]
+    fn mirrored_and_shifted_pixels_stay_as_they_are() {
+        let (w, h) = (41, 30);
+        let augment = Augment { flip: true, crop: true, ..Augment::NONE };
+        for seed in 0..50 {
+            let mut stream = Stream::of(seed, 0, Purpose::Test, 0);
+            let (pixels, labels) =
+                augment.apply(&example(w, h), (w, h), (16, 13), &[true; 3], &as_it_is(), &mut stream);
+            let same =
+                |(pixel, label): (&[f32], &u8)| pixel.iter().all(|v| *v == [40.0, 200.0][usize::from(*label)] / 255.0);
+            assert!(pixels.chunks_exact(3).zip(&labels).all(same), "{seed}");
         }
     }
 
