@@ -1,7 +1,7 @@
 //! Images learnt from in a second, by each network: `cargo bench --features train --bench learn -- --set DIR`.
 //!
 //! The whole of a training step counts: reading and varying images, the network forth and back, the optimiser. Told is the median over
-//! steps, so that the first ones, which set up kernels and decode images, do not count. `benches/learn.py` runs the same networks in
+//! steps, so that the first ones, which set up kernels and decode the images of one batch, do not count. `benches/learn.py` runs the same networks in
 //! Python's torch, turn by turn with this program.
 
 #![allow(clippy::print_stdout, reason = "a program that prints a table")]
@@ -59,7 +59,7 @@ fn main() {
         let plan = Plan {
             network: *network,
             shape: Shape { width, height, ..Plan::default().shape },
-            train: vec![Selection::parse(&format!("{}@all", asked.set.display())).expect("a set")],
+            train: vec![Selection::parse(&format!("{}@0..{}", asked.set.display(), asked.batch)).expect("a set")],
             steps: asked.steps,
             batch: asked.batch,
             watch_every: u64::MAX,

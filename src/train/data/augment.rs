@@ -203,9 +203,13 @@ fn between(x: f32, n: u32) -> (usize, usize, f32) {
     (low, (low + 1).min(n as usize - 1), at - low as f32)
 }
 
+/// Steps of a tone curve: finer than the 8 bits of what it is applied to.
+const CURVE: usize = 2048;
+
 /// Another exposure, white balance, tone curve and saturation, and what lamps at the sides do.
 struct Light {
-    gamma: f32,
+    /// v^γ of values v from 0 to 1, in even steps.
+    curve: Vec<f32>,
     /// Of each band: its gain, and by how much of it that grows from the centre to the right and to the lower edge.
     gains: Vec<[f32; 3]>,
     saturation: f32,
@@ -219,7 +223,8 @@ impl Light {
         let gains: Vec<f32> = colour.iter().map(|_| exposure * log_normal(0.1)).collect();
         let saturation = stream.range32(0.5, 1.5);
         let mut slope = || (0.08 * stream.normal()) as f32;
-        Self { gamma, gains: gains.into_iter().map(|g| [g, slope(), slope()]).collect(), saturation }
+        let curve = (0..=CURVE).map(|i| (i as f32 / CURVE as f32).powf(gamma)).collect();
+        Self { curve, gains: gains.into_iter().map(|g| [g, slope(), slope()]).collect(), saturation }
     }
 
     /// `at` tells where a pixel lies in an image of `size`, from its centre.
@@ -231,7 +236,7 @@ impl Light {
             // Beyond the edges, where pictures are mirrored, it grows no further.
             let (x, y) = ((x * right).clamp(-1.0, 1.0), (y * down).clamp(-1.0, 1.0));
             for (v, [gain, along, across]) in pixel.iter_mut().zip(&self.gains) {
-                *v = gain * (1.0 + along * x + across * y).max(0.0) * v.powf(self.gamma);
+                *v = gain * (1.0 + along * x + across * y).max(0.0) * self.curve[(*v * CURVE as f32 + 0.5) as usize];
             }
             let gray = pixel.iter().zip(colour).filter(|(_, c)| **c).map(|(v, _)| *v).sum::<f32>() / colours;
             for (v, _) in pixel.iter_mut().zip(colour).filter(|(_, c)| **c) {
@@ -242,30 +247,39 @@ impl Light {
 }
 
 /// A separable Gaussian of `sigma` pixels, edges repeated.
-fn blur(pixels: &mut Vec<f32>, bands: usize, (w, h): (u32, u32), sigma: f32) {
+fn blur(pixels: &mut [f32], bands: usize, (w, h): (u32, u32), sigma: f32) {
     let radius = (3.0 * sigma).ceil() as i64;
     let mut kernel: Vec<f32> = (-radius..=radius).map(|i| (-0.5 * (i as f32 / sigma).powi(2)).exp()).collect();
     let sum: f32 = kernel.iter().sum();
     for k in &mut kernel {
         *k /= sum;
     }
-    let (w, h) = (w as i64, h as i64);
-    for (dx, dy) in [(1, 0), (0, 1)] {
-        let mut out = vec![0.0; pixels.len()];
-        for y in 0..h {
-            for x in 0..w {
-                let to = ((y * w + x) as usize) * bands;
-                for (i, k) in kernel.iter().enumerate() {
-                    let step = i as i64 - radius;
-                    let (sx, sy) = ((x + dx * step).clamp(0, w - 1), (y + dy * step).clamp(0, h - 1));
-                    let from = ((sy * w + sx) as usize) * bands;
-                    for b in 0..bands {
-                        out[to + b] += k * pixels[from + b];
-                    }
-                }
-            }
+    let row = w as usize * bands;
+    let reach = radius as usize;
+    let mut across = vec![0.0; pixels.len()];
+    let mut padded = vec![0.0; row + 2 * reach * bands];
+    for (out, from) in across.chunks_exact_mut(row).zip(pixels.chunks_exact(row)) {
+        let (left, rest) = padded.split_at_mut(reach * bands);
+        let (middle, right) = rest.split_at_mut(row);
+        middle.copy_from_slice(from);
+        left.chunks_exact_mut(bands).for_each(|pixel| pixel.copy_from_slice(&from[..bands]));
+        right.chunks_exact_mut(bands).for_each(|pixel| pixel.copy_from_slice(&from[row - bands..]));
+        for (i, k) in kernel.iter().enumerate() {
+            add_times(out, &padded[i * bands..], *k);
         }
-        *pixels = out;
+    }
+    pixels.fill(0.0);
+    for (y, out) in pixels.chunks_exact_mut(row).enumerate() {
+        for (i, k) in kernel.iter().enumerate() {
+            let from = (y + i).saturating_sub(reach).min(h as usize - 1) * row;
+            add_times(out, &across[from..], *k);
+        }
+    }
+}
+
+fn add_times(to: &mut [f32], values: &[f32], factor: f32) {
+    for (to, v) in to.iter_mut().zip(values) {
+        *to += factor * v;
     }
 }
 
@@ -364,6 +378,16 @@ mod tests {
         let mut flat = vec![0.5f32; 60 * 50];
         blur(&mut flat, 1, (60, 50), 1.1);
         assert!(flat.iter().all(|v| (v - 0.5).abs() < 1e-5));
+        // A bright pixel becomes the Gaussian itself, in its own band.
+        let mut spot = vec![0.0f32; 2 * 21 * 19];
+        spot[2 * (9 * 21 + 10)] = 1.0;
+        blur(&mut spot, 2, (21, 19), 1.1);
+        let at = |x: usize, y: usize| spot[2 * (y * 21 + x)];
+        let expected = |r2: f32| (-0.5 * r2 / 1.21f32).exp() / (std::f32::consts::TAU * 1.21);
+        for (x, y, r2) in [(10, 9, 0.0), (11, 9, 1.0), (10, 11, 4.0), (8, 8, 5.0)] {
+            assert!((at(x, y) - expected(r2)).abs() < 2e-3, "{x} {y} {}", at(x, y));
+        }
+        assert!(spot.iter().skip(1).step_by(2).all(|v| *v == 0.0));
         add_noise(&mut flat, 0.03, &mut Stream::of(1, 0, Purpose::Test, 0));
         let n = flat.len() as f32;
         let mean = flat.iter().sum::<f32>() / n;
