@@ -122,10 +122,14 @@ pub(super) fn failed(e: &tch::TchError) -> Error {
 }
 
 fn tensor(parameter: &Parameter, values: &[f32], device: Device) -> Tensor {
-    let shape: Vec<i64> = parameter.shape.iter().map(|n| *n as i64).collect();
+    laid(&parameter.shape, values, device).detach().set_requires_grad(parameter.role.is_learnt())
+}
+
+/// Values on a device, laid out as weights are.
+pub(super) fn laid(shape: &[usize], values: &[f32], device: Device) -> Tensor {
+    let shape: Vec<i64> = shape.iter().map(|n| *n as i64).collect();
     let plain = Tensor::from_slice(values).view(shape.as_slice()).to_device(device);
-    let laid = if shape.len() == 4 { channels_last(&plain) } else { plain };
-    laid.detach().set_requires_grad(parameter.role.is_learnt())
+    if shape.len() == 4 { channels_last(&plain) } else { plain }
 }
 
 /// The same values, channels beside each other in memory; tch has no name for this.

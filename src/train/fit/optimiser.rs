@@ -2,7 +2,7 @@
 
 use super::plan::Method;
 use crate::Result;
-use crate::train::engine::{Model, values};
+use crate::train::engine::{Model, laid, values};
 use crate::train::weights::Array;
 use std::collections::BTreeMap;
 use tch::Tensor;
@@ -24,12 +24,8 @@ const EPSILON: f64 = 1e-8;
 impl Optimiser {
     /// With an empty memory, or with that of a checkpoint after so many steps.
     pub fn new(method: Method, decay: f64, steps: u64, memory: &[Array], model: &Model) -> Self {
-        let mut all = BTreeMap::new();
-        for array in memory {
-            let shape: Vec<i64> = array.shape.iter().map(|n| *n as i64).collect();
-            let tensor = Tensor::from_slice(&array.values).view(shape.as_slice()).to_device(model.place.device);
-            all.insert(array.name.clone(), tensor);
-        }
+        let laid = |array: &Array| (array.name.clone(), laid(&array.shape, &array.values, model.place.device));
+        let all = memory.iter().map(laid).collect();
         Self { method, decay, steps: steps as i32, memory: all }
     }
 
