@@ -77,7 +77,7 @@ const DOORS: &[(&str, &str)] = &[
     ("sobol_burley", "sampling/sampler.rs"),
     ("solar_positioning", "light/position.rs"),
     // libtorch: networks and how they learn.
-    ("tch", "train/engine/ train/fit/optimiser.rs train/fit/teach.rs train/deploy/"),
+    ("tch", "train/engine/ train/fit/objective.rs train/fit/optimiser.rs train/fit/teach.rs train/deploy/"),
     // Files appear whole or not at all: images of fields, and drawn textures below them. The denoiser's go through a folder.
     ("tempfile", "output/mod.rs output/denoise.rs texture/draw/write.rs"),
     ("thiserror", "error.rs"),
