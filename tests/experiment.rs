@@ -436,6 +436,7 @@ fn mistakes_in_a_page_are_shown_where_they_are() {
         ("count: 6,", "count: 6, split: (0, 0, 0),", "(0, 0, 0)", "these are no shares", "train,val,test"),
         ("name: \"More\"", "name: \"few!\"", "\"few!\"", "there is another `few!`", "of its own"),
         ("name: \"More\"", "name: \"?\"", "\"?\"", "no letter and no digit", "letters"),
+        ("steps: 10", "window: (8, 8), steps: 10", "(8, 8)", "networks do not see 8 × 8 pixels", "sides from 32"),
         ("from: [(set: \"frames\", images: \"0..2\")]", "from: []", "[]", "nothing is learnt from", "name a set"),
         (frames, "(set: \"frame\")", "\"frame\"", "there is no set `frame`", "did you mean `frames`?"),
         ("\"0..2\"", "\"2..0\"", "\"2..0\"", "`2..0` picks no images", "0..10"),
@@ -493,4 +494,19 @@ fn a_scale_changes_what_it_names_and_nothing_else() {
     assert_eq!(images(&large), (1300, (480, 360)));
     assert!(images(&small).0 < 1300 && large.learn.steps > small.learn.steps);
     assert_eq!((large.train, large.test), (small.train, small.test));
+}
+
+#[test]
+fn our_pages_are_understood_at_both_scales() {
+    let mut pages = 0;
+    for entry in std::fs::read_dir("scenes/experiments").expect("our pages") {
+        let path = entry.expect("a page").path();
+        for scale in [None, Some("paper")] {
+            let experiment = Experiment::read(&path, scale).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+            let (width, height) = experiment.learn.window();
+            assert!(width <= experiment.learn.shape.width && height <= experiment.learn.shape.height);
+        }
+        pages += 1;
+    }
+    assert!(pages >= 2);
 }
