@@ -149,19 +149,26 @@ fn parent(path: &Path) -> &Path {
 pub fn remove_unfinished(folder: &Path) -> Result<()> {
     let mut todo = vec![folder.to_path_buf()];
     while let Some(folder) = todo.pop() {
-        for entry in std::fs::read_dir(&folder).map_err(Error::io(&folder))? {
-            let entry = entry.map_err(Error::io(&folder))?;
-            let path = entry.path();
-            let unfinished = entry.file_name().to_string_lossy().starts_with(UNFINISHED);
-            match (entry.file_type().map_err(Error::io(&path))?.is_dir(), unfinished) {
-                (true, true) => std::fs::remove_dir_all(&path).map_err(Error::io(&path))?,
-                (true, false) => todo.push(path),
-                (false, true) => std::fs::remove_file(&path).map_err(Error::io(&path))?,
-                (false, false) => {}
-            }
-        }
+        todo.extend(remove_unfinished_in(&folder)?);
     }
     Ok(())
+}
+
+/// The same in the folder alone; returns the folders within.
+pub fn remove_unfinished_in(folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut within = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(Error::io(folder))? {
+        let entry = entry.map_err(Error::io(folder))?;
+        let path = entry.path();
+        let unfinished = entry.file_name().to_string_lossy().starts_with(UNFINISHED);
+        match (entry.file_type().map_err(Error::io(&path))?.is_dir(), unfinished) {
+            (true, true) => std::fs::remove_dir_all(&path).map_err(Error::io(&path))?,
+            (true, false) => within.push(path),
+            (false, true) => std::fs::remove_file(&path).map_err(Error::io(&path))?,
+            (false, false) => {}
+        }
+    }
+    Ok(within)
 }
 
 /// Gives a file that is there a second name, so that equal files take space once; `bytes` are what it holds, written anew where the file

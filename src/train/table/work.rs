@@ -6,7 +6,7 @@ use super::print;
 use super::rows::{self, Learner, Row};
 use super::sets::Bound;
 use crate::dataset::generate::Shard;
-use crate::output::{remove_unfinished, write_atomically};
+use crate::output::{remove_unfinished, remove_unfinished_in, write_atomically};
 use crate::train::baseline::{Baseline, Kind, files};
 use crate::train::data::{Pick, Selection, Shape, Store};
 use crate::train::fit::Plan;
@@ -16,6 +16,7 @@ use crate::train::run::{self, Identity, Learnt, Results};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -100,7 +101,7 @@ pub fn run(order: &Order<'_>, hands: &Hands<'_>) -> Result<Vec<PathBuf>> {
         return tables(order, hands);
     }
     bound.check()?;
-    write_atomically(&out.join("experiment.ron"), order.page.as_bytes())?;
+    alone(out, || write_atomically(&out.join("experiment.ron"), order.page.as_bytes()))?;
     for set in bound.used() {
         bound.make(set, order.trace, order.quiet, hands.tell, hands.stop)?;
     }
@@ -139,9 +140,23 @@ fn tables(order: &Order<'_>, hands: &Hands<'_>) -> Result<Vec<PathBuf>> {
     for words in told {
         (hands.warn)(&words);
     }
-    let mut paths = tables.write(order.out)?;
-    paths.push(print::page(&order.bound.experiment, &tables, order.out)?);
-    Ok(paths)
+    alone(order.out, || {
+        let mut paths = tables.write(order.out)?;
+        paths.push(print::page(&order.bound.experiment, &tables, order.out)?);
+        Ok(paths)
+    })
+}
+
+/// Writes files that all shards write, one shard at a time, after those that a killed one has left half-written. Where the file system
+/// knows no locks they stay: nobody can tell whose they are.
+fn alone<T>(out: &Path, write: impl FnOnce() -> Result<T>) -> Result<T> {
+    std::fs::create_dir_all(out).map_err(Error::io(out))?;
+    // The lock goes with the open folder.
+    let held = File::open(out).and_then(|folder| folder.lock().map(|()| folder));
+    if held.is_ok() {
+        remove_unfinished_in(out)?;
+    }
+    write()
 }
 
 /// One row's work.
