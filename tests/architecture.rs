@@ -31,6 +31,8 @@ const NEVER: &[(&str, &str)] = &[
     ("render/label.rs", "film sampling bsdf material light integrator"),
     ("integrator", "accel film output plant soil scatter texture"),
     ("film", "scene sampling"),
+    // It says what is otherwise; who grows, draws and writes is theirs.
+    ("ablation", "integrator accel bsdf output dataset"),
     // It asks `render` for an image and a label map.
     ("dataset", "integrator bsdf"),
     // It reads what writers wrote, so it reads real images too.

@@ -4,6 +4,7 @@ use crate::field::FieldArgs;
 use crate::quality::QualityArgs;
 use crate::technique::TechniqueArgs;
 use clap::ValueEnum;
+use furrow::ablation::{Drawing, Edit, FULL};
 use furrow::accel::{self, EmbreeAccel};
 use furrow::cli::signal::Signals;
 use furrow::film::Film;
@@ -37,6 +38,9 @@ pub(crate) struct Args {
     integrator: Draw,
     #[command(flatten)]
     technique: TechniqueArgs,
+    /// Change one thing of the field, by its name; `trace ablate --list` tells them.
+    #[arg(long, value_name = "NAME", conflicts_with = "enough")]
+    edit: Option<String>,
     /// Also write the picture without its noise, beside the noisy one; needs Open Image Denoise, for `--integrator path`.
     #[arg(long)]
     denoise: bool,
@@ -93,17 +97,25 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         }
     };
     args.field.check()?;
+    let edit = args.edit.as_deref().map_or(Ok(&FULL), Edit::named)?;
+    let drawing = edit.drawing(Drawing {
+        engine: "trace".into(),
+        spp: args.quality.most(),
+        denoise: args.denoise,
+        max_depth: args.technique.limits().0,
+    });
+    let (quality, technique) = (args.quality.with_spp(drawing.spp), args.technique.with_max_depth(drawing.max_depth));
     if !matches!(args.integrator, Draw::Path) {
-        args.technique.check_unused(args.denoise)?;
+        technique.check_unused(drawing.denoise)?;
     }
     // Before hours are spent on what could not be denoised then.
-    let denoiser = args.denoise.then(Denoiser::find).transpose()?;
+    let denoiser = drawing.denoise.then(Denoiser::find).transpose()?;
     let out = args.out.clone().unwrap_or_else(|| args.field.default_folder());
     if args.pixel.is_none() {
         cli::check_folder(&out)?;
     }
     let pool = render::pool(args.threads)?;
-    let field: Field = pool.install(|| args.field.grow())?;
+    let field: Field = pool.install(|| args.field.grow(edit))?;
     for warning in &field.warnings {
         say(format!("warning: {warning}"));
     }
@@ -127,44 +139,47 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     ));
 
     let world = World { scene, geometry: &geometry };
-    let integrator = args.integrator.integrator(&args.technique);
-    let settings =
-        Settings { spp: args.quality.most(), seed: field.sample_seed(), window, points: args.technique.points() };
+    let integrator = args.integrator.integrator(&technique);
+    let settings = Settings { spp: quality.most(), seed: field.sample_seed(), window, points: technique.points() };
     if let Some((x, y)) = args.pixel {
         let words = pool.install(|| render::explain(&world, &field.plants, integrator.as_ref(), &settings, x, y));
+        let told = edit.label().map(|name| format!("\n  edit: {name}, {}", edit.about)).unwrap_or_default();
         // The words are the result; a closed pipe is no failure.
-        let _ = writeln!(std::io::stdout(), "{words}");
+        let _ = writeln!(std::io::stdout(), "{words}{told}");
         return Ok(Vec::new());
     }
 
     // First, so that the clock of `--time` need not guess how long they take.
     let labels = pool.install(|| render::label(&geometry, &scene.parts, &scene.camera, window));
     let traced = AtomicU64::new(0);
-    let bar = progress(args.quality.samples(window), args.quiet);
+    let bar = progress(quality.samples(window), args.quiet);
     let done = |n| {
         traced.fetch_add(n, Ordering::Relaxed);
         bar.inc(n);
     };
     let watch = Watch { done: &done, stop: signals.heed() };
     let start = Instant::now();
-    let deadline = args.quality.deadline(begin, window, args.denoise);
-    let film: Film = pool.install(|| args.quality.render(&world, integrator.as_ref(), &settings, deadline, &watch))?;
+    let deadline = quality.deadline(begin, window, drawing.denoise);
+    let film: Film = pool.install(|| quality.render(&world, integrator.as_ref(), &settings, deadline, &watch))?;
     let rendered = start.elapsed();
     bar.finish_and_clear();
-    let photograph = field.photograph(&film);
+    let photograph = edit.photograph(&field, &film);
+    let labels = edit.labels(labels, &film, &scene.tags());
+    let mut deviations = technique.deviations();
+    deviations.extend(edit.label().map(|name| format!("edit: {name}")));
     let provenance = Provenance {
         scene_hash: field.hash.clone(),
         seed: field.seed,
         index: field.index,
-        spp: args.quality.spp(&film),
+        spp: quality.spp(&film),
         integrator: args.integrator.name(),
-        deviations: args.technique.deviations(),
+        deviations,
         kernels: accel::version()?,
     };
     let mut paths = pool.install(|| output::write_image(&out, &film, &labels, &photograph, &provenance))?;
     if let Some(denoiser) = denoiser {
         let clean = denoiser.denoise(&film, args.threads)?;
-        paths.extend(output::write_denoised(&out, &clean, &field.photograph(&clean), &provenance)?);
+        paths.extend(output::write_denoised(&out, &clean, &edit.photograph(&field, &clean), &provenance)?);
     }
     // One sample has no spread to tell an error by.
     let (_, mean, most) = film.samples();
@@ -174,11 +189,11 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         "{samples:.0} Msamples in {:.1} s: {:.2} Msamples/s; {}median relative error {error}; {:.1} s in all; files in {}",
         rendered.as_secs_f64(),
         samples / rendered.as_secs_f64(),
-        if args.quality.is_open() { format!("{mean:.0} samples a pixel; ") } else { String::new() },
+        if quality.is_open() { format!("{mean:.0} samples a pixel; ") } else { String::new() },
         begin.elapsed().as_secs_f64(),
         out.display()
     ));
-    for warning in args.quality.missed(&film, begin.elapsed()) {
+    for warning in quality.missed(&film, begin.elapsed()) {
         say(format!("warning: {warning}"));
     }
     Ok(paths)

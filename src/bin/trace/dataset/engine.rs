@@ -45,10 +45,12 @@ impl PathTracer {
             return differs("the engine", &rendering.engine, "trace");
         }
         let technique = TechniqueArgs::of(&rendering.without, rendering.max_depth, rendering.clamp)?;
+        let mut deviations = technique.deviations();
+        deviations.extend(rendering.edit.as_ref().map(|name| format!("edit: {name}")));
         Ok(Some(Self {
             path: technique.path(),
             points: technique.points(),
-            deviations: technique.deviations(),
+            deviations,
             spp: rendering.spp,
             denoiser: rendering.denoise.then(Denoiser::find).transpose()?,
             kernels,
