@@ -141,8 +141,11 @@ impl Players {
     }
 
     fn run(&self, text: &str, out: &Path, shard: Shard, only: Option<Only>) -> Result<Vec<PathBuf>> {
-        let page = page(text);
-        let experiment = Experiment::of(&page, None)?;
+        self.run_page(&page(text), out, shard, only)
+    }
+
+    fn run_page(&self, page: &Page, out: &Path, shard: Shard, only: Option<Only>) -> Result<Vec<PathBuf>> {
+        let experiment = Experiment::of(page, None)?;
         let real = [Real { name: "frames".into(), folder: frames().into() }];
         let bound = Bound::new(experiment, &real, &[], out)?;
         let trace = Path::new(env!("CARGO_BIN_EXE_trace"));
@@ -489,7 +492,7 @@ fn a_scale_changes_what_it_names_and_nothing_else() {
     let (small, large) = (Experiment::read(paper, None).unwrap(), Experiment::read(paper, Some("paper")).unwrap());
     let images = |e: &Experiment| match &e.sets[0].1 {
         table::Source::Scene { count, size, .. } => (*count, *size),
-        table::Source::Real { .. } => unreachable!("synthetic A is rendered"),
+        other => unreachable!("synthetic A is rendered, not {other:?}"),
     };
     assert_eq!(images(&large), (1300, (480, 360)));
     assert!(images(&small).0 < 1300 && large.learn.steps > small.learn.steps);
@@ -509,4 +512,72 @@ fn our_pages_are_understood_at_both_scales() {
         pages += 1;
     }
     assert!(pages >= 2);
+}
+
+/// Two datasets of the same fields, the second without its sky; made once.
+fn variants() -> &'static Path {
+    static VARIANTS: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
+    let made = VARIANTS.get_or_init(|| {
+        let (keep, folder) = common::program::scratch();
+        let page = ["ablate", "--scene", common::program::SMALL, "--only", "no-sky", "--count", "6", "--width", "48"];
+        let more = ["--spp", "1", "--split", "4,0,2", "--quiet", "--out", common::dataset::path(&folder)];
+        succeed(common::program::trace(&[&page[..], &more].concat()));
+        (keep, folder)
+    });
+    &made.1
+}
+
+/// The page that was written beside them, small.
+fn written() -> Page {
+    let mut page = Page::read(&variants().join("ablation.ron")).unwrap();
+    page.text = page.text.replace("\"unet\"", "\"basic-segnet\"").replace("[1, 2, 3]", "[1, 2]");
+    page
+}
+
+#[test]
+fn what_ablate_writes_is_an_experiment_on_its_datasets() {
+    let page = written();
+    let experiment = Experiment::of(&page, Some("glance")).unwrap();
+    let names: Vec<&str> = experiment.train.iter().map(|t| t.name.as_str()).collect();
+    assert_eq!(names, ["full", "no-sky"]);
+    assert_eq!(experiment.against.as_deref(), Some("full"));
+    assert_eq!(experiment.test.iter().map(|t| t.name.as_str()).collect::<Vec<_>>(), ["Rendered", "real"]);
+    let fault = |from: &str, to: &str| {
+        let page = Page { path: page.path.clone(), text: page.text.replace(from, to) };
+        Experiment::of(&page, None).unwrap_err().to_string()
+    };
+    let said = fault("path: \"no-sky\"", "path: \"no-skye\"");
+    assert!(said.contains("there is no dataset in `no-skye`") && said.contains('^'), "{said}");
+    let said = fault("against: \"full\"", "against: \"fulll\"");
+    assert!(said.contains("no training set `fulll`") && said.contains("did you mean `full`?"), "{said}");
+}
+
+#[test]
+fn changes_are_told_seed_by_seed_with_their_spread() {
+    let (_keep, out) = common::program::scratch();
+    let page = written();
+    let page = Page { path: page.path.clone(), text: page.text.replace("\"real\"", "\"frames\"") };
+    Players::default().run_page(&page, &out, Shard::ALL, None).unwrap();
+    let table = |column: &str| number(&out, "against", &["basic-segnet", "no-sky"], column);
+    assert_eq!((table("Rendered vegetation"), table("Rendered vegetation ±"), table("seeds")), (0.0, 0.0, 2.0));
+    assert!(table("of the other's") > 0.0);
+    // The players answer by seed alone: soil with seed 1, the truth with seed 2. Now the changed set has taught seed 2 nothing as well.
+    let eval = |set: &str, seed: u32| out.join(format!("runs/basic-segnet/{set}/seed-{seed}/eval/rendered.json"));
+    let read = |path: &Path| -> serde_json::Value { serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap() };
+    let teach = |set: &str, seed: u32, from: u32| {
+        let mut judgement = read(&eval(set, seed));
+        judgement["report"] = read(&eval(set, from))["report"].clone();
+        std::fs::write(eval(set, seed), serde_json::to_vec(&judgement).unwrap()).unwrap();
+        Players::default().run_page(&page, &out, Shard::ALL, Some(Only::Tables)).unwrap();
+        let text = std::fs::read_to_string(out.join("against.csv")).unwrap();
+        text.lines().nth(1).unwrap().split(',').filter(|cell| *cell == "yes").count()
+    };
+    assert_eq!(teach("no-sky", 2, 1), 0, "0 and -100 have a mean of -50 and a spread of 71");
+    assert!((table("Rendered vegetation") + 50.0).abs() < 1e-9);
+    assert!((table("Rendered vegetation ±") - 50.0 * 2.0_f64.sqrt()).abs() < 1e-9);
+    assert!(teach("full", 1, 2) > 0, "-100 and -100 have no spread");
+    assert_eq!((table("Rendered vegetation"), table("Rendered vegetation ±")), (-100.0, 0.0));
+    let html = std::fs::read_to_string(out.join("results.html")).unwrap();
+    assert!(html.contains("Change of I/U against full") && html.contains("no-sky: sun and lamps alone"));
+    assert_eq!(html.matches("data:image/jpeg").count(), 1);
 }

@@ -48,6 +48,9 @@ pub struct ExperimentDesc {
     pub train: Vec<TrainDesc>,
     /// What is judged on: columns of the tables.
     pub test: Vec<TestDesc>,
+    /// The training set, by its name, that all others are compared with, seed by seed: what does each change do? Unless given, none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub against: Option<String>,
     /// The same experiment, larger or smaller, by name: `train table --scale NAME`.
     #[serde(default, skip_serializing_if = "Named::is_empty")]
     pub scales: Named<ScaleDesc>,
@@ -138,6 +141,11 @@ pub enum SetDesc {
         /// Shares of the images to train on, to watch by and to test on; 8 to 1 to 1 unless given.
         #[serde(default = "usual_split")]
         split: (u32, u32, u32),
+    },
+    /// A dataset that is there already, such as `trace ablate` makes.
+    Dataset {
+        /// Its folder; counts from the folder of this page.
+        path: String,
     },
     /// Images of the world with labels, which `train table --real NAME=DIR` leads to: a dataset that `trace dataset import` made, or a
     /// folder with `images/` and with masks in `labels/` (0 soil, 1 crop, 2 weed, 255 no label), which is then imported into `sets/NAME`.

@@ -2,6 +2,7 @@
 
 use super::desc::{ExperimentDesc, LearnDesc, Named, PartDesc, ScaleDesc, SetDesc};
 use super::names::{slug, unknown};
+use crate::dataset::recipe::{self, Recipe};
 use crate::dataset::split::Shares;
 use crate::page::Page;
 use crate::sampling::place::Step;
@@ -34,6 +35,8 @@ pub struct Experiment {
     pub train: Vec<TrainSet>,
     /// What is judged on, at least one.
     pub test: Vec<TestSet>,
+    /// Name of the training set that the others are compared with.
+    pub against: Option<String>,
     /// The scale that was asked for.
     pub scale: Option<String>,
 }
@@ -55,6 +58,13 @@ pub enum Source {
         seed: Option<u64>,
         /// Shares of the splits.
         split: Shares,
+    },
+    /// A dataset already.
+    Dataset {
+        /// Its folder.
+        folder: PathBuf,
+        /// Images.
+        count: u64,
     },
     /// Brought in.
     Real {
@@ -166,12 +176,14 @@ impl Checker<'_> {
         let seeds = other.and_then(|s| s.seeds.as_ref()).unwrap_or(&desc.seeds);
         self.seeds(seeds, &at("seeds", other.is_some_and(|s| s.seeds.is_some())))?;
         let sets = self.sets(other, (learn.shape.width, learn.shape.height))?;
+        let train = self.train(&sets)?;
         Ok(Experiment {
             networks,
             baselines: self.baselines(&learn)?,
             seeds: seeds.clone(),
             learn,
-            train: self.train(&sets)?,
+            against: self.against(&train)?,
+            train,
             test: self.test(&sets)?,
             sets,
             scale: scale.map(str::to_owned),
@@ -275,6 +287,15 @@ impl Checker<'_> {
             let at = |field| [Step::Field("sets"), Step::Item(i), Step::Field(field)];
             let source = match desc {
                 SetDesc::Real { about } => Source::Real { about: about.clone() },
+                SetDesc::Dataset { path } => {
+                    let folder = self.page.resolve(path);
+                    if !folder.join(recipe::FILE).is_file() {
+                        let help =
+                            "its path counts from the page's folder; `trace ablate` and `trace dataset` make some";
+                        return Err(self.fault(&at("path"), format!("there is no dataset in `{path}`"), help));
+                    }
+                    Source::Dataset { count: Recipe::read(&folder)?.count, folder }
+                }
                 SetDesc::Scene { page, count, size, spp, seed, split: (train, val, test) } => {
                     self.page.need_file(page)?;
                     self.count(*count, &at("count"))?;
@@ -352,7 +373,8 @@ impl Checker<'_> {
             let (what, help) = words.split_once(": ").unwrap_or((&words, "write 0..10"));
             self.fault(&step("images"), what, help)
         })?;
-        if let (Source::Scene { count, .. }, Pick::Range(_, most) | Pick::Random(most)) = (&sets[set].1, pick)
+        if let Source::Scene { count, .. } | Source::Dataset { count, .. } = &sets[set].1
+            && let Pick::Range(_, most) | Pick::Random(most) = pick
             && most > *count
         {
             let help = "ask for fewer here, or for more there; the last of a range is left out";
@@ -408,6 +430,16 @@ impl Checker<'_> {
             return Err(self.fault(&[Step::Field("test")], "there is no test set", help));
         }
         Ok(all)
+    }
+
+    /// The training set that others are compared with.
+    fn against(&self, train: &[TrainSet]) -> Result<Option<String>> {
+        let Some(name) = &self.desc.against else { return Ok(None) };
+        if train.iter().any(|t| t.name == *name) {
+            return Ok(Some(name.clone()));
+        }
+        let known: Vec<&str> = train.iter().map(|t| t.name.as_str()).collect();
+        Err(self.unknown(&[Step::Field("against")], "training set", &known, name))
     }
 
     /// The folder's name of a title that no other has.

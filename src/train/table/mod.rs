@@ -16,6 +16,7 @@
 //! OUT/table-2.*                                P and R of vegetation, as its Table II
 //! OUT/table-3.*                                I/U of each class that is a plant and of vegetation, with its spread over seeds
 //! OUT/runs.*                                   every run by itself
+//! OUT/against.*                                what each training set changes against one of them, where the page names one
 //! OUT/times.*                                  how long networks take, as its Table III
 //! OUT/results.html                             all but times on one page
 //! ```
@@ -34,7 +35,10 @@
 //! | `judgement` | how well a row does on a test set, kept |
 //! | `work` | all of it, as far as it is missing |
 //! | `print` | tables |
+//! | `against` | what changes do: every training set against one |
+//! | `variants` | the page of an experiment on datasets that lie beside it |
 
+mod against;
 mod desc;
 mod experiment;
 mod judgement;
@@ -42,6 +46,7 @@ mod names;
 mod print;
 mod rows;
 mod sets;
+mod variants;
 mod work;
 
 pub use desc::{ExperimentDesc, LearnDesc, Named, PartDesc, ScaleDesc, SetDesc, TestDesc, TrainDesc};
@@ -51,4 +56,5 @@ pub use names::slug;
 pub use print::{RUNS, TIMES, Tables, listing, tables};
 pub use rows::{Learner, Row, rows};
 pub use sets::{Bound, Real};
+pub use variants::variants;
 pub use work::{Answerer, Hands, Only, Order, PAGE, State, run};

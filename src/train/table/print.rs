@@ -1,18 +1,20 @@
 //! The paper's tables, with the numbers that are there.
 
+use super::against;
 use super::experiment::{Experiment, TestSet};
 use super::judgement::{self, Judgement, Known};
 use super::rows::{self, Learner, Row};
 use super::sets::Bound;
 use crate::Result;
 use crate::output::write_atomically;
+use crate::train::classes::Classes;
 use crate::train::figure;
 use crate::train::measure::{Cell, Report, Table};
 use crate::train::run::{self, Results};
 use std::path::{Path, PathBuf};
 
 /// Decimals of a percentage.
-const PERCENT: usize = 1;
+pub(super) const PERCENT: usize = 1;
 
 /// Name of the table of every run by itself.
 pub const RUNS: &str = "runs";
@@ -40,11 +42,11 @@ impl Tables {
 }
 
 /// A row of the experiment, as far as it is.
-struct Seen {
-    row: Row,
+pub(super) struct Seen {
+    pub(super) row: Row,
     results: Option<Results>,
     /// One a test set.
-    reports: Vec<Option<Report>>,
+    pub(super) reports: Vec<Option<Report>>,
     /// Median seconds an image, one a test set.
     seconds: Vec<Option<f64>>,
 }
@@ -65,13 +67,16 @@ pub fn tables(bound: &Bound, out: &Path) -> Result<(Tables, Vec<String>)> {
         .map(|row| see(experiment, row, out, &mut told))
         .collect::<Result<Vec<_>>>()?;
     let lines = lines(experiment, &seen);
-    let all = vec![
+    let mut all = vec![
         ("table-1", segmentation(experiment, &lines)),
         ("table-2", vegetation(experiment, &lines)),
         ("table-3", classes(experiment, &lines)),
         (RUNS, runs(experiment, &seen)),
         (TIMES, times(experiment, &seen)),
     ];
+    if let Some(table) = against::table(bound, &seen)? {
+        all.insert(0, ("against", table));
+    }
     Ok((Tables(all), told))
 }
 
@@ -125,12 +130,12 @@ impl Line<'_> {
     }
 }
 
-fn mean(values: &[f64]) -> Option<f64> {
+pub(super) fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
 /// Standard deviation with n − 1; none of fewer than two.
-fn spread(values: &[f64]) -> Option<f64> {
+pub(super) fn spread(values: &[f64]) -> Option<f64> {
     let middle = mean(values).filter(|_| values.len() > 1)?;
     Some((values.iter().map(|v| (v - middle).powi(2)).sum::<f64>() / (values.len() - 1) as f64).sqrt())
 }
@@ -153,7 +158,7 @@ fn means(title: String, experiment: &Experiment, lines: &[Line<'_>], scores: &[S
 }
 
 /// What tables are of, in words.
-fn scale(experiment: &Experiment) -> String {
+pub(super) fn scale(experiment: &Experiment) -> String {
     let learn = &experiment.learn;
     let scale = experiment.scale.as_ref().map(|s| format!("scale {s}, ")).unwrap_or_default();
     format!(
@@ -209,7 +214,8 @@ fn classes(experiment: &Experiment, lines: &[Line<'_>]) -> Table {
 }
 
 /// Writes all but times on one page for people, `results.html`; returns its path.
-pub(super) fn page(experiment: &Experiment, tables: &Tables, out: &Path) -> Result<PathBuf> {
+pub(super) fn page(bound: &Bound, tables: &Tables, out: &Path) -> Result<PathBuf> {
+    let experiment = &bound.experiment;
     let learn = &experiment.learn;
     let fact = |name: &str, value: String| (name.to_owned(), value);
     let names = |all: Vec<&str>| all.join(", ");
@@ -223,12 +229,22 @@ pub(super) fn page(experiment: &Experiment, tables: &Tables, out: &Path) -> Resu
         fact("sets", names(experiment.sets.iter().map(|(name, _)| name.as_str()).collect())),
     ];
     let shown: Vec<Table> = tables.0.iter().filter(|(name, _)| *name != TIMES).map(|(_, t)| t.clone()).collect();
+    let shots = against::shots(bound)?;
+    let predictors: [String; 1] = ["labels".into()];
     let page = figure::Page {
         kind: "Experiment",
         title: "Trained on rendered and real images, judged on real ones",
-        lead: "Means over seeds; a network below the colour baselines has learnt nothing of shape.",
+        lead: if experiment.against.is_some() {
+            against::LEAD
+        } else {
+            "Means over seeds; a network below the colour baselines has learnt nothing of shape."
+        },
         facts: &facts,
         tables: &shown,
+        shots: &shots,
+        predictors: &predictors,
+        palette: &Classes::default().colors(),
+        classes: &Classes::default().names(),
         ..figure::Page::default()
     };
     let path = out.join("results.html");

@@ -80,6 +80,7 @@ impl Bound {
             let own = out.join("sets").join(name);
             sets.push(match (source, reals.iter().find(|r| r.name == *name)) {
                 (Source::Scene { .. }, _) => (own, Origin::Rendered),
+                (Source::Dataset { folder, .. }, _) => (folder.clone(), Origin::There),
                 (Source::Real { .. }, None) => (own, Origin::Unknown),
                 (Source::Real { .. }, Some(real)) => real_set(real, own)?,
             });

@@ -142,7 +142,7 @@ fn tables(order: &Order<'_>, hands: &Hands<'_>) -> Result<Vec<PathBuf>> {
     }
     alone(order.out, || {
         let mut paths = tables.write(order.out)?;
-        paths.push(print::page(&order.bound.experiment, &tables, order.out)?);
+        paths.push(print::page(order.bound, &tables, order.out)?);
         Ok(paths)
     })
 }

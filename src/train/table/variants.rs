@@ -1,0 +1,84 @@
+//! The page of an experiment that learns from each of several datasets beside it and compares them with the first: what `trace ablate`
+//! writes.
+
+use crate::dataset::Set;
+use crate::dataset::split::Split;
+use crate::{Error, Result};
+use std::fmt::Write;
+
+/// Seeds: fewer have no spread worth the name.
+const SEEDS: [u64; 3] = [1, 2, 3];
+/// Steps of a training.
+const STEPS: u64 = 600;
+/// Images a step.
+const BATCH: u64 = 4;
+/// Part of an image that a step learns from.
+const WINDOW: (u32, u32) = (240, 180);
+/// Windows of that size that two cores of 2 GHz learn in a second, in bf16 (`cargo bench --bench learn`).
+const RATE: f64 = 17.0;
+/// Smallest side that networks see.
+const LEAST: u32 = 32;
+
+/// The text of the page for datasets that lie beside it in folders of their names, with what each is; `reals` are the names of the sets of
+/// real images that it asks for.
+pub fn variants(sets: &[(Set, &str)], reals: &[String]) -> Result<String> {
+    let Some((full, _)) = sets.first() else {
+        return Err(Error::Training("there is no dataset to learn from\n help: make one first".into()));
+    };
+    let rendering = full.recipe.rendering()?;
+    let size = (rendering.width.max(LEAST), rendering.height.max(LEAST));
+    let window = (size.0 > WINDOW.0 && size.1 > WINDOW.1).then_some(WINDOW);
+    let seen = window.unwrap_or(size);
+    let trainings = (sets.len() * SEEDS.len()) as u64;
+    let pixels = f64::from(seen.0) * f64::from(seen.1) / (f64::from(WINDOW.0) * f64::from(WINDOW.1));
+    let hours = (trainings * STEPS * BATCH) as f64 * pixels / RATE / 3600.0;
+    let name = |set: &Set| set.folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let base = name(full);
+    let mut text = format!(
+        "// What does each thing that a render can do without matter to a network? Written by `trace ablate`, anew each time: copy it to change
+// it. Stopped, the same line goes on; with --row k/N each machine of a cluster takes some rows.
+//
+//   train table ablation.ron --out answer{}
+//
+// DIR holds images/ and labels/ (0 soil, 1 crop, 2 weed, 255 none); `--without NAME` leaves a real set out. {trainings} trainings take two
+// cores that multiply bf16 about {hours:.1} hours.
+Experiment(
+    networks: [\"unet\"],
+    baselines: [],
+    seeds: {SEEDS:?},
+    learn: (size: {size:?}, {}steps: {STEPS}, batch: {BATCH}),
+    sets: {{
+",
+        reals.iter().fold(String::new(), |words, real| words + " --real " + real + "=DIR"),
+        window.map(|window| format!("window: {window:?}, ")).unwrap_or_default(),
+    );
+    for (set, about) in sets {
+        let _ = writeln!(text, "        // {about}\n        {0:?}: Dataset(path: {0:?}),", name(set));
+    }
+    for real in reals {
+        let _ = writeln!(text, "        {real:?}: Real(about: \"labelled photographs\"),");
+    }
+    text.push_str("    },\n    train: [\n");
+    for (set, _) in sets {
+        let _ = writeln!(text, "        (name: {0:?}, from: [(set: {0:?})]),", name(set));
+    }
+    text.push_str("    ],\n    test: [\n");
+    if !full.names(Split::Test).is_empty() {
+        let _ = writeln!(text, "        (name: \"Rendered\", set: {base:?}, images: \"test\"),");
+    }
+    for real in reals {
+        let _ = writeln!(text, "        (name: {real:?}, set: {real:?}),");
+    }
+    let _ = write!(
+        text,
+        "    ],
+    against: {base:?},
+    scales: {{
+        \"glance\": (seeds: [1, 2], learn: (steps: 20)),
+        \"long\": (seeds: [1, 2, 3, 4, 5], learn: (steps: 5000)),
+    }},
+)
+"
+    );
+    Ok(text)
+}
