@@ -52,6 +52,9 @@ pub enum Error {
     /// The denoiser failed; the picture that it was to denoise is there.
     #[error("{0}")]
     Denoise(String),
+    /// The rasterized engine cannot draw here.
+    #[error("{0}")]
+    Raster(String),
     /// A dataset that cannot be used as asked.
     #[error("{0}")]
     Dataset(String),
@@ -80,6 +83,7 @@ impl Error {
             | Self::Image { .. }
             | Self::Model { .. }
             | Self::Scene(_)
+            | Self::Raster(_)
             | Self::Dataset(_)
             | Self::Run { .. }
             | Self::Training(_) => 2,

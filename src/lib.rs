@@ -8,7 +8,7 @@
 //! |---|---|
 //! | 12 | [`train`] |
 //! | 11 | [`dataset`] |
-//! | 10 | [`output`] |
+//! | 10 | [`output`], [`raster`] |
 //! | 9 | [`render`] |
 //! | 8 | [`integrator`] |
 //! | 7 | [`scene`] |
@@ -38,6 +38,8 @@ pub mod optics;
 pub mod output;
 pub mod page;
 pub mod plant;
+#[cfg(feature = "raster")]
+pub mod raster;
 pub mod render;
 pub mod sampling;
 pub mod scatter;

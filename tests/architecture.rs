@@ -31,6 +31,8 @@ const NEVER: &[(&str, &str)] = &[
     ("render/label.rs", "film sampling bsdf material light integrator"),
     ("integrator", "accel film output plant soil scatter texture"),
     ("film", "scene sampling"),
+    // The other way of drawing shares the scene, not the rays.
+    ("raster", "integrator accel bsdf sampling output"),
     // It asks `render` for an image and a label map.
     ("dataset", "integrator bsdf"),
     // It reads what writers wrote, so it reads real images too.
@@ -43,6 +45,8 @@ const NEVER: &[(&str, &str)] = &[
 const DOORS: &[(&str, &str)] = &[
     // Bytes written as text inside a model's document, or a page's.
     ("base64", "model/uri.rs html/mod.rs"),
+    // Numbers as bytes for the card, and waiting for it.
+    ("bytemuck", "raster/"),
     ("clap", "bin/"),
     ("embree3", "accel/embree.rs"),
     ("exr", "output/exr/mod.rs"),
@@ -56,13 +60,14 @@ const DOORS: &[(&str, &str)] = &[
     ("noise", "texture/noise.rs"),
     // Labels need bits that stay, drawn textures need 16 bits and words inside.
     ("png", "output/png.rs texture/draw/"),
+    ("pollster", "raster/gpu.rs"),
     // ONNX files.
     ("prost", "train/deploy/onnx/"),
     ("rand", "sampling/rng.rs"),
     ("rand_pcg", "sampling/rng.rs"),
     // Parallel at the top only.
     // Images, plants, and the soil's skin: loops over what is many.
-    ("rayon", "render/ dataset/ scene/build.rs soil/skin.rs material/ground.rs"),
+    ("rayon", "render/ dataset/ scene/build.rs soil/skin.rs material/ground.rs raster/sheets.rs"),
     // One reader for all pages; faults inside a value are found where they lie.
     ("ron", "page.rs sampling/fault.rs"),
     ("serde", "*"),
@@ -82,6 +87,8 @@ const DOORS: &[(&str, &str)] = &[
     ("tempfile", "output/mod.rs output/denoise.rs texture/draw/write.rs"),
     ("thiserror", "error.rs"),
     ("tobj", "model/obj.rs"),
+    // Graphics cards.
+    ("wgpu", "raster/"),
 ];
 
 /// Dependencies that no source names: libtorch's place is told to the build script of whoever depends on it directly.

@@ -5,7 +5,7 @@ use super::set::Set;
 use super::split::Shares;
 use super::{File, format, seal};
 use crate::scene::build::{self, Options};
-use crate::{Error, Result, accel};
+use crate::{Error, Result};
 use std::path::{Component, Path, PathBuf};
 
 /// What the user asks for.
@@ -29,6 +29,8 @@ pub struct Order {
     pub licence: String,
     /// What draws, by name.
     pub engine: String,
+    /// What the last bits may depend on: ray tracing kernels, a graphics card.
+    pub kernels: String,
     /// Samples a pixel.
     pub spp: u32,
     /// Whether the photographs are denoised.
@@ -73,7 +75,7 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
             without: order.without.clone(),
             max_depth: order.max_depth,
             clamp: order.clamp,
-            kernels: accel::version()?,
+            kernels: order.kernels.clone(),
         }),
         count: order.count,
         split: order.split,

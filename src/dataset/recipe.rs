@@ -57,7 +57,7 @@ pub struct Rendering {
     pub width: u32,
     /// Pixels down.
     pub height: u32,
-    /// What draws: `trace` for the path tracer.
+    /// What draws: `trace` for the path tracer, `raster` for the rasterized engine.
     pub engine: String,
     /// Samples a pixel.
     pub spp: u32,
@@ -69,7 +69,7 @@ pub struct Rendering {
     pub max_depth: Option<u32>,
     /// Most radiance of a path, where there is a limit.
     pub clamp: Option<f32>,
-    /// The ray tracing kernels and their instruction set.
+    /// The ray tracing kernels and their instruction set, or the graphics card and its driver.
     pub kernels: String,
 }
 

@@ -2,7 +2,7 @@
 
 use super::Varies;
 use super::shading::{bump, grained_frame};
-use super::swatch::{Swatch, Tone, centre};
+use super::swatch::{Grain, Swatch, Tone, centre};
 use crate::bsdf::{self, Bsdf, Side};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec2, Vec3};
@@ -127,7 +127,7 @@ impl LeafMaterial {
         let roughness = self.upper.coat().map_or(1.0, |coat| (coat.alpha[0] * coat.alpha[1]).sqrt());
         let Some(picture) = &self.picture else {
             let plain = self.optics.plain().reflectance.0.truncate();
-            return Swatch::plain(read(plain * self.tint), roughness);
+            return Swatch::plain(read(plain * self.tint), roughness).paler_below(self.back_paleness);
         };
         let color = |[r, g, b, _]: [f32; 4]| Vec3::new(r, g, b);
         let texel = move |x, y| read(color(picture.color.texel(x, y)));
@@ -141,6 +141,8 @@ impl LeafMaterial {
         Swatch::pictured(key, size, texel, tinted, roughness)
             .tinted(self.tint, passed(tinted) / passed(bare))
             .raised(slope, self.relief)
+            .grained(move |x, y| Grain { open: picture.maps.occlusion.sample(centre(size, x, y), 0.0), film: 0.0 })
+            .paler_below(self.back_paleness)
     }
 
     pub(super) fn varies(&self) -> Varies {

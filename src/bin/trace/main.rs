@@ -1,9 +1,11 @@
 //! `trace`: grows a field, path traces it, labels it, writes it.
 
 mod dataset;
+mod engine;
 mod export;
 mod field;
 mod quality;
+mod raster;
 mod render;
 mod technique;
 mod texture;
@@ -34,6 +36,7 @@ Examples:
   trace --scene scenes/field.ron --target-error 0.02    as many samples as 2 % noise needs, where it needs them
   trace --scene scenes/field.ron --time 30s             the best picture within half a minute
   trace --scene scenes/field.ron --crop 500,400,200,150 only a part of it, at full size
+  trace --scene scenes/field.ron --engine raster        the same field as a game engine draws it (feature `raster`)
   trace --scene scenes/field.ron --integrator ids       which part each pixel belongs to, in false colours
   trace --scene scenes/field.ron --pixel 648,483        what that pixel shows, in words
   trace dataset --scene scenes/field.ron --count 100 --out data   a hundred of them, labelled, resumable

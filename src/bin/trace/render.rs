@@ -1,7 +1,9 @@
 //! `trace`: grows a field, path traces it, labels it, writes it.
 
+use crate::engine::Engine;
 use crate::field::FieldArgs;
 use crate::quality::QualityArgs;
+use crate::raster::Card;
 use crate::technique::TechniqueArgs;
 use clap::ValueEnum;
 use furrow::accel::{self, EmbreeAccel};
@@ -9,13 +11,13 @@ use furrow::cli::signal::Signals;
 use furrow::film::Film;
 use furrow::geometry::Window;
 use furrow::integrator::{FalseColor, Integrator, World};
-use furrow::output::{self, Denoiser, Provenance};
+use furrow::output::{self, Denoiser, Provenance, Spp};
 use furrow::render::{self, Settings, Watch};
 use furrow::scene::Field;
-use furrow::{Result, cli};
+use furrow::{Error, Result, cli};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
@@ -32,6 +34,9 @@ pub(crate) struct Args {
     /// Threads; 0 for one on each core. The files do not depend on it.
     #[arg(long, default_value_t = 0, value_parser = threads)]
     threads: usize,
+    /// What draws.
+    #[arg(long, value_enum, default_value_t = Engine::Trace)]
+    engine: Engine,
     /// What to draw.
     #[arg(long, value_enum, default_value_t = Draw::Path)]
     integrator: Draw,
@@ -93,6 +98,10 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         }
     };
     args.field.check()?;
+    args.technique.check(args.engine)?;
+    if args.engine == Engine::Raster {
+        args.check_raster()?;
+    }
     if !matches!(args.integrator, Draw::Path) {
         args.technique.check_unused(args.denoise)?;
     }
@@ -102,6 +111,8 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     if args.pixel.is_none() {
         cli::check_folder(&out)?;
     }
+    // Likewise.
+    let card = (args.engine == Engine::Raster).then(|| Card::open(&args.technique)).transpose()?;
     let pool = render::pool(args.threads)?;
     let field: Field = pool.install(|| args.field.grow())?;
     for warning in &field.warnings {
@@ -115,6 +126,9 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         cli::check_pixel(pixel, width, height)?;
     }
     let built = begin.elapsed();
+    if let Some(card) = card {
+        return pool.install(|| rasterize(args, &field, window, &card, &out, begin));
+    }
     let geometry = pool.install(|| EmbreeAccel::build(&scene.surfaces(), pool.current_num_threads() as u32))?;
     say(format!(
         "{}: {} plants, {} parts, {:.2} M triangles; grown in {:.2} s, built in {:.2} s",
@@ -180,6 +194,62 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     ));
     for warning in args.quality.missed(&film, begin.elapsed()) {
         say(format!("warning: {warning}"));
+    }
+    Ok(paths)
+}
+
+impl Args {
+    /// Refuses what the rasterized engine cannot do.
+    fn check_raster(&self) -> Result<()> {
+        let useless = [
+            (!matches!(self.integrator, Draw::Path), "--integrator"),
+            (self.pixel.is_some(), "--pixel"),
+            (self.denoise, "--denoise"),
+            (self.quality.is_open(), "--time and --target-error"),
+        ];
+        match useless.into_iter().find(|(given, _)| *given) {
+            Some((_, flags)) => Err(Error::Scene(format!(
+                "{flags} say nothing with --engine raster, which has no rays and no noise\n help: use --engine trace, or leave them out"
+            ))),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Draws a field as a game engine does; returns the paths of the files.
+fn rasterize(
+    args: &Args,
+    field: &Field,
+    window: Window,
+    card: &Card,
+    out: &Path,
+    begin: Instant,
+) -> Result<Vec<PathBuf>> {
+    let built = begin.elapsed();
+    let (film, labels) = card.draw(&field.scene)?;
+    let drawn = begin.elapsed() - built;
+    let film = film.cut(window);
+    let provenance = Provenance {
+        scene_hash: field.hash.clone(),
+        seed: field.seed,
+        index: field.index,
+        spp: Spp::Uniform(1),
+        integrator: args.engine.name().into(),
+        deviations: args.technique.deviations(),
+        kernels: card.name().into(),
+    };
+    let paths = output::write_image(out, &film, &labels.cut(window), &field.photograph(&film), &provenance)?;
+    if !args.quiet {
+        eprintln!(
+            "{}: {} plants, {:.2} M triangles; drawn on {} in {:.2} s; {:.1} s in all; files in {}",
+            args.field.page().display(),
+            field.plants.len(),
+            field.scene.triangles() as f64 / 1e6,
+            card.name(),
+            drawn.as_secs_f64(),
+            begin.elapsed().as_secs_f64(),
+            out.display()
+        );
     }
     Ok(paths)
 }

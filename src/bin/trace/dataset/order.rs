@@ -1,14 +1,15 @@
 //! What dataset: `trace dataset plan`.
 
+use crate::engine::Engine;
 use crate::field::PageArgs;
+use crate::raster::Card;
 use crate::technique::TechniqueArgs;
-use clap::ValueEnum;
 use furrow::dataset::plan::{self, Order};
 use furrow::dataset::split::Shares;
 use furrow::dataset::{Set, format};
 use furrow::output::Denoiser;
 use furrow::sampling::Sampler;
-use furrow::{Result, cli, render};
+use furrow::{Error, Result, accel, cli, render};
 use std::path::PathBuf;
 
 /// What is made.
@@ -44,19 +45,6 @@ pub(crate) struct Args {
     technique: TechniqueArgs,
 }
 
-/// What draws.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum Engine {
-    /// The path tracer.
-    Trace,
-}
-
-impl Engine {
-    fn name(self) -> String {
-        self.to_possible_value().map(|v| v.get_name().to_owned()).unwrap_or_default()
-    }
-}
-
 /// The names of the formats, with what they are.
 pub(super) fn formats() -> clap::builder::PossibleValuesParser {
     let value = |(name, words): &(&'static str, &'static str)| clap::builder::PossibleValue::new(*name).help(*words);
@@ -68,6 +56,17 @@ pub(crate) fn run(args: &Args) -> Result<Set> {
     args.page.check()?;
     let out = args.out.clone().unwrap_or_default();
     cli::check_folder(&out)?;
+    args.technique.check(args.engine)?;
+    if args.denoise && args.engine == Engine::Raster {
+        return Err(Error::Dataset(
+            "--denoise says nothing with --engine raster, which has no noise\n help: leave it out".into(),
+        ));
+    }
+    // What may change the last bits.
+    let kernels = match args.engine {
+        Engine::Trace => accel::version()?,
+        Engine::Raster => Card::open(&args.technique)?.name().to_owned(),
+    };
     if args.denoise {
         // Before hours are spent on what could not be denoised then.
         Denoiser::find()?;
@@ -85,8 +84,10 @@ pub(crate) fn run(args: &Args) -> Result<Set> {
         formats,
         split: args.split,
         licence: args.licence.clone(),
-        engine: args.engine.name(),
-        spp: args.spp,
+        engine: args.engine.name().into(),
+        kernels,
+        // A card draws each pixel once.
+        spp: if args.engine == Engine::Raster { 1 } else { args.spp },
         denoise: args.denoise,
         without: args.technique.without(),
         max_depth,
