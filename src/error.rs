@@ -58,6 +58,9 @@ pub enum Error {
     /// A training that cannot be done as asked.
     #[error("{0}")]
     Training(String),
+    /// Pictures that cannot be compared as asked.
+    #[error("{0}")]
+    Compare(String),
     /// A dataset that is not whole or not what it says it is.
     #[error("{0}")]
     Damaged(String),
@@ -81,6 +84,7 @@ impl Error {
             | Self::Model { .. }
             | Self::Scene(_)
             | Self::Dataset(_)
+            | Self::Compare(_)
             | Self::Run { .. }
             | Self::Training(_) => 2,
             Self::Interrupted => 75,

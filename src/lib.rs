@@ -7,7 +7,7 @@
 //! | floor | rooms |
 //! |---|---|
 //! | 12 | [`train`] |
-//! | 11 | [`dataset`] |
+//! | 11 | [`dataset`], [`compare`] |
 //! | 10 | [`output`] |
 //! | 9 | [`render`] |
 //! | 8 | [`integrator`] |
@@ -24,6 +24,7 @@
 pub mod accel;
 pub mod bsdf;
 pub mod cli;
+pub mod compare;
 pub mod dataset;
 pub mod error;
 pub mod film;
