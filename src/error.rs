@@ -61,6 +61,9 @@ pub enum Error {
     /// A training that cannot be done as asked.
     #[error("{0}")]
     Training(String),
+    /// Pictures that cannot be compared as asked.
+    #[error("{0}")]
+    Compare(String),
     /// A dataset that is not whole or not what it says it is.
     #[error("{0}")]
     Damaged(String),
@@ -85,6 +88,7 @@ impl Error {
             | Self::Scene(_)
             | Self::Raster(_)
             | Self::Dataset(_)
+            | Self::Compare(_)
             | Self::Run { .. }
             | Self::Training(_) => 2,
             Self::Interrupted => 75,

@@ -7,8 +7,13 @@
 //! | floor | rooms |
 //! |---|---|
 //! | 12 | [`train`] |
+<<<<<<< HEAD
 //! | 11 | [`dataset`] |
 //! | 10 | [`output`], [`raster`] |
+=======
+//! | 11 | [`dataset`], [`compare`] |
+//! | 10 | [`output`] |
+>>>>>>> compare
 //! | 9 | [`render`] |
 //! | 8 | [`integrator`] |
 //! | 7 | [`scene`] |
@@ -24,6 +29,7 @@
 pub mod accel;
 pub mod bsdf;
 pub mod cli;
+pub mod compare;
 pub mod dataset;
 pub mod error;
 pub mod film;

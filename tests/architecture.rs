@@ -37,6 +37,8 @@ const NEVER: &[(&str, &str)] = &[
     ("dataset", "integrator bsdf"),
     // It reads what writers wrote, so it reads real images too.
     ("train", "scene render integrator accel film light material bsdf plant soil scatter"),
+    // It reads pictures, whatever program made them.
+    ("compare", "render integrator accel film light material bsdf plant soil scatter"),
     // `cli` is what the programs share.
     ("*", "cli bin"),
 ];
@@ -58,6 +60,9 @@ const DOORS: &[(&str, &str)] = &[
     ("image", "texture/ output/photo.rs"),
     ("indicatif", "bin/"),
     ("noise", "texture/noise.rs"),
+    // Measures of difference that others have written and checked.
+    ("nv_flip", "compare/flip.rs"),
+    ("palette", "compare/color.rs"),
     // Labels need bits that stay, drawn textures need 16 bits and words inside.
     ("png", "output/png.rs texture/draw/"),
     ("pollster", "raster/gpu.rs"),
@@ -67,12 +72,12 @@ const DOORS: &[(&str, &str)] = &[
     ("rand_pcg", "sampling/rng.rs"),
     // Parallel at the top only.
     // Images, plants, and the soil's skin: loops over what is many.
-    ("rayon", "render/ dataset/ scene/build.rs soil/skin.rs material/ground.rs raster/sheets.rs"),
+    ("rayon", "render/ dataset/ compare/ scene/build.rs soil/skin.rs material/ground.rs raster/sheets.rs"),
     // One reader for all pages; faults inside a value are found where they lie.
     ("ron", "page.rs sampling/fault.rs"),
     ("serde", "*"),
     // glTF documents, read and written; records and formats of datasets.
-    ("serde_json", "model/document.rs model/gltf.rs output/gltf/ dataset/ train/"),
+    ("serde_json", "model/document.rs model/gltf.rs output/gltf/ dataset/ compare/table.rs train/"),
     // Weights, as every trainer reads them.
     ("safetensors", "train/weights.rs"),
     ("sha2", "scene/library.rs dataset/ train/run.rs train/weights.rs"),

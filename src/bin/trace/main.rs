@@ -1,5 +1,6 @@
 //! `trace`: grows a field, path traces it, labels it, writes it.
 
+mod compare;
 mod dataset;
 mod engine;
 mod export;
@@ -41,6 +42,7 @@ Examples:
   trace --scene scenes/field.ron --pixel 648,483        what that pixel shows, in words
   trace dataset --scene scenes/field.ron --count 100 --out data   a hundred of them, labelled, resumable
   trace export --scene scenes/field.ron --format gltf   the same field for another program
+  trace compare out/field out/noisy                     how far one image is from another: PSNR, SSIM, FLIP, by class
   trace texture textures/leaf/sugar_beet.ron            draw a texture from its recipe
 
 Files of an image:
@@ -59,6 +61,8 @@ Exit codes: 0 done, 1 failed, 2 wrong input, 75 stopped cleanly (Ctrl-C, TERM, H
 
 #[derive(Subcommand)]
 enum Verb {
+    /// Measure how far pictures are from others of the same things, and show where.
+    Compare(compare::Args),
     /// Make many fields with all their labels, in the formats of other tools.
     Dataset(Box<dataset::Cli>),
     /// Write a field as a scene of another program.
@@ -71,6 +75,7 @@ fn main() -> ExitCode {
     let signals = signal::Signals::watch();
     let cli = Cli::parse();
     let done = match cli.verb {
+        Some(Verb::Compare(args)) => compare::run(&args),
         Some(Verb::Dataset(args)) => dataset::run(&args, &signals),
         Some(Verb::Export(args)) => export::run(&args),
         Some(Verb::Texture(args)) => texture::run(&args),

@@ -5,7 +5,7 @@ mod engine;
 mod finish;
 mod import;
 mod order;
-mod progress;
+pub(crate) mod progress;
 mod render;
 mod verify;
 
