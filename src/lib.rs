@@ -7,13 +7,8 @@
 //! | floor | rooms |
 //! |---|---|
 //! | 12 | [`train`] |
-<<<<<<< HEAD
-//! | 11 | [`dataset`] |
-//! | 10 | [`output`], [`raster`] |
-=======
 //! | 11 | [`dataset`], [`compare`] |
-//! | 10 | [`output`] |
->>>>>>> compare
+//! | 10 | [`output`], [`raster`] |
 //! | 9 | [`render`] |
 //! | 8 | [`integrator`] |
 //! | 7 | [`scene`] |
