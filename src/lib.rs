@@ -8,7 +8,7 @@
 //! |---|---|
 //! | 12 | [`train`] |
 //! | 11 | [`dataset`], [`compare`] |
-//! | 10 | [`output`], [`raster`] |
+//! | 10 | [`ablation`], [`output`], [`raster`] |
 //! | 9 | [`render`] |
 //! | 8 | [`integrator`] |
 //! | 7 | [`scene`] |
@@ -21,6 +21,7 @@
 //!
 //! `tests/architecture.rs` reads this table and holds the rooms to it.
 
+pub mod ablation;
 pub mod accel;
 pub mod bsdf;
 pub mod cli;

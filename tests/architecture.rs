@@ -33,6 +33,8 @@ const NEVER: &[(&str, &str)] = &[
     ("film", "scene sampling"),
     // The other way of drawing shares the scene, not the rays.
     ("raster", "integrator accel bsdf sampling output"),
+    // It says what is otherwise; who grows, draws and writes is theirs.
+    ("ablation", "integrator accel bsdf output dataset"),
     // It asks `render` for an image and a label map.
     ("dataset", "integrator bsdf"),
     // It reads what writers wrote, so it reads real images too.

@@ -4,7 +4,8 @@ use super::recipe::{FILE, Made, Recipe, Rendering};
 use super::set::Set;
 use super::split::Shares;
 use super::{File, format, seal};
-use crate::scene::build::{self, Options};
+use crate::ablation::{Drawing, Edit};
+use crate::scene::build::Options;
 use crate::{Error, Result};
 use std::path::{Component, Path, PathBuf};
 
@@ -27,18 +28,14 @@ pub struct Order {
     pub split: Shares,
     /// What others may do with them.
     pub licence: String,
-    /// What draws, by name.
-    pub engine: String,
+    /// How the images are drawn, before the edit.
+    pub drawing: Drawing,
     /// What the last bits may depend on: ray tracing kernels, a graphics card.
     pub kernels: String,
-    /// Samples a pixel.
-    pub spp: u32,
-    /// Whether the photographs are denoised.
-    pub denoise: bool,
+    /// What is changed; [`crate::ablation::FULL`] for nothing.
+    pub edit: &'static Edit,
     /// Techniques left out.
     pub without: Vec<String>,
-    /// Most surfaces on a path.
-    pub max_depth: Option<u32>,
     /// Most radiance of a path.
     pub clamp: Option<f32>,
 }
@@ -51,7 +48,7 @@ const MOST_SPECIES: usize = u8::MAX as usize;
 pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
     // Names are checked before anything is written.
     let options = Options { seed: order.seed, index: 0, width: order.width, height: order.height };
-    let field = build::field(&order.scene, &options)?;
+    let field = order.edit.field(&order.edit.open(&order.scene)?, &options)?;
     if field.species.len() > MOST_SPECIES {
         return Err(Error::Dataset(format!(
             "{}: {} species, more than the {MOST_SPECIES} that species.png numbers\n help: make two pages of it",
@@ -61,6 +58,7 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
     }
     let (files, scene) = gather(&field.files, &order.scene)?;
     let camera = &field.scene.camera;
+    let Drawing { engine, spp, denoise, max_depth } = order.edit.drawing(order.drawing.clone());
     let mut recipe = Recipe {
         furrow: env!("CARGO_PKG_VERSION").into(),
         made: Made::Rendered(Rendering {
@@ -69,13 +67,14 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
             seed: field.seed,
             width: camera.width(),
             height: camera.height(),
-            engine: order.engine.clone(),
-            spp: order.spp,
-            denoise: order.denoise,
+            engine,
+            spp,
+            denoise,
             without: order.without.clone(),
-            max_depth: order.max_depth,
+            max_depth,
             clamp: order.clamp,
             kernels: order.kernels.clone(),
+            edit: order.edit.label(),
         }),
         count: order.count,
         split: order.split,

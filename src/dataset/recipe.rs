@@ -4,6 +4,7 @@
 //! of a machine, no number of threads. So any shard on any machine that has the folder can go on with it.
 
 use super::split::Shares;
+use crate::ablation::{self, Edit};
 use crate::scene::record::SpeciesRecord;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -71,6 +72,16 @@ pub struct Rendering {
     pub clamp: Option<f32>,
     /// The ray tracing kernels and their instruction set, or the graphics card and its driver.
     pub kernels: String,
+    /// What was changed of the field, by its name among [`ablation::EDITS`]. What an edit of the drawing changes stands above as well.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub edit: Option<String>,
+}
+
+impl Rendering {
+    /// The edit; [`ablation::FULL`] where nothing was changed.
+    pub fn edit(&self) -> Result<&'static Edit> {
+        self.edit.as_deref().map_or(Ok(&ablation::FULL), Edit::named)
+    }
 }
 
 /// The recipe's file, below the dataset's folder.
@@ -129,10 +140,14 @@ impl Recipe {
     pub fn check_goes_on(&self, folder: &Path, other: &Self) -> Result<()> {
         let (before, now) = (fields(self)?, fields(other)?);
         let free = ["count", "formats", "licence"];
-        let differs: Vec<String> = now
-            .iter()
-            .filter(|(key, value)| !free.contains(&key.as_str()) && before.get(*key) != Some(value))
-            .map(|(key, value)| format!("{key} {} there, {value} here", before.get(key).unwrap_or(&"none".into())))
+        let keys: std::collections::BTreeSet<&String> = before.keys().chain(now.keys()).collect();
+        let value = |of: &std::collections::BTreeMap<String, String>, key: &String| {
+            of.get(key).cloned().unwrap_or_else(|| "none".into())
+        };
+        let differs: Vec<String> = keys
+            .into_iter()
+            .filter(|key| !free.contains(&key.as_str()) && before.get(*key) != now.get(*key))
+            .map(|key| format!("{key} {} there, {} here", value(&before, key), value(&now, key)))
             .collect();
         if differs.is_empty() && other.count >= self.count {
             return Ok(());

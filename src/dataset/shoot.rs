@@ -5,6 +5,7 @@ use super::recipe::Recipe;
 use super::record::{Exposure, Grown, Leaf, Plant, Record, Seen};
 use super::sample::{Rendered, Sample};
 use super::set::Set;
+use crate::ablation::Edit;
 use crate::accel::EmbreeAccel;
 use crate::film::Film;
 use crate::geometry::Window;
@@ -58,7 +59,8 @@ pub struct Shot {
 
 /// The page that a dataset is rendered from.
 pub fn source(set: &Set) -> Result<Source> {
-    Source::open(&set.folder.join(&set.recipe.rendering()?.scene))
+    let rendering = set.recipe.rendering()?;
+    rendering.edit()?.open(&set.folder.join(&rendering.scene))
 }
 
 /// Makes image `index` of a dataset from its [`source`]. Call it inside a pool.
@@ -68,7 +70,8 @@ pub fn shoot(set: &Set, source: &Source, index: u64, engine: &dyn Engine, watch:
     let begin = Instant::now();
     let options =
         Options { seed: Some(rendering.seed), index, width: Some(rendering.width), height: Some(rendering.height) };
-    let field = source.field(&options)?;
+    let edit = rendering.edit()?;
+    let field = edit.field(source, &options)?;
     if field.hash != rendering.scene_sha256 {
         return Err(Error::Dataset(format!(
             "{}: the page or something that it names was changed since the dataset was begun\n help: restore {}/scene/, or begin \
@@ -89,15 +92,16 @@ pub fn shoot(set: &Set, source: &Source, index: u64, engine: &dyn Engine, watch:
     let labels = drawn.labels.take().unwrap_or_else(|| render::label(&geometry, &scene.parts, &scene.camera, window));
     let provenance = engine.provenance(&field);
     let text = provenance.photograph_text(drawn.clean.is_some());
-    let sample = expose(recipe, &field, drawn, labels)?;
+    let sample = expose(recipe, edit, &field, drawn, labels)?;
     Ok(Shot { sample, text, times: Times { grow, draw, label: begin.elapsed() } })
 }
 
 /// The sample of a field that was drawn and labelled.
-fn expose(recipe: &Recipe, field: &Field, drawn: Drawn, labels: LabelMap) -> Result<Sample> {
+fn expose(recipe: &Recipe, edit: &Edit, field: &Field, drawn: Drawn, labels: LabelMap) -> Result<Sample> {
     let Drawn { film, clean, .. } = drawn;
-    let photograph = field.photograph(clean.as_ref().unwrap_or(&film));
+    let photograph = edit.photograph(field, clean.as_ref().unwrap_or(&film));
     let tags = field.scene.tags();
+    let labels = edit.labels(labels, &film, &tags);
     let kinds: BTreeMap<u16, u16> = field.plants.iter().map(|p| (p.number, p.kind)).collect();
     let kind = |plant: u16| kinds.get(&plant).copied().unwrap_or(0);
     let mut sample = Sample {

@@ -59,6 +59,16 @@ impl Lamp {
         Self { below: lamp.form_factor(Vec3::ZERO, Vec3::Z), ..lamp }
     }
 
+    /// The same power from an outline `by` times as large; `by` above 0.
+    #[must_use]
+    pub fn shrunk(&self, by: f32) -> Self {
+        let outline = match self.outline {
+            Outline::Rectangle(half) => Outline::Rectangle(half * by),
+            Outline::Disc(radius) => Outline::Disc(radius * by),
+        };
+        Self::new(outline, self.centre, self.frame, self.radiance / (by * by))
+    }
+
     /// Its outline.
     pub fn outline(&self) -> Outline {
         self.outline

@@ -31,6 +31,10 @@ pub struct Sun {
     /// Radiance of the disc's centre.
     centre: Spectrum,
     limb: Spectrum,
+    /// Sine of the disc's half angle.
+    sin: f32,
+    /// One minus its cosine.
+    one_minus_cos: f32,
 }
 
 impl Sun {
@@ -47,7 +51,15 @@ impl Sun {
     fn with_limb(towards: Vec3, normal_irradiance: Spectrum, limb: Spectrum) -> Self {
         let mean = Spectrum::ONE - limb * (1.0 / 3.0);
         let centre = normal_irradiance / (mean * (PI * SIN * SIN));
-        Self { frame: Frame::about(towards), normal_irradiance, centre, limb }
+        Self { frame: Frame::about(towards), normal_irradiance, centre, limb, sin: SIN, one_minus_cos: ONE_MINUS_COS }
+    }
+
+    /// The same irradiance from a disc whose half angle's sine is `by` times this one's; `by` above 0, at most 1.
+    #[must_use]
+    pub fn shrunk(self, by: f32) -> Self {
+        let sin = self.sin * by;
+        let one_minus_cos = sin * sin / (1.0 + (1.0 - sin * sin).sqrt());
+        Self { centre: self.centre / (by * by), sin, one_minus_cos, ..self }
     }
 
     /// Unit direction to the disc's centre.
@@ -64,7 +76,7 @@ impl Sun {
     /// digits where the cosine has none.
     #[inline]
     fn radius_sq(&self, dir: Vec3) -> Option<f32> {
-        let r2 = dir.cross(self.frame.z).length_squared() * (1.0 / (SIN * SIN));
+        let r2 = dir.cross(self.frame.z).length_squared() * (1.0 / (self.sin * self.sin));
         (r2 <= 1.0 && dir.dot(self.frame.z) > 0.0).then_some(r2)
     }
 
@@ -78,19 +90,19 @@ impl Sun {
 impl Emitter for Sun {
     #[inline]
     fn sample_li(&self, _p: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        let local = warp::uniform_cone(u, ONE_MINUS_COS);
-        let r2 = (local.x * local.x + local.y * local.y) * (1.0 / (SIN * SIN));
+        let local = warp::uniform_cone(u, self.one_minus_cos);
+        let r2 = (local.x * local.x + local.y * local.y) * (1.0 / (self.sin * self.sin));
         Some(LightSample {
             wi: self.frame.to_world(local),
             distance: f32::INFINITY,
             radiance: self.radiance(r2),
-            pdf: warp::uniform_cone_pdf(ONE_MINUS_COS),
+            pdf: warp::uniform_cone_pdf(self.one_minus_cos),
         })
     }
 
     #[inline]
     fn pdf_li(&self, _p: Vec3, wi: Vec3) -> f32 {
-        self.radius_sq(wi).map_or(0.0, |_| warp::uniform_cone_pdf(ONE_MINUS_COS))
+        self.radius_sq(wi).map_or(0.0, |_| warp::uniform_cone_pdf(self.one_minus_cos))
     }
 
     #[inline]
@@ -107,7 +119,7 @@ impl Emitter for Sun {
     fn importance(&self, _p: Vec3, n: Vec3, two_sided: bool) -> f32 {
         let cos = n.dot(self.frame.z);
         // The upper limb still lights a plane when the centre has set below it.
-        let cos = if two_sided { cos.abs() + SIN } else { (cos + SIN).max(0.0) };
+        let cos = if two_sided { cos.abs() + self.sin } else { (cos + self.sin).max(0.0) };
         self.normal_irradiance.mean() * cos
     }
 

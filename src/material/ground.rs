@@ -1,8 +1,8 @@
 //! The ground and its clods: the baked skin of the soil, made moist, in four bands.
 
-use super::Varies;
 use super::shading::frame;
 use super::swatch::{Grain, Swatch, Tone};
+use super::{Feature, Varies};
 use crate::bsdf::{Bsdf, OrenNayar, Wet};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec2, Vec3, vec2};
@@ -90,17 +90,27 @@ pub struct Ground {
     skin: Arc<GroundSkin>,
     tint: f32,
     relief: bool,
+    /// Slope angle of the facets, radians; `None` for Lambert's soil, which no film of water makes glossy.
+    facets: Option<f32>,
 }
 
 impl Ground {
     /// The ground: its fine relief tilts the shading normal.
     pub fn new(skin: Arc<GroundSkin>) -> Self {
-        Self { skin, tint: 1.0, relief: true }
+        Self { skin, tint: 1.0, relief: true, facets: Some(SIGMA) }
     }
 
     /// Clods of it, brighter by `tint`: they have relief of their own.
     pub fn clods(skin: Arc<GroundSkin>, tint: f32) -> Self {
-        Self { skin, tint, relief: false }
+        Self { skin, tint, relief: false, facets: Some(SIGMA) }
+    }
+
+    pub(super) fn leave_out(&mut self, feature: Feature) {
+        match feature {
+            Feature::Facets => self.facets = None,
+            Feature::Relief => self.relief = false,
+            Feature::Transmission | Feature::Coat | Feature::Picture => {}
+        }
     }
 
     pub(super) fn swatch(&self) -> Swatch<'_> {
@@ -143,10 +153,10 @@ impl Ground {
         } else {
             at.ns
         };
-        let bsdf = if film < DRY {
-            Bsdf::OrenNayar(OrenNayar::new(reflectance, SIGMA))
-        } else {
-            Bsdf::Wet(Wet::new(reflectance, SIGMA, film, FILM_ROUGHNESS))
+        let bsdf = match self.facets {
+            None => Bsdf::OrenNayar(OrenNayar::new(reflectance, 0.0)),
+            Some(sigma) if film < DRY => Bsdf::OrenNayar(OrenNayar::new(reflectance, sigma)),
+            Some(sigma) => Bsdf::Wet(Wet::new(reflectance, sigma, film, FILM_ROUGHNESS)),
         };
         (bsdf, frame(at, normal, wo))
     }

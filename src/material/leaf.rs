@@ -1,8 +1,8 @@
 //! Blades, petioles, stems: pigments and a picture → coat, reflection of either side, transmission.
 
-use super::Varies;
 use super::shading::{bump, grained_frame};
 use super::swatch::{Grain, Swatch, Tone, centre};
+use super::{Feature, Varies};
 use crate::bsdf::{self, Bsdf, Side};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec2, Vec3};
@@ -92,6 +92,10 @@ pub struct LeafMaterial {
     relief: f32,
     /// Colour of this specimen over the picture's, per visible band.
     tint: Vec3,
+    /// Whether light passes through.
+    transmits: bool,
+    /// Whether the picture gives the colour, not the pigments alone.
+    pictured: bool,
 }
 
 impl LeafMaterial {
@@ -109,6 +113,8 @@ impl LeafMaterial {
             back_paleness: desc.back_paleness.f32(),
             relief: desc.relief.f32(),
             tint: Vec3::ONE,
+            transmits: true,
+            pictured: true,
         }
     }
 
@@ -119,15 +125,30 @@ impl LeafMaterial {
         Self { tint: rgb(base * factor) / rgb(base), ..self.clone() }
     }
 
+    pub(super) fn leave_out(&mut self, feature: Feature) {
+        match feature {
+            Feature::Transmission => self.transmits = false,
+            Feature::Coat => (self.upper, self.lower) = (Side::bare(Spectrum::ZERO), Side::bare(Spectrum::ZERO)),
+            Feature::Relief => self.relief = 0.0,
+            Feature::Picture => self.pictured = false,
+            Feature::Facets => {}
+        }
+    }
+
+    /// The colour of the pigments alone.
+    fn plain(&self) -> Vec3 {
+        self.optics.plain().reflectance.0.truncate()
+    }
+
     pub(super) fn swatch(&self) -> Swatch<'_> {
         let read = |color: Vec3| {
             let leaf = self.optics.at(color.to_array());
-            Tone { reflectance: leaf.reflectance, transmittance: leaf.transmittance }
+            let transmittance = if self.transmits { leaf.transmittance } else { Spectrum::ZERO };
+            Tone { reflectance: leaf.reflectance, transmittance }
         };
         let roughness = self.upper.coat().map_or(1.0, |coat| (coat.alpha[0] * coat.alpha[1]).sqrt());
-        let Some(picture) = &self.picture else {
-            let plain = self.optics.plain().reflectance.0.truncate();
-            return Swatch::plain(read(plain * self.tint), roughness).paler_below(self.back_paleness);
+        let Some(picture) = self.picture.as_ref().filter(|_| self.pictured) else {
+            return Swatch::plain(read(self.plain() * self.tint), roughness).paler_below(self.back_paleness);
         };
         let color = |[r, g, b, _]: [f32; 4]| Vec3::new(r, g, b);
         let texel = move |x, y| read(color(picture.color.texel(x, y)));
@@ -155,17 +176,19 @@ impl LeafMaterial {
     pub(super) fn scatter(&self, at: &Interaction, wo: Vec3) -> (Bsdf, Frame) {
         let tangents = at.tangents();
         let (leaf, normal) = match &self.picture {
-            None => {
-                let [r, g, b, _] = self.optics.plain().reflectance.to_array();
-                (self.optics.at((Vec3::new(r, g, b) * self.tint).to_array()), at.ns)
-            }
+            None => (self.optics.at((self.plain() * self.tint).to_array()), at.ns),
             Some(picture) => {
                 // The footprint as an extent of the image, by the larger side of a texel on the surface.
                 let metres = tangents.1.length().max(1e-6);
                 let lod = picture.color.lod(at.footprint / metres);
-                let [r, g, b, _] = picture.color.sample(at.uv, lod);
+                let color = if self.pictured {
+                    let [r, g, b, _] = picture.color.sample(at.uv, lod);
+                    Vec3::new(r, g, b)
+                } else {
+                    self.plain()
+                };
                 let slope = picture.maps.normal.sample(at.uv, lod) * self.relief;
-                (self.optics.at((Vec3::new(r, g, b) * self.tint).to_array()), bump(at, tangents, slope))
+                (self.optics.at((color * self.tint).to_array()), bump(at, tangents, slope))
             }
         };
         let upper = leaf.reflectance;
@@ -174,7 +197,8 @@ impl LeafMaterial {
         let [r, g, b, nir] = upper.to_array();
         let paler = Spectrum::new(r * self.back_paleness, g * self.back_paleness, b * self.back_paleness, nir);
         let lower = Spectrum(paler.0.min(room.0));
-        let bsdf = bsdf::Leaf::new(self.upper.with(upper), self.lower.with(lower), leaf.transmittance);
+        let transmittance = if self.transmits { leaf.transmittance } else { Spectrum::ZERO };
+        let bsdf = bsdf::Leaf::new(self.upper.with(upper), self.lower.with(lower), transmittance);
         (Bsdf::Leaf(bsdf), grained_frame(at, normal, tangents.0, wo))
     }
 }

@@ -1,5 +1,6 @@
 //! What parts are made of: textures and optics at a point → its scattering and the frame it scatters in.
 
+mod feature;
 pub mod ground;
 pub mod leaf;
 mod painted;
@@ -11,6 +12,7 @@ use crate::bsdf::Bsdf;
 use crate::geometry::Interaction;
 use crate::math::{Frame, Vec3};
 
+pub use feature::Feature;
 pub use ground::{Ground, GroundSkin};
 pub use leaf::{LeafDesc, LeafMaterial, Picture};
 pub use painted::{Painted, Repaint};

@@ -5,9 +5,9 @@
 //! what is opaque returns as much as in red, as dry soil, stone and paint roughly do. Where the near infrared
 //! of something opaque is known, it is that of the picture's mean and follows the picture's red.
 
-use super::Varies;
 use super::shading::{bump, frame};
 use super::swatch::{Swatch, Tone, centre};
+use super::{Feature, Varies};
 use crate::bsdf::{self, Bsdf, OrenNayar, Side};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec2, Vec3};
@@ -109,6 +109,18 @@ impl Painted {
             Spectrum(passed.0.min((Spectrum::splat(0.99) - reflectance).0))
         });
         Tone { reflectance, transmittance }
+    }
+
+    pub(super) fn leave_out(&mut self, feature: Feature) {
+        match feature {
+            // A sheet still, so that nothing else of it changes.
+            Feature::Transmission => {
+                self.transmission = self.transmission.take().map(|s| Sheet { transmittance: Spectrum::ZERO, ..s });
+            }
+            Feature::Coat => self.coat = None,
+            Feature::Relief => self.relief = None,
+            Feature::Facets | Feature::Picture => {}
+        }
     }
 
     pub(super) fn swatch(&self) -> Swatch<'_> {

@@ -1,8 +1,8 @@
 //! Stone, wood, straw: one colour, rough, opaque.
 
-use super::Varies;
 use super::shading::frame;
 use super::swatch::{Swatch, Tone};
+use super::{Feature, Varies};
 use crate::bsdf::{Bsdf, OrenNayar};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec3};
@@ -34,6 +34,12 @@ impl Solid {
     #[must_use]
     pub fn with_grain(self, seed: u32, size: f32, depth: f32) -> Self {
         Self { grain: Some(Grain { noise: Perlin::new(seed), size, depth }), ..self }
+    }
+
+    pub(super) fn leave_out(&mut self, feature: Feature) {
+        if feature == Feature::Facets {
+            self.sigma = 0.0;
+        }
     }
 
     /// Without the grain.

@@ -103,6 +103,10 @@ pub struct LeafKind {
     /// How far the stalk of a full-sized leaf arches outward.
     #[serde(default = "vary::<Finite, 15>")]
     pub stalk_bend_deg: Vary<Finite>,
+    /// Whether its blades are flat sheets from base to tip: no fold, curl, wave, blister, twist or bend. Pages do not say so,
+    /// experiments do.
+    #[serde(skip)]
+    pub flat: bool,
 }
 
 fn blade() -> OrganKind {

@@ -48,6 +48,9 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
     let mut skeleton = Skeleton::new(&measures(leaf));
     let root = stand(leaf, seat, &mut stream);
     pose(&mut skeleton, leaf, root, &mut stream);
+    if leaf.kind.flat {
+        skeleton.straighten();
+    }
     let motions = skeleton.motions(root);
     let mut stream = leaf.stream.child(crate::sampling::Purpose::Leaf, 101);
     let relief = relief(leaf, &mut stream);
@@ -61,7 +64,11 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
         Shape::Pinnate { pairs, lobes, segment_mm } => {
             let counts = (pairs.draw(&mut stream) as usize, lobes.draw(&mut stream) as usize);
             let segment = segment_mm.draw32(&mut stream) * 1e-3;
-            dissected::blade(counts, segment, leaf.width, &skeleton, &mut stream)
+            let mut rest = dissected::blade(counts, segment, leaf.width, &skeleton, &mut stream);
+            if leaf.kind.flat {
+                rest.positions.iter_mut().for_each(|p| p.z = 0.0);
+            }
+            rest
         }
     };
     let skin = if leaf.kind.skin.is_empty() { leaf.kind_name } else { &leaf.kind.skin };
@@ -173,7 +180,7 @@ fn pose(skeleton: &mut Skeleton, leaf: &LeafNow<'_>, root: Pose, stream: &mut St
 fn relief(leaf: &LeafNow<'_>, stream: &mut Stream) -> Relief {
     let kind = leaf.kind;
     let angle = kind.vein_angle_deg.f32().to_radians();
-    Relief {
+    let relief = Relief {
         fold: leaf.fold,
         fold_tip: 0.6 * leaf.fold,
         curl: kind.curl_deg.draw32(stream).to_radians(),
@@ -186,7 +193,10 @@ fn relief(leaf: &LeafNow<'_>, stream: &mut Stream) -> Relief {
         sway: kind.sway.draw32(stream),
         twist: kind.twist_deg.draw32(stream).to_radians(),
         seed: stream.seed32(),
-    }
+    };
+    // What lies in the blade's plane stays.
+    let Relief { asymmetry, sway, seed, .. } = relief;
+    if kind.flat { Relief { asymmetry, sway, seed, ..Relief::default() } } else { relief }
 }
 
 /// The stalk in the flat leaf's coordinates, and the midrib that it becomes under the blade.

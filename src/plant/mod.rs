@@ -280,6 +280,11 @@ impl Plant {
     }
 }
 
+/// By how much a plant of this stream is turned about its axis, radians clockwise from above: its leaves' azimuths count from there.
+pub fn turn(stream: &Stream) -> f32 {
+    stage::turn(stream)
+}
+
 /// Grows one plant.
 pub fn grow(desc: &PlantDesc, stage: Stage, stream: &Stream) -> Plant {
     let Some(growth) = stage::growth(desc, stage, stream) else {

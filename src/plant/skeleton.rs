@@ -215,6 +215,21 @@ impl Skeleton {
         }
     }
 
+    /// Lays the blade straight along its chord, from where its base is towards where its tip is now, with flat sides. The stalk keeps
+    /// its posture.
+    pub fn straighten(&mut self) {
+        let (mut turned, mut forward, mut up) = (0.0_f32, 0.0, 0.0);
+        for k in self.base..self.along.len() - 1 {
+            turned += self.joints[k].bend;
+            forward += self.joints[k + 1].a * turned.cos();
+            up += self.joints[k + 1].a * turned.sin();
+        }
+        for joint in &mut self.joints[self.base..] {
+            joint.bend = 0.0;
+        }
+        self.joints[self.base].bend = up.atan2(forward);
+    }
+
     fn solve(&self, root: Pose, bent: bool) -> Vec<Pose> {
         let mut poses: Vec<Pose> = Vec::with_capacity(self.joints.len());
         for joint in &self.joints {
@@ -373,6 +388,28 @@ mod tests {
         let side = motions[skeleton.branch(0, false, 2)].point(vec3(-0.02, 0.02, 0.0));
         let middle = motions[skeleton.base()].point(vec3(0.0, 0.02, 0.0));
         assert!(middle.z > 0.003 && side.z > middle.z, "{middle} {side}");
+    }
+
+    #[test]
+    fn a_straightened_blade_is_flat_and_points_where_its_tip_was() {
+        let mut skeleton = Skeleton::new(&beet());
+        for (i, joint) in skeleton.joints.iter_mut().enumerate() {
+            joint.bend = -0.2 + 0.1 * (i as f32 * 1.7).sin();
+        }
+        let tip = skeleton.along().len() - 1;
+        let ends = |s: &Skeleton| [s.base(), tip].map(|k| s.forward(Pose::leaf(-0.04))[k].origin);
+        let [base, was] = ends(&skeleton);
+        skeleton.straighten();
+        let [same, is] = ends(&skeleton);
+        assert!((same - base).length() < 1e-7, "the stalk moved");
+        assert!((is - base).normalize().dot((was - base).normalize()) > 0.99999);
+        assert!(((is - base).length() - 0.08).abs() < 1e-6);
+        let motions = skeleton.motions(Pose::leaf(-0.04));
+        let normal = skeleton.forward(Pose::leaf(-0.04))[skeleton.base()].rotation.col(1);
+        for (motion, joint) in motions.iter().zip(&skeleton.joints).skip(skeleton.base()) {
+            let at = motion.point(vec3(0.01, 0.05, 0.0));
+            assert!((at - base).dot(normal).abs() < 1e-6, "{:?}", joint.name);
+        }
     }
 
     #[test]

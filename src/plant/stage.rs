@@ -166,6 +166,11 @@ impl<'a> Between<'a> {
     }
 }
 
+/// Azimuth from which the leaves of the plant of `stream` count, radians clockwise from north.
+pub(super) fn turn(stream: &Stream) -> f32 {
+    stream.child(Purpose::Plant, 0).child(Purpose::Plant, 1).range32(0.0, 2.0 * PI)
+}
+
 /// What the plant of `stream` looks like at `stage`; `None` without stages.
 pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream) -> Option<Growth<'a>> {
     const MM: f32 = 1e-3;
@@ -174,7 +179,7 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream) 
     let whole = (Some(from), to);
     let own = stream.child(Purpose::Plant, 0);
     let vigour = desc.vigour.draw32(&mut own.child(Purpose::Plant, 0));
-    let spin = own.child(Purpose::Plant, 1).range32(0.0, 2.0 * PI);
+    let spin = turn(stream);
     let hypocotyl = between.draw(whole, None, &own, 2, |s| &s.hypocotyl_mm) * MM;
     let stem = between.draw(whole, None, &own, 3, |s| &s.stem_mm) * MM;
     let tillers = between.draw(whole, None, &own, 4, |s| &s.tillers).round() as usize;

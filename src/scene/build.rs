@@ -1,5 +1,6 @@
 //! Page + seed + index → one field.
 
+mod growing;
 mod known;
 mod models;
 mod season;
@@ -24,6 +25,8 @@ use crate::sensor::Linear;
 use crate::sensor::{Photograph, SensorDesc};
 use crate::soil::{self, Debris, Ground, Pile, Rect, SeedRows, Site, SoilDesc, SoilRecord};
 use crate::{Error, Result};
+pub use growing::Growing;
+use growing::Individual;
 use rayon::prelude::*;
 pub use season::Season;
 use std::path::{Path, PathBuf};
@@ -141,6 +144,16 @@ impl Source {
         Ok(Self { page, desc, library: Mutex::new(library) })
     }
 
+    /// The same page with its fields grown otherwise.
+    #[must_use]
+    pub fn growing(mut self, growing: Growing) -> Self {
+        if let Some(change) = growing.page {
+            change(&mut self.desc);
+        }
+        self.library.get_mut().unwrap_or_else(PoisonError::into_inner).growing = growing;
+        self
+    }
+
     /// Builds field `options.index`. Call it inside a pool.
     pub fn field(&self, options: &Options) -> Result<Field> {
         let held = || self.library.lock().unwrap_or_else(PoisonError::into_inner);
@@ -162,6 +175,8 @@ struct Seedling {
     turn: f32,
     only_leaf: Option<u16>,
     stream: Stream,
+    /// Whose shape and age it has, where all of its species are alike.
+    individual: Option<Individual>,
 }
 
 /// The ground while it is being covered.
@@ -170,6 +185,21 @@ struct Earth {
     maps: Vec<Arc<Layer>>,
     pile: Pile,
     stones: Vec<Debris>,
+}
+
+/// What plants and models stand on.
+#[derive(Clone, Copy)]
+struct Floor<'a> {
+    ground: &'a Ground,
+    /// Whether the ground is the plane z = 0; what grows leans on it as it does on the ground with its heights.
+    flat: bool,
+}
+
+impl Floor<'_> {
+    /// Height at a place, metres.
+    fn height(&self, x: f32, y: f32) -> f32 {
+        if self.flat { 0.0 } else { self.ground.height(x, y) }
+    }
 }
 
 struct Builder<'a> {
@@ -283,6 +313,7 @@ impl<'a> Builder<'a> {
             }
             Some(soil) => {
                 let Earth { ground, maps, mut pile, mut stones } = self.break_ground(soil, view)?;
+                let floor = Floor { ground: &ground, flat: soil.flat };
                 known = Some(self.soil_record(soil, &ground));
                 let texel = (0.9 * self.ground_pixel()).clamp(2e-4, 2e-3);
                 // The skin takes as long as everything else, and neither needs the other.
@@ -292,11 +323,11 @@ impl<'a> Builder<'a> {
                         let taken: Vec<Disc> = stones.iter().map(|s| (s.centre.truncate(), s.radius)).collect();
                         let seedlings = self.seedlings(sown, &taken)?;
                         let clods = self.cover(soil, &ground, &mut pile, &seedlings, &mut stones);
-                        Ok::<_, Error>((clods, self.populate(&seedlings, Some(&ground), shown)?))
+                        Ok::<_, Error>((clods, self.populate(&seedlings, Some(floor), shown)?))
                     },
                 );
                 let (clods, plants) = rest?;
-                self.lay(&ground, clods, stones, &Arc::new(skin));
+                self.lay(floor, clods, stones, &Arc::new(skin));
                 plants
             }
         };
@@ -367,14 +398,21 @@ impl<'a> Builder<'a> {
         let stems: Vec<(Vec2, f32)> = seedlings.iter().map(|s| (s.position, STEM_ROOM)).collect();
         let clods = soil::clods(ground, pile, &stems);
         debris.extend(soil::litter(&desc.litter, ground, pile, &self.stream(Purpose::Debris, LITTER)));
-        clods
+        if !desc.flat {
+            return clods;
+        }
+        for thing in debris {
+            thing.lower(ground);
+        }
+        Vec::new()
     }
 
     /// Makes parts of everything of the ground; they come before those of the plants.
-    fn lay(&mut self, ground: &Ground, clods: Vec<(f32, Mesh)>, debris: Vec<Debris>, skin: &Arc<GroundSkin>) {
+    fn lay(&mut self, floor: Floor<'_>, clods: Vec<(f32, Mesh)>, debris: Vec<Debris>, skin: &Arc<GroundSkin>) {
         let plants = std::mem::take(&mut self.scene.parts);
         let material = self.material(Material::Ground(GroundMaterial::new(skin.clone())));
-        self.part(ground.mesh(), material);
+        let mesh = if floor.flat { floor.ground.levelled().mesh() } else { floor.ground.mesh() };
+        self.part(mesh, material);
         for (tint, mesh) in clods {
             let material = self.material(Material::Ground(GroundMaterial::clods(skin.clone(), tint)));
             self.part(mesh, material);
@@ -392,11 +430,11 @@ impl<'a> Builder<'a> {
     fn populate(
         &mut self,
         seedlings: &[Seedling],
-        ground: Option<&Ground>,
+        floor: Option<Floor<'_>>,
         shown: Option<Rect>,
     ) -> Result<Vec<PlantRecord>> {
-        let mut plants = self.plant(seedlings, ground, shown)?;
-        plants.extend(self.models(seedlings.len(), ground)?);
+        let mut plants = self.plant(seedlings, floor, shown)?;
+        plants.extend(self.models(seedlings.len(), floor)?);
         Ok(plants)
     }
 
@@ -426,13 +464,14 @@ impl<'a> Builder<'a> {
             let mut stream = self.stream(Purpose::Scatter, 2000 + k as u64);
             let position = vec2(placed.position_m.0.draw32(&mut stream), placed.position_m.1.draw32(&mut stream));
             all.push(Seedling {
-                species,
+                species: species.clone(),
                 growth: placed.growth.clone(),
                 season: self.season.place(),
                 position,
                 turn: placed.turn_deg.draw32(&mut stream).to_radians(),
                 only_leaf: placed.only_leaf.map(|l| l.get() as u16),
                 stream: stream.child(Purpose::Plant, 0),
+                individual: self.individual(&species.desc),
             });
         }
         self.check_number(0.0, all.len(), ["plants", ""], 0)?;
@@ -463,6 +502,7 @@ impl<'a> Builder<'a> {
             turn: 0.0,
             only_leaf: None,
             stream: self.stream(Purpose::Plant, population).child(Purpose::Plant, spot.key),
+            individual: self.individual(&species.desc),
         }
     }
 
@@ -470,11 +510,11 @@ impl<'a> Builder<'a> {
     fn plant(
         &mut self,
         seedlings: &[Seedling],
-        ground: Option<&Ground>,
+        floor: Option<Floor<'_>>,
         view: Option<Rect>,
     ) -> Result<Vec<PlantRecord>> {
         let grown: Vec<(PlantRecord, Vec<Grown>)> =
-            seedlings.par_iter().enumerate().map(|(i, s)| grow(s, i as u16 + 1, ground)).collect();
+            seedlings.par_iter().enumerate().map(|(i, s)| grow(s, i as u16 + 1, floor)).collect();
         let mut records = Vec::with_capacity(grown.len());
         for (record, organs) in grown {
             // Grown to know its size, dropped where neither it nor its shadow reaches the view.
@@ -520,15 +560,19 @@ struct Grown {
 }
 
 /// Grows one plant, in its own stream, and stands it on the ground.
-fn grow(s: &Seedling, number: u16, ground: Option<&Ground>) -> (PlantRecord, Vec<Grown>) {
+fn grow(s: &Seedling, number: u16, floor: Option<Floor<'_>>) -> (PlantRecord, Vec<Grown>) {
     let desc: &SpeciesDesc = &s.species.desc;
     let mut stream = s.stream.clone();
     let stage = s.growth.draw(s.season, &mut stream);
     let green = (1.0 + desc.chlorophyll_sd.get() * stream.normal()).clamp(0.6, 1.5) as f32;
     let (x, y) = (s.position.x, s.position.y);
-    let (z, normal) = ground.map_or((0.0, Vec3::Z), |g| (g.height(x, y), g.trend(x, y, STANCE)));
+    let (z, normal) = floor.map_or((0.0, Vec3::Z), |f| (f.height(x, y), f.ground.trend(x, y, STANCE)));
     let axis = scatter::axis(normal, AXIS_NOISE_DEG, &mut stream);
-    let plant = plant::grow(&desc.plant, stage, &stream);
+    let plant = match &s.individual {
+        Some(individual) => individual.plant(desc, &s.growth, s.season, &stream),
+        None => plant::grow(&desc.plant, stage, &stream),
+    };
+    let shape = s.individual.as_ref().map_or(&stream, Individual::shape);
     let foot = Vec3::new(x, y, z);
     // Plant coordinates: y to the north before the turn, z along the axis. Growing has given it a turn of its own.
     let ahead = Vec3::new(s.turn.sin(), s.turn.cos(), 0.0);
@@ -545,7 +589,7 @@ fn grow(s: &Seedling, number: u16, ground: Option<&Ground>) -> (PlantRecord, Vec
         let mut mesh = organ.mesh;
         mesh.transform(rotation, foot);
         let choices = &s.species.skins[&organ.skin];
-        let choice = stream.child(Purpose::Leaf, 1 << 20 | u64::from(organ.leaf)).index(choices.len());
+        let choice = shape.child(Purpose::Leaf, 1 << 20 | u64::from(organ.leaf)).index(choices.len());
         let (material, mask) = &choices[choice];
         let base = desc.skins[&organ.skin].pigments.chlorophyll.f32();
         let cut = matches!(organ.kind, OrganKind::Blade | OrganKind::Cotyledon);

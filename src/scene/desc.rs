@@ -216,6 +216,10 @@ pub struct SpeciesDesc {
     /// Relative spread of the chlorophyll from plant to plant.
     #[serde(default = "spread")]
     pub chlorophyll_sd: Num<Fraction>,
+    /// Whether all its plants are one individual: of one shape in all fields, of one age in each, so that a field has one mesh of it
+    /// many times. Place, lean, turn and green stay each plant's own. Pages do not say so, experiments do.
+    #[serde(skip)]
+    pub alike: bool,
 }
 
 const fn spread() -> Num<Fraction> {

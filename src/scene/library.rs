@@ -1,5 +1,6 @@
 //! Everything that pages name, read once: species, pictures, soil layers.
 
+use super::build::Growing;
 use super::desc::SpeciesDesc;
 use crate::geometry::AlphaMask;
 use crate::material::{LeafMaterial, Picture};
@@ -38,6 +39,8 @@ pub(super) struct Library {
     species: BTreeMap<PathBuf, Arc<Species>>,
     models: BTreeMap<(PathBuf, bool), Arc<Model>>,
     layers: BTreeMap<(PathBuf, PathBuf), Arc<Layer>>,
+    /// How species grow otherwise than their pages say.
+    pub(super) growing: Growing,
 }
 
 impl Library {
@@ -73,7 +76,7 @@ impl Library {
             return Ok(known.clone());
         }
         let own = self.page(&full)?;
-        let desc: SpeciesDesc = own.parse()?;
+        let mut desc: SpeciesDesc = own.parse()?;
         for key in desc.plant.skins() {
             if !desc.skins.contains_key(&key) {
                 let known: Vec<&str> = desc.skins.keys().map(String::as_str).collect();
@@ -104,6 +107,9 @@ impl Library {
                 }
             };
             skins.insert(name.clone(), choices);
+        }
+        if let Some(change) = self.growing.species {
+            change(&mut desc);
         }
         let species = Arc::new(Species { desc, skins });
         self.species.insert(full, species.clone());

@@ -51,6 +51,10 @@ pub struct SoilDesc {
     /// Straw, sticks and bits of dead plants.
     #[serde(default)]
     pub litter: LitterDesc,
+    /// Whether the ground is a plane without clods, under the same texture: everything else lies and stands where it would, as it would,
+    /// only lower or higher. Pages do not say so, experiments do.
+    #[serde(skip)]
+    pub flat: bool,
 }
 
 /// One layer of soil.

@@ -231,6 +231,13 @@ impl Ground {
         slopes
     }
 
+    /// The same ground without any height: moisture, colours and texture stay.
+    #[must_use]
+    pub fn levelled(&self) -> Self {
+        let n = self.heights.len();
+        Self { heights: vec![0.0; n], slopes: vec![Vec2::ZERO; n], ..self.clone() }
+    }
+
     /// Height of the ground, metres: exactly the mesh's. Beyond the margin the edge goes on.
     pub fn height(&self, x: f32, y: f32) -> f32 {
         self.grid.value(&self.heights, vec2(x, y))

@@ -174,6 +174,16 @@ pub struct Debris {
     pub radius: f32,
 }
 
+impl Debris {
+    /// Lowers it from where it lies on `ground` onto the plane z = 0; what lay on a clod comes down all the way.
+    pub fn lower(&mut self, ground: &Ground) {
+        let lowest = self.mesh.positions.iter().map(|p| p.z).fold(f32::INFINITY, f32::min);
+        let by = ground.height(self.centre.x, self.centre.y).max(lowest);
+        self.mesh.positions.iter_mut().for_each(|p| p.z -= by);
+        self.centre.z -= by;
+    }
+}
+
 /// The stream of cell (i, j): the same wherever the area begins.
 fn cell_stream(stream: &Stream, i: i32, j: i32) -> Stream {
     stream.child(Purpose::Debris, (u64::from(i as u32) << 32) | u64::from(j as u32))

@@ -51,7 +51,7 @@ pub fn tree(folder: &Path) -> BTreeMap<String, Vec<u8>> {
             let at: PathBuf = entry.expect("an entry").path();
             let name = at.strip_prefix(folder).expect("below").to_str().expect("UTF-8").replace('\\', "/");
             if at.is_dir() {
-                if name != "ledger" {
+                if !name.ends_with("ledger") {
                     todo.push(at);
                 }
             } else {

@@ -12,6 +12,11 @@ pub(crate) enum Engine {
 }
 
 impl Engine {
+    /// The engine of this name; the path tracer for any other.
+    pub(crate) fn named(name: &str) -> Self {
+        if name == Self::Raster.name() { Self::Raster } else { Self::Trace }
+    }
+
     /// Its name in flags and files.
     pub(crate) fn name(self) -> &'static str {
         match self {

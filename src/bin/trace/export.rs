@@ -2,6 +2,7 @@
 
 use crate::field::FieldArgs;
 use clap::ValueEnum;
+use furrow::ablation::FULL;
 use furrow::output::{self, Export};
 use furrow::scene::Field;
 use furrow::{Result, cli, render};
@@ -52,7 +53,7 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     cli::check_folder(&out)?;
     let pool = render::pool(0)?;
     let (field, export) = pool.install(|| {
-        let field = args.field.grow()?;
+        let field = args.field.grow(&FULL)?;
         let export = args.format.write(&out, &field)?;
         Ok::<_, furrow::Error>((field, export))
     })?;

@@ -1,6 +1,8 @@
 //! Which field: the flags that every verb with a scene shares.
 
-use furrow::scene::{Field, build};
+use furrow::ablation::Edit;
+use furrow::scene::Field;
+use furrow::scene::build::Options;
 use furrow::{Result, cli};
 use std::path::{Path, PathBuf};
 
@@ -54,10 +56,10 @@ impl FieldArgs {
         self.page.check()
     }
 
-    /// Grows the field. Call it inside a pool.
-    pub(crate) fn grow(&self) -> Result<Field> {
+    /// Grows the field as an edit has it. Call it inside a pool.
+    pub(crate) fn grow(&self, edit: &Edit) -> Result<Field> {
         let PageArgs { seed, width, height, .. } = self.page;
-        build::field(self.page(), &build::Options { seed, index: self.index, width, height })
+        edit.field(&edit.open(self.page())?, &Options { seed, index: self.index, width, height })
     }
 
     /// `out/<name of the page>`.

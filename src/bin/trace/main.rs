@@ -1,5 +1,6 @@
 //! `trace`: grows a field, path traces it, labels it, writes it.
 
+mod ablate;
 mod compare;
 mod dataset;
 mod engine;
@@ -41,6 +42,7 @@ Examples:
   trace --scene scenes/field.ron --integrator ids       which part each pixel belongs to, in false colours
   trace --scene scenes/field.ron --pixel 648,483        what that pixel shows, in words
   trace dataset --scene scenes/field.ron --count 100 --out data   a hundred of them, labelled, resumable
+  trace ablate --scene scenes/field.ron --count 100 --out ab      the same hundred with one thing changed at a time
   trace export --scene scenes/field.ron --format gltf   the same field for another program
   trace compare out/field out/noisy                     how far one image is from another: PSNR, SSIM, FLIP, by class
   trace texture textures/leaf/sugar_beet.ron            draw a texture from its recipe
@@ -65,6 +67,8 @@ enum Verb {
     Compare(compare::Args),
     /// Make many fields with all their labels, in the formats of other tools.
     Dataset(Box<dataset::Cli>),
+    /// Make a dataset, and the same again with one thing changed at a time: what does each matter to a network?
+    Ablate(Box<ablate::Args>),
     /// Write a field as a scene of another program.
     Export(export::Args),
     /// Draw textures from their recipes; images are written beside them.
@@ -77,6 +81,7 @@ fn main() -> ExitCode {
     let done = match cli.verb {
         Some(Verb::Compare(args)) => compare::run(&args),
         Some(Verb::Dataset(args)) => dataset::run(&args, &signals),
+        Some(Verb::Ablate(args)) => ablate::run(&args, &signals),
         Some(Verb::Export(args)) => export::run(&args),
         Some(Verb::Texture(args)) => texture::run(&args),
         None => render::run(&cli.render, &signals),

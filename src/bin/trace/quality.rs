@@ -16,7 +16,7 @@ const WRITING: f64 = 5e-6;
 const DENOISING: f64 = 10e-6;
 
 /// When there are samples enough.
-#[derive(clap::Args)]
+#[derive(clap::Args, Clone)]
 #[command(group = clap::ArgGroup::new("enough").multiple(true))]
 pub(crate) struct QualityArgs {
     /// Samples a pixel.
@@ -52,6 +52,11 @@ fn time(text: &str) -> Result<Duration, String> {
 }
 
 impl QualityArgs {
+    /// The same with another number of samples a pixel, where their number is given.
+    pub(crate) fn with_spp(&self, spp: u32) -> Self {
+        Self { spp, ..self.clone() }
+    }
+
     /// Most samples a pixel.
     pub(crate) fn most(&self) -> u32 {
         if self.is_open() { self.max_spp } else { self.spp }

@@ -6,6 +6,7 @@ use crate::quality::QualityArgs;
 use crate::raster::Card;
 use crate::technique::TechniqueArgs;
 use clap::ValueEnum;
+use furrow::ablation::{Drawing, Edit, FULL};
 use furrow::accel::{self, EmbreeAccel};
 use furrow::cli::signal::Signals;
 use furrow::film::Film;
@@ -42,6 +43,9 @@ pub(crate) struct Args {
     integrator: Draw,
     #[command(flatten)]
     technique: TechniqueArgs,
+    /// Change one thing of the field, by its name; `trace ablate --list` tells them.
+    #[arg(long, value_name = "NAME", conflicts_with = "enough")]
+    edit: Option<String>,
     /// Also write the picture without its noise, beside the noisy one; needs Open Image Denoise, for `--integrator path`.
     #[arg(long)]
     denoise: bool,
@@ -98,23 +102,32 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         }
     };
     args.field.check()?;
-    args.technique.check(args.engine)?;
-    if args.engine == Engine::Raster {
+    let edit = args.edit.as_deref().map_or(Ok(&FULL), Edit::named)?;
+    let drawing = edit.drawing(Drawing {
+        engine: args.engine.name().into(),
+        spp: args.quality.most(),
+        denoise: args.denoise,
+        max_depth: args.technique.limits().0,
+    });
+    let engine = Engine::named(&drawing.engine);
+    let (quality, technique) = (args.quality.with_spp(drawing.spp), args.technique.with_max_depth(drawing.max_depth));
+    technique.check(engine)?;
+    if engine == Engine::Raster {
         args.check_raster()?;
     }
     if !matches!(args.integrator, Draw::Path) {
-        args.technique.check_unused(args.denoise)?;
+        technique.check_unused(drawing.denoise)?;
     }
     // Before hours are spent on what could not be denoised then.
-    let denoiser = args.denoise.then(Denoiser::find).transpose()?;
+    let denoiser = drawing.denoise.then(Denoiser::find).transpose()?;
     let out = args.out.clone().unwrap_or_else(|| args.field.default_folder());
     if args.pixel.is_none() {
         cli::check_folder(&out)?;
     }
     // Likewise.
-    let card = (args.engine == Engine::Raster).then(|| Card::open(&args.technique)).transpose()?;
+    let card = (engine == Engine::Raster).then(|| Card::open(&technique)).transpose()?;
     let pool = render::pool(args.threads)?;
-    let field: Field = pool.install(|| args.field.grow())?;
+    let field: Field = pool.install(|| args.field.grow(edit))?;
     for warning in &field.warnings {
         say(format!("warning: {warning}"));
     }
@@ -127,7 +140,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     }
     let built = begin.elapsed();
     if let Some(card) = card {
-        return pool.install(|| rasterize(args, &field, window, &card, &out, begin));
+        return pool.install(|| rasterize(args, edit, &field, window, &card, &out, begin));
     }
     let geometry = pool.install(|| EmbreeAccel::build(&scene.surfaces(), pool.current_num_threads() as u32))?;
     say(format!(
@@ -141,44 +154,45 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     ));
 
     let world = World { scene, geometry: &geometry };
-    let integrator = args.integrator.integrator(&args.technique);
-    let settings =
-        Settings { spp: args.quality.most(), seed: field.sample_seed(), window, points: args.technique.points() };
+    let integrator = args.integrator.integrator(&technique);
+    let settings = Settings { spp: quality.most(), seed: field.sample_seed(), window, points: technique.points() };
     if let Some((x, y)) = args.pixel {
         let words = pool.install(|| render::explain(&world, &field.plants, integrator.as_ref(), &settings, x, y));
+        let told = edit.label().map(|name| format!("\n  edit: {name}, {}", edit.about)).unwrap_or_default();
         // The words are the result; a closed pipe is no failure.
-        let _ = writeln!(std::io::stdout(), "{words}");
+        let _ = writeln!(std::io::stdout(), "{words}{told}");
         return Ok(Vec::new());
     }
 
     // First, so that the clock of `--time` need not guess how long they take.
     let labels = pool.install(|| render::label(&geometry, &scene.parts, &scene.camera, window));
     let traced = AtomicU64::new(0);
-    let bar = progress(args.quality.samples(window), args.quiet);
+    let bar = progress(quality.samples(window), args.quiet);
     let done = |n| {
         traced.fetch_add(n, Ordering::Relaxed);
         bar.inc(n);
     };
     let watch = Watch { done: &done, stop: signals.heed() };
     let start = Instant::now();
-    let deadline = args.quality.deadline(begin, window, args.denoise);
-    let film: Film = pool.install(|| args.quality.render(&world, integrator.as_ref(), &settings, deadline, &watch))?;
+    let deadline = quality.deadline(begin, window, drawing.denoise);
+    let film: Film = pool.install(|| quality.render(&world, integrator.as_ref(), &settings, deadline, &watch))?;
     let rendered = start.elapsed();
     bar.finish_and_clear();
-    let photograph = field.photograph(&film);
+    let photograph = edit.photograph(&field, &film);
+    let labels = edit.labels(labels, &film, &scene.tags());
     let provenance = Provenance {
         scene_hash: field.hash.clone(),
         seed: field.seed,
         index: field.index,
-        spp: args.quality.spp(&film),
+        spp: quality.spp(&film),
         integrator: args.integrator.name(),
-        deviations: args.technique.deviations(),
+        deviations: deviations(&technique, edit),
         kernels: accel::version()?,
     };
     let mut paths = pool.install(|| output::write_image(&out, &film, &labels, &photograph, &provenance))?;
     if let Some(denoiser) = denoiser {
         let clean = denoiser.denoise(&film, args.threads)?;
-        paths.extend(output::write_denoised(&out, &clean, &field.photograph(&clean), &provenance)?);
+        paths.extend(output::write_denoised(&out, &clean, &edit.photograph(&field, &clean), &provenance)?);
     }
     // One sample has no spread to tell an error by.
     let (_, mean, most) = film.samples();
@@ -188,11 +202,11 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         "{samples:.0} Msamples in {:.1} s: {:.2} Msamples/s; {}median relative error {error}; {:.1} s in all; files in {}",
         rendered.as_secs_f64(),
         samples / rendered.as_secs_f64(),
-        if args.quality.is_open() { format!("{mean:.0} samples a pixel; ") } else { String::new() },
+        if quality.is_open() { format!("{mean:.0} samples a pixel; ") } else { String::new() },
         begin.elapsed().as_secs_f64(),
         out.display()
     ));
-    for warning in args.quality.missed(&film, begin.elapsed()) {
+    for warning in quality.missed(&film, begin.elapsed()) {
         say(format!("warning: {warning}"));
     }
     Ok(paths)
@@ -216,9 +230,15 @@ impl Args {
     }
 }
 
+/// Whatever differs from the page and the defaults, for the files.
+pub(crate) fn deviations(technique: &TechniqueArgs, edit: &Edit) -> Vec<String> {
+    technique.deviations().into_iter().chain(edit.label().map(|name| format!("edit: {name}"))).collect()
+}
+
 /// Draws a field as a game engine does; returns the paths of the files.
 fn rasterize(
     args: &Args,
+    edit: &Edit,
     field: &Field,
     window: Window,
     card: &Card,
@@ -228,17 +248,18 @@ fn rasterize(
     let built = begin.elapsed();
     let (film, labels) = card.draw(&field.scene)?;
     let drawn = begin.elapsed() - built;
-    let film = film.cut(window);
+    let (film, labels) = (film.cut(window), labels.cut(window));
+    let labels = edit.labels(labels, &film, &field.scene.tags());
     let provenance = Provenance {
         scene_hash: field.hash.clone(),
         seed: field.seed,
         index: field.index,
         spp: Spp::Uniform(1),
-        integrator: args.engine.name().into(),
-        deviations: args.technique.deviations(),
+        integrator: Engine::Raster.name().into(),
+        deviations: deviations(&args.technique, edit),
         kernels: card.name().into(),
     };
-    let paths = output::write_image(out, &film, &labels.cut(window), &field.photograph(&film), &provenance)?;
+    let paths = output::write_image(out, &film, &labels, &edit.photograph(field, &film), &provenance)?;
     if !args.quiet {
         eprintln!(
             "{}: {} plants, {:.2} M triangles; drawn on {} in {:.2} s; {:.1} s in all; files in {}",

@@ -106,6 +106,11 @@ impl TechniqueArgs {
         (self.max_depth, self.clamp)
     }
 
+    /// The same with another limit of surfaces on a path.
+    pub(crate) fn with_max_depth(&self, max_depth: Option<u32>) -> Self {
+        Self { max_depth, ..self.clone() }
+    }
+
     /// The technique that names and limits stand for.
     pub(crate) fn of(without: &[String], max_depth: Option<u32>, clamp: Option<f32>) -> Result<Self> {
         let part = |name: &String| {

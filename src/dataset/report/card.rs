@@ -56,6 +56,7 @@ pub(super) fn provenance(recipe: &Recipe) -> String {
             let mut deviations: Vec<String> = made.without.iter().map(|t| format!("without {}", escape(t))).collect();
             deviations.extend(made.max_depth.map(|n| format!("at most {n} surfaces on a path")));
             deviations.extend(made.clamp.map(|x| format!("radiance of a path cut at {x}")));
+            deviations.extend(made.edit.as_ref().map(|name| format!("edit {}", escape(name))));
             if !deviations.is_empty() {
                 rows.push(("deviations", deviations.join(", ")));
             }

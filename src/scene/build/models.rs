@@ -1,7 +1,7 @@
 //! Models from disk, stood on the ground and labelled.
 
 use super::known::model_name;
-use super::{Builder, MOST_PLANTS};
+use super::{Builder, Floor, MOST_PLANTS};
 use crate::geometry::Mesh;
 use crate::material::{Material, Painted, Repaint};
 use crate::math::{Mat3, Spectrum, Vec3};
@@ -12,7 +12,6 @@ use crate::sampling::vary::Num;
 use crate::scene::desc::ModelDesc;
 use crate::scene::tag::{Class, Tag};
 use crate::scene::{Part, PlantRecord};
-use crate::soil::Ground;
 use crate::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -21,11 +20,11 @@ const FARTHEST: f32 = 1000.0;
 
 impl Builder<'_> {
     /// Places every model; `numbered` plants have their numbers already. Returns the plants among the models.
-    pub(super) fn models(&mut self, numbered: usize, ground: Option<&Ground>) -> Result<Vec<PlantRecord>> {
+    pub(super) fn models(&mut self, numbered: usize, floor: Option<Floor<'_>>) -> Result<Vec<PlantRecord>> {
         let mut records: Vec<PlantRecord> = Vec::new();
         let mut last = numbered;
         for (k, desc) in self.desc.models.iter().enumerate() {
-            let found = self.place(k, desc, last, ground)?;
+            let found = self.place(k, desc, last, floor)?;
             last = found.iter().map(|r| usize::from(r.number)).max().unwrap_or(last);
             records.extend(found);
         }
@@ -37,7 +36,7 @@ impl Builder<'_> {
         k: usize,
         desc: &ModelDesc,
         numbered: usize,
-        ground: Option<&Ground>,
+        floor: Option<Floor<'_>>,
     ) -> Result<Vec<PlantRecord>> {
         let at = [Step::Field("models"), Step::Item(k)];
         let model = self.library.model(self.page, &desc.file, desc.up)?;
@@ -49,7 +48,7 @@ impl Builder<'_> {
         let (x, y) = (desc.position_m.0.draw32(&mut stream), desc.position_m.1.draw32(&mut stream));
         let turn = desc.turn_deg.draw32(&mut stream).to_radians();
         let scale = desc.scale.draw32(&mut stream);
-        let foot = Vec3::new(x, y, ground.map_or(0.0, |g| g.height(x, y)) + desc.lift_m.draw32(&mut stream));
+        let foot = Vec3::new(x, y, floor.map_or(0.0, |f| f.height(x, y)) + desc.lift_m.draw32(&mut stream));
         let repaint = Repaint {
             roughness: desc.roughness.map(Num::f32),
             transmission: desc.transmission.map(|(r, g, b, nir)| Spectrum::new(r.f32(), g.f32(), b.f32(), nir.f32())),

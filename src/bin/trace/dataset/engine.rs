@@ -1,7 +1,9 @@
 //! Who draws what a recipe asks for.
 
 use crate::raster::Card;
+use crate::render::deviations;
 use crate::technique::TechniqueArgs;
+use furrow::ablation::{Edit, FULL};
 use furrow::accel::{self, EmbreeAccel};
 use furrow::dataset::Set;
 use furrow::dataset::recipe::Rendering;
@@ -30,15 +32,17 @@ pub(super) fn of(set: &Set) -> Result<Option<Box<dyn Engine>>> {
     };
     same("furrow", &set.recipe.furrow, version)?;
     let technique = TechniqueArgs::of(&rendering.without, rendering.max_depth, rendering.clamp)?;
+    let edit = rendering.edit.as_deref().map_or(Ok(&FULL), Edit::named)?;
+    let deviations = deviations(&technique, edit);
     match rendering.engine.as_str() {
         "trace" => {
             same("the ray tracing kernels", &rendering.kernels, &accel::version()?)?;
-            Ok(Some(Box::new(PathTracer::new(rendering, technique)?)))
+            Ok(Some(Box::new(PathTracer::new(rendering, technique, deviations)?)))
         }
         "raster" => {
             let card = Card::open(&technique)?;
             same("the graphics card", &rendering.kernels, card.name())?;
-            Ok(Some(Box::new(Rasterizer { card, technique })))
+            Ok(Some(Box::new(Rasterizer { card, deviations })))
         }
         other => same("the engine", other, "trace or raster").map(|()| None),
     }
@@ -47,15 +51,16 @@ pub(super) fn of(set: &Set) -> Result<Option<Box<dyn Engine>>> {
 /// The path tracer, and the denoiser where one is asked for.
 struct PathTracer {
     technique: TechniqueArgs,
+    deviations: Vec<String>,
     spp: u32,
     denoiser: Option<Denoiser>,
     kernels: String,
 }
 
 impl PathTracer {
-    fn new(rendering: &Rendering, technique: TechniqueArgs) -> Result<Self> {
+    fn new(rendering: &Rendering, technique: TechniqueArgs, deviations: Vec<String>) -> Result<Self> {
         let denoiser = rendering.denoise.then(Denoiser::find).transpose()?;
-        Ok(Self { technique, spp: rendering.spp, denoiser, kernels: rendering.kernels.clone() })
+        Ok(Self { technique, deviations, spp: rendering.spp, denoiser, kernels: rendering.kernels.clone() })
     }
 }
 
@@ -71,14 +76,14 @@ impl Engine for PathTracer {
     }
 
     fn provenance(&self, field: &Field) -> Provenance {
-        provenance(field, self.spp, "path", &self.technique, &self.kernels)
+        provenance(field, self.spp, "path", &self.deviations, &self.kernels)
     }
 }
 
 /// A game engine's way.
 struct Rasterizer {
     card: Card,
-    technique: TechniqueArgs,
+    deviations: Vec<String>,
 }
 
 impl Engine for Rasterizer {
@@ -88,18 +93,18 @@ impl Engine for Rasterizer {
     }
 
     fn provenance(&self, field: &Field) -> Provenance {
-        provenance(field, 1, "raster", &self.technique, self.card.name())
+        provenance(field, 1, "raster", &self.deviations, self.card.name())
     }
 }
 
-fn provenance(field: &Field, spp: u32, integrator: &str, technique: &TechniqueArgs, kernels: &str) -> Provenance {
+fn provenance(field: &Field, spp: u32, integrator: &str, deviations: &[String], kernels: &str) -> Provenance {
     Provenance {
         scene_hash: field.hash.clone(),
         seed: field.seed,
         index: field.index,
         spp: Spp::Uniform(spp),
         integrator: integrator.into(),
-        deviations: technique.deviations(),
+        deviations: deviations.to_vec(),
         kernels: kernels.into(),
     }
 }

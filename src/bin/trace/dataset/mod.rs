@@ -4,9 +4,9 @@ mod emit;
 mod engine;
 mod finish;
 mod import;
-mod order;
+pub(crate) mod order;
 pub(crate) mod progress;
-mod render;
+pub(crate) mod render;
 mod verify;
 
 use clap::{Parser, Subcommand};

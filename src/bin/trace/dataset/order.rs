@@ -4,17 +4,28 @@ use crate::engine::Engine;
 use crate::field::PageArgs;
 use crate::raster::Card;
 use crate::technique::TechniqueArgs;
+use furrow::ablation::{Drawing, Edit, FULL};
 use furrow::dataset::plan::{self, Order};
 use furrow::dataset::split::Shares;
 use furrow::dataset::{Set, format};
 use furrow::output::Denoiser;
 use furrow::sampling::Sampler;
 use furrow::{Error, Result, accel, cli, render};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What is made.
 #[derive(clap::Args)]
 pub(crate) struct Args {
+    #[command(flatten)]
+    images: ImageArgs,
+    /// Change one thing of every field, by its name; `trace ablate --list` tells them.
+    #[arg(long, value_name = "NAME")]
+    edit: Option<String>,
+}
+
+/// Which images, in what form.
+#[derive(clap::Args)]
+pub(crate) struct ImageArgs {
     #[command(flatten)]
     page: PageArgs,
     /// How many images. A dataset may get longer later.
@@ -22,7 +33,7 @@ pub(crate) struct Args {
     count: Option<u64>,
     /// Folder of the dataset.
     #[arg(long, value_name = "DIR", required = true)]
-    out: Option<PathBuf>,
+    pub(crate) out: Option<PathBuf>,
     /// Formats to write beside the native one, separated by commas.
     #[arg(long, value_delimiter = ',', value_name = "FORMAT", value_parser = formats())]
     format: Vec<String>,
@@ -53,49 +64,64 @@ pub(super) fn formats() -> clap::builder::PossibleValuesParser {
 
 /// Begins the dataset, or finds it begun.
 pub(crate) fn run(args: &Args) -> Result<Set> {
-    args.page.check()?;
-    let out = args.out.clone().unwrap_or_default();
-    cli::check_folder(&out)?;
-    args.technique.check(args.engine)?;
-    if args.denoise && args.engine == Engine::Raster {
-        return Err(Error::Dataset(
-            "--denoise says nothing with --engine raster, which has no noise\n help: leave it out".into(),
-        ));
-    }
-    // What may change the last bits.
-    let kernels = match args.engine {
-        Engine::Trace => accel::version()?,
-        Engine::Raster => Card::open(&args.technique)?.name().to_owned(),
-    };
-    if args.denoise {
-        // Before hours are spent on what could not be denoised then.
-        Denoiser::find()?;
-    }
-    let mut formats = args.format.clone();
-    formats.sort();
-    formats.dedup();
-    let (max_depth, clamp) = args.technique.limits();
-    let order = Order {
-        scene: args.page.path().to_path_buf(),
-        seed: args.page.seed,
-        count: args.count.unwrap_or(0),
-        width: args.page.width,
-        height: args.page.height,
-        formats,
-        split: args.split,
-        licence: args.licence.clone(),
-        engine: args.engine.name().into(),
-        kernels,
+    let edit = args.edit.as_deref().map_or(Ok(&FULL), Edit::named)?;
+    args.images.begin(&args.images.out.clone().unwrap_or_default(), edit)
+}
+
+impl ImageArgs {
+    /// How the images are drawn without an edit.
+    pub(crate) fn drawing(&self) -> Drawing {
+        let (max_depth, _) = self.technique.limits();
         // A card draws each pixel once.
-        spp: if args.engine == Engine::Raster { 1 } else { args.spp },
-        denoise: args.denoise,
-        without: args.technique.without(),
-        max_depth,
-        clamp,
-    };
-    let (set, warnings) = render::pool(0)?.install(|| plan::plan(&out, &order))?;
-    for warning in warnings {
-        eprintln!("warning: {warning}");
+        let spp = if self.engine == Engine::Raster { 1 } else { self.spp };
+        Drawing { engine: self.engine.name().into(), spp, denoise: self.denoise, max_depth }
     }
-    Ok(set)
+
+    /// Begins a dataset of these images as an edit has them, or finds it begun.
+    pub(crate) fn begin(&self, out: &Path, edit: &'static Edit) -> Result<Set> {
+        self.page.check()?;
+        cli::check_folder(out)?;
+        let drawing = self.drawing();
+        let drawn = edit.drawing(drawing.clone());
+        let engine = Engine::named(&drawn.engine);
+        self.technique.check(engine)?;
+        if drawn.denoise && engine == Engine::Raster {
+            return Err(Error::Dataset(
+                "--denoise says nothing with --engine raster, which has no noise\n help: leave it out".into(),
+            ));
+        }
+        // What may change the last bits.
+        let kernels = match engine {
+            Engine::Trace => accel::version()?,
+            Engine::Raster => Card::open(&self.technique)?.name().to_owned(),
+        };
+        if drawn.denoise {
+            // Before hours are spent on what could not be denoised then.
+            Denoiser::find()?;
+        }
+        let mut formats = self.format.clone();
+        formats.sort();
+        formats.dedup();
+        let (_, clamp) = self.technique.limits();
+        let order = Order {
+            scene: self.page.path().to_path_buf(),
+            seed: self.page.seed,
+            count: self.count.unwrap_or(0),
+            width: self.page.width,
+            height: self.page.height,
+            formats,
+            split: self.split,
+            licence: self.licence.clone(),
+            drawing,
+            kernels,
+            edit,
+            without: self.technique.without(),
+            clamp,
+        };
+        let (set, warnings) = render::pool(0)?.install(|| plan::plan(out, &order))?;
+        for warning in warnings {
+            eprintln!("warning: {warning}");
+        }
+        Ok(set)
+    }
 }

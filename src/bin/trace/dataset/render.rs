@@ -33,7 +33,7 @@ pub(crate) struct WorkArgs {
     at_once: usize,
     /// Print nothing but errors and the paths of the files.
     #[arg(long)]
-    quiet: bool,
+    pub(crate) quiet: bool,
 }
 
 /// Makes the images of a shard.
@@ -44,7 +44,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
 }
 
 /// Makes the images of a dataset that are missing.
-pub(super) fn generate(set: &Set, args: &WorkArgs, shard: Shard, signals: &Signals) -> Result<()> {
+pub(crate) fn generate(set: &Set, args: &WorkArgs, shard: Shard, signals: &Signals) -> Result<()> {
     let begin = Instant::now();
     let engine = engine::of(set)?;
     let (soon, now) = signals.heed_patiently();

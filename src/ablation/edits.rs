@@ -1,0 +1,125 @@
+//! The table of edits. The tests find what is new here unasked.
+
+use super::{Change, Drawing, Edit, growth, labels, light, picture};
+use crate::material::Feature;
+use crate::scene::build::Growing;
+
+/// No edit: what all others are compared with.
+pub static FULL: Edit =
+    Edit { name: "full", about: "the field as its page says", keeps_labels: true, change: Change::Nothing };
+
+/// An edit of how the field is drawn.
+macro_rules! drawn {
+    ($name:literal, $about:literal, $field:ident = $value:expr) => {
+        Edit {
+            name: $name,
+            about: $about,
+            keeps_labels: true,
+            change: Change::Drawing(|drawing| drawing.$field = $value),
+        }
+    };
+}
+
+/// An edit of what parts are made of.
+macro_rules! without {
+    ($name:literal, $about:literal, $feature:ident) => {
+        Edit { name: $name, about: $about, keeps_labels: true, change: Change::Materials(Feature::$feature) }
+    };
+}
+
+/// An edit of how plants grow.
+macro_rules! grown {
+    ($name:literal, $about:literal, $change:path) => {
+        Edit {
+            name: $name,
+            about: $about,
+            keeps_labels: false,
+            change: Change::Growth(Growing { page: None, species: Some($change) }),
+        }
+    };
+}
+
+/// All edits.
+pub static EDITS: &[Edit] = &[
+    Edit {
+        name: "raster",
+        about: "drawn as a game engine of 2017 does: shadow maps, no bounces; labels of its own target of ids",
+        // But for a few pixels in a million, whose centre lies on an edge.
+        keeps_labels: false,
+        change: Change::Drawing(|drawing| *drawing = Drawing::raster()),
+    },
+    // Light transport.
+    drawn!("direct-light", "no light that came by another surface", max_depth = Some(1)),
+    drawn!("one-bounce", "light that came by one other surface at most", max_depth = Some(2)),
+    // Light.
+    Edit {
+        name: "no-sky",
+        about: "sun and lamps alone; a sky stays where nothing else shines",
+        keeps_labels: true,
+        change: Change::Lights(light::no_sky),
+    },
+    Edit {
+        name: "hard-ambient",
+        about: "instead of the sky the same light from everywhere, as much of it on level ground",
+        keeps_labels: true,
+        change: Change::Lights(light::hard_ambient),
+    },
+    Edit {
+        name: "point-light",
+        about: "sun and lamps are points of the same power: shadows have hard edges",
+        keeps_labels: true,
+        change: Change::Lights(light::points),
+    },
+    // Surfaces.
+    without!("no-transmission", "no light passes through leaves", Transmission),
+    without!("no-coat", "leaves without wax: no gloss, the same reflectance", Coat),
+    without!("lambert-soil", "soil, stones and straw are Lambert's, wet or dry", Facets),
+    without!("no-normal-maps", "no relief finer than the meshes", Relief),
+    without!(
+        "plain-leaves",
+        "leaves in the one colour of their pigments, without their pictures' colours; outlines stay",
+        Picture
+    ),
+    // Geometry.
+    Edit {
+        name: "flat-soil",
+        about: "the ground is a plane under the same texture, without clods; stones, straw and plants come down with it",
+        keeps_labels: false,
+        change: Change::Growth(Growing { page: Some(growth::flat_soil), species: None }),
+    },
+    grown!("flat-leaves", "blades are flat sheets from base to tip", growth::flat_leaves),
+    grown!("low-poly", "blades of 16 triangles", growth::few_triangles),
+    grown!("one-mesh", "all plants of a species in a field are one mesh, in all fields one individual", growth::alike),
+    // Camera.
+    Edit {
+        name: "no-lens-blur",
+        about: "a pinhole in perfect focus: neither blur nor depth of field",
+        keeps_labels: true,
+        change: Change::Lens(picture::sharp),
+    },
+    Edit {
+        name: "no-sensor-noise",
+        about: "a sensor that counts every photon once and reads without error",
+        keeps_labels: true,
+        change: Change::Sensor(|sensor| sensor.noise.on = false),
+    },
+    Edit {
+        name: "no-nir",
+        about: "nir.png holds the grey of rgb.png: near infrared tells nothing more",
+        keeps_labels: true,
+        change: Change::Photograph(picture::gray_nir),
+    },
+    // Labels.
+    Edit {
+        name: "smooth-labels",
+        about: "labels as anti-aliased colours have them: each pixel's blend of class colours, read as the nearest class",
+        keeps_labels: false,
+        change: Change::Labels(labels::smooth),
+    },
+    // Samples.
+    drawn!("spp-4", "4 samples a pixel", spp = 4),
+    drawn!("spp-16", "16 samples a pixel", spp = 16),
+    drawn!("spp-64", "64 samples a pixel", spp = 64),
+    drawn!("spp-256", "256 samples a pixel", spp = 256),
+    drawn!("denoised", "photographs without the noise of few samples; needs Open Image Denoise", denoise = true),
+];

@@ -1,0 +1,136 @@
+//! Named edits of a field, each of which changes exactly one thing: what does a network lose, or a render cost, without it?
+//!
+//! An edit acts at one place on the way from page to files, and its type says where ([`Change`]): it cannot reach anything else. No
+//! random number is drawn for it, so plants, light and noise are those of the field without it, and where geometry stays the
+//! labels stay bit for bit ([`Edit::keeps_labels`]).
+//!
+//! | file | idea |
+//! |---|---|
+//! | `edits` | the table: a new edit is a row, with a function where it needs one |
+//! | `drawing` | how a field is drawn |
+//! | `growth`, `light`, `picture`, `labels` | what edits do to plants and soil, light, camera and photographs, labels |
+//!
+//! What a record tells of plants, light and soil is what was drawn for the field, before an edit of light or materials.
+//!
+//! Not in the table is what there is nothing of to take away: the sensor has neither mosaic nor colour matrix yet.
+
+mod drawing;
+mod edits;
+mod growth;
+mod labels;
+mod light;
+mod picture;
+
+use crate::film::{Film, Footprint};
+use crate::light::Light;
+use crate::material::Feature;
+use crate::render::LabelMap;
+use crate::sampling::fault::choose;
+use crate::scene::Field;
+use crate::scene::build::{Growing, Options, Source};
+use crate::scene::tag::Tag;
+use crate::sensor::{Camera, Photograph, SensorDesc};
+use crate::{Error, Result};
+use std::path::Path;
+
+pub use drawing::Drawing;
+pub use edits::{EDITS, FULL};
+
+/// One edit.
+#[derive(Debug)]
+pub struct Edit {
+    /// What it is called: lower-case words with hyphens.
+    pub name: &'static str,
+    /// What it does, in a line.
+    pub about: &'static str,
+    /// Whether class, plant and leaf of every pixel stay as they are without it.
+    pub keeps_labels: bool,
+    /// What it changes.
+    pub change: Change,
+}
+
+/// Where an edit acts, on the way from page to files.
+#[derive(Clone, Copy, Debug)]
+pub enum Change {
+    /// Nowhere.
+    Nothing,
+    /// On what the pages say, before anything grows.
+    Growth(Growing),
+    /// On what shines.
+    Lights(fn(&mut Vec<Light>)),
+    /// On what parts are made of: this is left out.
+    Materials(Feature),
+    /// On the lens: the camera, and how a pixel gathers light.
+    Lens(fn(&mut Camera, &mut Footprint)),
+    /// On the sensor.
+    Sensor(fn(&mut SensorDesc)),
+    /// On how the field is drawn.
+    Drawing(fn(&mut Drawing)),
+    /// On the photographs.
+    Photograph(fn(&mut Photograph)),
+    /// On the labels; they are told what the pixels' samples met, and who each part is.
+    Labels(fn(&mut LabelMap, &Film, &[Tag])),
+}
+
+impl Edit {
+    /// The edit of this name; the error lists all names.
+    pub fn named(name: &str) -> Result<&'static Self> {
+        EDITS.iter().find(|edit| edit.name == name).ok_or_else(|| {
+            let known: Vec<&str> = EDITS.iter().map(|edit| edit.name).collect();
+            let help = choose("edits", &known, name);
+            Error::Scene(format!("there is no edit `{name}`\n help: {help}"))
+        })
+    }
+
+    /// Its name; none for [`FULL`].
+    pub fn label(&self) -> Option<String> {
+        (!matches!(self.change, Change::Nothing)).then(|| self.name.to_owned())
+    }
+
+    /// Opens a page for [`Edit::field`].
+    pub fn open(&self, page: &Path) -> Result<Source> {
+        let growing = if let Change::Growth(growing) = self.change { growing } else { Growing::default() };
+        Ok(Source::open(page)?.growing(growing))
+    }
+
+    /// Builds a field of a page that this edit has opened. Call it inside a pool.
+    pub fn field(&self, source: &Source, options: &Options) -> Result<Field> {
+        let mut field = source.field(options)?;
+        let scene = &mut field.scene;
+        match self.change {
+            Change::Lights(change) => change(&mut scene.lights),
+            Change::Materials(feature) => scene.materials.iter_mut().for_each(|m| m.leave_out(feature)),
+            Change::Lens(change) => change(&mut scene.camera, &mut scene.filter),
+            Change::Sensor(change) => change(&mut field.sensor),
+            Change::Nothing | Change::Growth(_) | Change::Drawing(_) | Change::Photograph(_) | Change::Labels(_) => {}
+        }
+        Ok(field)
+    }
+
+    /// How a field is drawn that would be drawn like this.
+    #[must_use]
+    pub fn drawing(&self, mut drawing: Drawing) -> Drawing {
+        if let Change::Drawing(change) = self.change {
+            change(&mut drawing);
+        }
+        drawing
+    }
+
+    /// Takes the photograph of a film of a field.
+    pub fn photograph(&self, field: &Field, film: &Film) -> Photograph {
+        let mut photograph = field.photograph(film);
+        if let Change::Photograph(change) = self.change {
+            change(&mut photograph);
+        }
+        photograph
+    }
+
+    /// The labels that are written of a field with these; `tags` holds one row a part.
+    #[must_use]
+    pub fn labels(&self, mut labels: LabelMap, film: &Film, tags: &[Tag]) -> LabelMap {
+        if let Change::Labels(change) = self.change {
+            change(&mut labels, film, tags);
+        }
+        labels
+    }
+}

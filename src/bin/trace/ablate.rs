@@ -1,0 +1,152 @@
+//! `trace ablate`: one dataset, and the same fields again with one thing changed at a time.
+
+use crate::dataset::order::ImageArgs;
+use crate::dataset::render::{WorkArgs, generate};
+use crate::engine::Engine;
+use crate::raster::Card;
+use crate::technique::TechniqueArgs;
+use furrow::ablation::{Change, Drawing, EDITS, Edit, FULL};
+use furrow::cli::signal::Signals;
+use furrow::dataset::generate::Shard;
+use furrow::dataset::{Set, finish};
+use furrow::output::Denoiser;
+use furrow::{Error, Result, cli};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Makes a dataset in DIR/full and one for each edit in DIR/NAME: the same fields, plants, light and noise with one thing changed.
+///
+/// All have the same files, and where geometry stays the same labels bit for bit. Stopped, killed or damaged, the same command makes
+/// what is missing. Each is a dataset like any other: `trace dataset verify` checks it, `trace dataset emit` sends it to a cluster.
+#[derive(clap::Args)]
+#[command(after_help = AFTER)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    images: ImageArgs,
+    /// Only these edits, separated by commas, beside the full dataset.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', conflicts_with = "except")]
+    only: Vec<String>,
+    /// All edits but these, separated by commas.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    except: Vec<String>,
+    /// Tell the edits, one a line, and make nothing.
+    #[arg(long, exclusive = true)]
+    list: bool,
+    /// Begin the datasets and render nothing: for shards, and for a cluster.
+    #[arg(long, conflicts_with = "shard")]
+    plan: bool,
+    /// Render of each dataset the images whose number leaves k when divided by N, and finish nothing.
+    #[arg(long, value_name = "k/N", value_parser = Shard::parse)]
+    shard: Option<Shard>,
+    #[command(flatten)]
+    work: WorkArgs,
+}
+
+const AFTER: &str = "\
+Examples:
+  trace ablate --list
+  trace ablate --scene scenes/synthetic-d.ron --count 100 --out ab --width 480 --height 360 --spp 16
+  trace ablate --scene scenes/synthetic-d.ron --count 100 --out ab --only no-sky,flat-leaves
+
+On several machines that share a folder, each with the same arguments:
+  trace ablate … --out ab --plan                        begin all datasets
+  trace ablate … --out ab --shard 0/8                   … to 7/8, each anywhere, as often as needed
+  trace ablate … --out ab                               what is missing, and what belongs to all images
+or one dataset at a time: trace dataset emit ab/no-sky --engine slurm --shards 8";
+
+/// Makes what is missing; returns the paths of the files that belong to all images of a dataset.
+pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
+    if args.list {
+        list();
+        return Ok(Vec::new());
+    }
+    let edits = chosen(args)?;
+    let out = args.images.out.clone().unwrap_or_default();
+    cli::check_folder(&out)?;
+    let say = |text: String| {
+        if !args.work.quiet {
+            eprintln!("{text}");
+        }
+    };
+    let mut sets: Vec<Set> = Vec::new();
+    for edit in &edits {
+        let folder = out.join(edit.name);
+        sets.push(if args.shard.is_some() { begun(&folder)? } else { args.images.begin(&folder, edit)? });
+    }
+    let mut paths = Vec::new();
+    for (i, (edit, set)) in edits.iter().zip(&sets).enumerate() {
+        if args.plan {
+            paths.push(set.folder.join(furrow::dataset::recipe::FILE));
+            continue;
+        }
+        say(format!("{} of {}: {}, {}", i + 1, edits.len(), edit.name, edit.about));
+        generate(set, &args.work, args.shard.unwrap_or(Shard::ALL), signals)?;
+        if args.shard.is_none() {
+            paths.extend(finish::finish(set, None)?);
+        }
+    }
+    Ok(paths)
+}
+
+/// Prints the edits.
+fn list() {
+    let mut out = std::io::stdout().lock();
+    for edit in [&FULL].into_iter().chain(EDITS) {
+        let labels = if edit.keeps_labels { "" } else { " (other labels)" };
+        // A closed pipe is no failure.
+        let _ = writeln!(out, "{:<16} {}{labels}", edit.name, edit.about);
+    }
+}
+
+/// The full dataset and the edits that were asked for, in the order of the table. Where all are, those that would change nothing here
+/// or cannot be made here are left out, and told.
+fn chosen(args: &Args) -> Result<Vec<&'static Edit>> {
+    for name in args.only.iter().chain(&args.except) {
+        Edit::named(name)?;
+    }
+    let mut all = vec![&FULL];
+    let drawing = args.images.drawing();
+    for edit in EDITS {
+        let named = args.only.iter().any(|name| name == edit.name);
+        if args.except.iter().any(|name| name == edit.name) || !(named || args.only.is_empty()) {
+            continue;
+        }
+        let drawn = edit.drawing(drawing.clone());
+        if matches!(edit.change, Change::Drawing(_)) && drawn == drawing {
+            if named {
+                return Err(Error::Dataset(format!(
+                    "--only {}: the full dataset is drawn like that already\n help: leave it out, or give other arguments",
+                    edit.name
+                )));
+            }
+            eprintln!("{} is left out: the full dataset is drawn like that", edit.name);
+        } else if let (false, Err(e)) = (named, possible(&drawn, &drawing)) {
+            eprintln!("warning: {} is left out: {e}", edit.name);
+        } else {
+            all.push(edit);
+        }
+    }
+    Ok(all)
+}
+
+/// Whether this machine has what a drawing needs beyond that of the full dataset.
+fn possible(drawn: &Drawing, full: &Drawing) -> Result<()> {
+    if drawn.denoise && !full.denoise {
+        Denoiser::find()?;
+    }
+    if drawn.engine != full.engine && Engine::named(&drawn.engine) == Engine::Raster {
+        Card::open(&TechniqueArgs::default())?;
+    }
+    Ok(())
+}
+
+/// A dataset that `--plan` has begun. Shards that began it at the same time would meet each other's unfinished files.
+fn begun(folder: &Path) -> Result<Set> {
+    if folder.join(furrow::dataset::recipe::FILE).is_file() {
+        return Set::open(folder);
+    }
+    Err(Error::Dataset(format!(
+        "{}: no dataset was begun here\n help: the same command with --plan instead of --shard begins all of them; then run the shards",
+        folder.display()
+    )))
+}

@@ -1,0 +1,56 @@
+//! Fields that grow otherwise than their pages say: what experiments change. No random number is drawn for it or left undrawn, so
+//! everything else is as it was.
+
+use super::Builder;
+use crate::math::{Mat3, Vec3};
+use crate::plant::{self, Plant};
+use crate::sampling::rng::mix;
+use crate::sampling::{Purpose, Stream};
+use crate::scene::desc::{FieldDesc, Growth, SpeciesDesc};
+
+/// What is changed of the pages after they were read and before anything grows.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Growing {
+    /// Of the field's page.
+    pub page: Option<fn(&mut FieldDesc)>,
+    /// Of each species' page.
+    pub species: Option<fn(&mut SpeciesDesc)>,
+}
+
+/// The one plant that all of a species are.
+pub(super) struct Individual {
+    /// The field's: how old it is.
+    age: Stream,
+    /// The same in all fields of a seed.
+    shape: Stream,
+}
+
+impl Builder<'_> {
+    /// The individual of a species whose plants are alike.
+    pub(super) fn individual(&self, desc: &SpeciesDesc) -> Option<Individual> {
+        // By name, so that a species that stands in two places of a page is one all the same.
+        let key = desc.name.bytes().fold(0, |key, byte| mix(key ^ u64::from(byte)));
+        let stream = |index| Stream::of(self.seed, index, Purpose::Plant, key);
+        desc.alike.then(|| Individual { age: stream(self.index).child(Purpose::Page, 0), shape: stream(0) })
+    }
+}
+
+impl Individual {
+    /// Its shape.
+    pub(super) fn shape(&self) -> &Stream {
+        &self.shape
+    }
+
+    /// Grows it to the age that the field draws, turned as the plant of `own` would be.
+    pub(super) fn plant(&self, desc: &SpeciesDesc, growth: &Growth, season: usize, own: &Stream) -> Plant {
+        let stage = growth.draw(season, &mut self.age.clone());
+        let mut plant = plant::grow(&desc.plant, stage, &self.shape);
+        // Azimuths run clockwise seen from above.
+        let turn = Mat3::from_rotation_z(plant::turn(&self.shape) - plant::turn(own));
+        for organ in &mut plant.organs {
+            organ.mesh.transform(turn, Vec3::ZERO);
+            organ.midrib = organ.midrib.map(|ends| ends.map(|p| turn * p));
+        }
+        plant
+    }
+}
