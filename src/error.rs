@@ -52,12 +52,18 @@ pub enum Error {
     /// The denoiser failed; the picture that it was to denoise is there.
     #[error("{0}")]
     Denoise(String),
+    /// The rasterized engine cannot draw here.
+    #[error("{0}")]
+    Raster(String),
     /// A dataset that cannot be used as asked.
     #[error("{0}")]
     Dataset(String),
     /// A training that cannot be done as asked.
     #[error("{0}")]
     Training(String),
+    /// Pictures that cannot be compared as asked.
+    #[error("{0}")]
+    Compare(String),
     /// A dataset that is not whole or not what it says it is.
     #[error("{0}")]
     Damaged(String),
@@ -80,7 +86,9 @@ impl Error {
             | Self::Image { .. }
             | Self::Model { .. }
             | Self::Scene(_)
+            | Self::Raster(_)
             | Self::Dataset(_)
+            | Self::Compare(_)
             | Self::Run { .. }
             | Self::Training(_) => 2,
             Self::Interrupted => 75,

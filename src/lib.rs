@@ -7,8 +7,8 @@
 //! | floor | rooms |
 //! |---|---|
 //! | 12 | [`train`] |
-//! | 11 | [`dataset`] |
-//! | 10 | [`ablation`], [`output`] |
+//! | 11 | [`dataset`], [`compare`] |
+//! | 10 | [`ablation`], [`output`], [`raster`] |
 //! | 9 | [`render`] |
 //! | 8 | [`integrator`] |
 //! | 7 | [`scene`] |
@@ -25,6 +25,7 @@ pub mod ablation;
 pub mod accel;
 pub mod bsdf;
 pub mod cli;
+pub mod compare;
 pub mod dataset;
 pub mod error;
 pub mod film;
@@ -39,6 +40,8 @@ pub mod optics;
 pub mod output;
 pub mod page;
 pub mod plant;
+#[cfg(feature = "raster")]
+pub mod raster;
 pub mod render;
 pub mod sampling;
 pub mod scatter;

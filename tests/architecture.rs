@@ -31,12 +31,16 @@ const NEVER: &[(&str, &str)] = &[
     ("render/label.rs", "film sampling bsdf material light integrator"),
     ("integrator", "accel film output plant soil scatter texture"),
     ("film", "scene sampling"),
+    // The other way of drawing shares the scene, not the rays.
+    ("raster", "integrator accel bsdf sampling output"),
     // It says what is otherwise; who grows, draws and writes is theirs.
     ("ablation", "integrator accel bsdf output dataset"),
     // It asks `render` for an image and a label map.
     ("dataset", "integrator bsdf"),
     // It reads what writers wrote, so it reads real images too.
     ("train", "scene render integrator accel film light material bsdf plant soil scatter"),
+    // It reads pictures, whatever program made them.
+    ("compare", "render integrator accel film light material bsdf plant soil scatter"),
     // `cli` is what the programs share.
     ("*", "cli bin"),
 ];
@@ -45,6 +49,8 @@ const NEVER: &[(&str, &str)] = &[
 const DOORS: &[(&str, &str)] = &[
     // Bytes written as text inside a model's document, or a page's.
     ("base64", "model/uri.rs html/mod.rs"),
+    // Numbers as bytes for the card, and waiting for it.
+    ("bytemuck", "raster/"),
     ("clap", "bin/"),
     ("embree3", "accel/embree.rs"),
     ("exr", "output/exr/mod.rs"),
@@ -56,20 +62,24 @@ const DOORS: &[(&str, &str)] = &[
     ("image", "texture/ output/photo.rs"),
     ("indicatif", "bin/"),
     ("noise", "texture/noise.rs"),
+    // Measures of difference that others have written and checked.
+    ("nv_flip", "compare/flip.rs"),
+    ("palette", "compare/color.rs"),
     // Labels need bits that stay, drawn textures need 16 bits and words inside.
     ("png", "output/png.rs texture/draw/"),
+    ("pollster", "raster/gpu.rs"),
     // ONNX files.
     ("prost", "train/deploy/onnx/"),
     ("rand", "sampling/rng.rs"),
     ("rand_pcg", "sampling/rng.rs"),
     // Parallel at the top only.
     // Images, plants, and the soil's skin: loops over what is many.
-    ("rayon", "render/ dataset/ scene/build.rs soil/skin.rs material/ground.rs"),
+    ("rayon", "render/ dataset/ compare/ scene/build.rs soil/skin.rs material/ground.rs raster/sheets.rs"),
     // One reader for all pages; faults inside a value are found where they lie.
     ("ron", "page.rs sampling/fault.rs"),
     ("serde", "*"),
     // glTF documents, read and written; records and formats of datasets.
-    ("serde_json", "model/document.rs model/gltf.rs output/gltf/ dataset/ train/"),
+    ("serde_json", "model/document.rs model/gltf.rs output/gltf/ dataset/ compare/table.rs train/"),
     // Weights, as every trainer reads them.
     ("safetensors", "train/weights.rs"),
     ("sha2", "scene/library.rs dataset/ train/run.rs train/weights.rs"),
@@ -84,6 +94,8 @@ const DOORS: &[(&str, &str)] = &[
     ("tempfile", "output/mod.rs output/denoise.rs texture/draw/write.rs"),
     ("thiserror", "error.rs"),
     ("tobj", "model/obj.rs"),
+    // Graphics cards.
+    ("wgpu", "raster/"),
 ];
 
 /// Dependencies that no source names: libtorch's place is told to the build script of whoever depends on it directly.

@@ -168,6 +168,7 @@ fn page(report: &Report, shots: &[Shot]) -> String {
         title: "run <1>",
         lead: "Two images & a curve.",
         facts: &[("weights".into(), "a<b".into())],
+        answer: None,
         report: Some(report),
         charts: &[chart(true), chart(false)],
         shots,

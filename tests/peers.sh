@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
-# Installs what the build and the tests need, on Debian 12, as root or as a user who may sudo, and asks nothing: Embree and a C compiler; and the
+# Installs what the build and the tests need, on Debian 12, as root or as a user who may sudo, and asks nothing: Embree and a C compiler; Mesa's
+# Vulkan for the rasterized engine; and the
 # programs that the tests ask for a second opinion (a browser, a batch system, Python clients in target/venv); libtorch for the feature `train`.
 # What is there already is left alone.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-packages="libembree-dev build-essential python3-venv libllvm19 chromium slurm-wlm munge iproute2 procps parallel"
+packages="libembree-dev build-essential mesa-vulkan-drivers libvulkan1 python3-venv libllvm19 chromium slurm-wlm munge iproute2 procps parallel"
 # shellcheck disable=SC2086 # a list of packages
 if ! dpkg -s $packages >/dev/null 2>&1; then
   sudo=$([ "$(id -u)" = 0 ] || echo sudo)

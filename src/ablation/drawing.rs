@@ -3,7 +3,7 @@
 /// How a field is drawn.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Drawing {
-    /// What draws, by name: `trace` for the path tracer.
+    /// What draws, by name: `trace` for the path tracer, `raster` for the rasterized engine.
     pub engine: String,
     /// Samples a pixel.
     pub spp: u32,
@@ -11,4 +11,11 @@ pub struct Drawing {
     pub denoise: bool,
     /// Most surfaces on a path, where it is not the default.
     pub max_depth: Option<u32>,
+}
+
+impl Drawing {
+    /// The rasterized engine: each pixel once, without noise, without paths.
+    pub fn raster() -> Self {
+        Self { engine: "raster".into(), spp: 1, denoise: false, max_depth: None }
+    }
 }

@@ -6,7 +6,7 @@ use super::split::Shares;
 use super::{File, format, seal};
 use crate::ablation::{Drawing, Edit};
 use crate::scene::build::Options;
-use crate::{Error, Result, accel};
+use crate::{Error, Result};
 use std::path::{Component, Path, PathBuf};
 
 /// What the user asks for.
@@ -30,6 +30,8 @@ pub struct Order {
     pub licence: String,
     /// How the images are drawn, before the edit.
     pub drawing: Drawing,
+    /// What the last bits may depend on: ray tracing kernels, a graphics card.
+    pub kernels: String,
     /// What is changed; [`crate::ablation::FULL`] for nothing.
     pub edit: &'static Edit,
     /// Techniques left out.
@@ -71,7 +73,7 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
             without: order.without.clone(),
             max_depth,
             clamp: order.clamp,
-            kernels: accel::version()?,
+            kernels: order.kernels.clone(),
             edit: order.edit.label(),
         }),
         count: order.count,

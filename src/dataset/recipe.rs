@@ -58,7 +58,7 @@ pub struct Rendering {
     pub width: u32,
     /// Pixels down.
     pub height: u32,
-    /// What draws: `trace` for the path tracer.
+    /// What draws: `trace` for the path tracer, `raster` for the rasterized engine.
     pub engine: String,
     /// Samples a pixel.
     pub spp: u32,
@@ -70,7 +70,7 @@ pub struct Rendering {
     pub max_depth: Option<u32>,
     /// Most radiance of a path, where there is a limit.
     pub clamp: Option<f32>,
-    /// The ray tracing kernels and their instruction set.
+    /// The ray tracing kernels and their instruction set, or the graphics card and its driver.
     pub kernels: String,
     /// What was changed of the field, by its name among [`ablation::EDITS`]. What an edit of the drawing changes stands above as well.
     #[serde(default, skip_serializing_if = "Option::is_none")]

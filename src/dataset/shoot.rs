@@ -32,6 +32,8 @@ pub struct Drawn {
     pub film: Film,
     /// The film that the photographs are made of, where it is another: one without noise.
     pub clean: Option<Film>,
+    /// What lies at each pixel's centre, where the engine knows it by itself.
+    pub labels: Option<LabelMap>,
 }
 
 /// Where an image's time went.
@@ -82,11 +84,12 @@ pub fn shoot(set: &Set, source: &Source, index: u64, engine: &dyn Engine, watch:
     let geometry = EmbreeAccel::build(&field.scene.surfaces(), threads as u32)?;
     let grow = begin.elapsed();
     let begin = Instant::now();
-    let drawn = engine.draw(&field, &geometry, threads, watch)?;
+    let mut drawn = engine.draw(&field, &geometry, threads, watch)?;
     let draw = begin.elapsed();
     let begin = Instant::now();
     let window = Window::full(field.scene.camera.width(), field.scene.camera.height());
-    let labels = render::label(&geometry, &field.scene.parts, &field.scene.camera, window);
+    let Field { scene, .. } = &field;
+    let labels = drawn.labels.take().unwrap_or_else(|| render::label(&geometry, &scene.parts, &scene.camera, window));
     let provenance = engine.provenance(&field);
     let text = provenance.photograph_text(drawn.clean.is_some());
     let sample = expose(recipe, edit, &field, drawn, labels)?;
@@ -95,7 +98,7 @@ pub fn shoot(set: &Set, source: &Source, index: u64, engine: &dyn Engine, watch:
 
 /// The sample of a field that was drawn and labelled.
 fn expose(recipe: &Recipe, edit: &Edit, field: &Field, drawn: Drawn, labels: LabelMap) -> Result<Sample> {
-    let Drawn { film, clean } = drawn;
+    let Drawn { film, clean, .. } = drawn;
     let photograph = edit.photograph(field, clean.as_ref().unwrap_or(&film));
     let tags = field.scene.tags();
     let labels = edit.labels(labels, &film, &tags);

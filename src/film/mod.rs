@@ -105,6 +105,16 @@ impl Film {
         &self.pixels[(y * self.window.width() + x) as usize]
     }
 
+    /// A part of it.
+    ///
+    /// # Panics
+    /// Where the part reaches beyond it.
+    #[must_use]
+    pub fn cut(&self, window: Window) -> Self {
+        let pixels = self.window.places_of(window).map(|i| self.pixels[i].clone()).collect();
+        Self { window, pixels }
+    }
+
     /// Median over pixels of [`Pixel::relative_error`]: one honest figure.
     pub fn median_relative_error(&self) -> f32 {
         median_relative_error(&self.pixels)

@@ -28,4 +28,11 @@ impl Window {
     pub fn height(&self) -> u32 {
         self.y1 - self.y0
     }
+
+    /// Where the pixels of a part lie in this window's list of pixels, row by row.
+    pub fn places_of(&self, part: Self) -> impl Iterator<Item = usize> {
+        let (left, top, width) = (self.x0, self.y0, self.width() as usize);
+        (part.y0..part.y1)
+            .flat_map(move |y| (part.x0..part.x1).map(move |x| (y - top) as usize * width + (x - left) as usize))
+    }
 }

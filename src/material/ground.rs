@@ -1,7 +1,7 @@
 //! The ground and its clods: the baked skin of the soil, made moist, in four bands.
 
 use super::shading::frame;
-use super::swatch::{Swatch, Tone};
+use super::swatch::{Grain, Swatch, Tone};
 use super::{Feature, Varies};
 use crate::bsdf::{Bsdf, OrenNayar, Wet};
 use crate::geometry::Interaction;
@@ -132,6 +132,10 @@ impl Ground {
         Swatch::pictured(key, size, texel, mean, 1.0)
             .tinted(Vec3::splat(self.tint), Vec3::ONE)
             .raised(slope, f32::from(u8::from(self.relief)))
+            .grained(move |x, y| {
+                let film = skin.texels[y as usize * skin.width + x as usize].film;
+                Grain { open: 1.0, film: f32::from(film) / 255.0 }
+            })
     }
 
     pub(super) fn varies(&self) -> Varies {

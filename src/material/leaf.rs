@@ -1,7 +1,7 @@
 //! Blades, petioles, stems: pigments and a picture → coat, reflection of either side, transmission.
 
 use super::shading::{bump, grained_frame};
-use super::swatch::{Swatch, Tone, centre};
+use super::swatch::{Grain, Swatch, Tone, centre};
 use super::{Feature, Varies};
 use crate::bsdf::{self, Bsdf, Side};
 use crate::geometry::Interaction;
@@ -148,7 +148,7 @@ impl LeafMaterial {
         };
         let roughness = self.upper.coat().map_or(1.0, |coat| (coat.alpha[0] * coat.alpha[1]).sqrt());
         let Some(picture) = self.picture.as_ref().filter(|_| self.pictured) else {
-            return Swatch::plain(read(self.plain() * self.tint), roughness);
+            return Swatch::plain(read(self.plain() * self.tint), roughness).paler_below(self.back_paleness);
         };
         let color = |[r, g, b, _]: [f32; 4]| Vec3::new(r, g, b);
         let texel = move |x, y| read(color(picture.color.texel(x, y)));
@@ -162,6 +162,8 @@ impl LeafMaterial {
         Swatch::pictured(key, size, texel, tinted, roughness)
             .tinted(self.tint, passed(tinted) / passed(bare))
             .raised(slope, self.relief)
+            .grained(move |x, y| Grain { open: picture.maps.occlusion.sample(centre(size, x, y), 0.0), film: 0.0 })
+            .paler_below(self.back_paleness)
     }
 
     pub(super) fn varies(&self) -> Varies {

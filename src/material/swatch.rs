@@ -15,6 +15,15 @@ pub struct Tone {
     pub transmittance: Spectrum,
 }
 
+/// What is finer than the shape of a place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grain {
+    /// Share of the sky that it sees past the picture's own relief, 0–1; 1 where its reflectance already says so.
+    pub open: f32,
+    /// Share that lies under a film of water, 0–1.
+    pub film: f32,
+}
+
 /// A material as others can hold it. A place's reflectance in R, G, B is that of [`Swatch::texel`] times `tint`, its
 /// transmittance times `tint_transmitted`.
 pub struct Swatch<'a> {
@@ -24,6 +33,7 @@ pub struct Swatch<'a> {
     pub size: Option<(u32, u32)>,
     texel: Box<dyn Fn(u32, u32) -> Tone + 'a>,
     slope: Box<dyn Fn(u32, u32) -> Vec2 + 'a>,
+    grain: Box<dyn Fn(u32, u32) -> Grain + 'a>,
     /// Strength of the relief, a factor on [`Swatch::slope`]; 0 for none.
     pub relief: f32,
     /// Factor on reflected R, G, B.
@@ -32,6 +42,8 @@ pub struct Swatch<'a> {
     pub tint_transmitted: Vec3,
     /// GGX roughness α of the coat; 1 where there is none.
     pub roughness: f32,
+    /// How much more visible light the lower side reflects.
+    pub back_paleness: f32,
     /// The mean place, tint included.
     pub mean: Tone,
 }
@@ -44,10 +56,12 @@ impl<'a> Swatch<'a> {
             size: None,
             texel: Box::new(move |_, _| tone),
             slope: Box::new(|_, _| Vec2::ZERO),
+            grain: Box::new(|_, _| Grain { open: 1.0, film: 0.0 }),
             relief: 0.0,
             tint: Vec3::ONE,
             tint_transmitted: Vec3::ONE,
             roughness,
+            back_paleness: 1.0,
             mean: tone,
         }
     }
@@ -72,6 +86,21 @@ impl<'a> Swatch<'a> {
     /// The same picture with a relief of `strength`.
     pub(super) fn raised(self, slope: impl Fn(u32, u32) -> Vec2 + 'a, strength: f32) -> Self {
         Self { slope: Box::new(slope), relief: strength, ..self }
+    }
+
+    /// The same with what is finer than the shape of its places.
+    pub(super) fn grained(self, grain: impl Fn(u32, u32) -> Grain + 'a) -> Self {
+        Self { grain: Box::new(grain), ..self }
+    }
+
+    /// The same with a lower side that reflects `factor` times the visible light.
+    pub(super) fn paler_below(self, factor: f32) -> Self {
+        Self { back_paleness: factor, ..self }
+    }
+
+    /// What is finer than the shape of texel (x, y).
+    pub fn grain(&self, x: u32, y: u32) -> Grain {
+        (self.grain)(x, y)
     }
 
     /// Slope of the relief at texel (x, y): ∂h/∂x to the picture's right, ∂h/∂y up the picture.

@@ -22,7 +22,7 @@ pub use self::png::{
     Map, Picture, encode as encode_png, read_gray, read_gray16, read_indexed, read_map, read_rgb, write_png,
 };
 pub use denoise::Denoiser;
-pub use photo::{encode_jpeg, read_color_photo, read_gray_photo, read_photo, resize_gray, shrink, shrunk};
+pub use photo::{encode_jpeg, photo_size, read_color_photo, read_gray_photo, read_photo, resize_gray, shrink, shrunk};
 
 /// How many samples the pixels of an image have.
 #[derive(Clone, Copy, Debug, PartialEq)]

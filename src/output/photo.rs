@@ -2,7 +2,9 @@
 
 use crate::{Error, Result};
 use image::codecs::jpeg::JpegEncoder;
-use image::{DynamicImage, ExtendedColorType, GrayImage, RgbImage, imageops};
+use image::{DynamicImage, ExtendedColorType, GrayImage, ImageError, ImageReader, RgbImage, imageops};
+use std::fs::File;
+use std::io::{BufReader, ErrorKind};
 use std::path::Path;
 
 /// Reads a PNG or JPEG photograph of any depth as 8-bit sRGB: width, height, pixels.
@@ -27,6 +29,11 @@ pub fn read_color_photo(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
     Ok((w, h, photo.into_raw().as_chunks::<3>().0.to_vec()))
 }
 
+/// Width and height of a PNG or JPEG photograph, from its first bytes.
+pub fn photo_size(path: &Path) -> Result<(u32, u32)> {
+    open(path)?.into_dimensions().map_err(|e| unreadable(path, e))
+}
+
 /// Reads one as 8-bit gray: width, height, values.
 pub fn read_gray_photo(path: &Path) -> Result<(u32, u32, Vec<u8>)> {
     let photo = decode(path)?.into_luma8();
@@ -35,13 +42,18 @@ pub fn read_gray_photo(path: &Path) -> Result<(u32, u32, Vec<u8>)> {
 }
 
 fn decode(path: &Path) -> Result<DynamicImage> {
-    let reader = image::ImageReader::open(path).and_then(image::ImageReader::with_guessed_format);
-    reader.map_err(Error::io(path))?.decode().map_err(|e| match e {
-        image::ImageError::IoError(source) if source.kind() != std::io::ErrorKind::UnexpectedEof => {
-            Error::io(path)(source)
-        }
+    open(path)?.decode().map_err(|e| unreadable(path, e))
+}
+
+fn open(path: &Path) -> Result<ImageReader<BufReader<File>>> {
+    ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(Error::io(path))
+}
+
+fn unreadable(path: &Path, error: ImageError) -> Error {
+    match error {
+        ImageError::IoError(source) if source.kind() != ErrorKind::UnexpectedEof => Error::io(path)(source),
         e => Error::Image { path: path.into(), what: format!("this image cannot be read: {e}; PNG and JPEG can") },
-    })
+    }
 }
 
 /// An 8-bit sRGB picture at most `most` pixels wide and high, of the same shape: width, height, pixels. Each pixel is the mean of

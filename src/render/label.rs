@@ -27,6 +27,24 @@ pub struct LabelMap {
     pub normals: Vec<Vec3>,
 }
 
+impl LabelMap {
+    /// A part of it.
+    ///
+    /// # Panics
+    /// Where the part reaches beyond it.
+    #[must_use]
+    pub fn cut(&self, window: Window) -> Self {
+        let places: Vec<usize> = self.window.places_of(window).collect();
+        Self {
+            window,
+            parts: places.iter().map(|i| self.parts[*i]).collect(),
+            tags: places.iter().map(|i| self.tags[*i]).collect(),
+            depth: places.iter().map(|i| self.depth[*i]).collect(),
+            normals: places.iter().map(|i| self.normals[*i]).collect(),
+        }
+    }
+}
+
 /// Labels a window of the camera's image of these parts.
 pub fn label(geometry: &dyn Intersect, parts: &[Part], camera: &Camera, window: Window) -> LabelMap {
     let (width, count) = (window.width() as usize, (window.width() * window.height()) as usize);

@@ -1,5 +1,6 @@
-//! Random numbers: addressed streams, what a page may draw, low-discrepancy samples, warps and tables with their densities.
+//! Random numbers: addressed streams, what a page may draw, low-discrepancy samples, warps and tables with their densities, resamples.
 
+pub mod bootstrap;
 pub mod distribution;
 pub mod fault;
 pub mod place;

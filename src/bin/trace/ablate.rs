@@ -2,7 +2,10 @@
 
 use crate::dataset::order::ImageArgs;
 use crate::dataset::render::{WorkArgs, generate};
-use furrow::ablation::{Change, EDITS, Edit, FULL};
+use crate::engine::Engine;
+use crate::raster::Card;
+use crate::technique::TechniqueArgs;
+use furrow::ablation::{Change, Drawing, EDITS, Edit, FULL};
 use furrow::cli::signal::Signals;
 use furrow::dataset::generate::Shard;
 use furrow::dataset::{Set, finish};
@@ -129,19 +132,24 @@ fn chosen(args: &Args) -> Result<Vec<&'static Edit>> {
             if !args.work.quiet {
                 eprintln!("{} is left out: the full dataset is drawn like that", edit.name);
             }
-            continue;
-        }
-        if drawn.denoise
-            && !drawing.denoise
-            && !named
-            && let Err(e) = Denoiser::find()
-        {
+        } else if let (false, Err(e)) = (named, possible(&drawn, &drawing)) {
             eprintln!("warning: {} is left out: {e}", edit.name);
-            continue;
+        } else {
+            all.push(edit);
         }
-        all.push(edit);
     }
     Ok(all)
+}
+
+/// Whether this machine has what a drawing needs beyond that of the full dataset.
+fn possible(drawn: &Drawing, full: &Drawing) -> Result<()> {
+    if drawn.denoise && !full.denoise {
+        Denoiser::find()?;
+    }
+    if drawn.engine != full.engine && Engine::named(&drawn.engine) == Engine::Raster {
+        Card::open(&TechniqueArgs::default())?;
+    }
+    Ok(())
 }
 
 /// Writes the page of an experiment on all datasets that lie in the folder. Networks learn from red, green and blue: where only near

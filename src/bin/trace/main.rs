@@ -1,10 +1,13 @@
 //! `trace`: grows a field, path traces it, labels it, writes it.
 
 mod ablate;
+mod compare;
 mod dataset;
+mod engine;
 mod export;
 mod field;
 mod quality;
+mod raster;
 mod render;
 mod technique;
 mod texture;
@@ -35,11 +38,13 @@ Examples:
   trace --scene scenes/field.ron --target-error 0.02    as many samples as 2 % noise needs, where it needs them
   trace --scene scenes/field.ron --time 30s             the best picture within half a minute
   trace --scene scenes/field.ron --crop 500,400,200,150 only a part of it, at full size
+  trace --scene scenes/field.ron --engine raster        the same field as a game engine draws it (feature `raster`)
   trace --scene scenes/field.ron --integrator ids       which part each pixel belongs to, in false colours
   trace --scene scenes/field.ron --pixel 648,483        what that pixel shows, in words
   trace dataset --scene scenes/field.ron --count 100 --out data   a hundred of them, labelled, resumable
   trace ablate --scene scenes/field.ron --count 100 --out ab      the same hundred with one thing changed at a time
   trace export --scene scenes/field.ron --format gltf   the same field for another program
+  trace compare out/field out/noisy                     how far one image is from another: PSNR, SSIM, FLIP, by class
   trace texture textures/leaf/sugar_beet.ron            draw a texture from its recipe
 
 Files of an image:
@@ -58,6 +63,8 @@ Exit codes: 0 done, 1 failed, 2 wrong input, 75 stopped cleanly (Ctrl-C, TERM, H
 
 #[derive(Subcommand)]
 enum Verb {
+    /// Measure how far pictures are from others of the same things, and show where.
+    Compare(compare::Args),
     /// Make many fields with all their labels, in the formats of other tools.
     Dataset(Box<dataset::Cli>),
     /// Make a dataset, and the same again with one thing changed at a time: what does each matter to a network?
@@ -72,6 +79,7 @@ fn main() -> ExitCode {
     let signals = signal::Signals::watch();
     let cli = Cli::parse();
     let done = match cli.verb {
+        Some(Verb::Compare(args)) => compare::run(&args),
         Some(Verb::Dataset(args)) => dataset::run(&args, &signals),
         Some(Verb::Ablate(args)) => ablate::run(&args, &signals),
         Some(Verb::Export(args)) => export::run(&args),

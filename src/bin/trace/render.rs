@@ -1,7 +1,9 @@
 //! `trace`: grows a field, path traces it, labels it, writes it.
 
+use crate::engine::Engine;
 use crate::field::FieldArgs;
 use crate::quality::QualityArgs;
+use crate::raster::Card;
 use crate::technique::TechniqueArgs;
 use clap::ValueEnum;
 use furrow::ablation::{Drawing, Edit, FULL};
@@ -10,13 +12,13 @@ use furrow::cli::signal::Signals;
 use furrow::film::Film;
 use furrow::geometry::Window;
 use furrow::integrator::{FalseColor, Integrator, World};
-use furrow::output::{self, Denoiser, Provenance};
+use furrow::output::{self, Denoiser, Provenance, Spp};
 use furrow::render::{self, Settings, Watch};
 use furrow::scene::Field;
-use furrow::{Result, cli};
+use furrow::{Error, Result, cli};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
@@ -33,6 +35,9 @@ pub(crate) struct Args {
     /// Threads; 0 for one on each core. The files do not depend on it.
     #[arg(long, default_value_t = 0, value_parser = threads)]
     threads: usize,
+    /// What draws.
+    #[arg(long, value_enum, default_value_t = Engine::Trace)]
+    engine: Engine,
     /// What to draw.
     #[arg(long, value_enum, default_value_t = Draw::Path)]
     integrator: Draw,
@@ -99,12 +104,17 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     args.field.check()?;
     let edit = args.edit.as_deref().map_or(Ok(&FULL), Edit::named)?;
     let drawing = edit.drawing(Drawing {
-        engine: "trace".into(),
+        engine: args.engine.name().into(),
         spp: args.quality.most(),
         denoise: args.denoise,
         max_depth: args.technique.limits().0,
     });
+    let engine = Engine::named(&drawing.engine);
     let (quality, technique) = (args.quality.with_spp(drawing.spp), args.technique.with_max_depth(drawing.max_depth));
+    technique.check(engine)?;
+    if engine == Engine::Raster {
+        args.check_raster()?;
+    }
     if !matches!(args.integrator, Draw::Path) {
         technique.check_unused(drawing.denoise)?;
     }
@@ -114,6 +124,8 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     if args.pixel.is_none() {
         cli::check_folder(&out)?;
     }
+    // Likewise.
+    let card = (engine == Engine::Raster).then(|| Card::open(&technique)).transpose()?;
     let pool = render::pool(args.threads)?;
     let field: Field = pool.install(|| args.field.grow(edit))?;
     for warning in &field.warnings {
@@ -127,6 +139,9 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         cli::check_pixel(pixel, width, height)?;
     }
     let built = begin.elapsed();
+    if let Some(card) = card {
+        return pool.install(|| rasterize(args, edit, &field, window, &card, &out, begin));
+    }
     let geometry = pool.install(|| EmbreeAccel::build(&scene.surfaces(), pool.current_num_threads() as u32))?;
     say(format!(
         "{}: {} plants, {} parts, {:.2} M triangles; grown in {:.2} s, built in {:.2} s",
@@ -165,15 +180,13 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     bar.finish_and_clear();
     let photograph = edit.photograph(&field, &film);
     let labels = edit.labels(labels, &film, &scene.tags());
-    let mut deviations = technique.deviations();
-    deviations.extend(edit.label().map(|name| format!("edit: {name}")));
     let provenance = Provenance {
         scene_hash: field.hash.clone(),
         seed: field.seed,
         index: field.index,
         spp: quality.spp(&film),
         integrator: args.integrator.name(),
-        deviations,
+        deviations: deviations(&technique, edit),
         kernels: accel::version()?,
     };
     let mut paths = pool.install(|| output::write_image(&out, &film, &labels, &photograph, &provenance))?;
@@ -195,6 +208,69 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     ));
     for warning in quality.missed(&film, begin.elapsed()) {
         say(format!("warning: {warning}"));
+    }
+    Ok(paths)
+}
+
+impl Args {
+    /// Refuses what the rasterized engine cannot do.
+    fn check_raster(&self) -> Result<()> {
+        let useless = [
+            (!matches!(self.integrator, Draw::Path), "--integrator"),
+            (self.pixel.is_some(), "--pixel"),
+            (self.denoise, "--denoise"),
+            (self.quality.is_open(), "--time and --target-error"),
+        ];
+        match useless.into_iter().find(|(given, _)| *given) {
+            Some((_, flags)) => Err(Error::Scene(format!(
+                "{flags} say nothing with --engine raster, which has no rays and no noise\n help: use --engine trace, or leave them out"
+            ))),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Whatever differs from the page and the defaults, for the files.
+pub(crate) fn deviations(technique: &TechniqueArgs, edit: &Edit) -> Vec<String> {
+    technique.deviations().into_iter().chain(edit.label().map(|name| format!("edit: {name}"))).collect()
+}
+
+/// Draws a field as a game engine does; returns the paths of the files.
+fn rasterize(
+    args: &Args,
+    edit: &Edit,
+    field: &Field,
+    window: Window,
+    card: &Card,
+    out: &Path,
+    begin: Instant,
+) -> Result<Vec<PathBuf>> {
+    let built = begin.elapsed();
+    let (film, labels) = card.draw(&field.scene)?;
+    let drawn = begin.elapsed() - built;
+    let (film, labels) = (film.cut(window), labels.cut(window));
+    let labels = edit.labels(labels, &film, &field.scene.tags());
+    let provenance = Provenance {
+        scene_hash: field.hash.clone(),
+        seed: field.seed,
+        index: field.index,
+        spp: Spp::Uniform(1),
+        integrator: Engine::Raster.name().into(),
+        deviations: deviations(&args.technique, edit),
+        kernels: card.name().into(),
+    };
+    let paths = output::write_image(out, &film, &labels, &edit.photograph(field, &film), &provenance)?;
+    if !args.quiet {
+        eprintln!(
+            "{}: {} plants, {:.2} M triangles; drawn on {} in {:.2} s; {:.1} s in all; files in {}",
+            args.field.page().display(),
+            field.plants.len(),
+            field.scene.triangles() as f64 / 1e6,
+            card.name(),
+            drawn.as_secs_f64(),
+            begin.elapsed().as_secs_f64(),
+            out.display()
+        );
     }
     Ok(paths)
 }

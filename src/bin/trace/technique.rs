@@ -1,14 +1,17 @@
-//! Which techniques are at work: flags to leave out one that should not move the mean, and two limits that do.
+//! Which techniques are at work: flags to leave out one that should not move the path tracer's mean, or an effect of the rasterized
+//! engine; and two limits that do.
 
+use crate::engine::Engine;
 use clap::ValueEnum;
 use furrow::integrator::{Path, Technique};
 use furrow::sampling::Points;
 use furrow::{Error, Result};
 
-/// How light is gathered; for `--integrator path`.
+/// How light is gathered.
 #[derive(clap::Args, Clone, Default)]
 pub(crate) struct TechniqueArgs {
-    /// Leave out a technique, to see what it does: the picture gets noisier, its mean stays.
+    /// Leave out a technique, to see what it does: the path tracer's picture gets noisier and its mean stays, the rasterized engine's
+    /// picture changes.
     #[arg(long, value_enum, value_delimiter = ',', value_name = "TECHNIQUE")]
     without: Vec<Part>,
     /// Most surfaces on a path; 12 unless given. Few are biased: light that comes by more is missing.
@@ -19,7 +22,7 @@ pub(crate) struct TechniqueArgs {
     clamp: Option<f32>,
 }
 
-/// A technique that can be left out without moving the mean.
+/// A technique that can be left out.
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
 enum Part {
     /// Lights are met by chance only; the sun almost never is.
@@ -30,6 +33,30 @@ enum Part {
     Roulette,
     /// Random numbers are independent instead of spread evenly (quasi-Monte Carlo).
     Qmc,
+    /// Raster: shadow maps.
+    Shadows,
+    /// Raster: screen-space ambient occlusion.
+    Ssao,
+    /// Raster: normal maps.
+    NormalMaps,
+    /// Raster: light through leaves.
+    Foliage,
+    /// Raster: the sky's spherical harmonics; it is then the same from everywhere.
+    Harmonics,
+    /// Raster: four samples a pixel.
+    Msaa,
+}
+
+impl Part {
+    /// Whose technique it is.
+    fn engine(self) -> Engine {
+        match self {
+            Self::LightSampling | Self::Mis | Self::Roulette | Self::Qmc => Engine::Trace,
+            Self::Shadows | Self::Ssao | Self::NormalMaps | Self::Foliage | Self::Harmonics | Self::Msaa => {
+                Engine::Raster
+            }
+        }
+    }
 }
 
 impl TechniqueArgs {
@@ -91,6 +118,21 @@ impl TechniqueArgs {
                 .map_err(|_| Error::Dataset(format!("there is no technique `{name}` to leave out")))
         };
         Ok(Self { without: without.iter().map(part).collect::<Result<_>>()?, max_depth, clamp })
+    }
+
+    /// Refuses techniques of another engine than the one that draws.
+    pub(crate) fn check(&self, engine: Engine) -> Result<()> {
+        let other = self.without.iter().find(|part| part.engine() != engine);
+        let limits = engine == Engine::Raster && (self.max_depth.is_some() || self.clamp.is_some());
+        let words = match other.and_then(Part::to_possible_value) {
+            Some(name) => format!("--without {} says nothing", name.get_name()),
+            None if limits => "--max-depth and --clamp say nothing".into(),
+            None => return Ok(()),
+        };
+        Err(Error::Scene(format!(
+            "{words} with --engine {}\n help: `trace --help` tells which is whose",
+            engine.name()
+        )))
     }
 
     /// Refuses flags of the path tracer where another integrator draws.

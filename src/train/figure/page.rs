@@ -24,6 +24,8 @@ pub struct Page<'a> {
     pub lead: &'a str,
     /// What is what: names and values.
     pub facts: &'a [(String, String)],
+    /// The table that all is about; wide.
+    pub answer: Option<&'a Table>,
     /// How well a set of images was answered.
     pub report: Option<&'a Report>,
     /// Curves over training.
@@ -48,6 +50,10 @@ impl Page<'_> {
             body.push_str(&figures(report));
             body.push_str(&section("Scores", &scores(report)));
             body.push_str(&section("Who was taken for whom", &matrix(&report.confusion, &report.classes)));
+        }
+        if let Some(answer) = self.answer {
+            let table = table_html(answer);
+            body.push_str(&section("What changes do", &format!("<div class=\"wide\">{table}</div>")));
         }
         body.push_str(&section("Curves", &self.curves()));
         body.push_str(&section("Images", &self.images()?));

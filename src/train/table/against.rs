@@ -2,25 +2,32 @@
 //!
 //! Two trainings of one network with one seed begin with the same weights and meet images in the same order, so the difference of
 //! their scores is of what they learnt from, and of chance. The table tells its mean over seeds, its standard deviation (n − 1), and
-//! whether the mean is beyond that: a change that is not may be chance.
+//! whether the mean is beyond that: a change that is not may be chance. Beside it stand what rendering took, and how far the images
+//! are from the unchanged ones, measured once and kept in `distance/`.
 
 use super::experiment::{Experiment, TrainSet};
 use super::print::{PERCENT, Seen, mean, scale, spread};
 use super::sets::Bound;
 use crate::Result;
-use crate::dataset::recipe::Rendering;
+use crate::compare::{Band, Comparison, Options, Pairs, Region};
+use crate::dataset::recipe::{FILE, Rendering};
 use crate::dataset::{Set, ledger, native};
 use crate::train::data::Pick;
 use crate::train::figure::Shot;
 use crate::train::measure::{Cell, Report, Table};
+use crate::train::run;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Most pixels across and down that a page shows of an image.
 const SHOWN: (u32, u32) = (240, 180);
 
 /// Columns between the two halves of a picture.
 const GAP: u32 = 4;
+
+/// Most images of a dataset that are measured: means over them are known to a few per cent.
+const MEASURED: usize = 20;
 
 /// What the page says of it all.
 pub(super) const LEAD: &str = "What each change of what is learnt from does: the mean difference over seeds, and the standard deviation of \
@@ -35,7 +42,7 @@ fn others(experiment: &Experiment) -> Option<(usize, Vec<usize>)> {
 }
 
 /// The table; none where the page does not ask for it.
-pub(super) fn table(bound: &Bound, seen: &[Seen]) -> Result<Option<Table>> {
+pub(super) fn table(bound: &Bound, seen: &[Seen], out: &Path) -> Result<Option<Table>> {
     let experiment = &bound.experiment;
     let Some((base, others)) = others(experiment) else { return Ok(None) };
     let classes = experiment.learn.classes.names();
@@ -46,14 +53,18 @@ pub(super) fn table(bound: &Bound, seen: &[Seen]) -> Result<Option<Table>> {
         .map(|(k, name)| (name.as_str(), Some(k)))
         .chain([("vegetation", None)])
         .collect();
-    let fixed = ["network", "trained on", "core seconds an image", "of the other's", "seeds"].map(str::to_owned);
+    let name = &experiment.train[base].name;
+    let fixed = ["network", "trained on", "core seconds an image"].map(str::to_owned).into_iter();
+    let fixed = fixed.chain([format!("times {name}"), "FLIP".into(), "CIEDE2000".into(), "seeds".into()]);
     let heads = experiment.test.iter().flat_map(|test| {
         let three = |name: &str| ["", " ±", " beyond"].map(|what| format!("{} {name}{what}", test.name));
         scores.iter().flat_map(move |(name, _)| three(name))
     });
-    let title = format!("Change of I/U against {} ({})", experiment.train[base].name, scale(experiment));
-    let mut table = Table::new(title, fixed.into_iter().chain(heads));
+    let title = format!("Change of I/U against {name} ({})", scale(experiment));
+    let mut table = Table::new(title, fixed.chain(heads));
     let costs = experiment.train.iter().map(|train| cost(bound, train)).collect::<Result<Vec<_>>>()?;
+    let distances =
+        (0..experiment.train.len()).map(|train| known(bound, out, base, train)).collect::<Result<Vec<_>>>()?;
     let mut names: Vec<&str> = seen.iter().map(|s| s.row.learner.name()).collect();
     names.dedup();
     for name in names {
@@ -70,6 +81,8 @@ pub(super) fn table(bound: &Bound, seen: &[Seen]) -> Result<Option<Table>> {
                 Cell::text(&experiment.train[train].name),
                 Cell::number(costs[train], 2),
                 Cell::number(ratio, 2),
+                Cell::number(distances[train].as_ref().map(|d| d.flip), 3),
+                Cell::number(distances[train].as_ref().map(|d| d.ciede2000), 2),
                 Cell::Count(pairs.iter().filter(judged).count() as u64),
             ];
             let cells = (0..experiment.test.len()).flat_map(|test| {
@@ -106,6 +119,82 @@ fn cost(bound: &Bound, train: &TrainSet) -> Result<Option<f64>> {
         last.insert(row.index, row.seconds * row.threads as f64 / row.at_once.max(1) as f64);
     }
     Ok(mean(&last.into_values().collect::<Vec<_>>()))
+}
+
+/// How far the images of a training set are from those of the one that it is compared with.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Distance {
+    /// Fingerprints of both sets.
+    of: [String; 2],
+    /// Images that were measured.
+    images: u64,
+    /// Mean FLIP, 0 to 1.
+    flip: f64,
+    /// Mean ΔE₀₀.
+    ciede2000: f64,
+}
+
+/// Two rendered sets of the same fields.
+struct Both {
+    folders: [PathBuf; 2],
+    prints: [String; 2],
+    images: usize,
+}
+
+impl Both {
+    /// The first sets of two training sets, where both are there, rendered, and of the same seed and size.
+    fn of(bound: &Bound, base: usize, train: usize) -> Result<Option<Self>> {
+        let first = |train: usize| bound.experiment.train[train].from.first().map(|part| bound.folder(part.set));
+        let (Some(a), Some(b)) = (first(base), first(train)) else { return Ok(None) };
+        if a == b || !a.join(FILE).is_file() || !b.join(FILE).is_file() {
+            return Ok(None);
+        }
+        let sets = [Set::open(a)?, Set::open(b)?];
+        let [Ok(x), Ok(y)] = [sets[0].recipe.rendering(), sets[1].recipe.rendering()] else { return Ok(None) };
+        let same = |r: &Rendering| (r.scene_sha256.clone(), r.seed, r.width, r.height);
+        if same(x) != same(y) {
+            return Ok(None);
+        }
+        let images = sets[0].recipe.count.min(sets[1].recipe.count) as usize;
+        let prints = [sets[0].recipe.fingerprint()?, sets[1].recipe.fingerprint()?];
+        Ok(Some(Self { folders: [a.into(), b.into()], prints, images: images.min(MEASURED) }))
+    }
+}
+
+/// Where a distance is kept.
+fn place(bound: &Bound, out: &Path, train: usize) -> PathBuf {
+    out.join("distance").join(format!("{}.json", bound.experiment.train[train].slug))
+}
+
+/// A distance that was measured of these sets.
+fn known(bound: &Bound, out: &Path, base: usize, train: usize) -> Result<Option<Distance>> {
+    let path = place(bound, out, train);
+    let Some(both) = Both::of(bound, base, train)?.filter(|_| path.is_file()) else { return Ok(None) };
+    let found = run::read_json::<Distance>(&path).ok();
+    Ok(found.filter(|d| d.of == both.prints && d.images == both.images as u64))
+}
+
+/// Measures the distances that are not known yet.
+pub(super) fn measure(bound: &Bound, out: &Path) -> Result<()> {
+    let Some((base, others)) = others(&bound.experiment) else { return Ok(()) };
+    for train in others {
+        let Some(both) = Both::of(bound, base, train)? else { continue };
+        if known(bound, out, base, train)?.is_some() {
+            continue;
+        }
+        let [a, b] = &both.folders;
+        let mut found = Pairs::find(a, b, None)?;
+        found.pairs.truncate(both.images);
+        let images = found.pairs.len() as u64;
+        let compared = Comparison::of(found, &Options { shown: 0, ..Options::default() }, &|| ())?;
+        let whole = compared.means.iter().find(|m| (m.band, m.region) == (Band::Rgb, Region::All));
+        let Some((flip, color)) = whole.and_then(|m| Some((m.flip.as_ref()?.mean, m.ciede2000.as_ref()?.mean))) else {
+            continue;
+        };
+        let distance = Distance { of: both.prints, images, flip, ciede2000: color };
+        run::write_json(&place(bound, out, train), &distance)?;
+    }
+    Ok(())
 }
 
 /// The middle of one field as each training set has it, beside the same of the one that they are compared with, and the labels of both.

@@ -17,6 +17,7 @@
 //! OUT/table-3.*                                I/U of each class that is a plant and of vegetation, with its spread over seeds
 //! OUT/runs.*                                   every run by itself
 //! OUT/against.*                                what each training set changes against one of them, where the page names one
+//! OUT/distance/                                how far the images of each are from those, measured once
 //! OUT/times.*                                  how long networks take, as its Table III
 //! OUT/results.html                             all but times on one page
 //! ```

@@ -22,6 +22,9 @@ pub const RUNS: &str = "runs";
 /// Name of the table of times, the only one that is not the same twice.
 pub const TIMES: &str = "times";
 
+/// Name of the table of changes against one training set.
+const AGAINST: &str = "against";
+
 /// Tables by the names of their files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tables(pub Vec<(&'static str, Table)>);
@@ -74,8 +77,8 @@ pub fn tables(bound: &Bound, out: &Path) -> Result<(Tables, Vec<String>)> {
         (RUNS, runs(experiment, &seen)),
         (TIMES, times(experiment, &seen)),
     ];
-    if let Some(table) = against::table(bound, &seen)? {
-        all.insert(0, ("against", table));
+    if let Some(table) = against::table(bound, &seen, out)? {
+        all.insert(0, (AGAINST, table));
     }
     Ok((Tables(all), told))
 }
@@ -228,7 +231,9 @@ pub(super) fn page(bound: &Bound, tables: &Tables, out: &Path) -> Result<PathBuf
         fact("scale", experiment.scale.clone().unwrap_or_else(|| "that of the page".into())),
         fact("sets", names(experiment.sets.iter().map(|(name, _)| name.as_str()).collect())),
     ];
-    let shown: Vec<Table> = tables.0.iter().filter(|(name, _)| *name != TIMES).map(|(_, t)| t.clone()).collect();
+    let answer = tables.0.iter().find(|(name, _)| *name == AGAINST).map(|(_, table)| table);
+    let shown: Vec<Table> =
+        tables.0.iter().filter(|(name, _)| ![TIMES, AGAINST].contains(name)).map(|(_, t)| t.clone()).collect();
     let shots = against::shots(bound)?;
     let predictors: [String; 1] = ["labels".into()];
     let page = figure::Page {
@@ -240,6 +245,7 @@ pub(super) fn page(bound: &Bound, tables: &Tables, out: &Path) -> Result<PathBuf
             "Means over seeds; a network below the colour baselines has learnt nothing of shape."
         },
         facts: &facts,
+        answer,
         tables: &shown,
         shots: &shots,
         predictors: &predictors,

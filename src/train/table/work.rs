@@ -1,5 +1,6 @@
 //! All of an experiment, as far as it is missing: sets, then row after row training and evaluations, then tables.
 
+use super::against;
 use super::experiment::TrainSet;
 use super::judgement::{self, BASELINE, Judged, Judgement, Known};
 use super::print;
@@ -136,6 +137,7 @@ pub fn run(order: &Order<'_>, hands: &Hands<'_>) -> Result<Vec<PathBuf>> {
 
 /// Writes the tables of what is there.
 fn tables(order: &Order<'_>, hands: &Hands<'_>) -> Result<Vec<PathBuf>> {
+    against::measure(order.bound, order.out)?;
     let (tables, told) = print::tables(order.bound, order.out)?;
     for words in told {
         (hands.warn)(&words);

@@ -5,7 +5,7 @@ mod engine;
 mod finish;
 mod import;
 pub(crate) mod order;
-mod progress;
+pub(crate) mod progress;
 pub(crate) mod render;
 mod verify;
 

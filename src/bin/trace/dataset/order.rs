@@ -1,15 +1,16 @@
 //! What dataset: `trace dataset plan`.
 
+use crate::engine::Engine;
 use crate::field::PageArgs;
+use crate::raster::Card;
 use crate::technique::TechniqueArgs;
-use clap::ValueEnum;
 use furrow::ablation::{Drawing, Edit, FULL};
 use furrow::dataset::plan::{self, Order};
 use furrow::dataset::split::Shares;
 use furrow::dataset::{Set, format};
 use furrow::output::Denoiser;
 use furrow::sampling::Sampler;
-use furrow::{Result, cli, render};
+use furrow::{Error, Result, accel, cli, render};
 use std::path::{Path, PathBuf};
 
 /// What is made.
@@ -55,19 +56,6 @@ pub(crate) struct ImageArgs {
     technique: TechniqueArgs,
 }
 
-/// What draws.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum Engine {
-    /// The path tracer.
-    Trace,
-}
-
-impl Engine {
-    fn name(self) -> String {
-        self.to_possible_value().map(|v| v.get_name().to_owned()).unwrap_or_default()
-    }
-}
-
 /// The names of the formats, with what they are.
 pub(super) fn formats() -> clap::builder::PossibleValuesParser {
     let value = |(name, words): &(&'static str, &'static str)| clap::builder::PossibleValue::new(*name).help(*words);
@@ -84,7 +72,9 @@ impl ImageArgs {
     /// How the images are drawn without an edit.
     pub(crate) fn drawing(&self) -> Drawing {
         let (max_depth, _) = self.technique.limits();
-        Drawing { engine: self.engine.name(), spp: self.spp, denoise: self.denoise, max_depth }
+        // A card draws each pixel once.
+        let spp = if self.engine == Engine::Raster { 1 } else { self.spp };
+        Drawing { engine: self.engine.name().into(), spp, denoise: self.denoise, max_depth }
     }
 
     /// Begins a dataset of these images as an edit has them, or finds it begun.
@@ -92,7 +82,20 @@ impl ImageArgs {
         self.page.check()?;
         cli::check_folder(out)?;
         let drawing = self.drawing();
-        if edit.drawing(drawing.clone()).denoise {
+        let drawn = edit.drawing(drawing.clone());
+        let engine = Engine::named(&drawn.engine);
+        self.technique.check(engine)?;
+        if drawn.denoise && engine == Engine::Raster {
+            return Err(Error::Dataset(
+                "--denoise says nothing with --engine raster, which has no noise\n help: leave it out".into(),
+            ));
+        }
+        // What may change the last bits.
+        let kernels = match engine {
+            Engine::Trace => accel::version()?,
+            Engine::Raster => Card::open(&self.technique)?.name().to_owned(),
+        };
+        if drawn.denoise {
             // Before hours are spent on what could not be denoised then.
             Denoiser::find()?;
         }
@@ -110,6 +113,7 @@ impl ImageArgs {
             split: self.split,
             licence: self.licence.clone(),
             drawing,
+            kernels,
             edit,
             without: self.technique.without(),
             clamp,

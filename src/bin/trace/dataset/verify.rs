@@ -1,10 +1,9 @@
 //! Whether a dataset is whole: `trace dataset verify`.
 
-use super::engine::PathTracer;
+use super::engine;
 use super::progress::Progress;
 use crate::render::threads;
 use furrow::cli::signal::Signals;
-use furrow::dataset::shoot::Engine;
 use furrow::dataset::{Set, verify};
 use furrow::{Result, render};
 use std::path::PathBuf;
@@ -32,11 +31,11 @@ pub(crate) struct Args {
 /// Checks; says what was found.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let set = Set::open(&args.dir)?;
-    let engine = if args.rerender > 0 { PathTracer::of(&set)? } else { None };
+    let engine = if args.rerender > 0 { engine::of(&set)? } else { None };
     let progress = Progress::new(Instant::now(), args.quiet);
     progress.expect(set.recipe.count);
     let done = |_| progress.add();
-    let engine = engine.as_ref().map(|e| e as &dyn Engine);
+    let engine = engine.as_deref();
     let pool = render::pool(args.threads)?;
     let found = pool.install(|| verify::verify(&set, args.rerender, engine, &done, signals.heed()))?;
     progress.finish();

@@ -1,0 +1,60 @@
+//! `trace compare`: how far pictures are from others of the same things.
+
+use crate::dataset::progress::Progress;
+use crate::render::threads;
+use furrow::compare::{Comparison, Options, PIXELS_PER_DEGREE, Pairs};
+use furrow::{Result, cli, render};
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// What is compared, and how.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// The reference: a PNG or JPEG, a folder of such, a rendered image's folder, or a dataset.
+    a: PathBuf,
+    /// What is measured against it; of folders, pictures of the same name are pairs.
+    b: PathBuf,
+    /// Labels as PNG files (0 soil, 1 crop, 2 weed, 255 none), for figures of each class; semantics.png beside the reference unless given.
+    #[arg(long, value_name = "PATH")]
+    labels: Option<PathBuf>,
+    /// Folder for compare.json, .csv, .md and .html.
+    #[arg(long, value_name = "DIR", default_value = "out/compare")]
+    out: PathBuf,
+    /// Pixels in a degree of the view of the eye that FLIP imagines; 67 is a 4K screen of 0.7 m at 0.7 m.
+    #[arg(long, value_name = "N", default_value_t = PIXELS_PER_DEGREE, value_parser = pixels_per_degree)]
+    ppd: f32,
+    /// Most pairs that the page shows, those of the largest FLIP.
+    #[arg(long, value_name = "N", default_value_t = 12)]
+    show: usize,
+    /// Threads; 0 for one on each core.
+    #[arg(long, default_value_t = 0, value_parser = threads)]
+    threads: usize,
+    /// Print nothing but errors, warnings and the paths of the files.
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// Parses pixels in a degree: below 1 nothing is left to see, above 500 the filters are larger than pictures.
+fn pixels_per_degree(text: &str) -> Result<f32, String> {
+    text.parse().ok().filter(|n| (1.0..=500.0).contains(n)).ok_or_else(|| "write a number from 1 to 500".into())
+}
+
+/// Measures every pair, writes tables and a page, and shows the means.
+pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
+    cli::check_folder(&args.out)?;
+    let found = Pairs::find(&args.a, &args.b, args.labels.as_deref())?;
+    for warning in found.warnings() {
+        eprintln!("warning: {warning}");
+    }
+    let progress = Progress::new(Instant::now(), args.quiet);
+    progress.expect(found.pairs.len() as u64);
+    let options = Options { labels: args.labels.clone(), pixels_per_degree: args.ppd, shown: args.show };
+    let pool = render::pool(args.threads)?;
+    let comparison = pool.install(|| Comparison::of(found, &options, &|| progress.add()))?;
+    progress.finish();
+    let paths = comparison.write(&args.out)?;
+    if !args.quiet {
+        eprint!("{}", comparison.table());
+    }
+    Ok(paths)
+}

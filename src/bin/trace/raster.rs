@@ -1,0 +1,56 @@
+//! The rasterized engine, where this program was built with it.
+
+use crate::technique::TechniqueArgs;
+use furrow::Result;
+use furrow::film::Film;
+use furrow::render::LabelMap;
+use furrow::scene::Scene;
+
+/// A card that draws, and what it leaves out.
+pub(crate) struct Card {
+    #[cfg(feature = "raster")]
+    rasterizer: furrow::raster::Rasterizer,
+    #[cfg(feature = "raster")]
+    settings: furrow::raster::Settings,
+}
+
+#[cfg(feature = "raster")]
+impl Card {
+    /// The fastest there is.
+    pub(crate) fn open(technique: &TechniqueArgs) -> Result<Self> {
+        let named = |name: &String| furrow::raster::Effect::named(name);
+        let settings = furrow::raster::Settings { without: technique.without().iter().filter_map(named).collect() };
+        Ok(Self { rasterizer: furrow::raster::Rasterizer::new()?, settings })
+    }
+
+    /// Its name and driver.
+    pub(crate) fn name(&self) -> &str {
+        self.rasterizer.adapter()
+    }
+
+    /// The whole picture and its labels.
+    pub(crate) fn draw(&self, scene: &Scene) -> Result<(Film, LabelMap)> {
+        self.rasterizer.draw(scene, &self.settings).map(|drawn| (drawn.film, drawn.labels))
+    }
+}
+
+#[cfg(not(feature = "raster"))]
+impl Card {
+    /// An error: there is none.
+    pub(crate) fn open(_: &TechniqueArgs) -> Result<Self> {
+        Err(furrow::Error::Raster(
+            "this program was built without the rasterized engine\n help: cargo build --release --features raster"
+                .into(),
+        ))
+    }
+
+    /// No name.
+    pub(crate) fn name(&self) -> &str {
+        ""
+    }
+
+    /// Never called.
+    pub(crate) fn draw(&self, _: &Scene) -> Result<(Film, LabelMap)> {
+        Self::open(&TechniqueArgs::default()).map(|_| unreachable!("no card opens"))
+    }
+}

@@ -1,0 +1,267 @@
+//! Which picture belongs to which, and where labels are.
+//!
+//! A picture is a file, or a folder with `rgb.png`; `nir.png` and `semantics.png` beside it belong to it. Any other folder holds many, below
+//! `images/` where it has that: such of folders with `rgb.png` (datasets, renders), by the folder's name; else every PNG and JPEG, by its own,
+//! whose labels lie below `labels/`. Names go without extensions, so that a JPEG may stand against a PNG.
+
+use crate::{Error, Result};
+use std::collections::BTreeMap;
+use std::path::{Component, Path, PathBuf};
+
+/// Extensions of pictures.
+const PICTURES: [&str; 3] = ["png", "jpg", "jpeg"];
+/// Names that a warning or an error tells.
+const TOLD: usize = 3;
+
+/// Two pictures of one thing.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Pair {
+    /// What both are called.
+    pub name: String,
+    /// The reference.
+    pub a: PathBuf,
+    /// The test.
+    pub b: PathBuf,
+    /// Near infrared of both, where both have it.
+    pub nir: Option<(PathBuf, PathBuf)>,
+    /// Classes of the pixels.
+    pub labels: Option<PathBuf>,
+}
+
+/// What is there to compare.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Pairs {
+    /// What the reference is called: as much of its path's end as tells it from the test.
+    pub a: String,
+    /// What the test is called.
+    pub b: String,
+    /// The pairs by name; one at least.
+    pub pairs: Vec<Pair>,
+    /// Names that only the reference has.
+    pub only_a: Vec<String>,
+    /// Names that only the test has.
+    pub only_b: Vec<String>,
+}
+
+/// One picture, or many by name.
+enum Source {
+    One(PathBuf),
+    Many(BTreeMap<String, PathBuf>),
+}
+
+impl Pairs {
+    /// Finds the pairs of two pictures or two folders. `labels` is a file or folder of labels; without it they are looked for beside `a`.
+    /// An error where nothing can be paired, or nothing has labels though they were given.
+    pub fn find(a: &Path, b: &Path, labels: Option<&Path>) -> Result<Self> {
+        let (of_a, of_b) = (source(a)?, source(b)?);
+        if let Some(labels) = labels {
+            there(labels)?;
+        }
+        let (name_a, name_b) = names(a, b);
+        let mut found = Self { a: name_a, b: name_b, pairs: Vec::new(), only_a: Vec::new(), only_b: Vec::new() };
+        match (of_a, of_b) {
+            (Source::One(one), Source::One(other)) => {
+                let name = stem(&one);
+                let labels = match labels {
+                    Some(given) => given_to_one(given, &one),
+                    None => beside_one(&one),
+                };
+                found.pairs.push(Pair { name, nir: infrared(&one, &other), a: one, b: other, labels });
+            }
+            (Source::Many(of_a), Source::Many(mut of_b)) => {
+                for (name, one) in of_a {
+                    let Some(other) = of_b.remove(&name) else {
+                        found.only_a.push(name);
+                        continue;
+                    };
+                    let labels = match labels {
+                        Some(given) => given_to_many(given, &name),
+                        None => beside(&one).or_else(|| first([a.join("labels").join(format!("{name}.png"))])),
+                    };
+                    found.pairs.push(Pair { name, nir: infrared(&one, &other), a: one, b: other, labels });
+                }
+                found.only_b.extend(of_b.into_keys());
+            }
+            (one, _) => {
+                let (one, many) = if matches!(one, Source::One(_)) { (a, b) } else { (b, a) };
+                return Err(Error::Compare(format!(
+                    "{} is one picture, {} a folder of many\n help: give two pictures or two folders",
+                    one.display(),
+                    many.display()
+                )));
+            }
+        }
+        found.check(labels)?;
+        Ok(found)
+    }
+
+    fn check(&self, labels: Option<&Path>) -> Result<()> {
+        if self.pairs.is_empty() {
+            return Err(Error::Compare(format!(
+                "no picture of {} has a partner in {}\n help: pictures are paired by their names below the folder, without the extension; \
+                 the first has {}, the second {}",
+                self.a,
+                self.b,
+                told(&self.only_a),
+                told(&self.only_b)
+            )));
+        }
+        match labels {
+            Some(labels) if self.pairs.iter().all(|pair| pair.labels.is_none()) => Err(Error::Compare(format!(
+                "{}: there are no labels of {} in it\n help: they are PNG files with the pictures' names, or semantics.png in folders with these",
+                labels.display(),
+                self.pairs[0].name
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    /// What was left out, one sentence each.
+    pub fn warnings(&self) -> Vec<String> {
+        let alone = |names: &[String], of: &str, other: &str| {
+            let what =
+                if names.len() == 1 { "is a picture without a partner" } else { "are pictures without partners" };
+            (!names.is_empty()).then(|| format!("{} of {of} {what} in {other}: {}", names.len(), told(names)))
+        };
+        let bare: Vec<String> =
+            self.pairs.iter().filter(|pair| pair.labels.is_none()).map(|pair| pair.name.clone()).collect();
+        let unlabelled = (!bare.is_empty() && bare.len() < self.pairs.len())
+            .then(|| format!("classes leave out {} without labels: {}", bare.len(), told(&bare)));
+        [alone(&self.only_a, &self.a, &self.b), alone(&self.only_b, &self.b, &self.a), unlabelled]
+            .into_iter()
+            .flatten()
+            .collect()
+    }
+}
+
+/// The first names of a list.
+fn told(names: &[String]) -> String {
+    let first = names.iter().take(TOLD).map(String::as_str).collect::<Vec<_>>().join(", ");
+    match names.len().saturating_sub(TOLD) {
+        0 => first,
+        more => format!("{first} and {more} more"),
+    }
+}
+
+fn there(path: &Path) -> Result<()> {
+    if path.exists() {
+        return Ok(());
+    }
+    Err(Error::Compare(format!(
+        "{}: there is no such file or folder\n help: give a PNG or JPEG, a folder of such, a rendered image or a dataset",
+        path.display()
+    )))
+}
+
+fn source(path: &Path) -> Result<Source> {
+    there(path)?;
+    if path.is_file() {
+        return Ok(Source::One(path.into()));
+    }
+    let rendered = path.join("rgb.png");
+    if rendered.is_file() {
+        return Ok(Source::One(rendered));
+    }
+    let images = path.join("images");
+    let mut found = BTreeMap::new();
+    walk(if images.is_dir() { &images } else { path }, "", &mut found)?;
+    if found.is_empty() {
+        return Err(Error::Compare(format!(
+            "{}: there is no PNG or JPEG in this folder\n help: give a picture, a folder of such, a rendered image or a dataset",
+            path.display()
+        )));
+    }
+    Ok(Source::Many(found))
+}
+
+/// Every picture below a folder, by its name there.
+fn walk(folder: &Path, prefix: &str, found: &mut BTreeMap<String, PathBuf>) -> Result<()> {
+    let entries = std::fs::read_dir(folder).and_then(Iterator::collect::<std::io::Result<Vec<_>>>);
+    for entry in entries.map_err(Error::io(folder))? {
+        let path = entry.path();
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if name.starts_with('.') {
+            continue;
+        }
+        let rendered = path.join("rgb.png");
+        let (name, picture) = if rendered.is_file() {
+            (name, rendered)
+        } else if path.is_dir() {
+            walk(&path, &format!("{prefix}{name}/"), found)?;
+            continue;
+        } else if path.extension().is_some_and(|e| PICTURES.iter().any(|p| e.eq_ignore_ascii_case(p))) {
+            (stem(&path), path)
+        } else {
+            continue;
+        };
+        let name = format!("{prefix}{name}");
+        if let Some(other) = found.insert(name.clone(), picture.clone()) {
+            return Err(Error::Compare(format!(
+                "{} and {} are both called {name}\n help: pictures are paired by their names without the extension; move one away",
+                other.display(),
+                picture.display()
+            )));
+        }
+    }
+    Ok(())
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// What else is known of the picture `rgb.png` (or `rgb_denoised.png`): the file beside it whose name begins with something else.
+fn beside_rgb(picture: &Path, other: &str) -> Option<PathBuf> {
+    let rest = stem(picture).strip_prefix("rgb")?.to_owned();
+    first([picture.with_file_name(format!("{other}{rest}.png"))])
+}
+
+fn infrared(a: &Path, b: &Path) -> Option<(PathBuf, PathBuf)> {
+    Some((beside_rgb(a, "nir")?, beside_rgb(b, "nir")?))
+}
+
+/// `semantics.png` beside `rgb.png` and what was made of it.
+fn beside(picture: &Path) -> Option<PathBuf> {
+    stem(picture).starts_with("rgb").then(|| first([picture.with_file_name("semantics.png")])).flatten()
+}
+
+fn beside_one(picture: &Path) -> Option<PathBuf> {
+    let file = format!("{}.png", stem(picture));
+    let folder = picture.parent().filter(|folder| folder.ends_with("images"));
+    beside(picture).or_else(|| first([folder?.with_file_name("labels").join(file)]))
+}
+
+fn given_to_one(given: &Path, picture: &Path) -> Option<PathBuf> {
+    let file = format!("{}.png", stem(picture));
+    first([given.to_path_buf(), given.join("semantics.png"), given.join(file)])
+}
+
+fn given_to_many(given: &Path, name: &str) -> Option<PathBuf> {
+    let file = format!("{name}.png");
+    let rendered = format!("{name}/semantics.png");
+    first([
+        given.join(&rendered),
+        given.join("images").join(rendered),
+        given.join("labels").join(&file),
+        given.join(file),
+    ])
+}
+
+/// The first that is a file.
+fn first<const N: usize>(paths: [PathBuf; N]) -> Option<PathBuf> {
+    paths.into_iter().find(|path| path.is_file())
+}
+
+/// As much of two paths' ends as tells them apart; files hold no more of a path.
+fn names(a: &Path, b: &Path) -> (String, String) {
+    let parts = |path: &Path| -> Vec<String> {
+        let whole = std::fs::canonicalize(path).unwrap_or_else(|_| path.into());
+        let names = whole.components().filter(|c| matches!(c, Component::Normal(_)));
+        names.map(|c| c.as_os_str().to_string_lossy().into_owned()).collect()
+    };
+    let (a, b) = (parts(a), parts(b));
+    let end = |parts: &[String], n: usize| parts[parts.len().saturating_sub(n)..].join("/");
+    let most = a.len().max(b.len()).max(1);
+    let apart = (1..=most).find(|n| end(&a, *n) != end(&b, *n)).unwrap_or(1);
+    (end(&a, apart), end(&b, apart))
+}

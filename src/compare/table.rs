@@ -1,0 +1,221 @@
+//! Figures as JSON and CSV for programs, as Markdown for people.
+
+use super::comparison::{Compared, Comparison};
+use super::figures::{Band, Region, Row};
+use super::summary::{Mean, Summary};
+use crate::html::{count, number};
+use crate::{Error, Result};
+use serde::Serialize;
+use std::fmt::Write;
+
+/// Heads of the measures, as people read them.
+pub(super) const MEASURES: [&str; 5] = ["MSE", "PSNR, dB", "SSIM", "FLIP", "ΔE₀₀"];
+
+#[derive(Serialize)]
+struct Document<'a> {
+    furrow: &'static str,
+    reference: &'a str,
+    test: &'a str,
+    pixels_per_degree: f32,
+    only_reference: &'a [String],
+    only_test: &'a [String],
+    means: Vec<Means>,
+    pairs: Vec<PairOf<'a>>,
+}
+
+#[derive(Serialize)]
+struct Means {
+    band: Band,
+    region: Region,
+    pairs: u64,
+    mse: Bounded,
+    psnr_db: Option<Bounded>,
+    ssim: Option<Bounded>,
+    flip: Option<Bounded>,
+    ciede2000: Option<Bounded>,
+}
+
+#[derive(Serialize)]
+struct Bounded {
+    mean: f64,
+    low: Option<f64>,
+    high: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct PairOf<'a> {
+    name: &'a str,
+    width: u32,
+    height: u32,
+    figures: Vec<Values>,
+}
+
+#[derive(Serialize)]
+struct Values {
+    band: Band,
+    region: Region,
+    pixels: u64,
+    mse: f64,
+    psnr_db: Option<f64>,
+    ssim: Option<f64>,
+    flip: Option<f64>,
+    ciede2000: Option<f64>,
+}
+
+/// All of it; `null` is what does not exist, or an infinite PSNR.
+pub(super) fn json(of: &Comparison) -> Result<String> {
+    let bounded = |m: Mean| Bounded { mean: m.mean, low: m.interval.map(|i| i.low), high: m.interval.map(|i| i.high) };
+    let means = of.means.iter().map(|s| Means {
+        band: s.band,
+        region: s.region,
+        pairs: s.pairs,
+        mse: bounded(s.mse),
+        psnr_db: s.psnr_db().map(bounded),
+        ssim: s.ssim.map(bounded),
+        flip: s.flip.map(bounded),
+        ciede2000: s.ciede2000.map(bounded),
+    });
+    let values = |row: &Row| Values {
+        band: row.band,
+        region: row.region,
+        pixels: row.pixels,
+        mse: row.mse,
+        psnr_db: row.psnr_db(),
+        ssim: row.ssim,
+        flip: row.flip,
+        ciede2000: row.ciede2000,
+    };
+    let pairs = of.pairs.iter().map(|pair| PairOf {
+        name: &pair.name,
+        width: pair.width,
+        height: pair.height,
+        figures: pair.figures.rows.iter().map(values).collect(),
+    });
+    let document = Document {
+        furrow: env!("CARGO_PKG_VERSION"),
+        reference: &of.found.a,
+        test: &of.found.b,
+        pixels_per_degree: of.pixels_per_degree,
+        only_reference: &of.found.only_a,
+        only_test: &of.found.only_b,
+        means: means.collect(),
+        pairs: pairs.collect(),
+    };
+    let text = serde_json::to_string_pretty(&document);
+    text.map(|text| text + "\n").map_err(|e| Error::Compare(format!("cannot write figures as JSON: {e}")))
+}
+
+/// A row for each pair, band and region.
+pub(super) fn csv(of: &Comparison) -> String {
+    let mut out = "name,band,region,pixels,mse,psnr_db,ssim,flip,ciede2000\n".to_owned();
+    let value = |v: Option<f64>| v.map(|v| v.to_string()).unwrap_or_default();
+    for pair in &of.pairs {
+        let name = &pair.name;
+        let name = if name.contains([',', '"', '\n', '\r']) {
+            format!("\"{}\"", name.replace('"', "\"\""))
+        } else {
+            name.clone()
+        };
+        for row in &pair.figures.rows {
+            let (band, region, pixels, mse) = (row.band.name(), row.region.name(), row.pixels, row.mse);
+            let psnr = row.psnr_db().unwrap_or(f64::INFINITY);
+            let [ssim, flip, color] = [row.ssim, row.flip, row.ciede2000].map(value);
+            let _ = writeln!(out, "{name},{band},{region},{pixels},{mse},{psnr},{ssim},{flip},{color}");
+        }
+    }
+    out
+}
+
+/// Means, then each pair where there are more.
+pub(super) fn markdown(of: &Comparison) -> String {
+    let name = |name: &str| name.replace('|', "\\|").replace(char::is_control, "·");
+    let mut out = format!("# {} against {}\n\n{}\n\n{}", name(&of.found.b), name(&of.found.a), lead(of), means(of));
+    if of.pairs.len() > 1 {
+        let head: Vec<String> = ["pair"].into_iter().chain(MEASURES).map(str::to_owned).collect();
+        let row = |pair: &Compared| [vec![name(&pair.name)], cells(pair.figures.all())].concat();
+        let rows: Vec<Vec<String>> = [head].into_iter().chain(of.pairs.iter().map(row)).collect();
+        let _ = write!(out, "\nOf each pair, all pixels in colour:\n\n{}", columns(&rows));
+    }
+    for warning in of.found.warnings() {
+        let _ = write!(out, "\nNot compared: {}.\n", name(&warning));
+    }
+    out
+}
+
+/// What was measured, in a sentence.
+pub(super) fn lead(of: &Comparison) -> String {
+    let pairs = count(of.pairs.len() as u64, "pair of pictures", "pairs of pictures");
+    let around =
+        if of.pairs.len() > 1 { "; means over pairs, and where 95 % of resamples of the pairs have them" } else { "" };
+    format!("{pairs}{around}. FLIP at {} pixels a degree.", number(f64::from(of.pixels_per_degree)))
+}
+
+/// Means over pairs, a row for each band and region.
+pub(super) fn means(of: &Comparison) -> String {
+    let head: Vec<String> = [""].into_iter().chain(MEASURES).map(str::to_owned).collect();
+    let row = |s: &Summary| [vec![label(s.band, s.region)], mean_cells(s)].concat();
+    columns(&[head].into_iter().chain(of.means.iter().map(row)).collect::<Vec<_>>())
+}
+
+/// What a row is of.
+pub(super) fn label(band: Band, region: Region) -> String {
+    match band {
+        Band::Rgb => region.name().to_owned(),
+        Band::Nir => format!("{}, near infrared", region.name()),
+    }
+}
+
+/// The measures of a pair as people read them, in the order of [`MEASURES`].
+pub(super) fn cells(row: &Row) -> Vec<String> {
+    let shown = |(k, value): (usize, Option<f64>)| value.map_or_else(|| missing(k), |v| digits(k, v));
+    [Some(row.mse), row.psnr_db(), row.ssim, row.flip, row.ciede2000].into_iter().enumerate().map(shown).collect()
+}
+
+/// The same of means, with their intervals.
+fn mean_cells(s: &Summary) -> Vec<String> {
+    mean_parts(s)
+        .into_iter()
+        .map(|(mean, bounds)| bounds.map_or_else(|| mean.clone(), |bounds| format!("{mean} ({bounds})")))
+        .collect()
+}
+
+/// Means and the bounds of their intervals, in the order of [`MEASURES`].
+pub(super) fn mean_parts(s: &Summary) -> Vec<(String, Option<String>)> {
+    let part = |(k, mean): (usize, Option<Mean>)| match mean {
+        Some(m) => (digits(k, m.mean), m.interval.map(|i| format!("{} to {}", digits(k, i.low), digits(k, i.high)))),
+        None => (missing(k), None),
+    };
+    [Some(s.mse), s.psnr_db(), s.ssim, s.flip, s.ciede2000].into_iter().enumerate().map(part).collect()
+}
+
+/// A value of the measure number `k`, with as many digits as tell something.
+fn digits(k: usize, value: f64) -> String {
+    match k {
+        0 => format!("{value:.6}"),
+        1 | 4 => format!("{value:.2}"),
+        _ => format!("{value:.4}"),
+    }
+}
+
+/// What stands where there is no value: PSNR is then infinite, others do not exist.
+fn missing(k: usize) -> String {
+    if k == 1 { "∞".into() } else { "–".into() }
+}
+
+/// Rows, the first of them the head, as a table in Markdown whose columns are aligned.
+fn columns(rows: &[Vec<String>]) -> String {
+    let width = |k: usize| rows.iter().map(|row| row[k].chars().count()).max().unwrap_or(0).max(2);
+    let widths: Vec<usize> = (0..rows[0].len()).map(width).collect();
+    let line = |row: &Vec<String>| {
+        let cell = |(k, text): (usize, &String)| {
+            let width = widths[k];
+            if k == 0 { format!("| {text:<width$} ") } else { format!("| {text:>width$} ") }
+        };
+        row.iter().enumerate().map(cell).collect::<String>() + "|\n"
+    };
+    let rule = |(k, width): (usize, &usize)| {
+        if k == 0 { format!("|{:-<1$}", "", width + 2) } else { format!("|{:-<1$}:", "", width + 1) }
+    };
+    let rule = widths.iter().enumerate().map(rule).collect::<String>() + "|\n";
+    line(&rows[0]) + &rule + &rows[1..].iter().map(line).collect::<String>()
+}

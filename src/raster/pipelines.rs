@@ -1,0 +1,206 @@
+//! What the card does in each pass: shaders, layouts, formats.
+
+use super::gpu::Gpu;
+use super::vertices::STRIDE;
+use wgpu::{
+    BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingType, BufferBindingType, ColorTargetState,
+    ColorWrites, CompareFunction, DepthStencilState, FragmentState, MultisampleState, PipelineLayoutDescriptor,
+    RenderPipeline, RenderPipelineDescriptor, SamplerBindingType, ShaderModule, ShaderModuleDescriptor, ShaderSource,
+    ShaderStages, TextureFormat, TextureSampleType, TextureViewDimension, VertexBufferLayout, VertexState,
+    VertexStepMode, vertex_attr_array,
+};
+
+/// Radiance of R, G, B, NIR.
+pub(super) const RADIANCE: TextureFormat = TextureFormat::Rgba16Float;
+/// Part at each pixel's centre, from 1.
+pub(super) const PARTS: TextureFormat = TextureFormat::R32Uint;
+/// Where that is.
+pub(super) const POSITIONS: TextureFormat = TextureFormat::Rgba32Float;
+/// And how it faces.
+pub(super) const NORMALS: TextureFormat = TextureFormat::Rgba16Float;
+/// Openness to the sky.
+pub(super) const OPENNESS: TextureFormat = TextureFormat::R8Unorm;
+/// Depth.
+pub(super) const DEPTH: TextureFormat = TextureFormat::Depth32Float;
+
+/// Bindings and passes.
+pub(super) struct Pipelines {
+    /// View, wears, lights.
+    pub(super) frame: BindGroupLayout,
+    /// A sheet's textures.
+    pub(super) sheet: BindGroupLayout,
+    /// Shadow maps, openness, sky.
+    pub(super) around: BindGroupLayout,
+    /// The matrix of a shadow map.
+    pub(super) caster: BindGroupLayout,
+    /// No bindings.
+    pub(super) nothing: BindGroupLayout,
+    /// Positions and normals.
+    pub(super) surface: BindGroupLayout,
+    /// Depth from a light.
+    pub(super) shadow: RenderPipeline,
+    /// Ids, positions, normals.
+    pub(super) label: RenderPipeline,
+    /// Ambient occlusion.
+    pub(super) occlude: RenderPipeline,
+    /// The picture, with one sample a pixel and with four.
+    pub(super) shade: [RenderPipeline; 2],
+    /// What lies behind it, likewise.
+    pub(super) behind: [RenderPipeline; 2],
+}
+
+/// Samples a pixel of the picture: without smoothing and with it.
+pub(super) const SAMPLES: [u32; 2] = [1, 4];
+
+fn entry(binding: u32, ty: BindingType) -> BindGroupLayoutEntry {
+    BindGroupLayoutEntry { binding, visibility: ShaderStages::VERTEX_FRAGMENT, ty, count: None }
+}
+
+fn texture(binding: u32, sample_type: TextureSampleType) -> BindGroupLayoutEntry {
+    entry(binding, BindingType::Texture { sample_type, view_dimension: TextureViewDimension::D2, multisampled: false })
+}
+
+fn buffer(binding: u32, ty: BufferBindingType) -> BindGroupLayoutEntry {
+    entry(binding, BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None })
+}
+
+impl Pipelines {
+    pub(super) fn new(gpu: &Gpu) -> Self {
+        let device = &gpu.device;
+        let layout = |entries: &[BindGroupLayoutEntry]| {
+            device.create_bind_group_layout(&BindGroupLayoutDescriptor { label: None, entries })
+        };
+        let storage = BufferBindingType::Storage { read_only: true };
+        let fine = TextureSampleType::Float { filterable: true };
+        let exact = TextureSampleType::Float { filterable: false };
+        let filtering = BindingType::Sampler(SamplerBindingType::Filtering);
+        let frame = layout(&[buffer(0, BufferBindingType::Uniform), buffer(1, storage), buffer(2, storage)]);
+        let sheet =
+            layout(&[texture(0, fine), texture(1, fine), texture(2, fine), texture(3, fine), entry(4, filtering)]);
+        let maps = BindingType::Texture {
+            sample_type: TextureSampleType::Depth,
+            view_dimension: TextureViewDimension::D2Array,
+            multisampled: false,
+        };
+        let comparing = BindingType::Sampler(SamplerBindingType::Comparison);
+        let around =
+            layout(&[entry(0, maps), entry(1, comparing), texture(2, fine), texture(3, exact), entry(4, filtering)]);
+        let caster = layout(&[buffer(0, BufferBindingType::Uniform)]);
+        let surface = layout(&[texture(0, exact), texture(1, exact)]);
+        let nothing = layout(&[]);
+        let module = |source: &'static str| {
+            device
+                .create_shader_module(ShaderModuleDescriptor { label: None, source: ShaderSource::Wgsl(source.into()) })
+        };
+        let scene = module(include_str!("scene.wgsl"));
+        let occlusion = module(include_str!("occlusion.wgsl"));
+        let pass = |of: &Pass<'_>| of.pipeline(gpu);
+        let all = [Some(&frame), Some(&sheet), Some(&around)];
+        let draw = Pass { module: &scene, vertex: "corner", fragment: "shade", ..Pass::of(&scene, &all) };
+        let back = Pass { depth: Some(CompareFunction::Always), ..Pass::of(&scene, &all) };
+        let shade = SAMPLES.map(|samples| pass(&Pass { samples, targets: &[RADIANCE], corners: true, ..draw }));
+        let behind = SAMPLES
+            .map(|samples| pass(&Pass { vertex: "screen", fragment: "behind", samples, targets: &[RADIANCE], ..back }));
+        let label = pass(&Pass {
+            vertex: "corner",
+            fragment: "label",
+            targets: &[PARTS, POSITIONS, NORMALS],
+            corners: true,
+            ..Pass::of(&scene, &[Some(&frame), Some(&sheet)])
+        });
+        let shadow = pass(&Pass {
+            vertex: "caster",
+            fragment: "cover",
+            depth: Some(CompareFunction::LessEqual),
+            corners: true,
+            ..Pass::of(&scene, &[Some(&nothing), Some(&sheet), Some(&nothing), Some(&caster)])
+        });
+        let occlude = pass(&Pass {
+            vertex: "screen",
+            fragment: "occlude",
+            targets: &[OPENNESS],
+            depth: None,
+            ..Pass::of(&occlusion, &[Some(&frame), Some(&surface)])
+        });
+        Self { frame, sheet, around, caster, nothing, surface, shadow, label, occlude, shade, behind }
+    }
+}
+
+/// What makes a pipeline.
+#[derive(Clone, Copy)]
+struct Pass<'a> {
+    module: &'a ShaderModule,
+    layouts: &'a [Option<&'a BindGroupLayout>],
+    vertex: &'a str,
+    fragment: &'a str,
+    targets: &'a [TextureFormat],
+    samples: u32,
+    /// Whether it draws corners, or one triangle over all.
+    corners: bool,
+    /// Which depths it draws; `None` for a pass without depth. Near is 1 and far is 0 but for shadow maps.
+    depth: Option<CompareFunction>,
+}
+
+impl<'a> Pass<'a> {
+    fn of(module: &'a ShaderModule, layouts: &'a [Option<&'a BindGroupLayout>]) -> Self {
+        Self {
+            module,
+            layouts,
+            vertex: "",
+            fragment: "",
+            targets: &[],
+            samples: 1,
+            corners: false,
+            depth: Some(CompareFunction::Greater),
+        }
+    }
+
+    fn pipeline(&self, gpu: &Gpu) -> RenderPipeline {
+        let attributes =
+            vertex_attr_array![0 => Float32x4, 1 => Float32x3, 2 => Float32x3, 3 => Float32x2, 4 => Uint32];
+        let corners = VertexBufferLayout {
+            array_stride: STRIDE as u64 * 4,
+            step_mode: VertexStepMode::Vertex,
+            attributes: &attributes,
+        };
+        let buffers = if self.corners { vec![Some(corners)] } else { Vec::new() };
+        let layout = gpu.device.create_pipeline_layout(&PipelineLayoutDescriptor {
+            label: None,
+            bind_group_layouts: self.layouts,
+            immediate_size: 0,
+        });
+        let targets: Vec<Option<ColorTargetState>> = self
+            .targets
+            .iter()
+            .map(|format| Some(ColorTargetState { format: *format, blend: None, write_mask: ColorWrites::ALL }))
+            .collect();
+        gpu.device.create_render_pipeline(&RenderPipelineDescriptor {
+            label: Some(self.fragment),
+            layout: Some(&layout),
+            vertex: VertexState {
+                module: self.module,
+                entry_point: Some(self.vertex),
+                compilation_options: Default::default(),
+                buffers: &buffers,
+            },
+            // Leaves have two sides.
+            primitive: Default::default(),
+            depth_stencil: self.depth.map(|compare| DepthStencilState {
+                format: DEPTH,
+                depth_write_enabled: Some(compare != CompareFunction::Always),
+                depth_compare: Some(compare),
+                stencil: Default::default(),
+                bias: Default::default(),
+            }),
+            multisample: MultisampleState { count: self.samples, ..Default::default() },
+            fragment: Some(FragmentState {
+                module: self.module,
+                entry_point: Some(self.fragment),
+                compilation_options: Default::default(),
+                targets: &targets,
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+    }
+}

@@ -1,0 +1,256 @@
+//! The rasterized engine: its labels, its light, its effects, its files.
+//!
+//! Rationale: a comparison of two engines says something only where all else is equal: the same labels, the same light falling in, the same
+//! lens and sensor. Expected: labels are those of the rays in 99.9 % of the pixels of every scene, and where they are not, an edge
+//! of the labels runs; a matt plane returns ρ E cos θ / π of a sun and ρ E / π of an even surrounding, a leaf T E / π of what falls on its other side through the wrapped cosine;
+//! each effect that is left out changes the picture and no label; equal input makes equal bits.
+//! Source: closed forms; the label pass, which `labels.rs` holds against double precision.
+
+mod common;
+
+use common::program::{self, FILES, SMALL, names, scratch, trace};
+use common::scenes::square;
+use furrow::accel::EmbreeAccel;
+use furrow::bsdf::{Bsdf, Leaf, OrenNayar};
+use furrow::film::Filter;
+use furrow::geometry::{Intersect, Ray, Window};
+use furrow::light::{Environment, Light, Sun};
+use furrow::material::Material;
+use furrow::math::{Spectrum, Vec2, Vec3, vec2, vec3};
+use furrow::raster::{Drawn, Effect, Rasterizer, Settings};
+use furrow::render::{LabelMap, label};
+use furrow::scene::build::{self, Options};
+use furrow::scene::tag::{Class, Tag};
+use furrow::scene::{Part, Scene};
+use furrow::sensor::{Camera, Distortion, Pose};
+use std::f32::consts::PI;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+/// The one card of all tests.
+fn card() -> &'static Rasterizer {
+    static CARD: OnceLock<Rasterizer> = OnceLock::new();
+    CARD.get_or_init(|| Rasterizer::new().expect("a Vulkan driver: apt-get install mesa-vulkan-drivers libvulkan1"))
+}
+
+fn draw(scene: &Scene, without: &[Effect]) -> Drawn {
+    card().draw(scene, &Settings { without: without.to_vec() }).expect("a picture")
+}
+
+fn rays(scene: &Scene) -> LabelMap {
+    let geometry = EmbreeAccel::build(&scene.surfaces(), 2).expect("an accelerator");
+    label(&geometry, &scene.parts, &scene.camera, Window::full(scene.camera.width(), scene.camera.height()))
+}
+
+/// Whether rays see this tag within a twentieth of a pixel of the centre: an edge runs there.
+fn near(scene: &Scene, geometry: &EmbreeAccel, tag: Tag, x: u32, y: u32) -> bool {
+    let centre = vec2(x as f32 + 0.5, y as f32 + 0.5);
+    let around = (0..64).map(|k| {
+        let turn = k as f32 * 2.4;
+        Vec2::from_angle(turn) * (0.05 * (k as f32 / 63.0).sqrt())
+    });
+    around.map(|off| scene.camera.ray(centre + off, [0.5; 2])).any(|(origin, direction)| {
+        let seen = geometry.closest(&Ray::new(origin, direction));
+        seen.map_or(Tag::default(), |hit| scene.parts[hit.part as usize].tag) == tag
+    })
+}
+
+/// The pages that ship, and the small one.
+fn pages() -> Vec<PathBuf> {
+    let mut all: Vec<PathBuf> =
+        std::fs::read_dir("scenes").expect("pages").map(|e| e.expect("an entry").path()).collect();
+    all.retain(|p| p.extension().is_some_and(|e| e == "ron"));
+    all.push(SMALL.into());
+    all.sort();
+    all
+}
+
+#[test]
+fn labels_are_those_of_the_rays_on_every_scene() {
+    let pages = pages();
+    assert!(pages.len() >= 12, "{pages:?}");
+    for page in pages {
+        let options = Options { width: Some(400), ..Options::default() };
+        let field = build::field(&page, &options).expect("a field");
+        let geometry = EmbreeAccel::build(&field.scene.surfaces(), 2).expect("an accelerator");
+        let (expected, found) = (rays(&field.scene), draw(&field.scene, &[]).labels);
+        let (width, count) = (expected.window.width() as usize, expected.tags.len());
+        let differ: Vec<usize> = (0..count).filter(|i| expected.tags[*i] != found.tags[*i]).collect();
+        assert!(differ.len() * 1000 <= count, "{}: {} of {count} pixels differ", page.display(), differ.len());
+        for i in differ {
+            let (x, y) = ((i % width) as u32, (i / width) as u32);
+            let edge = near(&field.scene, &geometry, found.tags[i], x, y);
+            assert!(edge, "{}: no edge runs through pixel ({x}, {y})", page.display());
+        }
+        // Depth and normals are those of the surface, but for pixels where another triangle of it won.
+        let same = (0..count).filter(|i| expected.parts[*i] == found.parts[*i]).collect::<Vec<_>>();
+        let far = same.iter().filter(|i| {
+            let (a, b) = (expected.depth[**i], found.depth[**i]);
+            a.is_finite() != b.is_finite() || (a - b).abs() > 2e-4
+        });
+        assert!(far.count() * 1000 <= count, "{}: depths differ", page.display());
+        let turned = same.iter().filter(|i| (expected.normals[**i] - found.normals[**i]).length() > 0.02);
+        assert!(turned.count() * 200 <= count, "{}: normals differ", page.display());
+    }
+}
+
+/// A square metre of a material a metre below the camera.
+fn plane(bsdf: Bsdf, lights: Vec<Light>, distortion: Distortion) -> Scene {
+    let pose = Pose::nadir(vec3(0.0, 0.0, 1.0), 0.0, 0.0, 0.0);
+    let camera = Camera::new((64, 48), [80.0; 2], [32.0, 24.0], distortion, pose).expect("a camera");
+    let tag = Tag { class: Class::Crop, plant: 1, leaf: 0 };
+    Scene {
+        parts: vec![Part { mesh: square(Vec3::ZERO, 4.0), mask: None, material: 0, tag }],
+        materials: vec![Material::Plain(bsdf)],
+        lights,
+        camera,
+        filter: Filter::Box.footprint(),
+    }
+}
+
+fn expect(scene: &Scene, expected: Spectrum, what: &str) {
+    for (i, pixel) in draw(scene, &[]).film.pixels.iter().enumerate() {
+        let error = (pixel.mean.0 - expected.0).abs() / expected.0;
+        assert!(error.max_element() < 5e-3, "{what}: pixel {i} is {:?}, not {expected:?}", pixel.mean);
+    }
+}
+
+#[test]
+fn a_matt_plane_returns_what_the_cosine_law_says() {
+    let albedo = Spectrum::new(0.3, 0.2, 0.1, 0.5);
+    let bsdf = Bsdf::OrenNayar(OrenNayar::new(albedo, 0.0));
+    let irradiance = Spectrum::new(1.0, 2.0, 3.0, 4.0);
+    let slant = vec3(0.6, 0.0, 0.8);
+    let bent = Distortion { k1: -0.2, ..Distortion::default() };
+    for lens in [Distortion::default(), bent] {
+        let sun = plane(bsdf, vec![Light::Sun(Sun::uniform(slant, irradiance))], lens);
+        expect(&sun, albedo * irradiance * (0.8 / PI), "sun");
+        let around = plane(bsdf, vec![Light::Environment(Environment::new(irradiance))], lens);
+        expect(&around, albedo * irradiance, "surrounding");
+    }
+}
+
+#[test]
+fn light_from_behind_comes_through_a_leaf() {
+    let (returned, passed) = (Spectrum::splat(0.1), Spectrum::new(0.1, 0.2, 0.05, 0.4));
+    let bsdf = Bsdf::Leaf(Leaf::bare(returned, passed));
+    let irradiance = Spectrum::ONE;
+    let below = plane(bsdf, vec![Light::Sun(Sun::uniform(-Vec3::Z, irradiance))], Distortion::default());
+    // Wrapped by a half, light from straight behind counts (1 + ½) / (1 + ½)².
+    expect(&below, passed * (1.5 / 2.25 / PI), "from below");
+    let dark = draw(&below, &[Effect::Foliage]).film;
+    assert!(dark.pixels.iter().all(|p| p.mean.max() == 0.0), "without the effect nothing comes through");
+}
+
+#[test]
+fn a_lamp_falls_off_with_the_square_of_the_distance() {
+    let albedo = Spectrum::splat(0.5);
+    let small = furrow::light::Lamp::new(
+        furrow::light::Outline::Disc(0.005),
+        vec3(0.0, 0.0, 0.8),
+        furrow::math::Frame::about(-Vec3::Z),
+        Spectrum::splat(1000.0),
+    );
+    let scene = plane(Bsdf::OrenNayar(OrenNayar::new(albedo, 0.0)), vec![Light::Lamp(small)], Distortion::default());
+    let film = draw(&scene, &[]).film;
+    for (x, y) in [(32, 24), (0, 0), (60, 40)] {
+        let (_, direction) = scene.camera.centre_ray(x, y);
+        let at = scene.camera.pose().position - direction / direction.z;
+        let to = vec3(0.0, 0.0, 0.8) - at;
+        let cosine = to.z / to.length();
+        let expected = 0.5 / PI * 1000.0 * small.area() * cosine * cosine / to.length_squared();
+        let found = film.at(x, y).mean.to_array()[1];
+        assert!((found / expected - 1.0).abs() < 0.01, "({x}, {y}): {found} for {expected}");
+    }
+}
+
+#[test]
+fn each_effect_changes_the_picture_and_no_label() {
+    let field = build::field(SMALL.as_ref(), &Options::default()).expect("a field");
+    let whole = draw(&field.scene, &[]);
+    let again = draw(&field.scene, &[]);
+    assert!(whole.film == again.film && whole.labels == again.labels, "equal input makes equal bits");
+    for (name, effect) in Effect::ALL {
+        let less = draw(&field.scene, &[effect]);
+        assert!(less.labels == whole.labels, "{name}");
+        let changed = less.film.pixels.iter().zip(&whole.film.pixels).filter(|(a, b)| a.mean != b.mean).count();
+        assert!(changed * 100 > whole.film.pixels.len(), "{name}: {changed} pixels");
+    }
+}
+
+#[test]
+fn it_is_about_as_bright_as_the_path_tracer() {
+    let field = build::field(SMALL.as_ref(), &Options::default()).expect("a field");
+    let (film, _) = program::shoot(&field, 16, 2);
+    let mean = |film: &furrow::film::Film| {
+        film.pixels.iter().map(|p| p.mean.0).sum::<furrow::math::Vec4>() / film.pixels.len() as f32
+    };
+    let ratio = mean(&draw(&field.scene, &[]).film) / mean(&film);
+    // No light bounces, and the sky is not hidden by what is farther than a leaf.
+    assert!(ratio.min_element() > 0.75 && ratio.max_element() < 1.25, "{ratio}");
+}
+
+#[test]
+fn the_program_writes_the_files_of_an_image() {
+    let (_keep, out) = scratch();
+    program::run(&out, &["--engine", "raster"]);
+    assert_eq!(names(&out), FILES);
+    let size = |folder: &Path| {
+        let decoder = png::Decoder::new(BufReader::new(File::open(folder.join("rgb.png")).expect("a picture")));
+        let info = decoder.read_info().expect("a picture").info().clone();
+        (info.width, info.height)
+    };
+    let (_keep, again) = scratch();
+    program::run(&again, &["--engine", "raster"]);
+    assert_eq!(std::fs::read(out.join("radiance.exr")).unwrap(), std::fs::read(again.join("radiance.exr")).unwrap());
+    let (_keep, part) = scratch();
+    program::run(&part, &["--engine", "raster", "--crop", "10,8,20,12"]);
+    assert_eq!(size(&part), (20, 12));
+    assert!(size(&out).0 > 20);
+}
+
+#[test]
+fn a_dataset_is_drawn_again_the_same() {
+    let (_keep, out) = scratch();
+    let folder = out.to_str().expect("a path");
+    let made = trace(&["dataset", "--scene", SMALL, "--count", "2", "--engine", "raster", "--out", folder, "--quiet"])
+        .output();
+    let made = made.expect("the program");
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    let recipe = std::fs::read_to_string(out.join("dataset.json")).expect("a recipe");
+    assert!(recipe.contains("\"engine\": \"raster\"") && recipe.contains(card().adapter()), "{recipe}");
+    let checked = trace(&["dataset", "verify", folder, "--rerender", "2"]).output().expect("the program");
+    let said = String::from_utf8_lossy(&checked.stderr);
+    assert!(checked.status.success() && said.contains("2 rendered again and the same"), "{said}");
+}
+
+#[test]
+fn what_it_cannot_do_is_said() {
+    let (_keep, out) = scratch();
+    let out = out.to_str().expect("a path");
+    for (flags, words) in [
+        (&["--engine", "raster", "--denoise"][..], "--denoise say nothing with --engine raster"),
+        (&["--engine", "raster", "--time", "5s"], "--time and --target-error say nothing"),
+        (&["--engine", "raster", "--without", "mis"], "--without mis says nothing with --engine raster"),
+        (&["--engine", "raster", "--max-depth", "3"], "--max-depth and --clamp say nothing with --engine raster"),
+        (&["--without", "msaa"], "--without msaa says nothing with --engine trace"),
+    ] {
+        let output = trace(&["--scene", SMALL, "--out", out]).args(flags).output().expect("the program");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.code() == Some(2) && said.contains(words), "{flags:?}: {said}");
+        assert!(!Path::new(out).exists(), "{flags:?} left files");
+    }
+}
+
+#[test]
+fn without_a_driver_it_names_the_package() {
+    let (_keep, out) = scratch();
+    let mut command = trace(&["--scene", SMALL, "--engine", "raster", "--out", out.to_str().expect("a path")]);
+    let output = command.env("VK_DRIVER_FILES", "/nowhere.json").env("VK_ICD_FILENAMES", "/nowhere.json").output();
+    let output = output.expect("the program");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(2) && said.contains("mesa-vulkan-drivers"), "{said}");
+    assert!(!out.exists());
+}
