@@ -25,7 +25,7 @@ use wgpu::{
 /// How far ambient occlusion looks, metres: about the height of a leaf over the ground.
 const OCCLUSION_RADIUS: f32 = 0.03;
 /// Samples along what a texture is stretched by.
-const ANISOTROPY: u16 = 8;
+const ANISOTROPY: u16 = 4;
 /// Numbers of the view as the shaders read them.
 const VIEW: usize = 48;
 
@@ -152,8 +152,8 @@ fn sampler(gpu: &Gpu, edge: AddressMode, anisotropy_clamp: u16) -> Sampler {
     })
 }
 
-fn depth(view: &TextureView, clear: f32) -> RenderPassDepthStencilAttachment<'_> {
-    let depth_ops = Some(Operations { load: LoadOp::Clear(clear), store: StoreOp::Store });
+fn depth(view: &TextureView, load: LoadOp<f32>) -> RenderPassDepthStencilAttachment<'_> {
+    let depth_ops = Some(Operations { load, store: StoreOp::Store });
     RenderPassDepthStencilAttachment { view, depth_ops, stencil_ops: None }
 }
 
@@ -204,7 +204,7 @@ impl Stage<'_> {
             });
             let matrix = self.gpu.buffer(BufferUsages::UNIFORM, bytemuck::cast_slice(lights.matrix(light)));
             let caster = bind(self.gpu, &self.pipelines.caster, &[matrix.as_entire_binding()]);
-            let mut pass = self.pass(encoder, &[], Some(depth(&layer, 1.0)));
+            let mut pass = self.pass(encoder, &[], Some(depth(&layer, LoadOp::Clear(1.0))));
             pass.set_bind_group(0, &empty[0], &[]);
             pass.set_bind_group(2, &empty[1], &[]);
             pass.set_bind_group(3, &caster, &[]);
@@ -221,7 +221,8 @@ impl Stage<'_> {
         let targets = [PARTS, POSITIONS, NORMALS].map(|format| self.gpu.target(size, format, 1));
         let views = targets.each_ref().map(view);
         let behind = view(&self.gpu.target(size, DEPTH, 1));
-        let mut pass = self.pass(encoder, &views.each_ref().map(|v| color(v, None)), Some(depth(&behind, 0.0)));
+        let mut pass =
+            self.pass(encoder, &views.each_ref().map(|v| color(v, None)), Some(depth(&behind, LoadOp::Clear(0.0))));
         pass.set_bind_group(0, &self.frame, &[]);
         self.triangles(&mut pass, &self.pipelines.label);
         drop(pass);
@@ -277,7 +278,12 @@ impl Stage<'_> {
             None => color(&shown, None),
         };
         let behind = view(&self.gpu.target(size, DEPTH, SAMPLES[which]));
-        let mut pass = self.pass(encoder, &[target], Some(depth(&behind, 0.0)));
+        // First what is nearest, then light for that alone.
+        let mut pass = self.pass(encoder, &[], Some(depth(&behind, LoadOp::Clear(0.0))));
+        pass.set_bind_group(0, &self.frame, &[]);
+        self.triangles(&mut pass, &self.pipelines.nearest[which]);
+        drop(pass);
+        let mut pass = self.pass(encoder, &[target], Some(depth(&behind, LoadOp::Load)));
         pass.set_bind_group(0, &self.frame, &[]);
         pass.set_bind_group(2, &around, &[]);
         if let Some(any) = self.sheets.first() {

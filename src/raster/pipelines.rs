@@ -43,7 +43,9 @@ pub(super) struct Pipelines {
     pub(super) label: RenderPipeline,
     /// Ambient occlusion.
     pub(super) occlude: RenderPipeline,
-    /// The picture, with one sample a pixel and with four.
+    /// The picture's depth, with one sample a pixel and with four.
+    pub(super) nearest: [RenderPipeline; 2],
+    /// The picture, likewise.
     pub(super) shade: [RenderPipeline; 2],
     /// What lies behind it, likewise.
     pub(super) behind: [RenderPipeline; 2],
@@ -96,9 +98,12 @@ impl Pipelines {
         let occlusion = module(include_str!("occlusion.wgsl"));
         let pass = |of: &Pass<'_>| of.pipeline(gpu);
         let all = [Some(&frame), Some(&sheet), Some(&around)];
-        let draw = Pass { module: &scene, vertex: "corner", fragment: "shade", ..Pass::of(&scene, &all) };
+        let draw = Pass { vertex: "corner", corners: true, ..Pass::of(&scene, &all) };
         let back = Pass { depth: Some(CompareFunction::Always), ..Pass::of(&scene, &all) };
-        let shade = SAMPLES.map(|samples| pass(&Pass { samples, targets: &[RADIANCE], corners: true, ..draw }));
+        let nearest = SAMPLES.map(|samples| pass(&Pass { fragment: "nearest", samples, layouts: &all[..2], ..draw }));
+        let depth = Some(CompareFunction::Equal);
+        let shade =
+            SAMPLES.map(|samples| pass(&Pass { fragment: "shade", samples, targets: &[RADIANCE], depth, ..draw }));
         let behind = SAMPLES
             .map(|samples| pass(&Pass { vertex: "screen", fragment: "behind", samples, targets: &[RADIANCE], ..back }));
         let label = pass(&Pass {
@@ -122,7 +127,7 @@ impl Pipelines {
             depth: None,
             ..Pass::of(&occlusion, &[Some(&frame), Some(&surface)])
         });
-        Self { frame, sheet, around, caster, nothing, surface, shadow, label, occlude, shade, behind }
+        Self { frame, sheet, around, caster, nothing, surface, shadow, label, occlude, nearest, shade, behind }
     }
 }
 
@@ -187,7 +192,7 @@ impl<'a> Pass<'a> {
             primitive: Default::default(),
             depth_stencil: self.depth.map(|compare| DepthStencilState {
                 format: DEPTH,
-                depth_write_enabled: Some(compare != CompareFunction::Always),
+                depth_write_enabled: Some(matches!(compare, CompareFunction::Greater | CompareFunction::LessEqual)),
                 depth_compare: Some(compare),
                 stencil: Default::default(),
                 bias: Default::default(),

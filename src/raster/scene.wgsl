@@ -63,7 +63,7 @@ struct Corner {
 };
 
 struct Varying {
-    @builtin(position) at: vec4<f32>,
+    @builtin(position) @invariant at: vec4<f32>,
     @location(0) position: vec3<f32>,
     @location(1) normal: vec3<f32>,
     @location(2) uv: vec2<f32>,
@@ -170,11 +170,18 @@ fn irradiance(n: vec3<f32>) -> vec4<f32> {
     return max(sum, vec4<f32>(0.0));
 }
 
+// Depth first, so that light is worked out once a pixel.
+@fragment
+fn nearest(in: Varying) {
+    if textureSample(mask, smooth_sampler, in.uv).r < 0.5 {
+        discard;
+    }
+}
+
 @fragment
 fn shade(in: Varying) -> @location(0) vec4<f32> {
     let wear = wears[in.part];
     let effects = view.counts.w;
-    let opacity = textureSample(mask, smooth_sampler, in.uv).r;
     let texel = textureSample(reflected, smooth_sampler, in.uv);
     let passed = textureSample(transmitted, smooth_sampler, in.uv);
     let fine = textureSample(relief, smooth_sampler, in.uv);
@@ -187,9 +194,6 @@ fn shade(in: Varying) -> @location(0) vec4<f32> {
     let dy = dpdy(in.position);
     let ux = dpdx(in.uv);
     let uy = dpdy(in.uv);
-    if opacity < 0.5 {
-        discard;
-    }
     let wo = normalize(view.eye.xyz - in.position);
     var n = normalize(in.normal);
     if (effects & NORMAL_MAPS) != 0u && wear.finish.y > 0.0 {

@@ -245,9 +245,9 @@ fn rasterize(
     out: &Path,
     begin: Instant,
 ) -> Result<Vec<PathBuf>> {
-    let built = begin.elapsed();
+    let start = Instant::now();
     let (film, labels) = card.draw(&field.scene)?;
-    let drawn = begin.elapsed() - built;
+    let drawn = start.elapsed();
     let (film, labels) = (film.cut(window), labels.cut(window));
     let labels = edit.labels(labels, &film, &field.scene.tags());
     let provenance = Provenance {
