@@ -6,5 +6,7 @@ fn main() {
     println!("cargo:rerun-if-changed=.libtorch/link.rs");
     if let Ok(lib) = std::env::var("DEP_TCH_LIBTORCH_LIB") {
         println!("cargo:rustc-link-arg=-Wl,--enable-new-dtags,-rpath,{lib}");
+        // `torch-sys` and `nv-flip-sys` both hold stb_image_write, which neither is asked to use here.
+        println!("cargo:rustc-link-arg=-Wl,--allow-multiple-definition");
     }
 }

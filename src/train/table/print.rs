@@ -234,16 +234,19 @@ pub(super) fn page(bound: &Bound, tables: &Tables, out: &Path) -> Result<PathBuf
     let answer = tables.0.iter().find(|(name, _)| *name == AGAINST).map(|(_, table)| table);
     let shown: Vec<Table> =
         tables.0.iter().filter(|(name, _)| ![TIMES, AGAINST].contains(name)).map(|(_, t)| t.clone()).collect();
+    let (title, lead) = match &experiment.against {
+        Some(_) => ("What each change matters to a network", against::LEAD),
+        None => (
+            "Trained on rendered and real images, judged on real ones",
+            "Means over seeds; a network below the colour baselines has learnt nothing of shape.",
+        ),
+    };
     let shots = against::shots(bound)?;
     let predictors: [String; 1] = ["labels".into()];
     let page = figure::Page {
         kind: "Experiment",
-        title: "Trained on rendered and real images, judged on real ones",
-        lead: if experiment.against.is_some() {
-            against::LEAD
-        } else {
-            "Means over seeds; a network below the colour baselines has learnt nothing of shape."
-        },
+        title,
+        lead,
         facts: &facts,
         answer,
         tables: &shown,
