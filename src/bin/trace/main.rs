@@ -1,5 +1,6 @@
 //! `trace`: grows a field, path traces it, labels it, writes it.
 
+mod catalogue;
 mod dataset;
 mod export;
 mod field;
@@ -39,6 +40,7 @@ Examples:
   trace dataset --scene scenes/field.ron --count 100 --out data   a hundred of them, labelled, resumable
   trace export --scene scenes/field.ron --format gltf   the same field for another program
   trace texture textures/leaf/sugar_beet.ron            draw a texture from its recipe
+  trace catalogue --species sugar_beet,galium           plants at every stage, with a scale, to look at
 
 Files of an image:
   rgb.png, nir.png   photographs in colour and near infrared, 8 bit
@@ -56,6 +58,8 @@ Exit codes: 0 done, 1 failed, 2 wrong input, 75 stopped cleanly (Ctrl-C, TERM, H
 
 #[derive(Subcommand)]
 enum Verb {
+    /// Show every species at every stage, with a scale.
+    Catalogue(catalogue::Args),
     /// Make many fields with all their labels, in the formats of other tools.
     Dataset(Box<dataset::Cli>),
     /// Write a field as a scene of another program.
@@ -68,6 +72,7 @@ fn main() -> ExitCode {
     let signals = signal::Signals::watch();
     let cli = Cli::parse();
     let done = match cli.verb {
+        Some(Verb::Catalogue(args)) => catalogue::run(&args, &signals),
         Some(Verb::Dataset(args)) => dataset::run(&args, &signals),
         Some(Verb::Export(args)) => export::run(&args),
         Some(Verb::Texture(args)) => texture::run(&args),
