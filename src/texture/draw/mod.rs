@@ -14,7 +14,7 @@ mod veins;
 mod write;
 
 pub use leaf::{LeafRecipe, Look, Relief};
-pub use shape::Margin;
+pub use shape::{Margin, Sinus};
 pub use soil::{Crumbs, Ground, Litter, SoilRecipe};
 pub use veins::Veins;
 pub use write::{encode, encode_height, write};
