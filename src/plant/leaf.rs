@@ -2,7 +2,9 @@
 
 use super::blade::{self, Rest};
 use super::dissected;
+use super::fern;
 use super::kind::Shape;
+use super::leaflets;
 use super::organ::{Organ, OrganKind};
 use super::skeleton::{Measures, Pose, Skeleton};
 use super::skin::{self, Relief};
@@ -39,6 +41,8 @@ pub(super) enum Lower {
     Petiole,
     /// A tube of this radius round the stem, metres.
     Sheath(f32),
+    /// The same, its outer wall in line with the blade.
+    Wrap(f32),
 }
 
 /// Adds a leaf's organs.
@@ -63,12 +67,23 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
             let segment = segment_mm.draw32(&mut stream) * 1e-3;
             dissected::blade(counts, segment, leaf.width, &skeleton, &mut stream)
         }
+        Shape::Fern { pairs, pinnules, segment_mm } => {
+            let counts = (pairs.draw(&mut stream) as usize, pinnules.draw(&mut stream) as usize);
+            let segment = segment_mm.draw32(&mut stream) * 1e-3;
+            fern::blade(counts, segment, leaf.width, &skeleton, &mut stream)
+        }
+        Shape::Leaflets { .. } => leaflets::blade(leaf, &relief, cells(leaf), &skeleton, &mut stream),
     };
     let skin = if leaf.kind.skin.is_empty() { leaf.kind_name } else { &leaf.kind.skin };
     let kind = leaf.kind.organ;
     // The relief leaves the midrib's ends where they are, so they go where their joints go.
     let end = |joint: usize| motions[joint].point(vec3(0.0, skeleton.along()[joint], 0.0));
-    let midrib = Some([end(skeleton.base()), end(skeleton.along().len() - 1)]);
+    let tip = match leaf.kind.shape {
+        // Between the foremost leaflets nothing is beyond the rachis.
+        Shape::Leaflets { .. } => skin::carried(&skeleton, &motions, leaf.kind.rib.f32() * leaf.blade),
+        _ => end(skeleton.along().len() - 1),
+    };
+    let midrib = Some([end(skeleton.base()), tip]);
     organs.push(Organ { kind, leaf: leaf.number, skin: skin.to_owned(), mesh: skin::skin(rest, &motions), midrib });
     let rest = stalk(leaf, &skeleton, &relief, lower, &mut stream);
     if rest.triangles.is_empty() {
@@ -173,7 +188,7 @@ fn pose(skeleton: &mut Skeleton, leaf: &LeafNow<'_>, root: Pose, stream: &mut St
 fn relief(leaf: &LeafNow<'_>, stream: &mut Stream) -> Relief {
     let kind = leaf.kind;
     let angle = kind.vein_angle_deg.f32().to_radians();
-    Relief {
+    let relief = Relief {
         fold: leaf.fold,
         fold_tip: 0.6 * leaf.fold,
         curl: kind.curl_deg.draw32(stream).to_radians(),
@@ -186,6 +201,11 @@ fn relief(leaf: &LeafNow<'_>, stream: &mut Stream) -> Relief {
         sway: kind.sway.draw32(stream),
         twist: kind.twist_deg.draw32(stream).to_radians(),
         seed: stream.seed32(),
+    };
+    // A rachis is straight; what bows and turns are its leaflets, each by itself.
+    match kind.shape {
+        Shape::Leaflets { .. } => Relief { sway: 0.0, twist: 0.0, ..relief },
+        _ => relief,
     }
 }
 
@@ -224,16 +244,24 @@ fn stalk(leaf: &LeafNow<'_>, skeleton: &Skeleton, relief: &Relief, lower: Lower,
                     let r = radius * lerp(1.0, 0.9, s);
                     rings.push(ring(y, (r * (1.0 + 0.2 * open), r), lerp(1.0, -0.4, open), 0.0));
                 }
+                Lower::Wrap(radius) => {
+                    // It opens where the next leaf comes out, and flattens into the blade.
+                    let open = smoothstep(0.8, 1.0, s);
+                    let r = radius * lerp(1.0, 0.9, s);
+                    let deep = r * lerp(1.0, 0.5, open);
+                    rings.push(ring(y, (r * (1.0 + 0.25 * open), deep), lerp(1.0, -0.7, open), -deep));
+                }
             }
         }
     }
     let reach = leaf.kind.rib.f32() * leaf.blade;
     if reach > 0.0 {
         let wide = if let Lower::Sheath(radius) = lower { 0.7 * radius } else { tip_radius };
+        let rachis = matches!(leaf.kind.shape, Shape::Leaflets { .. });
         // Without a stalk the rib begins at the stem.
         for i in u8::from(leaf.stalk > 0.0)..=8 {
             let s = f32::from(i) / 8.0;
-            let r = wide * lerp(0.8, 0.06, s.sqrt());
+            let r = wide * if rachis { lerp(0.8, 0.5, s) } else { lerp(0.8, 0.06, s.sqrt()) };
             // Sunk so that the blade lies on its flat top.
             rings.push(ring(s * reach, (r, r), -0.2, 0.1 * r));
         }
