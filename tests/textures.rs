@@ -107,7 +107,7 @@ fn a_texture_drawn_elsewhere_gets_its_source_beside_it() {
 
 fn leaf(path: &Path) -> (draw::LeafRecipe, Texture) {
     match draw::read(path).unwrap() {
-        Recipe::Leaf(recipe) => (recipe, Texture::load(&path.with_extension("png"), ColorSpace::Srgb).unwrap()),
+        Recipe::Leaf(recipe) => (*recipe, Texture::load(&path.with_extension("png"), ColorSpace::Srgb).unwrap()),
         Recipe::Soil(_) => panic!("{} is no leaf", path.display()),
     }
 }
@@ -266,7 +266,7 @@ fn odd_leaves_are_drawn_too() {
                 "(seed: 1, size: 48, length_mm: 9, aspect: {aspect}, outline: {outline}, {rest}, pigments: (chlorophyll: 0),
                   relief: Some((range_mm: 1, furrow_mm: 9, blister_mm: 9)))"
             );
-            let recipe = Recipe::Leaf(ron::from_str(&page).unwrap_or_else(|e| panic!("{page}: {e}")));
+            let recipe = Recipe::Leaf(Box::new(ron::from_str(&page).unwrap_or_else(|e| panic!("{page}: {e}"))));
             let drawn: Drawn = draw::draw(&recipe).unwrap();
             assert_eq!(drawn.rgba.len(), drawn.width as usize * drawn.height as usize * 4);
         }

@@ -46,11 +46,9 @@ pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {
         seat(&mut organs, leaf, &nodes, leaf.layer);
     }
     let mut number = growth.leaves.last().map_or(0, |leaf| leaf.number);
-    // The lowest axils break first. A seed leaf that has withered leaves its axil behind, so layers are counted, not leaves.
-    let axils = axils(growth);
-    for k in 0..growth.tillers.min(axils.len()).min(MOST) {
-        let (layer, azimuth) = axils[k];
-        side(&mut organs, growth, &nodes, (layer, azimuth), k, &mut number);
+    // The lowest axils whose leaves are still there break first.
+    for (k, axil) in axils(growth).into_iter().take(growth.tillers.min(MOST)).enumerate() {
+        side(&mut organs, growth, &nodes, axil, k, &mut number);
     }
     organs
 }
@@ -140,7 +138,7 @@ fn axils(growth: &Growth<'_>) -> Vec<(usize, f32)> {
     all
 }
 
-/// One side shoot: the main one's leaves but for the oldest, smaller.
+/// One side shoot from an axil (layer, azimuth): the main one's leaves above it, smaller.
 fn side(
     organs: &mut Vec<Organ>,
     growth: &Growth<'_>,

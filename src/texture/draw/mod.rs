@@ -28,7 +28,7 @@ use std::path::Path;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Recipe {
     /// A leaf's upper side, cut out by its opacity.
-    Leaf(LeafRecipe),
+    Leaf(Box<LeafRecipe>),
     /// A square of ground that tiles.
     Soil(SoilRecipe),
 }

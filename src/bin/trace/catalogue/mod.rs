@@ -109,8 +109,8 @@ impl Args {
         }
         let path = self.out.join(page.file_stem().unwrap_or_default()).with_extension("png");
         let (spp, size) = (self.spp, self.size);
-        let from: String = stages.iter().map(|(_, of)| format!("{of}\n")).collect();
-        let from = format!("{from}spp: {spp}\nsize: {size}");
+        let from: Vec<&str> = stages.iter().map(|(_, of)| of.as_str()).collect();
+        let from = format!("{}\nspp: {spp}\nsize: {size}", from.join("\n"));
         let kept = std::fs::read(&path).is_ok_and(|old| contains(&old, from.as_bytes()));
         if !kept {
             let mut columns = Vec::new();
