@@ -185,3 +185,29 @@ fn a_texture_is_drawn_beside_its_recipe() {
     assert!(run(folder.path(), &["texture", "small.ron"]).status.success());
     assert_eq!(first, std::fs::read(folder.path().join("small.png")).unwrap());
 }
+
+/// Expected: a sheet and a page that needs nothing beside it; asked again, the sheet is kept; a species that is not there is refused.
+#[test]
+fn a_catalogue_shows_species_and_keeps_what_would_come_out_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let pages = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/species");
+    let catalogue = |species: &str| {
+        let rest = ["--size", "64", "--spp", "1", "--pages", pages.to_str().unwrap()];
+        run(folder.path(), &[&["catalogue", "--species", species], rest.as_slice()].concat())
+    };
+    let first = catalogue("echinochloa");
+    assert!(first.status.success(), "{}", text(&first.stderr));
+    assert_eq!(text(&first.stdout), "out/catalogue/echinochloa.png\nout/catalogue/catalogue.html\n");
+    let page = std::fs::read_to_string(folder.path().join("out/catalogue/catalogue.html")).unwrap();
+    for words in ["ECHCG", "BBCH 22", "data:image/jpeg"] {
+        assert!(page.contains(words), "no {words}");
+    }
+    assert!(!page.contains("http"), "the page asks for something");
+    let sheet = || std::fs::read(folder.path().join("out/catalogue/echinochloa.png")).unwrap();
+    let before = sheet();
+    assert!(text(&catalogue("echinochloa").stderr).contains("kept"));
+    assert!(sheet() == before);
+    let missing = catalogue("echinocloa");
+    assert_eq!(missing.status.code(), Some(2));
+    assert!(text(&missing.stderr).contains("did you mean"), "{}", text(&missing.stderr));
+}

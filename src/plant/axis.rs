@@ -119,14 +119,15 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
     Axis { nodes, radii, section, crown }
 }
 
-fn ring(centre: Vec3, along: Vec3, radius: f32, profile: Profile) -> Ring {
+/// A ring across `along`.
+pub(super) fn ring(centre: Vec3, along: Vec3, radius: f32, profile: Profile) -> Ring {
     let frame = Frame::with_tangent(along, Vec3::X);
     // up × right must point along the tube.
     Ring { centre, right: frame.x, up: -frame.y, radii: (radius, radius), profile }
 }
 
 /// Closes the last ring by half an ellipsoid, its height over its radius given.
-fn dome(rings: &mut Vec<Ring>, along: Vec3, radius: f32, height: f32) {
+pub(super) fn dome(rings: &mut Vec<Ring>, along: Vec3, radius: f32, height: f32) {
     let Some(last) = rings.last().copied() else { return };
     for (rise, wide) in [(0.5, 0.87), (0.87, 0.5), (1.0, 0.02)] {
         let wide = radius * wide;

@@ -30,16 +30,21 @@ pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {
 /// The most ribbons of one blade: a guard against pages that ask for a million lobes.
 const MOST: usize = 600;
 
-struct Ribbons<'a> {
-    rest: Rest,
-    skeleton: &'a Skeleton,
-    width: f32,
-    count: usize,
+/// A blade of ribbons while it grows.
+pub(super) struct Ribbons<'a> {
+    /// What has grown.
+    pub(super) rest: Rest,
+    /// The joints that carry it.
+    pub(super) skeleton: &'a Skeleton,
+    /// Width of a segment, metres.
+    pub(super) width: f32,
+    /// How many ribbons there are.
+    pub(super) count: usize,
 }
 
 impl Ribbons<'_> {
     /// Adds a strip from `start` along `along` (metres), bowed towards `bow`, tapering at both ends.
-    fn strip(&mut self, start: Vec3, along: Vec3, up: Vec3, bow: Vec3, width: f32, pieces: u32) {
+    pub(super) fn strip(&mut self, start: Vec3, along: Vec3, up: Vec3, bow: Vec3, width: f32, pieces: u32) {
         self.count += 1;
         if self.count > MOST {
             return;

@@ -23,6 +23,27 @@ pub enum Shape {
         /// Width of a segment.
         segment_mm: Vary<Positive>,
     },
+    /// Pinnate to the third order in one plane, widest near its base: carrot. Of ribbons, like [`Shape::Pinnate`].
+    Fern {
+        /// Pairs of pinnae on a full-sized leaf.
+        pairs: Vary<PositiveCount>,
+        /// Pairs of pinnules on the longest pinna.
+        pinnules: Vary<PositiveCount>,
+        /// Width of a segment.
+        segment_mm: Vary<Positive>,
+    },
+    /// Pairs of leaflets on a rachis, each a sheet within an outline: peanut has two pairs. The blade's width is the span of
+    /// its lowest pair; the rachis is as long as `rib` says.
+    Leaflets {
+        /// A leaflet's outline, as in the drawn texture.
+        outline: Outline,
+        /// Pairs of leaflets.
+        pairs: Num<PositiveCount>,
+        /// Width of a leaflet over its length.
+        aspect: Num<Positive>,
+        /// Angle between rachis and leaflet, lowest pair and foremost.
+        spread_deg: (Num<Positive>, Num<Positive>),
+    },
 }
 
 /// A kind of leaf.

@@ -2,7 +2,9 @@
 
 use super::blade::{self, Rest};
 use super::dissected;
+use super::fern;
 use super::kind::Shape;
+use super::leaflets;
 use super::organ::{Organ, OrganKind};
 use super::skeleton::{Measures, Pose, Skeleton};
 use super::skin::{self, Relief};
@@ -39,6 +41,8 @@ pub(super) enum Lower {
     Petiole,
     /// A tube of this radius round the stem, metres.
     Sheath(f32),
+    /// The same, its outer wall in line with the blade.
+    Wrap(f32),
 }
 
 /// Adds a leaf's organs.
@@ -64,18 +68,25 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
         Shape::Pinnate { pairs, lobes, segment_mm } => {
             let counts = (pairs.draw(&mut stream) as usize, lobes.draw(&mut stream) as usize);
             let segment = segment_mm.draw32(&mut stream) * 1e-3;
-            let mut rest = dissected::blade(counts, segment, leaf.width, &skeleton, &mut stream);
-            if leaf.kind.flat {
-                rest.positions.iter_mut().for_each(|p| p.z = 0.0);
-            }
-            rest
+            pressed(leaf, dissected::blade(counts, segment, leaf.width, &skeleton, &mut stream))
         }
+        Shape::Fern { pairs, pinnules, segment_mm } => {
+            let counts = (pairs.draw(&mut stream) as usize, pinnules.draw(&mut stream) as usize);
+            let segment = segment_mm.draw32(&mut stream) * 1e-3;
+            pressed(leaf, fern::blade(counts, segment, leaf.width, &skeleton, &mut stream))
+        }
+        Shape::Leaflets { .. } => leaflets::blade(leaf, &relief, cells(leaf), &skeleton, &mut stream),
     };
     let skin = if leaf.kind.skin.is_empty() { leaf.kind_name } else { &leaf.kind.skin };
     let kind = leaf.kind.organ;
     // The relief leaves the midrib's ends where they are, so they go where their joints go.
     let end = |joint: usize| motions[joint].point(vec3(0.0, skeleton.along()[joint], 0.0));
-    let midrib = Some([end(skeleton.base()), end(skeleton.along().len() - 1)]);
+    let tip = match leaf.kind.shape {
+        // Between the foremost leaflets nothing is beyond the rachis.
+        Shape::Leaflets { .. } => skin::carried(&skeleton, &motions, leaf.kind.rib.f32() * leaf.blade),
+        _ => end(skeleton.along().len() - 1),
+    };
+    let midrib = Some([end(skeleton.base()), tip]);
     organs.push(Organ { kind, leaf: leaf.number, skin: skin.to_owned(), mesh: skin::skin(rest, &motions), midrib });
     let rest = stalk(leaf, &skeleton, &relief, lower, &mut stream);
     if rest.triangles.is_empty() {
@@ -177,6 +188,15 @@ fn pose(skeleton: &mut Skeleton, leaf: &LeafNow<'_>, root: Pose, stream: &mut St
     skeleton.bend_branches(|_, _| (wobble * stream.normal() as f32, 1.5 * wobble * stream.normal() as f32 - hang));
 }
 
+/// A dissected blade, pressed into its plane where all leaves are flat.
+fn pressed(leaf: &LeafNow<'_>, mut rest: Rest) -> Rest {
+    if leaf.kind.flat {
+        rest.positions.iter_mut().for_each(|p| p.z = 0.0);
+    }
+    rest
+}
+
+/// The blade's undulations.
 fn relief(leaf: &LeafNow<'_>, stream: &mut Stream) -> Relief {
     let kind = leaf.kind;
     let angle = kind.vein_angle_deg.f32().to_radians();
@@ -193,6 +213,11 @@ fn relief(leaf: &LeafNow<'_>, stream: &mut Stream) -> Relief {
         sway: kind.sway.draw32(stream),
         twist: kind.twist_deg.draw32(stream).to_radians(),
         seed: stream.seed32(),
+    };
+    // A rachis is straight; what bows and turns are its leaflets, each by itself.
+    let relief = match kind.shape {
+        Shape::Leaflets { .. } => Relief { sway: 0.0, twist: 0.0, ..relief },
+        _ => relief,
     };
     // What lies in the blade's plane stays.
     let Relief { asymmetry, sway, seed, .. } = relief;
@@ -234,16 +259,24 @@ fn stalk(leaf: &LeafNow<'_>, skeleton: &Skeleton, relief: &Relief, lower: Lower,
                     let r = radius * lerp(1.0, 0.9, s);
                     rings.push(ring(y, (r * (1.0 + 0.2 * open), r), lerp(1.0, -0.4, open), 0.0));
                 }
+                Lower::Wrap(radius) => {
+                    // It opens where the next leaf comes out, and flattens into the blade.
+                    let open = smoothstep(0.8, 1.0, s);
+                    let r = radius * lerp(1.0, 0.9, s);
+                    let deep = r * lerp(1.0, 0.5, open);
+                    rings.push(ring(y, (r * (1.0 + 0.25 * open), deep), lerp(1.0, -0.7, open), -deep));
+                }
             }
         }
     }
     let reach = leaf.kind.rib.f32() * leaf.blade;
     if reach > 0.0 {
         let wide = if let Lower::Sheath(radius) = lower { 0.7 * radius } else { tip_radius };
+        let rachis = matches!(leaf.kind.shape, Shape::Leaflets { .. });
         // Without a stalk the rib begins at the stem.
         for i in u8::from(leaf.stalk > 0.0)..=8 {
             let s = f32::from(i) / 8.0;
-            let r = wide * lerp(0.8, 0.06, s.sqrt());
+            let r = wide * if rachis { lerp(0.8, 0.5, s) } else { lerp(0.8, 0.06, s.sqrt()) };
             // Sunk so that the blade lies on its flat top.
             rings.push(ring(s * reach, (r, r), -0.2, 0.1 * r));
         }

@@ -12,18 +12,23 @@
 //! | `blade` | outline → flat rest mesh with skin weights |
 //! | `skin` | relief, linear blend skinning |
 //! | `tube`, `axis`, `leaf` | stems and stalks; the growth axis; one whole leaf |
-//! | `rosette`, `whorl`, `erect`, `dissected`, `tuft` | growth forms |
+//! | `leaflets`, `dissected`, `fern` | compound and divided blades |
+//! | `rosette`, `whorl`, `erect`, `dissected`, `tuft`, `cane`, `runner` | growth forms |
 //!
 //! A new growth form is a file with a `grow(&Growth) -> Vec<Organ>` and one line in [`Form`].
 
 mod axis;
 pub mod blade;
+mod cane;
 mod dissected;
 mod erect;
+mod fern;
 mod kind;
 mod leaf;
+mod leaflets;
 mod organ;
 mod rosette;
+mod runner;
 pub mod skeleton;
 pub mod skin;
 mod stage;
@@ -65,6 +70,10 @@ forms! {
     Dissected => dissected,
     /// A grass: sheaths, arching blades in two ranks, side shoots.
     Tuft => tuft,
+    /// A stout grass: one shoot of rolled sheaths, big arching blades in two ranks.
+    Cane => cane,
+    /// A main shoot and side shoots from its lowest axils; stems too long for their width lie down.
+    Runner => runner,
 }
 
 /// A species' plant, as it is written.

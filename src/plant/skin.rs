@@ -9,7 +9,7 @@
 //! the blisters between secondary veins, sway and twist. It is laid on the straight leaf and carried along by the joints.
 
 use super::blade::{Rest, Sheet};
-use super::skeleton::Pose;
+use super::skeleton::{Pose, Skeleton};
 use crate::geometry::Mesh;
 use crate::math::{Vec3, smoothstep, vec3};
 use crate::texture::noise::Perlin;
@@ -124,6 +124,12 @@ pub fn bend(rest: &Rest, motions: &[Pose]) -> Vec<Vec3> {
         weights.iter().filter(|(_, w)| *w != 0.0).map(|(k, w)| *w * motions[usize::from(*k)].point(*p)).sum()
     };
     rest.positions.iter().zip(&rest.weights).map(carry).collect()
+}
+
+/// Where the joints carry the midrib's point at `y`, metres from the blade's base.
+pub fn carried(skeleton: &Skeleton, motions: &[Pose], y: f32) -> Vec3 {
+    let weights = skeleton.weights_on_chain(y);
+    weights.iter().map(|(k, w)| *w * motions[usize::from(*k)].point(vec3(0.0, y, 0.0))).sum()
 }
 
 /// The bent mesh, with smooth normals.

@@ -31,7 +31,7 @@ fn pages() -> Vec<Page> {
     let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().path()).collect();
     files.retain(|f| f.extension().is_some_and(|e| e == "ron"));
     files.sort();
-    assert!(files.len() >= 6, "species pages are missing");
+    assert!(files.len() >= 16, "species pages are missing");
     files
         .iter()
         .map(|f| {
@@ -168,14 +168,55 @@ fn nothing_floats() {
                     .map(|o| distance(base, &o.mesh))
                     .fold(f32::MAX, f32::min),
             };
-            assert!(gap < 1e-3, "{at}: {gap}");
+            // Rings stand a tenth of a stalk apart, so the crown's skin may lie half of that from the nearest; and the blade of a
+            // large leaf lies over a channel that is some millimetres deep.
+            let (low, high) = organ.mesh.bounds().unwrap();
+            let share = if organ.kind == OrganKind::Petiole { 0.05 } else { 0.008 };
+            assert!(gap < (share * low.distance(high)).max(1e-3), "{at}: {gap}");
         }
     });
 }
 
+/// The rows of a table in `tests/ref`: its numbers come with their sources.
+fn table(name: &str) -> Vec<BTreeMap<String, String>> {
+    let path = format!("{}/tests/ref/{name}", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{path}: {e}"));
+    let mut lines = text.lines().filter(|l| !l.starts_with('#')).map(|l| l.split(',').map(str::to_owned));
+    let head: Vec<String> = lines.next().unwrap().collect();
+    lines.map(|row| head.iter().cloned().zip(row).collect()).collect()
+}
+
+/// A number of a row; `None` where the table does not state it.
+fn number(row: &BTreeMap<String, String>, column: &str) -> Option<f32> {
+    let text = &row[column];
+    (!text.is_empty()).then(|| text.parse().unwrap_or_else(|e| panic!("{row:?}: {column}: {e}")))
+}
+
+/// How many true leaves have unfolded at a stage, of all that are there: a leaf has once it is a third as long as the longest, and
+/// so has every older one, withered or not. For whorled plants whorls are counted.
+fn unfolded(plant: &PlantDesc, stage: &StageDesc) -> (usize, usize) {
+    let stream = stream(0);
+    let whorls = plant.form == Form::Whorl;
+    let lengths: Vec<(f64, usize)> = stage
+        .layers
+        .iter()
+        .filter(|l| plant.kinds[&l.kind].organ == OrganKind::Blade)
+        .map(|l| (l.blade_mm.draw(&mut stream.clone()), if whorls { 1 } else { l.leaves.get() as usize }))
+        .collect();
+    let peak = lengths.iter().fold(0.0, |m: f64, l| m.max(l.0));
+    let (mut longest, mut unfolded, mut all) = (0.0_f64, 0, 0);
+    for (length, n) in lengths {
+        if longest < peak || length > 0.35 * peak {
+            unfolded += n;
+        }
+        longest = longest.max(length);
+        all += n;
+    }
+    (unfolded, all)
+}
+
 /// Rationale: a stage is known by the number of its unfolded leaves. Expected: the code's second digit; 9 stands for nine
-/// or more. A leaf counts as unfolded once it is a third as long as the longest, and so does every older one.
-/// Source: Meier 2001; for whorled plants whorls are counted.
+/// or more. Source: Meier 2001.
 #[test]
 fn leaves_are_as_many_as_the_stage_says() {
     everywhere(|page, stage, _| {
@@ -184,22 +225,7 @@ fn leaves_are_as_many_as_the_stage_says() {
         }
         let stream = stream(0);
         let grown = stage::growth(&page.plant, Stage::Bbch(stage.bbch), &stream).unwrap();
-        let whorls = page.plant.form == Form::Whorl;
-        let (mut longest, mut unfolded, mut all) = (0.0_f64, 0, 0);
-        let lengths: Vec<(f64, usize)> = stage
-            .layers
-            .iter()
-            .filter(|l| page.plant.kinds[&l.kind].organ == OrganKind::Blade)
-            .map(|l| (l.blade_mm.draw(&mut stream.clone()), if whorls { 1 } else { l.leaves.get() as usize }))
-            .collect();
-        let peak = lengths.iter().fold(0.0, |m: f64, l| m.max(l.0));
-        for (length, n) in lengths {
-            if longest < peak || length > 0.35 * peak {
-                unfolded += n;
-            }
-            longest = longest.max(length);
-            all += n;
-        }
+        let (unfolded, all) = unfolded(&page.plant, stage);
         let expected = (stage.bbch - 10) as usize;
         let fits = if expected == 9 { unfolded >= 9 } else { unfolded == expected };
         assert!(fits, "{} BBCH {}: {unfolded} unfolded of {all}", page.eppo, stage.bbch);
@@ -207,44 +233,73 @@ fn leaves_are_as_many_as_the_stage_says() {
     });
 }
 
-/// Largest blades in mm. Source: sugar beet by stage: estimates consistent with the ground cover of the BBCH stages;
-/// seedlings of weeds: PlantevaernOnline, VIPS, SLU Ogräsrådgivaren, Korsmo.
+#[test]
+fn every_species_stands_in_both_tables() {
+    let (sizes, plans) = (table("species_sizes.csv"), table("species_plans.csv"));
+    for page in pages() {
+        for rows in [&sizes, &plans] {
+            assert!(rows.iter().any(|row| row["eppo"] == page.eppo), "{}: {} is in no table", page.name, page.eppo);
+        }
+    }
+}
+
+/// Expected: the largest leaf lies within the table's ranges, give or take three hundredths, whatever the seed; and as many leaves
+/// have unfolded. Source: those of `tests/ref/species_sizes.csv`.
 #[test]
 fn sizes_lie_within_the_tables() {
-    let table = [
-        ("BEAVX", 10, (18.0, 30.0), (5.0, 9.0)),
-        ("BEAVX", 12, (25.0, 45.0), (15.0, 28.0)),
-        ("BEAVX", 14, (45.0, 70.0), (28.0, 45.0)),
-        ("BEAVX", 16, (65.0, 100.0), (40.0, 62.0)),
-        ("BEAVX", 18, (90.0, 130.0), (55.0, 80.0)),
-        ("BEAVX", 19, (110.0, 150.0), (65.0, 90.0)),
-        ("CAPBP", 10, (3.0, 4.0), (1.5, 2.5)),
-        ("CAPBP", 12, (3.0, 8.0), (2.0, 5.0)),
-        ("CAPBP", 16, (15.0, 40.0), (5.0, 12.0)),
-        ("GALAP", 10, (8.0, 15.0), (5.0, 9.0)),
-        ("GALAP", 13, (12.0, 25.0), (3.0, 5.0)),
-        ("CHEAL", 10, (6.0, 15.0), (1.5, 4.0)),
-        ("CHEAL", 12, (8.0, 16.0), (5.0, 11.0)),
-        ("CHEAL", 16, (20.0, 40.0), (12.0, 30.0)),
-        ("MATIN", 10, (4.0, 6.0), (2.0, 3.0)),
-        ("MATIN", 12, (10.0, 20.0), (3.0, 7.0)),
-        ("MATIN", 16, (25.0, 60.0), (10.0, 25.0)),
-        ("ECHCG", 14, (60.0, 130.0), (4.0, 8.0)),
-    ];
-    for (eppo, bbch, length, width) in table {
-        let plant = page(eppo);
+    let pages = pages();
+    for row in table("species_sizes.csv") {
+        let plant = &pages.iter().find(|p| p.eppo == row["eppo"]).unwrap().plant;
+        let bbch: u32 = row["bbch"].parse().unwrap();
+        let at = format!("{} {bbch}", row["eppo"]);
+        let stage = plant.stages.iter().find(|s| s.bbch == bbch).unwrap_or_else(|| panic!("{at}: no such stage"));
+        let within = |what: &str, value: f32, slack: f32| {
+            let least = number(&row, &format!("{what}_least")).is_none_or(|l| value >= l * (1.0 - slack));
+            let most = number(&row, &format!("{what}_most")).is_none_or(|m| value <= m * (1.0 + slack));
+            assert!(least && most, "{at}: {what} {value}");
+        };
+        within("leaves", unfolded(plant, stage).0 as f32, 0.0);
         for seed in 0..20 {
             let stream = stream(seed);
-            let grown = stage::growth(&plant, Stage::Bbch(bbch), &stream).unwrap();
+            let grown = stage::growth(plant, Stage::Bbch(bbch), &stream).unwrap();
             let leaf = grown
                 .leaves
                 .iter()
                 .filter(|l| bbch == 10 || l.kind.organ == OrganKind::Blade)
                 .max_by(|a, b| a.blade.total_cmp(&b.blade))
                 .unwrap();
-            let (l, w) = (leaf.blade * 1e3, leaf.width * 1e3);
-            assert!(l > length.0 * 0.97 && l < length.1 * 1.03, "{eppo} {bbch}: length {l}");
-            assert!(w > width.0 * 0.97 && w < width.1 * 1.03, "{eppo} {bbch}: width {w}");
+            within("length", leaf.blade * 1e3, 0.03);
+            within("width", leaf.width * 1e3, 0.03);
+        }
+    }
+}
+
+/// Rationale: outlines are told apart by how much of their rectangle they fill. Expected: that of each species' commonest leaf is the
+/// table's within 7 %, and the grown blades have that area, a few hundredths more for the mesh's rim, less for waves. Source:
+/// those of `tests/ref/species_plans.csv`.
+#[test]
+fn blades_fill_as_much_of_their_length_and_width_as_the_table_says() {
+    let rows = table("species_plans.csv");
+    for page in pages() {
+        let row = rows.iter().find(|r| r["eppo"] == page.eppo).unwrap();
+        let Some(area) = number(row, "area") else { continue };
+        let kinds = || page.plant.kinds.iter().filter(|(_, k)| k.organ == OrganKind::Blade);
+        let ratio = |outline: outline::Outline| {
+            (0..2000).map(|i| 2.0 * outline.half_width((i as f32 + 0.5) / 2000.0)).sum::<f32>() / 2000.0
+        };
+        let fits = kinds().any(|(_, k)| match k.shape {
+            Shape::Sheet { outline } | Shape::Leaflets { outline, .. } => (ratio(outline) / area - 1.0).abs() < 0.07,
+            _ => false,
+        });
+        assert!(fits, "{}: no leaf fills {area}", page.eppo);
+        let stream = stream(3);
+        let stage = Stage::Bbch(page.plant.stages.iter().map(|s| s.bbch).filter(|b| *b <= 19).max().unwrap());
+        let plant = grow(&page.plant, stage, &stream);
+        for leaf in stage::growth(&page.plant, stage, &stream).unwrap().leaves {
+            let Shape::Sheet { outline: of @ outline::Outline::Power { .. } } = leaf.kind.shape else { continue };
+            let blade = plant.organs.iter().find(|o| o.leaf == leaf.number && o.midrib.is_some()).unwrap();
+            let share = blade.mesh.area() / (leaf.blade * leaf.width) / ratio(of);
+            assert!((0.85..1.25).contains(&share), "{} leaf {}: {share}", page.eppo, leaf.number);
         }
     }
 }
@@ -275,24 +330,44 @@ fn turn(a: f32, b: f32) -> f32 {
     (b - a).rem_euclid(TAU)
 }
 
-/// Source: the golden angle, 137.5°; crossed pairs before it in beet and goosefoot; two ranks in grasses.
+/// Rationale: what follows what on the stem tells a goosefoot from a chickweed. Expected: seed leaves are opposite, pairs cross those
+/// below, single leaves follow at the species' angle. Source: those of `tests/ref/species_plans.csv`.
 #[test]
 fn leaves_follow_each_other_at_the_species_angle() {
-    for seed in 0..20 {
-        let stream = stream(seed);
-        let beet = page("BEAVX");
-        let leaves = stage::growth(&beet, Stage::Bbch(18), &stream).unwrap().leaves;
-        assert!((turn(leaves[0].azimuth, leaves[1].azimuth) - PI).abs() < 0.4, "seed leaves are opposite");
-        assert!((turn(leaves[2].azimuth, leaves[3].azimuth) - PI).abs() < 0.4, "the first pair is opposite");
-        let crossed = turn(leaves[0].azimuth, leaves[2].azimuth).rem_euclid(PI);
-        assert!((crossed - 0.5 * PI).abs() < 0.4, "the first pair crosses the seed leaves: {crossed}");
-        for pair in leaves[4..].windows(2) {
-            let angle = turn(pair[0].azimuth, pair[1].azimuth).to_degrees();
-            assert!((angle - 137.5).abs() < 35.0, "{angle}");
+    let pages = pages();
+    for row in table("species_plans.csv") {
+        let page = pages.iter().find(|p| p.eppo == row["eppo"]).unwrap();
+        if page.plant.form == Form::Whorl {
+            continue;
         }
-        let grass = page("ECHCG");
-        for pair in stage::growth(&grass, Stage::Bbch(14), &stream).unwrap().leaves.windows(2) {
-            assert!((turn(pair[0].azimuth, pair[1].azimuth) - PI).abs() < 0.7, "two ranks");
+        for (seed, stage) in (0..20).flat_map(|s| page.plant.stages.iter().map(move |t| (s, t))) {
+            let at = format!("{} {} seed {seed}", page.eppo, stage.bbch);
+            let stream = stream(seed);
+            let leaves = stage::growth(&page.plant, Stage::Bbch(stage.bbch), &stream).unwrap().leaves;
+            let mut layers: BTreeMap<usize, Vec<f32>> = BTreeMap::new();
+            for leaf in &leaves {
+                layers.entry(leaf.layer).or_default().push(leaf.azimuth);
+            }
+            let seeds = page.plant.kinds.values().filter(|k| k.organ == OrganKind::Cotyledon).count();
+            let pairs: Vec<(usize, &Vec<f32>)> =
+                layers.iter().filter(|(_, l)| l.len() == 2).map(|(k, l)| (*k, l)).collect();
+            let expected = row["pairs"].parse::<usize>().map_or(usize::MAX, |n| n + seeds);
+            assert!(pairs.len() <= expected, "{at}: {} pairs", pairs.len());
+            for (_, pair) in &pairs {
+                assert!((turn(pair[0], pair[1]) - PI).abs() < 0.4, "{at}: a pair is not opposite");
+            }
+            for two in pairs.windows(2).filter(|two| two[0].0 + 1 == two[1].0) {
+                let crossed = turn(two[0].1[0], two[1].1[0]).rem_euclid(PI);
+                assert!((crossed - 0.5 * PI).abs() < 0.4, "{at}: pairs do not cross: {crossed}");
+            }
+            let Some(angle) = number(&row, "turn") else { continue };
+            let stray = number(&row, "stray").unwrap();
+            let single: Vec<(usize, f32)> =
+                layers.iter().filter(|(_, l)| l.len() == 1).map(|(k, l)| (*k, l[0])).collect();
+            for two in single.windows(2).filter(|two| two[0].0 + 1 == two[1].0) {
+                let turned = turn(two[0].1, two[1].1).to_degrees();
+                assert!((turned - angle).abs() < stray, "{at}: {turned}");
+            }
         }
     }
 }
@@ -346,7 +421,10 @@ fn triangles_stay_within_budget() {
         let count: usize = plant.organs.iter().map(|o| o.mesh.triangles.len()).sum();
         let most = match (page.eppo.as_str(), stage.bbch) {
             ("BEAVX", ..=16) => 12_000,
-            ("BEAVX", _) => 17_000,
+            ("BEAVX", ..=19) => 17_000,
+            // Twenty leaves and more, and every side shoot with leaves of its own.
+            ("BEAVX", _) | ("STEME" | "ARHHY", 20..) => 40_000,
+            ("DAUCA" | "CIRAR" | "ARHHY", _) => 14_000,
             _ => 9_000,
         };
         assert!(count <= most, "{} {}: {count}", page.eppo, stage.bbch);
@@ -445,12 +523,14 @@ fn the_keypoints_of_a_leaf_lie_on_its_blade_and_point_outward() {
             // A grass has no stem but its sheaths.
             let stem = if stem.triangles.is_empty() { &of(false).expect("a sheath").mesh } else { &stem };
             let away = [base, tip].map(|p| distance(&[p], stem));
-            assert!(away[1] > away[0], "{at}: {away:?}");
+            // Between two shoots a leaf may point to the other one.
+            assert!(away[1] > away[0] || page.plant.form == Form::Runner, "{at}: {away:?}");
             if let Some(stalk) = of(false) {
                 assert!(distance(&[base], &stalk.mesh) < 2e-3, "{at}: the stalk ends elsewhere");
             }
             // Divided leaves have texture coordinates of their own.
-            if page.plant.form != Form::Dissected {
+            let whole = |k: &LeafKind| matches!(k.shape, Shape::Sheet { .. });
+            if page.plant.kinds.values().all(whole) {
                 for (p, t) in [(base, 0.0), (tip, 1.0)] {
                     let there = point_at(blade, outline::uv(0.0, t)).expect("a point of the midrib");
                     assert!(p.distance(there) < 5e-4, "{at}: the midrib's {t} is {} m away", p.distance(there));

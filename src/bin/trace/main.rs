@@ -1,6 +1,7 @@
 //! `trace`: grows a field, path traces it, labels it, writes it.
 
 mod ablate;
+mod catalogue;
 mod compare;
 mod dataset;
 mod engine;
@@ -46,6 +47,7 @@ Examples:
   trace export --scene scenes/field.ron --format gltf   the same field for another program
   trace compare out/field out/noisy                     how far one image is from another: PSNR, SSIM, FLIP, by class
   trace texture textures/leaf/sugar_beet.ron            draw a texture from its recipe
+  trace catalogue --species sugar_beet,galium           plants at every stage, with a scale, to look at
 
 Files of an image:
   rgb.png, nir.png   photographs in colour and near infrared, 8 bit
@@ -63,6 +65,8 @@ Exit codes: 0 done, 1 failed, 2 wrong input, 75 stopped cleanly (Ctrl-C, TERM, H
 
 #[derive(Subcommand)]
 enum Verb {
+    /// Show every species at every stage, with a scale.
+    Catalogue(catalogue::Args),
     /// Measure how far pictures are from others of the same things, and show where.
     Compare(compare::Args),
     /// Make many fields with all their labels, in the formats of other tools.
@@ -79,6 +83,7 @@ fn main() -> ExitCode {
     let signals = signal::Signals::watch();
     let cli = Cli::parse();
     let done = match cli.verb {
+        Some(Verb::Catalogue(args)) => catalogue::run(&args, &signals),
         Some(Verb::Compare(args)) => compare::run(&args),
         Some(Verb::Dataset(args)) => dataset::run(&args, &signals),
         Some(Verb::Ablate(args)) => ablate::run(&args, &signals),

@@ -4,7 +4,7 @@
 
 use super::canvas::Canvas;
 use super::cells::Cells;
-use super::shape::{Margin, Shape};
+use super::shape::{Margin, Shape, Sinus};
 use super::tissue::Surface;
 use super::veins::{self, Segment, Veins};
 use super::{Drawn, Grey};
@@ -48,6 +48,9 @@ pub struct LeafRecipe {
     /// Depth of a notch in the tip, of the length.
     #[serde(default)]
     pub notch: Option<Num<Fraction>>,
+    /// A sinus in the base.
+    #[serde(default)]
+    pub sinus: Option<Sinus>,
     /// The veins.
     pub veins: Veins,
     /// The blade's pigments.
@@ -84,6 +87,10 @@ pub struct Look {
     pub spots: Num<NonNegative>,
     /// Specks finer than an areole.
     pub speckle: Num<Fraction>,
+    /// White wax over the whole blade: its share of the colour.
+    pub bloom: Num<Fraction>,
+    /// How dark the mark across the middle is, a V that points to the tip: persicaria.
+    pub mark: Num<Fraction>,
 }
 
 impl Default for Look {
@@ -100,6 +107,8 @@ impl Default for Look {
             blotches: Num::new(0.0),
             spots: Num::new(0.0),
             speckle: f(0.03),
+            bloom: f(0.0),
+            mark: f(0.0),
         }
     }
 }
@@ -136,6 +145,7 @@ pub(super) fn draw(recipe: &LeafRecipe) -> Result<Drawn> {
         Margin::Entire => 0.0,
         Margin::Toothed { count, .. } => count.get(),
         Margin::Lobed { pairs, .. } => pairs.get(),
+        Margin::Spined { lobes, .. } => lobes.get(),
     };
     let marks = recipe.look.blotches.get().max(recipe.look.spots.get());
     for (what, asked, most) in [
@@ -171,7 +181,7 @@ impl<'a> Painter<'a> {
         let seed = recipe.seed.get() as u64;
         let stream = Stream::of(seed, 0, Purpose::Texture, 0);
         let notch = recipe.notch.map_or(0.0, Num::f32);
-        let shape = Shape::new(recipe.outline, recipe.aspect, recipe.margin, notch, seed);
+        let shape = Shape::new(recipe.outline, recipe.aspect, recipe.margin, notch, seed).with_sinus(recipe.sinus);
         let scale = height as f32 / (1.0 + 2.0 * MARGIN);
         let lobed = matches!(recipe.margin, Margin::Lobed { .. });
         let segments = veins::grow(&recipe.veins, &shape, recipe.aspect.f32(), lobed, &stream);
@@ -280,7 +290,7 @@ impl<'a> Painter<'a> {
                 (0..16).filter(|k| inside(*k)).count() as f32 / 16.0
             };
         }
-        if matches!(self.recipe.margin, Margin::Entire) && self.recipe.notch.is_none() {
+        if matches!(self.recipe.margin, Margin::Entire) && self.recipe.notch.is_none() && self.recipe.sinus.is_none() {
             let near = cover.distance_to(0.3);
             for (v, d) in cover.values.iter_mut().zip(near.values) {
                 *v = v.max((2.7 - d).clamp(0.0, 1.0));

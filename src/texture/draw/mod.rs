@@ -14,7 +14,7 @@ mod veins;
 mod write;
 
 pub use leaf::{LeafRecipe, Look, Relief};
-pub use shape::Margin;
+pub use shape::{Margin, Sinus};
 pub use soil::{Crumbs, Ground, Litter, SoilRecipe};
 pub use veins::Veins;
 pub use write::{encode, encode_height, write};
@@ -28,7 +28,7 @@ use std::path::Path;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Recipe {
     /// A leaf's upper side, cut out by its opacity.
-    Leaf(LeafRecipe),
+    Leaf(Box<LeafRecipe>),
     /// A square of ground that tiles.
     Soil(SoilRecipe),
 }

@@ -1,4 +1,4 @@
-//! A leaf's silhouette: the outline shared with the mesh, cut by teeth, lobes or a notch.
+//! A leaf's silhouette: the outline shared with the mesh, cut by teeth, lobes, spines, a notch or a sinus.
 //!
 //! Coordinates are in lengths of the leaf: Y along the midrib, 0 at the base and 1 at the tip, X to the right.
 
@@ -35,6 +35,26 @@ pub enum Margin {
         /// How far the lobes lean to the tip, degrees.
         lean_deg: Num<Count>,
     },
+    /// Shallow lobes that end in pale spines, with smaller spines between them: thistles.
+    Spined {
+        /// Lobes on each side.
+        lobes: Num<PositiveCount>,
+        /// Depth of the bays between lobes, of the half-width.
+        depth: Num<Fraction>,
+        /// Length of the spines, of the half-width; the tissue ends that far within the outline.
+        spine: Num<Fraction>,
+    },
+}
+
+/// A sinus in the base, between two lobes that reach behind the stalk's end: heart- and arrow-shaped leaves. The picture's
+/// lower edge is then that of the lobes, and the stalk runs through the sinus.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sinus {
+    /// How far it reaches in, of the leaf's length.
+    pub depth: Num<Fraction>,
+    /// How wide it is open at the lower edge, of the leaf's width.
+    pub open: Num<Fraction>,
 }
 
 /// The silhouette.
@@ -43,9 +63,22 @@ pub(super) struct Shape {
     aspect: f32,
     margin: Margin,
     notch: f32,
+    /// Depth and width of the sinus in the base, in lengths.
+    sinus: Option<(f32, f32)>,
     lobes: Vec<Lobe>,
+    spines: Vec<Spine>,
     teeth: [Vec<(f32, f32)>; 2],
 }
+
+/// One spine: a slender triangle.
+struct Spine {
+    foot: Vec2,
+    axis: Vec2,
+    length: f32,
+}
+
+/// Half-width of a spine at its foot, in lengths of the leaf.
+const SPINE: f32 = 0.0055;
 
 /// One lobe: its foot on the midrib, axis, length and half-width.
 struct Lobe {
@@ -61,7 +94,16 @@ impl Shape {
     /// `aspect` is width over length; `notch` the depth of a notch in the tip, in lengths.
     pub(super) fn new(outline: Outline, aspect: Num<Positive>, margin: Margin, notch: f32, seed: u64) -> Self {
         let aspect = aspect.f32();
-        let mut shape = Self { outline, aspect, margin, notch, lobes: Vec::new(), teeth: [Vec::new(), Vec::new()] };
+        let mut shape = Self {
+            outline,
+            aspect,
+            margin,
+            notch,
+            sinus: None,
+            lobes: Vec::new(),
+            spines: Vec::new(),
+            teeth: [Vec::new(), Vec::new()],
+        };
         let random = |i: usize, k: u64| unit(mix(mix(seed ^ (k << 40)) ^ i as u64)) - 0.5;
         match margin {
             Margin::Entire => {}
@@ -79,6 +121,7 @@ impl Shape {
                         .collect();
                 }
             }
+            Margin::Spined { lobes, spine, .. } => shape.arm(lobes.f32(), spine.f32(), random),
             Margin::Lobed { pairs, terminal, lean_deg, .. } => {
                 let n = pairs.get() as usize;
                 let start = 1.0 - terminal.f32();
@@ -112,6 +155,51 @@ impl Shape {
         shape
     }
 
+    /// The same with a sinus in its base.
+    #[must_use]
+    pub(super) fn with_sinus(mut self, sinus: Option<Sinus>) -> Self {
+        self.sinus = sinus.map(|s| (s.depth.f32(), s.open.f32() * self.aspect));
+        self
+    }
+
+    /// How far a sinus reaches into the base, in lengths; 0 without one.
+    pub(super) fn sinus_depth(&self) -> f32 {
+        self.sinus.map_or(0.0, |(depth, _)| depth)
+    }
+
+    /// Sets spines on the tips of `lobes` lobes a side and on their shoulders, `spine` of the half-width long.
+    fn arm(&mut self, lobes: f32, spine: f32, random: impl Fn(usize, u64) -> f32) {
+        for (k, side) in [-1.0f32, 1.0].into_iter().enumerate() {
+            for i in 0..3 * lobes as usize {
+                let lobe = (i as f32 / 3.0).floor();
+                let place = lobe + [0.2, 0.5, 0.8][i % 3] + 0.1 * random(i, 20 + k as u64);
+                let y = lerp(0.06, 0.96, place / lobes);
+                let half = self.half_width(y);
+                let main = i % 3 == 1;
+                let x = side * half * (1.0 - spine) * self.bay(place, spine, y);
+                let lean = 0.35 + 0.5 * random(i, 24 + k as u64) + if i % 3 == 2 { 0.45 } else { 0.0 };
+                let long = spine * half.max(0.1 * self.aspect) * if main { 1.25 } else { 0.8 };
+                let axis = vec2(side * lean.cos(), lean.sin());
+                // Rooted in the tissue.
+                self.spines.push(Spine { foot: vec2(x, y) - axis * (0.6 * long), axis, length: 1.6 * long });
+            }
+        }
+        let (foot, axis) = (vec2(0.0, 1.0 - 2.4 * spine * self.aspect * 0.5), vec2(0.0, 1.0));
+        self.spines.push(Spine { foot, axis, length: 1.2 * spine * self.aspect });
+    }
+
+    /// Width left between bays at `place`, counted in lobes from the base: 1 on a lobe, less in a bay.
+    fn bay(&self, place: f32, spine: f32, y: f32) -> f32 {
+        let Margin::Spined { depth, .. } = self.margin else { return 1.0 };
+        let fade = smoothstep(0.0, 0.12, y) * (1.0 - smoothstep(0.85, 1.0, y + 0.2 * spine));
+        1.0 - depth.f32() * fade * (0.5 + 0.5 * (std::f32::consts::TAU * place).cos()).powf(0.8)
+    }
+
+    /// Whether a place belongs to a spine.
+    pub(super) fn is_spine(&self, p: Vec2) -> bool {
+        self.spines.iter().any(|s| s.inside(p) > 0.0)
+    }
+
     /// Half-width of the uncut outline at Y, in lengths.
     pub(super) fn half_width(&self, y: f32) -> f32 {
         self.aspect * self.outline.half_width(y)
@@ -130,8 +218,18 @@ impl Shape {
         } else {
             0.0
         };
-        match self.margin {
+        let whole = match self.margin {
             Margin::Entire => self.within(p.x, p.y + cut, 1.0),
+            Margin::Spined { lobes, spine, .. } => {
+                // Sheared coordinates make the lobes point to the tip.
+                let place = (p.y - 0.25 * p.x.abs() - 0.06) / 0.9 * lobes.f32();
+                let spine = spine.f32();
+                let mut d = self.within(p.x, p.y, (1.0 - spine) * self.bay(place, spine, p.y)).min(0.97 - p.y);
+                for s in &self.spines {
+                    d = d.max(s.inside(p));
+                }
+                d.min(self.within(p.x, p.y, 1.0))
+            }
             Margin::Toothed { depth, .. } => {
                 let side = usize::from(p.x > 0.0);
                 // Sheared coordinates make the teeth point to the tip.
@@ -148,7 +246,10 @@ impl Shape {
                 // The outline bounds everything, as it bounds the mesh.
                 d.min(self.within(p.x, p.y, 1.0))
             }
-        }
+        };
+        let Some((depth, open)) = self.sinus.filter(|(depth, _)| p.y < *depth) else { return whole };
+        let slope = 0.5 * open / depth;
+        whole.min((p.x.abs() - slope * (depth - p.y)) / (1.0 + slope * slope).sqrt())
     }
 
     fn within(&self, x: f32, y: f32, scale: f32) -> f32 {
@@ -196,6 +297,17 @@ impl Lobe {
         }
         let slope = (half(s + 0.01) - half(s - 0.01)) / (0.02 * self.length);
         room / (1.0 + slope * slope).sqrt()
+    }
+}
+
+impl Spine {
+    fn inside(&self, p: Vec2) -> f32 {
+        let q = p - self.foot;
+        let (s, n) = (q.dot(self.axis) / self.length, q.perp_dot(self.axis));
+        if !(0.0..=1.0).contains(&s) {
+            return -((s - s.clamp(0.0, 1.0)) * self.length).hypot(n);
+        }
+        SPINE * (1.0 - s) - n.abs()
     }
 }
 

@@ -108,12 +108,31 @@ impl<'a> Surface<'a> {
         let red =
             look.red.f32() * (rim + foot).min(1.0) * (0.7 + 0.6 * noise(p * 16.0 + far * 13.0, 3)).clamp(0.0, 1.0);
 
+        let mark = self.mark(p, across);
+        c *= 1.0 + 0.5 * mark;
+        let red = red.max(0.6 * mark);
+        if shape.is_spine(p) {
+            c *= 0.12;
+        }
+        let wax = look.bloom.f32() * (1.0 + 0.5 * noise(p * 7.0 + far * 19.0, 3));
         let meal = self.meal(p);
+        let meal = meal + wax * (1.0 - meal);
         let hash = unit(mix(
             self.seed ^ (u64::from((p.x * 6000.0 + 9e5) as u32) << 32 | u64::from((p.y * 6000.0 + 9e5) as u32))
         ));
         let shade = 1.0 + look.speckle.f32() * (noise(p * 230.0 + far * 17.0, 2) + 0.8 * (hash - 0.5));
         Tissue { chlorophyll: c.max(0.02), red, brown, meal, shade }
+    }
+
+    /// How much of the mark lies here.
+    fn mark(&self, p: Vec2, across: f32) -> f32 {
+        let dark = self.look.mark.f32();
+        if dark == 0.0 {
+            return 0.0;
+        }
+        let ragged = 0.03 * self.noise.fbm(p.x * 30.0 + 11.0, p.y * 30.0 + 5.0, 8192, 3, 0.55);
+        let from = (p.y - (0.6 - 0.2 * across) + ragged).abs() / lerp(0.13, 0.05, across);
+        dark * (1.0 - smoothstep(0.4, 1.0, from)) * (1.0 - smoothstep(0.7, 0.95, across))
     }
 
     /// Grains of meal: small round bladders, crowded at the base and along the middle.

@@ -125,8 +125,11 @@ fn secondaries(out: &mut Vec<Segment>, shape: &Shape, pairs: usize, angle_deg: f
             let sign = if side == 0 { -1.0 } else { 1.0 };
             // Feet stand closer toward the tip; left and right alternate by up to half a pitch.
             let even = (pair as f32 + 0.35 + 0.22 * sign + s.range32(-0.16, 0.16)) / pairs as f32;
-            let y = lerp(0.015, 0.9, even.clamp(0.0, 1.0).powf(1.12));
-            let angle = (angle_deg * lerp(1.12, 0.8, y) + s.range32(-5.0, 5.0)).to_radians();
+            let base = shape.sinus_depth();
+            let y = lerp(0.015_f32.max(base), 0.9, even.clamp(0.0, 1.0).powf(1.12));
+            // The lowest pair runs back into the lobes of a heart-shaped base.
+            let back = if pair == 0 { 260.0 * base } else { 0.0 };
+            let angle = (angle_deg * lerp(1.12, 0.8, y) + back + s.range32(-5.0, 5.0)).to_radians();
             let radius = midrib * lerp(0.42, 0.16, y) * s.range32(0.85, 1.1);
             let path = Path { sign, angle, curl: s.range32(0.32, 0.5), reach: s.range32(0.9, 0.95) };
             run(out, shape, &path, vec2(0.0, y), radius, 1, &mut s);

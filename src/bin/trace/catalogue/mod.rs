@@ -1,0 +1,219 @@
+//! `trace catalogue`: every species at every stage, from above and from the side, with a scale, to be looked at plant by plant.
+//!
+//! A species is one sheet, one column a stage: above, the camera looks straight down; below, from some 30° above the ground. It is
+//! the same plant in all of them. A sheet says inside what it was made of; asked again, one that would come out the same is
+//! kept.
+
+mod letters;
+mod page;
+mod sheet;
+
+use crate::render::threads;
+use furrow::accel::EmbreeAccel;
+use furrow::cli::{self, signal::Signals};
+use furrow::geometry::Window;
+use furrow::integrator::{Path as PathTracer, World};
+use furrow::math::vec3;
+use furrow::output::{self, Picture};
+use furrow::page::Page;
+use furrow::render::{self, Settings, Watch};
+use furrow::sampling::Points;
+use furrow::scene::desc::SpeciesDesc;
+use furrow::scene::{Field, PlantRecord, build};
+use furrow::{Error, Result};
+use page::Entry;
+use sheet::{Column, View};
+use std::path::{Path, PathBuf};
+
+/// Angle of view: narrow, so that near and far leaves have nearly one scale.
+const VIEW_DEG: f32 = 12.0;
+/// The farthest that a camera stands: beyond that the ground ends, and the angle of view grows instead, metres.
+const FARTHEST: f32 = 1.5;
+/// How far above the ground the second camera looks from.
+const SIDE_DEG: f32 = 30.0;
+/// Room around a plant.
+const ROOM: f32 = 1.15;
+/// The smallest half-width of a view, metres.
+const LEAST: f32 = 0.004;
+
+/// What to show.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Folder for the sheets and for catalogue.html.
+    #[arg(long, value_name = "DIR", default_value = "out/catalogue")]
+    out: PathBuf,
+    /// Only these, by the names of their pages: sugar_beet,galium.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    species: Vec<String>,
+    /// Folder of the species pages.
+    #[arg(long, value_name = "DIR", default_value = "scenes/species")]
+    pages: PathBuf,
+    /// Samples a pixel.
+    #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    spp: u32,
+    /// Side of each picture in pixels.
+    #[arg(long, default_value_t = 320, value_parser = clap::value_parser!(u32).range(64..=2048))]
+    size: u32,
+    /// Which plants.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Threads; 0 for one on each core. The files do not depend on it.
+    #[arg(long, default_value_t = 0, value_parser = threads)]
+    threads: usize,
+    /// Print nothing but errors and the paths of the files.
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// Draws the sheets that are missing or would differ, then the page; returns their paths.
+pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
+    cli::check_folder(&args.out)?;
+    let pages = args.pages()?;
+    let pool = render::pool(args.threads)?;
+    let (mut entries, mut paths) = (Vec::new(), Vec::new());
+    for page in &pages {
+        let (path, entry) = pool.install(|| args.species(page, signals))?;
+        paths.push(path);
+        entries.push(entry);
+    }
+    let html = args.out.join("catalogue.html");
+    output::write_atomically(&html, page::html(&entries).as_bytes())?;
+    paths.push(html);
+    Ok(paths)
+}
+
+impl Args {
+    /// The species pages that are asked for, in order of their names.
+    fn pages(&self) -> Result<Vec<PathBuf>> {
+        if !self.species.is_empty() {
+            let pages: Vec<PathBuf> = self.species.iter().map(|s| self.pages.join(s).with_extension("ron")).collect();
+            pages.iter().try_for_each(|page| cli::check_scene(page))?;
+            return Ok(pages);
+        }
+        let entries = std::fs::read_dir(&self.pages).map_err(Error::io(&self.pages))?;
+        let mut pages: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
+        pages.retain(|p| p.extension().is_some_and(|e| e == "ron"));
+        pages.sort();
+        Ok(pages)
+    }
+
+    /// One species: its sheet's path, and its entry in the page.
+    fn species(&self, page: &Path, signals: &Signals) -> Result<(PathBuf, Entry)> {
+        let desc: SpeciesDesc = Page::read(page)?.parse()?;
+        let mut stages = Vec::new();
+        for stage in &desc.plant.stages {
+            let bare = self.field(page, stage.bbch, None)?;
+            let plant = bare.plants.first().cloned();
+            let plant = plant.ok_or_else(|| Error::Scene(format!("{}: nothing grows", page.display())))?;
+            stages.push((plant, bare.provenance()));
+        }
+        let path = self.out.join(page.file_stem().unwrap_or_default()).with_extension("png");
+        let (spp, size) = (self.spp, self.size);
+        let from: Vec<&str> = stages.iter().map(|(_, of)| of.as_str()).collect();
+        let from = format!("{}\nspp: {spp}\nsize: {size}", from.join("\n"));
+        let kept = std::fs::read(&path).is_ok_and(|old| contains(&old, from.as_bytes()));
+        if !kept {
+            let mut columns = Vec::new();
+            for (plant, _) in &stages {
+                let views = [View::above(plant), View::aside(plant)];
+                let shots = views.iter().map(|view| self.shoot(page, plant.bbch, view, signals));
+                let shots: Vec<_> = shots.collect::<Result<_>>()?;
+                columns.push(Column { title: format!("BBCH {}", plant.bbch), shots });
+            }
+            let title = format!("{}  {}", desc.name, desc.eppo);
+            let sheet = sheet::compose(&title, &columns, size as usize);
+            let (width, height) = (sheet.width as u32, sheet.height as u32);
+            output::write_png(&path, width, height, &Picture::Rgb(&sheet.pixels), &from)?;
+        }
+        if !self.quiet {
+            eprintln!("{}: {} stages{}", page.display(), stages.len(), if kept { ", kept" } else { "" });
+        }
+        let (width, height, pixels) = output::read_rgb(&path)?;
+        let stages = stages.into_iter().map(|(plant, _)| plant).collect();
+        Ok((path, Entry { desc, stages, picture: output::encode_jpeg(width, height, &pixels, 88)? }))
+    }
+
+    /// The field with one plant, on bare ground where somebody looks, else on none.
+    fn field(&self, page: &Path, bbch: u32, view: Option<&View>) -> Result<Field> {
+        let text = |path: &Path| format!("{:?}", path.to_string_lossy());
+        let soil = page.parent().unwrap_or(Path::new("")).join("../../textures/soil");
+        let (angle, pose, soil) = view.map_or((VIEW_DEG, "Nadir(height_m: 1)".to_owned(), String::new()), |view| {
+            let (albedo, height) = (text(&soil.join("dirt.png")), text(&soil.join("dirt.height.png")));
+            let layer = format!("(albedo: {albedo}, height: {height}, size_m: 0.5, height_mm: (-0.6, 0.6))");
+            let bare = "relief: (rms_mm: 0.4, tilt_deg: 0), moisture: (mean: 0.25), clods: (over_5mm_per_m2: 0), \
+                        litter: (straw_cover: 0, sticks_per_m2: 0, bits_per_m2: 0)";
+            (view.angle_deg, view.pose(), format!("soil: (layers: [{layer}], {bare}),"))
+        });
+        let size = self.size;
+        let scene = format!(
+            "Field(
+                camera: Pinhole(size: ({size}, {size}), intrinsics: FieldOfView(horizontal_deg: {angle}), pose: {pose}),
+                lights: [Daylight(sun: Angles(elevation_deg: 52, azimuth_deg: 215), turbidity: 3, cloud: 0.35)],
+                {soil}
+                plants: [(species: {}, growth: Bbch({bbch}))],
+            )",
+            text(page)
+        );
+        build::field_of(&scene, &build::Options { seed: Some(self.seed), ..Default::default() })
+    }
+
+    /// One picture, and how many of its pixels are a millimetre at the plant's foot.
+    fn shoot(&self, page: &Path, bbch: u32, view: &View, signals: &Signals) -> Result<sheet::Shot> {
+        let field = self.field(page, bbch, Some(view))?;
+        let geometry = EmbreeAccel::build(&field.scene.surfaces(), self.threads.max(1) as u32)?;
+        let world = World { scene: &field.scene, geometry: &geometry };
+        let window = Window::full(self.size, self.size);
+        let settings = Settings { spp: self.spp, seed: field.sample_seed(), window, points: Points::Sobol };
+        let watch = Watch { done: &|_| {}, stop: signals.heed() };
+        let film = render::render(&world, &PathTracer::default(), &settings, &watch)?;
+        let foot = field.plants.first().map_or(vec3(0.0, 0.0, 0.0), |p| p.position);
+        let ends = [-5e-4, 5e-4].map(|x| field.scene.camera.project(foot + vec3(x, 0.0, 0.0)));
+        let [Some(from), Some(to)] = ends else {
+            return Err(Error::Scene(format!("{}: the plant is out of sight", page.display())));
+        };
+        let pixels = field.photograph(&film).rgb.as_chunks::<3>().0.to_vec();
+        Ok(sheet::Shot { pixels, pixels_per_mm: from.distance(to) })
+    }
+}
+
+fn contains(bytes: &[u8], part: &[u8]) -> bool {
+    bytes.windows(part.len()).any(|w| w == part)
+}
+
+/// How far from its foot a plant reaches, metres: it also leans, and what is high looks larger from above.
+fn reach(plant: &PlantRecord) -> f32 {
+    plant.radius + 0.12 * plant.height
+}
+
+impl View {
+    /// From straight above.
+    fn above(plant: &PlantRecord) -> Self {
+        Self::of(reach(plant), 90.0, 0.0)
+    }
+
+    /// From the side, high enough to see into the plant.
+    fn aside(plant: &PlantRecord) -> Self {
+        let (sin, cos) = SIDE_DEG.to_radians().sin_cos();
+        let reach = reach(plant);
+        let view = Self::of(reach.max(0.5 * plant.height * cos + reach * sin), SIDE_DEG, 0.5 * plant.height);
+        // A wide view from low down would see where the ground ends.
+        let higher = 0.3 * (view.angle_deg - VIEW_DEG);
+        Self { elevation_deg: SIDE_DEG + higher, ..view }
+    }
+
+    fn of(half: f32, elevation_deg: f32, target: f32) -> Self {
+        let half = (half * ROOM).max(LEAST);
+        let distance = (half / (0.5 * VIEW_DEG).to_radians().tan()).min(FARTHEST);
+        Self { distance, angle_deg: 2.0 * (half / distance).atan().to_degrees(), elevation_deg, target }
+    }
+
+    /// Its camera's pose, as a page writes it.
+    fn pose(&self) -> String {
+        if self.elevation_deg >= 90.0 {
+            return format!("Nadir(height_m: {})", self.distance);
+        }
+        let (sin, cos) = self.elevation_deg.to_radians().sin_cos();
+        let (y, z) = (-self.distance * cos, self.distance * sin + self.target);
+        format!("LookAt(position_m: (0, {y}, {z}), target_m: (0, 0, {}))", self.target)
+    }
+}

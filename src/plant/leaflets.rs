@@ -1,0 +1,70 @@
+//! Compound blades: pairs of leaflets on a rachis. Peanut has two pairs.
+//!
+//! A leaflet is a sheet like a whole blade, with relief, fold and bend of its own; its joints bend it once in the flat leaf's
+//! coordinates, then it goes rigidly where the rachis carries its foot. Young leaflets stand up and lie against each other.
+
+use super::blade::{self, Rest};
+use super::kind::Shape;
+use super::skeleton::{Measures, Pose, Skeleton};
+use super::skin::{self, Relief};
+use super::stage::LeafNow;
+use crate::math::{Mat3, lerp, vec3};
+use crate::sampling::Stream;
+
+/// Vein joints of a leaflet.
+const JOINTS: usize = 4;
+
+/// The rest mesh of all leaflets, each of `cells` along and across; nothing for another shape.
+pub(super) fn blade(
+    leaf: &LeafNow<'_>,
+    relief: &Relief,
+    (rows, columns): (usize, usize),
+    rachis: &Skeleton,
+    stream: &mut Stream,
+) -> Rest {
+    let mut rest = Rest::default();
+    let Shape::Leaflets { outline, pairs, aspect, spread_deg } = &leaf.kind.shape else { return rest };
+    let pairs = pairs.get() as usize;
+    let reach = leaf.kind.rib.f32() * leaf.blade;
+    let spread = [spread_deg.0, spread_deg.1].map(|s| s.f32().to_radians());
+    let length = 0.5 * leaf.width / spread[0].sin().max(0.2);
+    for pair in 0..pairs {
+        let share = if pairs > 1 { pair as f32 / (pairs - 1) as f32 } else { 1.0 };
+        for side in [-1.0_f32, 1.0] {
+            let size = lerp(0.92, 1.0, share) * (1.0 + 0.04 * stream.normal() as f32);
+            let turn = lerp(spread[0], spread[1], share) + 0.06 * stream.normal() as f32;
+            let rise = (leaf.fold + 0.08 * stream.normal() as f32).min(1.35);
+            let (along, width) = (length * size, length * size * aspect.f32());
+            let mut skeleton = Skeleton::new(&Measures {
+                stalk: 0.0,
+                stalk_joints: 1,
+                length: along,
+                veins: (1..=JOINTS).map(|k| k as f32 / (JOINTS as f32 + 1.0)).collect(),
+                secondaries: None,
+            });
+            for joint in &mut skeleton.joints[1..] {
+                joint.bend = -leaf.bend / (JOINTS as f32 + 1.0) + 0.02 * stream.normal() as f32;
+            }
+            let mut sheet = blade::sheet(*outline, width, rows, columns, &skeleton);
+            let seed = stream.seed32();
+            Relief { fold: 0.5 * leaf.fold, fold_tip: 0.3 * leaf.fold, seed, ..*relief }.apply(&mut sheet, along);
+            let foot = Pose { rotation: stance(side, turn, rise), origin: vec3(0.0, reach * share, 0.0) };
+            let tie = rachis.weights_on_chain(foot.origin.y);
+            let first = rest.positions.len() as u32;
+            for (p, uv) in skin::bend(&sheet.rest, &skeleton.motions(foot)).into_iter().zip(&sheet.rest.uvs) {
+                rest.corner(p, *uv, tie);
+            }
+            rest.triangles.extend(sheet.rest.triangles.iter().map(|t| t.map(|i| i + first)));
+        }
+    }
+    rest
+}
+
+/// The frame of a leaflet's first joint in the flat leaf's coordinates: vein, upper side, hinge. `rise` turns both leaflets of
+/// a pair up about the rachis, until they face each other.
+fn stance(side: f32, turn: f32, rise: f32) -> Mat3 {
+    let vein = vec3(side * turn.sin() * rise.cos(), turn.cos(), turn.sin() * rise.sin());
+    let up = vec3(-side * rise.sin(), 0.0, rise.cos());
+    let up = (up - vein * up.dot(vein)).normalize();
+    Mat3::from_cols(vein, up, vein.cross(up))
+}
