@@ -19,7 +19,9 @@
 //! | 2 | [`sampling`], [`geometry`] |
 //! | 1 | [`math`], [`error`] |
 //!
-//! `tests/architecture.rs` reads this table and holds the rooms to it.
+//! `tests/architecture.rs` reads this table and holds the rooms to it. [`raster`] is there with the feature of its name.
+//!
+//! [`raster`]: raster/index.html
 
 pub mod ablation;
 pub mod accel;

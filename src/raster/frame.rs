@@ -157,9 +157,9 @@ fn depth(view: &TextureView, load: LoadOp<f32>) -> RenderPassDepthStencilAttachm
     RenderPassDepthStencilAttachment { view, depth_ops, stencil_ops: None }
 }
 
-fn color<'a>(view: &'a TextureView, resolve_target: Option<&'a TextureView>) -> Option<RenderPassColorAttachment<'a>> {
+fn color<'a>(view: &'a TextureView, resolve_target: Option<&'a TextureView>) -> RenderPassColorAttachment<'a> {
     let ops = Operations { load: LoadOp::Clear(Color::TRANSPARENT), store: StoreOp::Store };
-    Some(RenderPassColorAttachment { view, depth_slice: None, resolve_target, ops })
+    RenderPassColorAttachment { view, depth_slice: None, resolve_target, ops }
 }
 
 impl Stage<'_> {
@@ -221,8 +221,11 @@ impl Stage<'_> {
         let targets = [PARTS, POSITIONS, NORMALS].map(|format| self.gpu.target(size, format, 1));
         let views = targets.each_ref().map(view);
         let behind = view(&self.gpu.target(size, DEPTH, 1));
-        let mut pass =
-            self.pass(encoder, &views.each_ref().map(|v| color(v, None)), Some(depth(&behind, LoadOp::Clear(0.0))));
+        let mut pass = self.pass(
+            encoder,
+            &views.each_ref().map(|v| Some(color(v, None))),
+            Some(depth(&behind, LoadOp::Clear(0.0))),
+        );
         pass.set_bind_group(0, &self.frame, &[]);
         self.triangles(&mut pass, &self.pipelines.label);
         drop(pass);
@@ -241,7 +244,7 @@ impl Stage<'_> {
         let (positions, normals) = (view(positions), view(normals));
         let of = [BindingResource::TextureView(&positions), BindingResource::TextureView(&normals)];
         let surface = bind(self.gpu, &self.pipelines.surface, &of);
-        let mut pass = self.pass(encoder, &[color(&view(&target), None)], None);
+        let mut pass = self.pass(encoder, &[Some(color(&view(&target), None))], None);
         pass.set_pipeline(&self.pipelines.occlude);
         pass.set_bind_group(0, &self.frame, &[]);
         pass.set_bind_group(1, &surface, &[]);
@@ -283,7 +286,7 @@ impl Stage<'_> {
         pass.set_bind_group(0, &self.frame, &[]);
         self.triangles(&mut pass, &self.pipelines.nearest[which]);
         drop(pass);
-        let mut pass = self.pass(encoder, &[target], Some(depth(&behind, LoadOp::Load)));
+        let mut pass = self.pass(encoder, &[Some(target)], Some(depth(&behind, LoadOp::Load)));
         pass.set_bind_group(0, &self.frame, &[]);
         pass.set_bind_group(2, &around, &[]);
         if let Some(any) = self.sheets.first() {
@@ -319,13 +322,13 @@ fn read_labels(gpu: &Gpu, scene: &Scene, parts: &Texture, positions: &Texture, n
         map.parts[i] = part;
         map.tags[i] = scene.parts[part as usize].tag;
         map.depth[i] = (Vec3::new(x, y, z) - pose.position).dot(pose.axes.z_axis);
-        map.normals[i] = halves(normal).truncate().normalize_or_zero();
+        map.normals[i] = halves(*normal).truncate().normalize_or_zero();
     }
     Ok(map)
 }
 
 /// Four half floats.
-fn halves(bytes: &[u8; 8]) -> Vec4 {
+fn halves(bytes: [u8; 8]) -> Vec4 {
     let pairs = bytes.as_chunks::<2>().0;
     Vec4::from_array(std::array::from_fn(|i| half(u16::from_le_bytes(pairs[i]))))
 }
@@ -362,7 +365,7 @@ fn film(scene: &Scene, labels: &LabelMap, radiance: &[u8], unscale: f32) -> Film
     let width = labels.window.width() as usize;
     let pixels = radiance.as_chunks::<8>().0.iter().enumerate().map(|(i, bytes)| {
         let mut pixel = Accumulator::default();
-        pixel.add(Spectrum(halves(bytes) * unscale));
+        pixel.add(Spectrum(halves(*bytes) * unscale));
         if labels.parts[i] != label::NONE {
             let (_, direction) = scene.camera.centre_ray((i % width) as u32, (i / width) as u32);
             let distance = labels.depth[i] / direction.dot(forward).max(1e-6);

@@ -4,10 +4,10 @@ use super::gpu::Gpu;
 use super::vertices::STRIDE;
 use wgpu::{
     BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingType, BufferBindingType, ColorTargetState,
-    ColorWrites, CompareFunction, DepthStencilState, FragmentState, MultisampleState, PipelineLayoutDescriptor,
-    RenderPipeline, RenderPipelineDescriptor, SamplerBindingType, ShaderModule, ShaderModuleDescriptor, ShaderSource,
-    ShaderStages, TextureFormat, TextureSampleType, TextureViewDimension, VertexBufferLayout, VertexState,
-    VertexStepMode, vertex_attr_array,
+    ColorWrites, CompareFunction, DepthBiasState, DepthStencilState, FragmentState, MultisampleState,
+    PipelineCompilationOptions, PipelineLayoutDescriptor, PrimitiveState, RenderPipeline, RenderPipelineDescriptor,
+    SamplerBindingType, ShaderModule, ShaderModuleDescriptor, ShaderSource, ShaderStages, StencilState, TextureFormat,
+    TextureSampleType, TextureViewDimension, VertexBufferLayout, VertexState, VertexStepMode, vertex_attr_array,
 };
 
 /// Radiance of R, G, B, NIR.
@@ -185,23 +185,23 @@ impl<'a> Pass<'a> {
             vertex: VertexState {
                 module: self.module,
                 entry_point: Some(self.vertex),
-                compilation_options: Default::default(),
+                compilation_options: PipelineCompilationOptions::default(),
                 buffers: &buffers,
             },
             // Leaves have two sides.
-            primitive: Default::default(),
+            primitive: PrimitiveState::default(),
             depth_stencil: self.depth.map(|compare| DepthStencilState {
                 format: DEPTH,
                 depth_write_enabled: Some(matches!(compare, CompareFunction::Greater | CompareFunction::LessEqual)),
                 depth_compare: Some(compare),
-                stencil: Default::default(),
-                bias: Default::default(),
+                stencil: StencilState::default(),
+                bias: DepthBiasState::default(),
             }),
             multisample: MultisampleState { count: self.samples, ..Default::default() },
             fragment: Some(FragmentState {
                 module: self.module,
                 entry_point: Some(self.fragment),
-                compilation_options: Default::default(),
+                compilation_options: PipelineCompilationOptions::default(),
                 targets: &targets,
             }),
             multiview_mask: None,
