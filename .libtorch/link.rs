@@ -8,5 +8,7 @@ fn main() {
         println!("cargo:rustc-link-arg=-Wl,--enable-new-dtags,-rpath,{lib}");
         // `torch-sys` and `nv-flip-sys` both hold stb_image_write, which neither is asked to use here.
         println!("cargo:rustc-link-arg=-Wl,--allow-multiple-definition");
+        // FLIP's library brings a miniz of its own, and libtorch must not take it for its: that crashes where weights are read.
+        println!("cargo:rustc-link-arg=-Wl,--exclude-libs,ALL");
     }
 }

@@ -165,7 +165,8 @@ fn basis(d: Vec3) -> [f32; 9] {
 mod tests {
     use super::*;
 
-    /// Expected: the irradiance of a horizontal plane as each light knows it, within what harmonics of the second order hold.
+    /// Expected: the irradiance of a horizontal plane as each light knows it, within the 9 % that Ramamoorthi & Hanrahan give as the most that
+    /// harmonics of the second order may be off; a sky at a low sun is.
     #[test]
     fn harmonics_hold_the_irradiance_of_the_ground() {
         for (name, light) in Light::examples() {
@@ -175,7 +176,7 @@ mod tests {
             let of = harmonics(&light);
             let up: Vec4 = of.iter().zip(basis(Vec3::Z)).map(|(e, y)| *e * y).sum();
             let expected = light.horizontal_irradiance().0;
-            assert!(((up - expected) / expected).abs().max_element() < 0.06, "{name}: {up} for {expected}");
+            assert!(((up - expected) / expected).abs().max_element() < 0.09, "{name}: {up} for {expected}");
         }
     }
 }
