@@ -47,13 +47,11 @@ impl Gpu {
         Ok(Self { device, queue, name, fault })
     }
 
-    /// An [`Error::Raster`] where the card could not do what it was told: nearly always for want of memory.
+    /// An [`Error::Raster`] where the card could not do what it was told, nearly always for want of memory. It stays: of pictures that are
+    /// drawn at the same time nobody can tell which one lacks something.
     pub(super) fn check(&self) -> Result<()> {
-        let mut fault = self.fault.lock().unwrap_or_else(PoisonError::into_inner);
-        match fault.take() {
-            Some(words) => {
-                Err(Error::Raster(format!("{}: {}\n help: try a smaller --width", self.name, words.trim_end())))
-            }
+        match self.fault.lock().unwrap_or_else(PoisonError::into_inner).as_deref().map(str::trim_end) {
+            Some(words) => Err(Error::Raster(format!("{}: {words}\n help: try a smaller --width", self.name))),
             None => Ok(()),
         }
     }

@@ -1,24 +1,11 @@
 // Screen-space ambient occlusion: McGuire, Mara & Luebke 2012, "Scalable Ambient Obscurance", on the positions and normals of the
 // target of ids.
 
-struct View {
-    eye: vec4<f32>,
-    ambient: array<vec4<f32>, 9>,
-    counts: vec4<u32>,
-    focal: vec4<f32>,
-};
-
-@group(0) @binding(0) var<uniform> view: View;
 @group(1) @binding(0) var positions: texture_2d<f32>;
 @group(1) @binding(1) var normals: texture_2d<f32>;
 
 const TAPS = 16;
 const TURNS = 7.0;
-
-@vertex
-fn screen(@builtin(vertex_index) i: u32) -> @builtin(position) vec4<f32> {
-    return vec4<f32>(f32(i & 1u) * 4.0 - 1.0, f32(i >> 1u) * 4.0 - 1.0, 0.0, 1.0);
-}
 
 @fragment
 fn occlude(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {

@@ -94,8 +94,8 @@ impl Pipelines {
             device
                 .create_shader_module(ShaderModuleDescriptor { label: None, source: ShaderSource::Wgsl(source.into()) })
         };
-        let scene = module(include_str!("scene.wgsl"));
-        let occlusion = module(include_str!("occlusion.wgsl"));
+        let scene = module(concat!(include_str!("view.wgsl"), include_str!("scene.wgsl")));
+        let occlusion = module(concat!(include_str!("view.wgsl"), include_str!("occlusion.wgsl")));
         let pass = |of: &Pass<'_>| of.pipeline(gpu);
         let all = [Some(&frame), Some(&sheet), Some(&around)];
         let draw = Pass { vertex: "corner", corners: true, ..Pass::of(&scene, &all) };

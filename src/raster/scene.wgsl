@@ -1,16 +1,5 @@
 // Everything that draws triangles: shadow maps, the target of ids, the picture.
 
-struct View {
-    // The eye, metres, world; w: what radiance is multiplied by so that half floats hold it.
-    eye: vec4<f32>,
-    // Spherical harmonics of the ambient irradiance, R, G, B, NIR.
-    ambient: array<vec4<f32>, 9>,
-    // Width and height in pixels, number of lights, effects.
-    counts: vec4<u32>,
-    // Pixels per unit of x/z; radius of the ambient occlusion, metres.
-    focal: vec4<f32>,
-};
-
 // What a part wears.
 struct Wear {
     // Factors on the reflected and the transmitted texel, R, G, B, NIR.
@@ -37,7 +26,6 @@ const NORMAL_MAPS = 4u;
 const FOLIAGE = 8u;
 const PI = 3.14159265359;
 
-@group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> wears: array<Wear>;
 @group(0) @binding(2) var<storage, read> lights: array<Light>;
 
@@ -283,11 +271,6 @@ fn cover(in: Caster) {
 }
 
 // What lies behind everything.
-@vertex
-fn screen(@builtin(vertex_index) i: u32) -> @builtin(position) vec4<f32> {
-    return vec4<f32>(f32(i & 1u) * 4.0 - 1.0, f32(i >> 1u) * 4.0 - 1.0, 0.0, 1.0);
-}
-
 @fragment
 fn behind(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
     return min(textureLoad(sky, vec2<i32>(at.xy), 0) * view.eye.w, vec4<f32>(60000.0));

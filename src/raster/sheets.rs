@@ -198,8 +198,8 @@ fn opacity(gpu: &Gpu, mask: Option<&AlphaMask>, most: u32) -> TextureView {
 /// The value that this share of a level's texels reaches.
 fn cut(level: &Plane, share: f64) -> f32 {
     let mut values: Vec<f32> = level.texels.iter().map(|v| v.x).collect();
-    values.sort_by(|a, b| b.total_cmp(a));
-    let rank = (share * values.len() as f64).round() as usize;
+    let rank = ((share * values.len() as f64).round() as usize).clamp(1, values.len()) - 1;
+    let (_, value, _) = values.select_nth_unstable_by(rank, |a, b| b.total_cmp(a));
     // Half of a level's texels that are one as the other: their own value is no cut between them.
-    values[rank.clamp(1, values.len()) - 1].min(0.5)
+    value.min(0.5)
 }
