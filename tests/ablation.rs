@@ -333,6 +333,9 @@ fn killed_it_ends_as_if_never_killed() {
     let begin = Instant::now();
     succeed(ablate(&whole, &more));
     let once = begin.elapsed();
+    // As a kill leaves it that falls into the first file of a dataset.
+    std::fs::create_dir_all(data.join("full")).unwrap();
+    std::fs::write(data.join("full/.furrow-half"), "half").unwrap();
     for part in [0.3, 0.5, 0.7] {
         let mut child = ablate(&data, &more).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
         std::thread::sleep(once.mul_f64(part).min(Duration::from_secs(10)));

@@ -5,6 +5,7 @@ use super::set::Set;
 use super::split::Shares;
 use super::{File, format, seal};
 use crate::ablation::{Drawing, Edit};
+use crate::output::is_unfinished;
 use crate::scene::build::Options;
 use crate::{Error, Result};
 use std::path::{Component, Path, PathBuf};
@@ -113,8 +114,9 @@ fn warnings(recipe: &Recipe) -> Result<Vec<String>> {
 /// Refuses a folder in which other things lie: nothing of the user's may be overwritten.
 pub(super) fn refuse_full(folder: &Path) -> Result<()> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
-    // A dataset that was stopped while it began has left its scene and nothing else.
-    let other = entries.filter_map(|e| Some(e.ok()?.file_name())).find(|name| name != "scene");
+    // A dataset that was stopped while it began has left its scene, and perhaps half a file.
+    let mut names = entries.filter_map(|e| Some(e.ok()?.file_name()));
+    let other = names.find(|name| name != "scene" && !is_unfinished(name));
     match other {
         None => Ok(()),
         Some(name) => Err(Error::Dataset(format!(

@@ -102,6 +102,11 @@ impl Provenance {
 /// Prefix of the names that files have until they are whole.
 const UNFINISHED: &str = ".furrow-";
 
+/// Whether a file of this name was never made whole: a killed program has left it.
+pub fn is_unfinished(name: &std::ffi::OsStr) -> bool {
+    name.to_string_lossy().starts_with(UNFINISHED)
+}
+
 /// Writes a file under a temporary name beside its target, flushes it, then renames: a reader never sees half a file.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     stream_atomically(path, |file| file.write_all(bytes).map_err(Error::io(path)))
@@ -160,7 +165,7 @@ pub fn remove_unfinished_in(folder: &Path) -> Result<Vec<PathBuf>> {
     for entry in std::fs::read_dir(folder).map_err(Error::io(folder))? {
         let entry = entry.map_err(Error::io(folder))?;
         let path = entry.path();
-        let unfinished = entry.file_name().to_string_lossy().starts_with(UNFINISHED);
+        let unfinished = is_unfinished(&entry.file_name());
         match (entry.file_type().map_err(Error::io(&path))?.is_dir(), unfinished) {
             (true, true) => std::fs::remove_dir_all(&path).map_err(Error::io(&path))?,
             (true, false) => within.push(path),

@@ -1,5 +1,6 @@
 //! Page + seed + index → one field.
 
+mod field;
 mod growing;
 mod known;
 mod models;
@@ -7,53 +8,28 @@ mod season;
 
 use super::desc::{FieldDesc, Growth, SpeciesDesc};
 use super::library::{Layer, Library, Species};
-use super::record::{Conditions, SpeciesRecord};
+use super::record::Conditions;
 use super::tag::Tag;
 use super::{Part, PlantRecord, Scene};
-use crate::film::Film;
 use crate::geometry::Mesh;
 use crate::light::LightRecord;
 use crate::material::{Ground as GroundMaterial, GroundSkin, Material, Solid};
-use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3, vec2};
+use crate::math::{Frame, Mat3, Vec2, Vec3, vec2};
 use crate::page::Page;
 use crate::plant::{self, LeafAxis, OrganKind};
 use crate::sampling::place::Step;
 use crate::sampling::rng::mix;
 use crate::sampling::{Purpose, Stream};
 use crate::scatter::{self, Disc, Rows, Spot};
-use crate::sensor::Linear;
-use crate::sensor::{Photograph, SensorDesc};
 use crate::soil::{self, Debris, Ground, Pile, Rect, SeedRows, Site, SoilDesc, SoilRecord};
 use crate::{Error, Result};
+pub use field::Field;
 pub use growing::Growing;
 use growing::Individual;
 use rayon::prelude::*;
 pub use season::Season;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
-
-impl Field {
-    /// Seed of the samples: a field of its own noise for every image.
-    pub fn sample_seed(&self) -> u64 {
-        mix(mix(self.seed) ^ self.index)
-    }
-
-    /// Where the field came from, one `key: value` a line: program, pages, seed, index.
-    pub fn provenance(&self) -> String {
-        let Self { hash, seed, index, .. } = self;
-        format!("program: furrow {}\nscene: sha256 {hash}\nseed: {seed}\nindex: {index}", env!("CARGO_PKG_VERSION"))
-    }
-
-    /// Takes the photograph of a film of this field.
-    pub fn photograph(&self, film: &Film) -> Photograph {
-        let stream = |k| Stream::of(self.seed, self.index, Purpose::Sensor, k);
-        let illuminant = self.scene.lights.iter().fold(Spectrum::ZERO, |sum, l| sum + l.horizontal_irradiance());
-        let pixels: Vec<Spectrum> = film.pixels.iter().map(|p| p.mean).collect();
-        let window = film.window;
-        let linear = Linear { pixels: &pixels, width: window.width(), left: window.x0, top: window.y0 };
-        self.sensor.build(&mut stream(0)).expose(linear, &self.scene.camera, illuminant, &stream(1))
-    }
-}
 
 /// What the command line adds to a page.
 #[derive(Clone, Copy, Debug, Default)]
@@ -66,32 +42,6 @@ pub struct Options {
     pub width: Option<u32>,
     /// Image height.
     pub height: Option<u32>,
-}
-
-/// One field, ready to be rendered, and what is known of it.
-pub struct Field {
-    /// What is out there.
-    pub scene: Scene,
-    /// Its plants, in the order of their numbers.
-    pub plants: Vec<PlantRecord>,
-    /// How its film becomes a picture.
-    pub sensor: SensorDesc,
-    /// SHA-256 of everything that was read, hex.
-    pub hash: String,
-    /// Seed.
-    pub seed: u64,
-    /// Which field of the distribution.
-    pub index: u64,
-    /// Every species that its page can draw, in the page's order: the same for all indices.
-    pub species: Vec<SpeciesRecord>,
-    /// What was drawn for it.
-    pub conditions: Conditions,
-    /// Every file that was read for it, in order.
-    pub files: Vec<PathBuf>,
-    /// Its page.
-    pub text: String,
-    /// What the user should know.
-    pub warnings: Vec<String>,
 }
 
 /// Room around the view in which plants are grown: they lean in and throw shadows.

@@ -1,0 +1,59 @@
+//! What is built: one field, and its photograph.
+
+use crate::film::Film;
+use crate::math::Spectrum;
+use crate::sampling::rng::mix;
+use crate::sampling::{Purpose, Stream};
+use crate::scene::record::{Conditions, SpeciesRecord};
+use crate::scene::{PlantRecord, Scene};
+use crate::sensor::{Linear, Photograph, SensorDesc};
+use std::path::PathBuf;
+
+/// One field, ready to be rendered, and what is known of it.
+pub struct Field {
+    /// What is out there.
+    pub scene: Scene,
+    /// Its plants, in the order of their numbers.
+    pub plants: Vec<PlantRecord>,
+    /// How its film becomes a picture.
+    pub sensor: SensorDesc,
+    /// SHA-256 of everything that was read, hex.
+    pub hash: String,
+    /// Seed.
+    pub seed: u64,
+    /// Which field of the distribution.
+    pub index: u64,
+    /// Every species that its page can draw, in the page's order: the same for all indices.
+    pub species: Vec<SpeciesRecord>,
+    /// What was drawn for it.
+    pub conditions: Conditions,
+    /// Every file that was read for it, in order.
+    pub files: Vec<PathBuf>,
+    /// Its page.
+    pub text: String,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+impl Field {
+    /// Seed of the samples: a field of its own noise for every image.
+    pub fn sample_seed(&self) -> u64 {
+        mix(mix(self.seed) ^ self.index)
+    }
+
+    /// Where the field came from, one `key: value` a line: program, pages, seed, index.
+    pub fn provenance(&self) -> String {
+        let Self { hash, seed, index, .. } = self;
+        format!("program: furrow {}\nscene: sha256 {hash}\nseed: {seed}\nindex: {index}", env!("CARGO_PKG_VERSION"))
+    }
+
+    /// Takes the photograph of a film of this field.
+    pub fn photograph(&self, film: &Film) -> Photograph {
+        let stream = |k| Stream::of(self.seed, self.index, Purpose::Sensor, k);
+        let illuminant = self.scene.lights.iter().fold(Spectrum::ZERO, |sum, l| sum + l.horizontal_irradiance());
+        let pixels: Vec<Spectrum> = film.pixels.iter().map(|p| p.mean).collect();
+        let window = film.window;
+        let linear = Linear { pixels: &pixels, width: window.width(), left: window.x0, top: window.y0 };
+        self.sensor.build(&mut stream(0)).expose(linear, &self.scene.camera, illuminant, &stream(1))
+    }
+}
