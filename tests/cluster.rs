@@ -215,7 +215,7 @@ fn task(jobs: &Path, number: u64) -> Command {
         .env("PATH", format!("{}:{}", tools.display(), std::env::var("PATH").unwrap()))
         .envs([("SLURM_ARRAY_JOB_ID", "7"), ("SLURM_CPUS_PER_TASK", "1")])
         .env("SLURM_ARRAY_TASK_ID", number.to_string())
-        .stdout(Stdio::null())
+        .stdout(std::fs::File::create(jobs.join("tools/log")).unwrap())
         .stderr(Stdio::null());
     command
 }
@@ -244,6 +244,8 @@ fn a_slurm_task_tells_its_scheduler_what_to_do() {
     let mut child = task(&jobs, 0).spawn().unwrap();
     until("sealed", || sealed(&folder) > so_far + 1);
     send("USR1", &child);
+    // A shell that is sent two signals within one breath may see the later alone; a scheduler leaves half a minute between.
+    until("told USR1", || std::fs::read_to_string(jobs.join("tools/log")).unwrap().contains("told USR1"));
     send("TERM", &child);
     assert_eq!(end(&mut child).code(), Some(75));
     assert_eq!(asked(), "requeue 7_1\nrequeue 7_0\n");
