@@ -6,7 +6,7 @@ use super::{Feature, Varies};
 use crate::bsdf::{Bsdf, OrenNayar, Wet};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec2, Vec3, vec2};
-use crate::optics::soil::{LOESS, at as four_bands, wet};
+use crate::optics::soil::{at as four_bands, wet};
 use crate::soil::Skin;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -44,7 +44,7 @@ impl GroundSkin {
     pub fn bake(skin: &Skin) -> Self {
         let texel = |i: usize| {
             let open = f32::from(skin.ao[i]) / 255.0;
-            let dry = four_bands(Skin::decode(skin.albedo[i]), LOESS) * open;
+            let dry = four_bands(Skin::decode(skin.albedo[i]), skin.like) * open;
             let (moist, film) = wet(dry, f32::from(skin.moisture[i]) / 255.0);
             Texel {
                 reflectance: moist.to_array().map(|r| (r.max(0.0).sqrt() * 255.0 + 0.5) as u8),

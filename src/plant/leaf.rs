@@ -23,7 +23,7 @@ const CELL: f32 = 0.9e-3;
 /// sides: a leaf that would, lies on the soil's crumbs. Near the crown the bound falls to half the crown's height.
 const LYING: f32 = 0.004;
 /// See [`LYING`].
-const LYING_WIDTH: f32 = 0.15;
+const LYING_WIDTH: f32 = 0.18;
 
 /// Where a leaf stands on its axis.
 #[derive(Clone, Copy, Debug)]

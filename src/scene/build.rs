@@ -21,7 +21,7 @@ use crate::sampling::place::Step;
 use crate::sampling::rng::mix;
 use crate::sampling::{Purpose, Stream};
 use crate::scatter::{self, Disc, Rows, Spot};
-use crate::soil::{self, Debris, Ground, Pile, Rect, SeedRows, Site, SoilDesc, SoilRecord};
+use crate::soil::{self, Canopy, Clods, Debris, Ground, Pile, Rect, SeedRows, Site, SoilDesc, SoilRecord};
 use crate::{Error, Result};
 pub use field::Field;
 pub use growing::Growing;
@@ -52,8 +52,6 @@ const GROUND_MARGIN: f32 = 0.04;
 const GROUND_REACH: f32 = 2.5;
 /// Length of the longest shadow that counts, in plant heights: that of a sun 20° above the horizon.
 const SHADOW: f32 = 2.75;
-/// Radius around a stem that clods leave free, metres.
-const STEM_ROOM: f32 = 0.004;
 /// Address of the season's stream, behind those of any number of lights.
 const SEASON: u64 = 1 << 32;
 /// Addresses of what lies on the ground.
@@ -135,6 +133,12 @@ struct Earth {
     maps: Vec<Arc<Layer>>,
     pile: Pile,
     stones: Vec<Debris>,
+}
+
+/// What the ground shows, and what its clods show: dry ones and damp ones.
+struct Skins {
+    ground: Arc<GroundSkin>,
+    clods: [Arc<GroundSkin>; 2],
 }
 
 /// What plants and models stand on.
@@ -267,17 +271,22 @@ impl<'a> Builder<'a> {
                 known = Some(self.soil_record(soil, &ground));
                 let texel = (0.9 * self.ground_pixel()).clamp(2e-4, 2e-3);
                 // The skin takes as long as everything else, and neither needs the other.
-                let (skin, rest) = rayon::join(
-                    || GroundSkin::bake(&ground.skin(&maps, texel)),
+                let fabric = |wet| Arc::new(GroundSkin::bake(&ground.fabric(&maps, texel, wet)));
+                let (skins, rest) = rayon::join(
+                    || Skins {
+                        ground: Arc::new(GroundSkin::bake(&ground.skin(&maps, texel))),
+                        clods: ground.clods_moisture().map(fabric),
+                    },
                     || {
                         let taken: Vec<Disc> = stones.iter().map(|s| (s.centre.truncate(), s.radius)).collect();
                         let seedlings = self.seedlings(sown, &taken)?;
-                        let clods = self.cover(soil, &ground, &mut pile, &seedlings, &mut stones);
-                        Ok::<_, Error>((clods, self.populate(&seedlings, Some(floor), shown)?))
+                        // Plants first: what grows moves the clods, not the other way round.
+                        let plants = self.populate(&seedlings, Some(floor), shown)?;
+                        Ok::<_, Error>((self.cover(soil, &ground, &mut pile, &mut stones), plants))
                     },
                 );
                 let (clods, plants) = rest?;
-                self.lay(floor, clods, stones, &Arc::new(skin));
+                self.lay(floor, clods, stones, &skins);
                 plants
             }
         };
@@ -336,17 +345,13 @@ impl<'a> Builder<'a> {
         ground.record(desc, &self.stream(Purpose::Debris, STONES), &self.stream(Purpose::Debris, LITTER))
     }
 
-    /// Clods around the stems, and litter, which joins the `debris`.
-    fn cover(
-        &self,
-        desc: &SoilDesc,
-        ground: &Ground,
-        pile: &mut Pile,
-        seedlings: &[Seedling],
-        debris: &mut Vec<Debris>,
-    ) -> Vec<(f32, Mesh)> {
-        let stems: Vec<(Vec2, f32)> = seedlings.iter().map(|s| (s.position, STEM_ROOM)).collect();
-        let clods = soil::clods(ground, pile, &stems);
+    /// Clods under the plants, and litter, which joins the `debris`.
+    fn cover(&self, desc: &SoilDesc, ground: &Ground, pile: &mut Pile, debris: &mut Vec<Debris>) -> Vec<Clods> {
+        let mut canopy = Canopy::none(ground);
+        for part in self.scene.parts.iter().filter(|_| !desc.flat) {
+            canopy.add(&part.mesh);
+        }
+        let clods = soil::clods(ground, pile, &canopy);
         debris.extend(soil::litter(&desc.litter, ground, pile, &self.stream(Purpose::Debris, LITTER)));
         if !desc.flat {
             return clods;
@@ -358,14 +363,15 @@ impl<'a> Builder<'a> {
     }
 
     /// Makes parts of everything of the ground; they come before those of the plants.
-    fn lay(&mut self, floor: Floor<'_>, clods: Vec<(f32, Mesh)>, debris: Vec<Debris>, skin: &Arc<GroundSkin>) {
+    fn lay(&mut self, floor: Floor<'_>, clods: Vec<Clods>, debris: Vec<Debris>, skins: &Skins) {
         let plants = std::mem::take(&mut self.scene.parts);
-        let material = self.material(Material::Ground(GroundMaterial::new(skin.clone())));
+        let material = self.material(Material::Ground(GroundMaterial::new(skins.ground.clone())));
         let mesh = if floor.flat { floor.ground.levelled().mesh() } else { floor.ground.mesh() };
         self.part(mesh, material);
-        for (tint, mesh) in clods {
-            let material = self.material(Material::Ground(GroundMaterial::clods(skin.clone(), tint)));
-            self.part(mesh, material);
+        for group in clods {
+            let skin = skins.clods[usize::from(group.damp)].clone();
+            let material = self.material(Material::Ground(GroundMaterial::clods(skin, group.tint)));
+            self.part(group.mesh, material);
         }
         for (i, thing) in debris.into_iter().enumerate() {
             let solid = Solid::new(thing.albedo * thing.tint, DEBRIS_SIGMA);

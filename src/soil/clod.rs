@@ -5,14 +5,14 @@
 //! the ground are left out: half of them, which no ray finds.
 
 use super::body::{self, Cut, LEVELS, Pose, Shape};
-use super::{Ground, Pile};
+use super::{Canopy, Ground, Pile};
 use crate::geometry::Mesh;
-use crate::math::{Vec2, vec3};
+use crate::math::{Vec2, vec2, vec3};
 use crate::sampling::{Purpose, Stream};
 
 /// How aggregates break.
 pub(super) const CUT: Cut =
-    Cut { planes: (6, 10), distance: (0.52, 0.92), sharpness: (12.0, 36.0), lumps: 0.2, rough: 0.2 };
+    Cut { planes: (7, 12), distance: (0.5, 0.86), sharpness: (24.0, 70.0), lumps: 0.22, rough: 0.24 };
 
 /// Different shapes; each is turned and stretched anew for every clod.
 const SHAPES: usize = 24;
@@ -26,16 +26,16 @@ const AXES: (f32, f32) = (0.77, 0.55);
 /// Grid spacing that the levels are made for, metres: about four pixels of 0.25 mm.
 const FINE_M: f32 = 0.0009;
 /// Shortest clod, mm, of each level of detail on a grid of [`FINE_M`]; on a coarser grid, for larger pixels, in proportion.
-const FROM_MM: [f32; LEVELS] = [0.0, 4.0, 8.0, 14.0, 30.0];
+const FROM_MM: [f32; LEVELS] = [0.0, 3.6, 6.5, 13.0, 28.0];
 
-/// Logarithm of how much brighter clods are than the moister ground between them (1.1–1.25 when it dries), on average.
-const DRY_GAIN: f32 = 0.13;
-
-/// How much more so a clod is that lies loosely on top than one half sunk.
+/// Logarithm of how much brighter a clod is that lies loosely on top than one half sunk.
 const LOOSE_GAIN: f32 = 0.14;
 
+/// Room between a clod and the leaf above it, metres; one that then stands out by less than this is not worth its triangles.
+const UNDER_LEAF_M: f32 = 0.0008;
+
 /// Share of the small clods that fall on a larger one and stay there; the others are shaken off.
-const STAY: f32 = 0.2;
+const STAY: f32 = 0.05;
 
 /// One clod before it is laid.
 struct Candidate {
@@ -44,17 +44,27 @@ struct Candidate {
     key: u32,
 }
 
-/// The clods of a ground in groups of like brightness: (factor on the ground's
-/// reflectance, mesh). Texture coordinates are the ground's own under each vertex.
+/// Clods that look alike.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Clods {
+    /// Factor on the reflectance of the ground's matter.
+    pub tint: f32,
+    /// Whether they are as wet as the ground, or as dry as the law says.
+    pub damp: bool,
+    /// Their bodies, with texture coordinates of [`Ground::fabric`].
+    pub mesh: Mesh,
+}
+
+/// The clods of a ground in groups of like brightness and moisture.
 ///
-/// `clear` are discs, such as stems, whose middle stays free. About 1.2 million triangles and 0.5 s of one core for a third
+/// None of them pierces the `canopy`. About 1.2 million triangles and 0.5 s of one core for a third
 /// of a square metre with clods from 2.5 mm.
-pub fn clods(ground: &Ground, pile: &mut Pile, clear: &[(Vec2, f32)]) -> Vec<(f32, Mesh)> {
+pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy) -> Vec<Clods> {
     let stream = ground.stream.child(Purpose::Debris, 101);
     let own = stream.child(Purpose::Page, 0);
     let scale = (FINE_M / ground.step()).min(1.0);
     let mut shapes: Vec<Vec<Option<Shape>>> = vec![vec![None; SHAPES]; LEVELS];
-    let mut groups: Vec<Mesh> = vec![Mesh::default(); GROUPS];
+    let mut groups: Vec<Mesh> = vec![Mesh::default(); 2 * GROUPS];
     for clod in candidates(ground, &stream) {
         let mut s = own.child(Purpose::Debris, u64::from(clod.key));
         let level = FROM_MM.iter().rposition(|from| clod.mm * scale >= *from).unwrap_or(0);
@@ -62,27 +72,31 @@ pub fn clods(ground: &Ground, pile: &mut Pile, clear: &[(Vec2, f32)]) -> Vec<(f3
         let shape = shapes[level][k]
             .get_or_insert_with(|| Shape::new(level, CUT, &mut stream.child(Purpose::Texture, k as u64)));
         let half = 0.5e-3 * clod.mm;
-        let mut vary = |mean: f32| (mean * (1.0 + 0.14 * s.normal() as f32)).clamp(0.6 * mean, 1.0);
+        let mut vary = |mean: f32| (mean * (1.0 + 0.2 * s.normal() as f32)).clamp(0.5 * mean, 1.0);
         let axes = vec3(1.0, vary(AXES.0), vary(AXES.1)) * half;
         let pose = Pose::lying(shape, axes, 0.3, &mut s);
         let sink = sink(clod.mm, s.uniform32());
         let tint = ground.law.tint_sigma * s.normal() as f32 + LOOSE_GAIN * (0.35 - sink) / 0.15;
-
+        let sink = sink * (1.0 - ground.law.loose);
         let stays = s.uniform32();
+        let damp = s.uniform32() < ground.law.damp;
+        let from = vec2(s.uniform32(), s.uniform32());
 
         let radius = 0.5 * (axes.x + axes.y);
         let at = if clod.mm < 15.0 { pile.settle(clod.at, radius, 0.75) } else { Some(clod.at) };
-        let Some(at) = at else { continue };
-        if clear.iter().any(|(p, r)| p.distance(at) < r + 0.5 * radius) || !pile.area().contains(at) {
-            continue;
-        }
+        let Some(at) = at.filter(|at| pile.area().contains(*at)) else { continue };
         let (support, _) = pile.support(at, radius);
         let height = pose.high - pose.low;
         if stays > STAY && support - ground.height(at.x, at.y) > 0.6 * height {
             continue;
         }
-        let centre = at.extend(support - sink * height - pose.low);
-        let mesh = &mut groups[group(tint, ground.law.tint_sigma)];
+        let free = canopy.over(at, axes.x.max(axes.y)) - UNDER_LEAF_M - support;
+        if free < UNDER_LEAF_M {
+            continue;
+        }
+        // What grows pushes down what lies under its leaves.
+        let centre = at.extend(support - (sink * height).max(height - free) - pose.low);
+        let mesh = &mut groups[group(tint, ground.law.tint_sigma) + GROUPS * usize::from(damp)];
         let slack = 0.06 * height;
         body::emit(
             mesh,
@@ -96,12 +110,15 @@ pub fn clods(ground: &Ground, pile: &mut Pile, clear: &[(Vec2, f32)]) -> Vec<(f3
                     corners.iter().all(|c| c.z < ground.height(c.x, c.y) - 3e-4)
                 }
             },
-            |_, p| ground.uv(p.x, p.y),
+            |_, p| Ground::fabric_uv(from, p - at.extend(0.0)),
         );
         pile.heap(at, pose.turn, 0.92 * axes.x, 0.92 * axes.y, support, centre.z + 0.95 * pose.high);
     }
     let sigma = ground.law.tint_sigma;
-    (0..GROUPS).map(|g| group_tint(g, sigma)).zip(groups).filter(|(_, mesh)| !mesh.triangles.is_empty()).collect()
+    let known = |g: usize| (group_tint(g % GROUPS, sigma), g >= GROUPS);
+    (groups.into_iter().enumerate().filter(|(_, mesh)| !mesh.triangles.is_empty()))
+        .map(|(g, mesh)| Clods { tint: known(g).0, damp: known(g).1, mesh })
+        .collect()
 }
 
 /// All clods, largest first.
@@ -137,5 +154,5 @@ fn group(tint: f32, sigma: f32) -> usize {
 
 fn group_tint(group: usize, sigma: f32) -> f32 {
     let reach = 2.2 * (sigma * sigma + LOOSE_GAIN * LOOSE_GAIN * 0.25).sqrt();
-    (((group as f32 + 0.5) / GROUPS as f32 * 2.0 - 1.0) * reach + DRY_GAIN).exp()
+    (((group as f32 + 0.5) / GROUPS as f32 * 2.0 - 1.0) * reach).exp()
 }

@@ -16,6 +16,9 @@ const PIVOT_MM: f32 = 5.0;
 /// Standard deviation of [`Perlin::fbm2`] with three octaves and gain 0.5.
 const FBM3_SD: f32 = 0.28;
 
+/// Straight breaks in the outline of a crumb.
+const BREAKS: usize = 6;
+
 /// Side of the cells that the aggregates are addressed by.
 const CELL_M: f32 = 0.02;
 
@@ -30,6 +33,12 @@ pub(super) struct Law {
     noise: Perlin,
     /// Standard deviation of the logarithm of brightness.
     pub(super) tint_sigma: f32,
+    /// Share of the ground's moisture that aggregates have lost.
+    pub(super) dryness: f32,
+    /// Share of them that have lost none.
+    pub(super) damp: f32,
+    /// Share of their sinking that clods are spared.
+    pub(super) loose: f32,
 }
 
 /// Where the law holds: the local number over 5 mm, m⁻², and the local exponent.
@@ -65,6 +74,9 @@ impl Law {
             sorting: desc.sorting.f32(),
             noise: Perlin::new(child(4).seed32()),
             tint_sigma: desc.tint_sigma.f32(),
+            dryness: desc.dryness.draw32(&mut child(5)),
+            damp: desc.damp.draw32(&mut child(6)),
+            loose: desc.loose.draw32(&mut child(7)),
         }
     }
 
@@ -108,13 +120,15 @@ impl Law {
     }
 }
 
-/// A raster of heights above the bare ground, and of tints.
+/// A raster of heights above the bare ground, of tints, and of what is dry.
 #[derive(Clone, Debug)]
 pub(super) struct Crumbs {
     /// Metres above the ground without crumbs.
     pub(super) height: Vec<f32>,
     /// Brightness times 128; 0 where no crumb lies.
     pub(super) tint: Vec<u8>,
+    /// Share of the ground's moisture that is lost, times 255.
+    pub(super) dry: Vec<u8>,
 }
 
 /// Where the raster's samples are.
@@ -137,7 +151,7 @@ impl Crumbs {
         share: impl Fn(Vec2) -> f32,
     ) -> Self {
         let n = raster.width * raster.height;
-        let mut crumbs = Self { height: vec![0.0; n], tint: vec![0; n] };
+        let mut crumbs = Self { height: vec![0.0; n], tint: vec![0; n], dry: vec![0; n] };
         let far = raster.origin + vec2(raster.width as f32, raster.height as f32) * raster.step;
         let area = Rect::new(raster.origin.x, raster.origin.y, far.x, far.y).grown(mm.1 * 1e-3);
         if mm.0 < mm.1 && amount > 0.0 {
@@ -147,16 +161,16 @@ impl Crumbs {
                 stream,
                 |p| amount * share(p),
                 |p, length, s| {
-                    crumbs.add(raster, p, length, law.tint_sigma, s);
+                    crumbs.add(raster, p, length, law, s);
                 },
             );
         }
         crumbs
     }
 
-    fn add(&mut self, raster: Raster, p: Vec2, length_mm: f32, sigma: f32, s: &mut Stream) {
-        // Ten numbers whatever happens, so that a crumb outside the area leaves its neighbours as they are.
-        let mut u = [0.0; 10];
+    fn add(&mut self, raster: Raster, p: Vec2, length_mm: f32, law: &Law, s: &mut Stream) {
+        // As many numbers whatever happens, so that a crumb outside the area leaves its neighbours as they are.
+        let mut u = [0.0; 18];
         u.fill_with(|| s.uniform32());
         let a = 0.5e-3 * length_mm;
         let b = a * (0.67 + 0.25 * u[0]);
@@ -167,8 +181,14 @@ impl Crumbs {
         let face = |v: f32, w: f32| Vec2::from_angle(v * std::f32::consts::TAU) * (0.4 + 0.9 * w);
         let (f, g) = (face(u[4], u[5]), face(u[6], u[7]));
         // The sum of two uniforms less one has standard deviation 0.408.
-        let tint = ((u[8] + u[9] - 1.0) / 0.408 * 1.5 * sigma).exp();
+        let tint = ((u[8] + u[9] - 1.0) / 0.408 * 1.5 * law.tint_sigma).exp();
         let tint = (tint * 128.0).clamp(1.0, 255.0) as u8;
+        let dry = if u[10] < law.damp { 0 } else { (law.dryness * 255.0) as u8 };
+        // The outline: an ellipse cut by straight breaks, so that crumbs are angular and no two alike.
+        let breaks: [Vec2; BREAKS] = std::array::from_fn(|k| {
+            let at = (k as f32 + 0.8 * u[11 + k]) / BREAKS as f32;
+            Vec2::from_angle((at + u[17]) * std::f32::consts::TAU) * (1.02 + 0.38 * u[11 + (k + 2) % BREAKS])
+        });
 
         let q = (p - raster.origin) / raster.step;
         let reach = a / raster.step;
@@ -178,7 +198,8 @@ impl Crumbs {
         for y in lo.y as i32..=hi.y as i32 {
             for x in lo.x as i32..=hi.x as i32 {
                 let d = turn.rotate(vec2(x as f32, y as f32) - q) * scale;
-                let inside = 1.0 - d.length_squared();
+                let cut = breaks.iter().fold(0.0f32, |most, b| most.max(b.dot(d)));
+                let inside = 1.0 - d.length_squared().max(cut * cut);
                 if inside <= 0.0 {
                     continue;
                 }
@@ -189,6 +210,7 @@ impl Crumbs {
                 if z > self.height[k] {
                     self.height[k] = z;
                     self.tint[k] = tint;
+                    self.dry[k] = dry;
                 }
             }
         }

@@ -1,5 +1,6 @@
 //! The written form of the ground: what a page says about soil, clods, stones and litter.
 
+use super::SoilColor;
 use crate::math::Spectrum;
 use crate::sampling::vary::{Count, Finite, Fraction, NonNegative, Num, Positive, PositiveCount, Vary};
 use serde::{Deserialize, Serialize};
@@ -15,6 +16,7 @@ use std::path::PathBuf;
 ///         (albedo: "soil/crust.png", height: "soil/crust_height.png", size_m: 0.5, height_mm: (-6, 1),
 ///          share: 0.4, clods: 0.3),
 ///     ],
+///     colors: [Loess, Sandy],
 ///     blend: (scale_m: 0.25, octaves: 3, sharpness: 6),
 ///     relief: (rms_mm: Uniform(5, 10), hurst: 0.7, row: (depth_mm: Uniform(5, 15), width_mm: 60)),
 ///     moisture: (mean: Uniform(0.1, 0.5)),
@@ -30,6 +32,10 @@ use std::path::PathBuf;
 pub struct SoilDesc {
     /// One to [`super::MAX_LAYERS`] layers.
     pub layers: Vec<LayerDesc>,
+    /// The dry soil's colour: each field has a random mix of these measured soils, and the layers' pictures vary around it. Empty:
+    /// the colours of the pictures.
+    #[serde(default)]
+    pub colors: Vec<SoilColor>,
     /// How the layers share the ground.
     #[serde(default)]
     pub blend: BlendDesc,
@@ -221,6 +227,13 @@ pub struct ClodsDesc {
     pub sorting: Num<Fraction>,
     /// Standard deviation of the logarithm of their brightness.
     pub tint_sigma: Num<NonNegative>,
+    /// How much of the ground's moisture clods and crumbs have lost: 0 as wet as the ground, 1 air-dry. On damp ground dry clods
+    /// are what is seen first.
+    pub dryness: Vary<Fraction>,
+    /// Share of clods and crumbs that were turned up lately and are as wet as the ground still.
+    pub damp: Vary<Fraction>,
+    /// How loosely clods lie: 0 a fifth to a half of the height is sunk, as harrow and rain leave them; 1 they lie on top.
+    pub loose: Vary<Fraction>,
 }
 
 impl Default for ClodsDesc {
@@ -233,7 +246,10 @@ impl Default for ClodsDesc {
             clustering: Vary::fixed(0.45),
             cluster_m: Vary::fixed(0.12),
             sorting: Num::new(0.1),
-            tint_sigma: Num::new(0.08),
+            tint_sigma: Num::new(0.1),
+            dryness: Vary::uniform(0.3, 0.9),
+            damp: Vary::uniform(0.05, 0.25),
+            loose: Vary::uniform(0.0, 0.5),
         }
     }
 }

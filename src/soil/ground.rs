@@ -1,6 +1,7 @@
 //! One piece of ground: its heights, their interpolation, and the mesh.
 
 use super::blend::{Blend, Weights};
+use super::color::Shift;
 use super::crumb::{Crumbs, Law, Raster};
 use super::grid::Grid;
 use super::record::{ClodsRecord, LayerRecord, LitterRecord, MoistureRecord, ReliefRecord, SoilRecord};
@@ -64,6 +65,7 @@ pub struct Ground {
     pub(super) fine: Fine,
     pub(super) blend: Blend,
     pub(super) law: Law,
+    pub(super) color: Shift,
     pub(super) crumbs_mm: (f32, f32),
     pub(super) clods_mm: (f32, f32),
     pub(super) crumbs_amount: f32,
@@ -89,6 +91,7 @@ impl Ground {
             fine: Fine::default(),
             blend,
             law,
+            color: Shift::draw(&desc.colors, &maps[0], &mut stream.child(Purpose::Soil, 40)),
             crumbs_mm: (desc.crumbs.min_mm.f32(), desc.clods.min_mm.f32()),
             clods_mm: (desc.clods.min_mm.f32(), desc.clods.max_mm.f32()),
             crumbs_amount: desc.crumbs.amount.draw32(&mut stream.child(Purpose::Soil, 20)),
@@ -187,12 +190,18 @@ impl Ground {
             .collect();
     }
 
+    /// Moisture of the dry and of the damp clods, 0..1.
+    pub fn clods_moisture(&self) -> [f32; 2] {
+        [self.moisture.mean * (1.0 - self.law.dryness), self.moisture.mean]
+    }
+
     /// What was drawn for this ground; `debris` is the stream of the stones, `litter` that of the litter.
     pub fn record(&self, desc: &SoilDesc, debris: &Stream, litter: &Stream) -> SoilRecord {
         let (blend_scale_m, blend_sharpness) = self.blend.patches();
         let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         SoilRecord {
             moisture: self.moisture.clone(),
+            reflectance: self.color.like,
             layers: (desc.layers.iter().zip(self.blend.shares()))
                 .map(|(layer, share)| LayerRecord { name: name(&layer.albedo), share })
                 .collect(),
@@ -203,6 +212,9 @@ impl Ground {
                 over_5mm_per_m2: self.law.over_pivot,
                 exponent: self.law.exponent,
                 crumbs_amount: self.crumbs_amount,
+                dryness: self.law.dryness,
+                damp: self.law.damp,
+                loose: self.law.loose,
             },
             stones_cover: super::stone::covers(&desc.stones, debris),
             litter: LitterRecord::draw(&desc.litter, litter),

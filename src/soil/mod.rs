@@ -10,7 +10,9 @@
 
 pub mod blend;
 mod body;
+mod canopy;
 mod clod;
+mod color;
 mod crumb;
 mod desc;
 mod grid;
@@ -24,7 +26,9 @@ mod stone;
 #[cfg(test)]
 mod tests;
 
-pub use clod::clods;
+pub use canopy::Canopy;
+pub use clod::{Clods, clods};
+pub use color::SoilColor;
 pub use desc::{
     BlendDesc, ClodsDesc, CrumbsDesc, LayerDesc, LitterDesc, MoistureDesc, ReliefDesc, RowReliefDesc, SoilDesc,
     StonesDesc,

@@ -1,5 +1,6 @@
 //! The ground as it was drawn.
 
+use crate::math::Spectrum;
 use serde::Serialize;
 
 /// The ground of one field.
@@ -7,6 +8,8 @@ use serde::Serialize;
 pub struct SoilRecord {
     /// How wet it is.
     pub moisture: MoistureRecord,
+    /// Mean reflectance of the dry soil, R, G, B, NIR, where the page names colours; of loess, whose NIR is taken, where it does not.
+    pub reflectance: Spectrum,
     /// The layers in the order of the page.
     pub layers: Vec<LayerRecord>,
     /// Size of the largest patches of one layer.
@@ -80,6 +83,12 @@ pub struct ClodsRecord {
     pub exponent: f32,
     /// Share of the crumbs that the law asks for.
     pub crumbs_amount: f32,
+    /// Share of the ground's moisture that they have lost.
+    pub dryness: f32,
+    /// Share of them that have lost none.
+    pub damp: f32,
+    /// Share of their sinking that clods are spared.
+    pub loose: f32,
 }
 
 /// The litter of one ground.

@@ -1,9 +1,10 @@
 //! The ground's own texture: colour, wetness and all relief that is finer than its grid.
 
+use super::blend::Weights;
 use super::crumb::Raster;
 use super::ground::blur;
 use super::{Ground, LayerMaps, MAX_LAYERS};
-use crate::math::{Vec2, vec2};
+use crate::math::{Spectrum, Vec2, Vec3, vec2};
 use rayon::prelude::*;
 
 /// A texture over [`Ground::area`], row 0 in the south, so that [`Ground::uv`] reads it with v growing down its rows.
@@ -28,6 +29,8 @@ pub struct Skin {
     pub slope: Vec<[i8; 2]>,
     /// Share of the sky that the relief finer than the mesh leaves open, times 255.
     pub ao: Vec<u8>,
+    /// Mean reflectance of the dry soil, whose NIR over red is that of every texel.
+    pub like: Spectrum,
 }
 
 impl Skin {
@@ -47,8 +50,8 @@ impl Skin {
 /// Depth of a pit between crumbs that hides half of the sky, metres.
 const HALF_SKY_M: f32 = 0.0005;
 
-/// How much drier the loose crumbs are than what they lie on.
-const CRUMB_DRYING: f32 = 0.08;
+/// Side of the square of matter that clods show, metres: more than the longest clod that a page asks for as a rule.
+const FABRIC_M: f32 = 0.12;
 
 /// How much wetter such a pit is.
 const PIT_WETTING: f32 = 0.2;
@@ -73,6 +76,7 @@ impl Ground {
             moisture: Vec::new(),
             slope: Vec::new(),
             ao: Vec::new(),
+            like: self.color.like,
         };
         let crumbs = self.crumbs(raster);
         let mut detail = crumbs.height;
@@ -98,13 +102,64 @@ impl Ground {
                     t => f32::from(t) / 128.0,
                 };
                 let tone = tint * cell.mix(|v| self.fine.tone[v]);
-                albedo[i] = Skin::encode(self.blend.albedo(maps, share, p).map(|a| a * tone));
+                albedo[i] = Skin::encode(self.dry(maps, share, p).map(|a| a * tone));
                 weights[i] = share.map(|w| (w * 255.0 + 0.5) as u8);
             }
         });
         self.bake_slopes(raster, split, &detail, &mut skin);
-        self.bake_pits(raster, split, detail, &crumbs.tint, &mut skin);
+        self.bake_pits(raster, split, detail, &crumbs.dry, &mut skin);
         skin
+    }
+
+    /// What clods are made of: a square of [`FABRIC_M`] of the ground's own matter without crumbs or relief, all of it as wet as
+    /// `moisture`, 0..1. [`Ground::fabric_uv`] reads it.
+    pub fn fabric<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32, moisture: f32) -> Skin {
+        let side = ((FABRIC_M / texel_m) as usize).clamp(16, 1024);
+        let texel = FABRIC_M / side as f32;
+        let n = side * side;
+        let rest = |p: Vec2| {
+            let mut noise = [0.0; MAX_LAYERS];
+            for (i, n) in noise.iter_mut().enumerate().take(self.blend.layers()) {
+                *n = self.blend.noise(i, p);
+            }
+            (p, self.blend.weights(noise, self.blend.heights(maps, p)))
+        };
+        let place = |k: usize| vec2((k % side) as f32 + 0.5, (k / side) as f32 + 0.5) * texel;
+        let (albedo, weights) = (0..n)
+            .into_par_iter()
+            .map(|k| rest(place(k)))
+            .map(|(p, w)| (Skin::encode(self.dry(maps, w, p)), w.map(|w| (w * 255.0 + 0.5) as u8)))
+            .unzip();
+        Skin {
+            width: side,
+            height: side,
+            origin: Vec2::ZERO,
+            texel_m: texel,
+            albedo,
+            weights,
+            moisture: vec![(moisture.clamp(0.0, 1.0) * 255.0 + 0.5) as u8; n],
+            slope: vec![[0; 2]; n],
+            ao: vec![255; n],
+            like: self.color.like,
+        }
+    }
+
+    /// Reflectance of the dry soil where the layers have the weights `share`.
+    fn dry<L: LayerMaps>(&self, maps: &[L], share: Weights, p: Vec2) -> [f32; 3] {
+        let painted = self.blend.albedo(maps, share, p);
+        std::array::from_fn(|k| painted[k] * self.color.gain[k])
+    }
+
+    /// Texture coordinates in [`Ground::fabric`] of a corner of a body that took its matter at `from`; the square goes on mirrored.
+    pub(super) fn fabric_uv(from: Vec2, p: Vec3) -> Vec2 {
+        // Sides lean, so that what stands upright shows no streaks.
+        let leaning = p.truncate() + vec2(0.8, 0.6) * p.z;
+        let fold = |x: f32| {
+            let t = x.rem_euclid(2.0);
+            if t > 1.0 { 2.0 - t } else { t }
+        };
+        let q = (leaning + from) / FABRIC_M;
+        vec2(fold(q.x), fold(q.y))
     }
 
     /// Slopes of the detail, less those that the mesh's normals already have.
@@ -119,16 +174,16 @@ impl Ground {
         skin.slope = differences(detail, raster).into_par_iter().enumerate().map(slope).collect();
     }
 
-    /// What lies in pits of the detail sees less of the sky and dries later; crumbs dry first.
-    fn bake_pits(&self, raster: Raster, split: usize, mut detail: Vec<f32>, crumbs: &[u8], skin: &mut Skin) {
+    /// What lies in pits of the detail sees less of the sky and dries later; crumbs dry first, by the shares in `dry`.
+    fn bake_pits(&self, raster: Raster, split: usize, mut detail: Vec<f32>, dry: &[u8], skin: &mut Skin) {
         let cell = |k: usize| self.texel_cell(k % raster.width, k / raster.width, split);
         detail.par_iter_mut().enumerate().for_each(|(k, d)| *d -= cell(k).mix(|v| self.fine.detail[v]));
         let around = blur(&detail, raster.width, (0.0008 / raster.step).ceil() as usize);
         let pit = |k: usize| (around[k] - detail[k]).max(0.0) / HALF_SKY_M;
         let open = |k: usize| (255.0 / (1.0 + pit(k)) + 0.5) as u8;
         let moisture = |k: usize| {
-            let drier = if crumbs[k] > 0 { CRUMB_DRYING } else { 0.0 };
-            let wet = cell(k).mix(|v| self.fine.moisture[v]) - drier + PIT_WETTING * pit(k).min(1.0);
+            let left = 1.0 - f32::from(dry[k]) / 255.0;
+            let wet = (cell(k).mix(|v| self.fine.moisture[v]) + PIT_WETTING * pit(k).min(1.0)) * left;
             (wet.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
         };
         (skin.ao, skin.moisture) = (0..detail.len()).into_par_iter().map(|k| (open(k), moisture(k))).unzip();

@@ -181,7 +181,7 @@ fn nothing_floats_and_nothing_is_wholly_buried() {
     let ground = ground(&page, 0.3);
     let mut pile = Pile::new(&ground);
     let mut all: Vec<Vec<Vec3>> = Vec::new();
-    for (tint, mesh) in clods(&ground, &mut pile, &[]) {
+    for Clods { tint, mesh, .. } in clods(&ground, &mut pile, &Canopy::none(&ground)) {
         assert_eq!(mesh.fault(), None);
         assert!(tint > 0.5 && tint < 2.0);
         // Scraps of a few corners are the rim of a body whose buried side was left out.
@@ -221,17 +221,60 @@ fn a_seedbed_stays_within_its_budget_and_keeps_stems_clear() {
     let maps = [Plain { albedo: [0.2, 0.15, 0.1], height: 0.5 }];
     let site = Site { area: Rect::new(0.0, 0.0, 0.3, 0.2), grid_m: 0.001, margin_m: 0.1, rows: None };
     let ground = Ground::new(&page, &maps, &site, &stream()).unwrap();
-    let stem = (vec2(0.15, 0.1), 0.01);
-    let groups = clods(&ground, &mut Pile::new(&ground), &[stem]);
-    let triangles: usize = groups.iter().map(|(_, m)| m.triangles.len()).sum();
+    let stem = vec2(0.15, 0.1);
+    let mut canopy = Canopy::none(&ground);
+    canopy.add(&sheet(stem - 0.004, stem + 0.004, ground.height(stem.x, stem.y)));
+    let groups = clods(&ground, &mut Pile::new(&ground), &canopy);
+    let triangles: usize = groups.iter().map(|g| g.mesh.triangles.len()).sum();
     let per_view = triangles as f32 / 0.06 * 0.325;
     assert!(per_view > 3e5 && per_view < 1.5e6, "{per_view}");
     assert!(groups.len() >= 5);
-    for (_, mesh) in &groups {
-        assert!(mesh.positions.iter().all(|p| p.truncate().distance(stem.0) > 0.003));
+    for Clods { mesh, .. } in &groups {
+        assert!(mesh.positions.iter().all(|p| p.truncate().distance(stem) > 0.003));
         assert!(mesh.uvs.iter().all(|t| t.cmpge(Vec2::ZERO).all() && t.cmple(Vec2::ONE).all()));
     }
-    assert_eq!(groups, clods(&ground, &mut Pile::new(&ground), &[stem]));
+    assert_eq!(groups, clods(&ground, &mut Pile::new(&ground), &canopy));
+}
+
+/// A level rectangle at a height.
+fn sheet(low: Vec2, high: Vec2, z: f32) -> Mesh {
+    let positions = vec![low.extend(z), vec2(high.x, low.y).extend(z), high.extend(z), vec2(low.x, high.y).extend(z)];
+    Mesh { positions, triangles: vec![[0, 1, 2], [0, 2, 3]], ..Mesh::default() }
+}
+
+#[test]
+fn clods_are_damp_and_dry_as_the_page_says_and_pierce_no_leaf() {
+    let mut page = page();
+    page.clods.over_5mm_per_m2 = Vary::fixed(4000.0);
+    page.clods.min_mm = Num::new(5.0);
+    page.clods.damp = Vary::fixed(0.25);
+    page.clods.dryness = Vary::fixed(0.75);
+    page.clods.loose = Vary::fixed(1.0);
+    page.moisture.mean = Vary::fixed(0.8);
+    let ground = ground(&page, 0.2);
+    let [dry, damp] = ground.clods_moisture();
+    assert!((dry - 0.2).abs() < 1e-6 && (damp - 0.8).abs() < 1e-6);
+    let fabric = ground.fabric(&MAPS, 0.001, dry);
+    assert!(fabric.moisture.iter().all(|m| (f32::from(*m) / 255.0 - dry).abs() < 0.01));
+    let leaf = 0.004 + ground.height(0.0, 0.0);
+    let mut canopy = Canopy::none(&ground);
+    canopy.add(&sheet(Vec2::splat(-0.03), Vec2::splat(0.03), leaf));
+    let (mut wet, mut all, mut under, mut far) = (0, 0, 0, 0f32);
+    for group in clods(&ground, &mut Pile::new(&ground), &canopy) {
+        for body in bodies(&group.mesh).into_iter().filter(|b| b.len() > 6) {
+            all += 1;
+            wet += i32::from(group.damp);
+            let middle = body.iter().sum::<Vec3>().truncate() / body.len() as f32;
+            let top = body.iter().map(|p| p.z).fold(f32::MIN, f32::max);
+            if middle.abs().max_element() < 0.03 {
+                under += 1;
+                assert!(top < leaf, "{top} {leaf}");
+            }
+            far = far.max(top - ground.height(middle.x, middle.y));
+        }
+    }
+    assert!((f64::from(wet) / f64::from(all) - 0.25).abs() < 0.05, "{wet} of {all}");
+    assert!(under > 2 && far > 0.012, "{under} {far}");
 }
 
 #[test]

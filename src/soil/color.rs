@@ -1,0 +1,108 @@
+//! The colour of a whole field: a mix of measured soils, into which the layers' pictures are moved.
+
+use super::LayerMaps;
+use crate::math::{Spectrum, vec2};
+use crate::optics::soil;
+use crate::sampling::Stream;
+use serde::{Deserialize, Serialize};
+
+/// A dry soil whose reflectance is known; see [`crate::optics::soil`] for their sources.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum SoilColor {
+    /// Common loam.
+    Loam,
+    /// Loess silt loam, the soil of many beet fields.
+    Loess,
+    /// Bright sand.
+    Sandy,
+    /// Dark humic clay.
+    Humic,
+    /// Reddish clay loam.
+    Reddish,
+    /// Pale, chalky soil.
+    Chalky,
+}
+
+impl SoilColor {
+    /// Reflectance of the dry soil: R, G, B, NIR.
+    pub fn reflectance(self) -> Spectrum {
+        match self {
+            Self::Loam => soil::LOAM,
+            Self::Loess => soil::LOESS,
+            Self::Sandy => soil::SANDY,
+            Self::Humic => soil::HUMIC,
+            Self::Reddish => soil::REDDISH,
+            Self::Chalky => soil::CHALKY,
+        }
+    }
+}
+
+/// What is done to the layers' pictures.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Shift {
+    /// Factor on R, G, B.
+    pub(super) gain: [f32; 3],
+    /// Mean reflectance, which tells how the NIR follows from red.
+    pub(super) like: Spectrum,
+}
+
+impl Shift {
+    /// Leaves the pictures as they are painted.
+    pub(super) const NONE: Self = Self { gain: [1.0; 3], like: soil::LOESS };
+
+    /// Moves the mean of the first layer's picture to a random mix of `colors`, evenly drawn among all mixes; the other layers go
+    /// with it. Without colours nothing moves.
+    pub(super) fn draw<L: LayerMaps>(colors: &[SoilColor], first: &L, stream: &mut Stream) -> Self {
+        if colors.is_empty() {
+            return Self::NONE;
+        }
+        // Weights −ln u over their sum are uniform over the simplex.
+        let weights: Vec<f32> = colors.iter().map(|_| -stream.uniform32().max(1e-6).ln()).collect();
+        let sum: f32 = weights.iter().sum();
+        let mut like = Spectrum::ZERO;
+        for (color, weight) in colors.iter().zip(&weights) {
+            like += color.reflectance() * (weight / sum);
+        }
+        let mean = mean(first);
+        let wanted = like.to_array();
+        Self { gain: std::array::from_fn(|k| wanted[k] / mean[k].max(1e-3)), like }
+    }
+}
+
+/// Mean colour of a tile, from 64 × 64 places.
+fn mean<L: LayerMaps>(maps: &L) -> [f32; 3] {
+    const SIDE: u16 = 64;
+    let mut sum = [0.0; 3];
+    for k in 0..SIDE * SIDE {
+        let uv = vec2(f32::from(k % SIDE) + 0.5, f32::from(k / SIDE) + 0.5) / f32::from(SIDE);
+        for (s, a) in sum.iter_mut().zip(maps.albedo(uv)) {
+            *s += a / f32::from(SIDE * SIDE);
+        }
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::Purpose;
+    use crate::soil::Plain;
+
+    #[test]
+    fn mixes_stay_between_the_soils_and_one_alone_is_itself() {
+        let plain = Plain { albedo: [0.2, 0.1, 0.05], height: 0.5 };
+        let draw = |colors: &[SoilColor], k| Shift::draw(colors, &plain, &mut Stream::of(3, k, Purpose::Test, 0));
+        let alone = draw(&[SoilColor::Sandy], 0);
+        let got: Vec<f32> = alone.gain.iter().zip(plain.albedo).map(|(g, a)| g * a).collect();
+        let sandy = soil::SANDY.to_array();
+        assert!((0..3).all(|k| (got[k] - sandy[k]).abs() < 1e-4), "{got:?}");
+        let (mut least, mut most) = (f32::MAX, 0f32);
+        for k in 0..200 {
+            let red = draw(&[SoilColor::Humic, SoilColor::Sandy], k).like.0.x;
+            (least, most) = (least.min(red), most.max(red));
+        }
+        assert!(least > soil::HUMIC.0.x && most < soil::SANDY.0.x, "{least} {most}");
+        assert!(most - least > 0.9 * (soil::SANDY.0.x - soil::HUMIC.0.x), "{least} {most}");
+        assert_eq!(draw(&[], 0), Shift::NONE);
+    }
+}
