@@ -37,6 +37,20 @@ pub struct CameraRecord {
     pub world_to_camera: [[f64; 3]; 3],
     /// The thin lens; none for a pinhole.
     pub aperture: Option<ApertureRecord>,
+    /// How it drives; none at rest. The position is that in the middle of the readout.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub motion: Option<MotionRecord>,
+}
+
+/// A driving camera as it was drawn: row y of h is in the middle of its exposure at (y/h − ½) · readout.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MotionRecord {
+    /// Velocity in the world.
+    pub velocity_m_s: [f64; 3],
+    /// How long a row gathers light.
+    pub exposure_s: f32,
+    /// From the first row's exposure to the last one's; 0 for a global shutter.
+    pub readout_s: f32,
 }
 
 /// A thin lens as it was drawn.
@@ -54,6 +68,8 @@ impl Camera {
         let [fx_px, fy_px, cx_px, cy_px] = self.intrinsics();
         let lens = self.distortion();
         let pose = self.pose();
+        let motion = self.motion();
+        let moves = self.blurs() || self.rolls();
         CameraRecord {
             width_px: self.width(),
             height_px: self.height(),
@@ -69,6 +85,11 @@ impl Camera {
             position_m: pose.position.to_array().map(f64::from),
             world_to_camera: pose.axes.to_cols_array_2d().map(|axis| axis.map(f64::from)),
             aperture: self.aperture().map(|a| ApertureRecord { radius_m: a.radius, focus_m: a.focus }),
+            motion: moves.then(|| MotionRecord {
+                velocity_m_s: motion.velocity.to_array().map(f64::from),
+                exposure_s: motion.exposure,
+                readout_s: motion.readout,
+            }),
         }
     }
 }
