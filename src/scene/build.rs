@@ -286,6 +286,7 @@ impl<'a> Builder<'a> {
         known::number_kinds(&mut plants, &species);
         let conditions = Conditions {
             camera: self.scene.camera.record(),
+            sensor: self.desc.sensor.build(&mut self.stream(Purpose::Sensor, 0)).record(),
             lights: std::mem::take(&mut self.lights),
             soil: known,
             crops: self.crop_records()?,

@@ -37,7 +37,7 @@ impl Camera {
         let height = f64::from(self.height);
         let mut rows = [-height, 2.0 * height];
         let mut bounds = [[f64::NEG_INFINITY; 2], [f64::INFINITY; 2]];
-        for _ in 0..3 {
+        for _ in 0..5 {
             let seen = rows.map(|row| corners.map(|p| self.seen_at(p, self.time(row))));
             let moved = |i: usize| {
                 let [a, b] = [seen[0][i], seen[1][i]].map(|[x, y, z]| [x / z, y / z]);

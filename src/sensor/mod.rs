@@ -1,5 +1,12 @@
 //! The camera: which ray belongs to a pixel, which pixel to a point; and the sensor that turns radiance into bytes.
 //!
+//! | file | idea |
+//! |---|---|
+//! | `desc`, `lens`, `pose`, `motion` | a camera: what it is, how it bends rays, where it stands, how it drives |
+//! | `settings`, `preset` | a sensor as a page writes it, and sensors by their names |
+//! | `response` | the sensor: its steps in their order |
+//! | `psf`, `exposure`, `noise`, `adc`, `balance`, `bayer`, `matrix`, `tone`, `sharpen`, `jpeg` | its steps, each by itself |
+//!
 //! OpenCV's conventions throughout: camera x right, y down, z forward; pixel (0, 0) covers 0 to 1 and has its centre at 0.5;
 //! intrinsics in pixels. Intrinsics are f64, rays f32.
 
@@ -34,12 +41,12 @@ pub use desc::{ApertureDesc, CameraDesc, IntrinsicsDesc};
 pub use exposure::{Exposure, ExposureDesc, Percent};
 pub use jpeg::{Jpeg, JpegDesc, Quality};
 pub use lens::{Distortion, DistortionDesc};
-pub use matrix::MatrixDesc;
+pub use matrix::{MatrixDesc, Row};
 pub use motion::{Motion, MotionDesc};
 pub use noise::{Noise, NoiseDesc};
 pub use pose::{Pose, PoseDesc};
 pub use psf::{Psf, PsfDesc};
-pub use record::{ApertureRecord, CameraRecord, MotionRecord};
+pub use record::{ApertureRecord, CameraRecord, MotionRecord, SensorRecord};
 pub use response::{Deep, Linear, Photograph, Sensor};
 pub use settings::SensorDesc;
 pub use sharpen::{Sharpen, SharpenDesc};
@@ -204,8 +211,13 @@ impl Camera {
         if at[0] * at[0] + at[1] * at[1] > self.horizon {
             return None;
         }
+        Some(self.image(at))
+    }
+
+    /// The pixel at which the lens puts the point (x/z, y/z).
+    fn image(&self, at: [f64; 2]) -> [f64; 2] {
         let [x, y] = self.distortion.distort(at);
-        Some([x * self.focal[0] + self.centre[0], y * self.focal[1] + self.centre[1]])
+        [x * self.focal[0] + self.centre[0], y * self.focal[1] + self.centre[1]]
     }
 
     /// Continuous pixel coordinates of a world point, inside the image or not; `None` behind the lens and, for a distorted

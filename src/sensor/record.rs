@@ -1,6 +1,6 @@
-//! A camera as it was drawn, for those who measure in its images.
+//! A camera and its sensor as they were drawn, for those who measure in their images.
 
-use super::Camera;
+use super::{Camera, Sensor};
 use serde::Serialize;
 
 /// A camera in OpenCV's terms: x right, y down, z forward. A world point X (metres; x east, y north, z up) lies at
@@ -60,6 +60,40 @@ pub struct ApertureRecord {
     pub radius_m: f32,
     /// Distance along the optical axis of the plane in focus.
     pub focus_m: f32,
+}
+
+/// What was drawn of a sensor's steps behind the noise and before it; each is there where it was taken.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct SensorRecord {
+    /// Standard deviations of the blur, colour and NIR.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub psf_px: Option<[f32; 2]>,
+    /// How far outside their places red and blue lie in the corners.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shift_px: Option<[f32; 2]>,
+    /// The colour matrix, row by row.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub matrix: Option<[[f32; 3]; 3]>,
+    /// Amount of the sharpening, and its radius in pixels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sharpen: Option<[f32; 2]>,
+    /// Quality of the compression.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub jpeg_quality: Option<u32>,
+}
+
+impl Sensor {
+    /// What was drawn of its steps; `None` where none of them is taken.
+    pub fn record(&self) -> Option<SensorRecord> {
+        let record = SensorRecord {
+            psf_px: (self.psf.color > 0.0 || self.psf.nir > 0.0).then_some([self.psf.color, self.psf.nir]),
+            shift_px: (self.psf.shift != [0.0; 2]).then_some(self.psf.shift),
+            matrix: self.matrix,
+            sharpen: (self.sharpen.amount > 0.0).then_some([self.sharpen.amount, self.sharpen.radius]),
+            jpeg_quality: self.jpeg.map(|jpeg| jpeg.quality),
+        };
+        (record != SensorRecord::default()).then_some(record)
+    }
 }
 
 impl Camera {
