@@ -41,6 +41,7 @@ macro_rules! layered {
 
         #[derive(Clone, Debug, Default, serde::Deserialize)]
         #[serde(deny_unknown_fields, default, rename = $word)]
+        #[allow(clippy::struct_field_names, reason = "a page's fields carry their units")]
         pub(super) struct $written {
             $($field: $given,)*
         }

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 /// A colour matrix, as it is written.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[expect(clippy::large_enum_variant, reason = "a page has one")]
 pub enum MatrixDesc {
     /// None: the channels as they are.
     #[default]
