@@ -33,9 +33,12 @@ fn drawing() -> Drawing {
     Drawing { engine: "trace".into(), spp: 2, denoise: false, max_depth: None }
 }
 
+/// A field in which there is something to take away for every edit.
+const DRIVING: &str = "tests/ref/driving.ron";
+
 fn grow(edit: &Edit) -> Field {
     let options = Options { width: Some(72), ..Options::default() };
-    let source = edit.open(Path::new(SMALL)).unwrap();
+    let source = edit.open(Path::new(DRIVING)).unwrap();
     render::pool(2).unwrap().install(|| edit.field(&source, &options)).unwrap()
 }
 

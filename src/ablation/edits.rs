@@ -98,6 +98,24 @@ pub static EDITS: &[Edit] = &[
         change: Change::Lens(picture::sharp),
     },
     Edit {
+        name: "no-motion-blur",
+        about: "a shutter that opens for no time: a driving robot's pictures are as sharp as its labels",
+        keeps_labels: true,
+        change: Change::Lens(picture::frozen),
+    },
+    Edit {
+        name: "no-psf",
+        about: "optics that blur nothing on the sensor; a pixel's filter stays",
+        keeps_labels: true,
+        change: Change::Sensor(picture::no_spread),
+    },
+    Edit {
+        name: "no-mosaic-and-matrix",
+        about: "every pixel sees all colours, and shows them as the filters have them",
+        keeps_labels: true,
+        change: Change::Sensor(picture::all_colors),
+    },
+    Edit {
         name: "no-sensor-noise",
         about: "a sensor that counts every photon once and reads without error",
         keeps_labels: true,

@@ -11,8 +11,6 @@
 //! | `growth`, `light`, `picture`, `labels` | what edits do to plants and soil, light, camera and photographs, labels |
 //!
 //! What a record tells of plants, light and soil is what was drawn for the field, before an edit of light or materials.
-//!
-//! Not in the table is what there is nothing of to take away: the sensor has neither mosaic nor colour matrix yet.
 
 mod drawing;
 mod edits;

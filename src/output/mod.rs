@@ -12,7 +12,7 @@ mod png;
 use crate::film::Film;
 use crate::render::LabelMap;
 use crate::scene::tag::Class;
-use crate::sensor::Photograph;
+use crate::sensor::{Deep, Photograph};
 use crate::{Error, Result};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -189,7 +189,7 @@ pub fn link_atomically(there: &Path, path: &Path, bytes: &[u8]) -> Result<()> {
 }
 
 /// Writes every file of one image into `folder` and returns their paths: `rgb.png`, `nir.png`, `radiance.exr`,
-/// `semantics.png`, `plants.png`, `leaves.png`, `overlay.png`.
+/// `semantics.png`, `plants.png`, `leaves.png`, `overlay.png`; `rgb16.png` and `nir16.png` of a sensor with more than 8 bits.
 pub fn write_image(
     folder: &Path,
     film: &Film,
@@ -214,7 +214,15 @@ pub fn write_image(
         ("leaves.png", png::encode(w, h, &Picture::Gray16(&leaves), &text)?),
         ("overlay.png", png::encode(w, h, &Picture::Rgb(&overlay), &text)?),
     ];
-    write_all(folder, files)
+    let mut paths = write_all(folder, files)?;
+    if let Some(Deep { rgb, nir }) = &photograph.deep {
+        let files = [
+            ("rgb16.png", png::encode(w, h, &Picture::Rgb16(rgb.as_chunks::<3>().0), &text)?),
+            ("nir16.png", png::encode(w, h, &Picture::Gray16(nir), &text)?),
+        ];
+        paths.extend(write_all(folder, files)?);
+    }
+    Ok(paths)
 }
 
 /// Writes what a denoiser made of an image beside it, and returns the paths: `rgb_denoised.png`, `nir_denoised.png`,

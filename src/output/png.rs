@@ -12,6 +12,8 @@ pub enum Picture<'a> {
     Linear(&'a [[u8; 3]]),
     /// 8-bit sRGB with opacity.
     Rgba(&'a [[u8; 4]]),
+    /// 16-bit sRGB.
+    Rgb16(&'a [[u16; 3]]),
     /// 8-bit gray.
     Gray(&'a [u8]),
     /// 16-bit gray: numbers, not brightness.
@@ -42,6 +44,12 @@ pub fn encode(width: u32, height: u32, picture: &Picture<'_>, text: &str) -> Res
             encoder.set_color(ColorType::Rgba);
             encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
             pixels.as_flattened().to_vec()
+        }
+        Picture::Rgb16(pixels) => {
+            encoder.set_color(ColorType::Rgb);
+            encoder.set_depth(BitDepth::Sixteen);
+            encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+            pixels.as_flattened().iter().flat_map(|p| p.to_be_bytes()).collect()
         }
         Picture::Gray(pixels) => {
             encoder.set_color(ColorType::Grayscale);

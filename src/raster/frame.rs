@@ -321,7 +321,8 @@ fn read_labels(gpu: &Gpu, scene: &Scene, parts: &Texture, positions: &Texture, n
         let [x, y, z, _] = bytemuck::cast::<_, [f32; 4]>(*place);
         map.parts[i] = part;
         map.tags[i] = scene.parts[part as usize].tag;
-        map.depth[i] = (Vec3::new(x, y, z) - pose.position).dot(pose.axes.z_axis);
+        let (eye, _) = scene.camera.centre_ray(i as u32 % window.width(), i as u32 / window.width());
+        map.depth[i] = (Vec3::new(x, y, z) - eye).dot(pose.axes.z_axis);
         map.normals[i] = halves(*normal).truncate().normalize_or_zero();
     }
     Ok(map)

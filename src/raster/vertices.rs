@@ -57,7 +57,7 @@ impl Vertices {
         for (i, placed) in places.iter().enumerate() {
             self.corners.push(corner(placed, mesh.positions[i], mesh.normals[i], mesh.uvs[i], part));
         }
-        let bends = !camera.distortion().is_none();
+        let bends = camera.bends_lines();
         for triangle in &mesh.triangles {
             if bends && longest(&triangle.map(|i| &places[i as usize]), camera).is_some() {
                 let of = triangle.map(|i| {

@@ -130,6 +130,7 @@ fn sample(world: &World<'_>, settings: &Settings, (x, y): (u32, u32), index: u32
         let [u, v, ..] = sampler.get4(sets::LENS);
         [u, v]
     });
-    let (origin, direction) = camera.ray(at, lens);
+    let shutter = if camera.blurs() { sampler.get4(sets::SHUTTER)[0] } else { 0.5 };
+    let (origin, direction) = camera.ray_during(at, lens, shutter);
     Sample { ray: Ray::new(origin, direction), sampler }
 }

@@ -32,6 +32,12 @@ pub enum Purpose {
     Training = 10,
     /// Which images a resample of the bootstrap holds.
     Resample = 11,
+    /// The sensor's steps behind the noise.
+    Chain = 20,
+    /// How the camera drives.
+    Motion = 21,
+    /// What is a camera's own: the fixed pattern of its sensor.
+    Body = 22,
 }
 
 /// A stream of random numbers with an address.

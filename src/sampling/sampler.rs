@@ -15,6 +15,9 @@ pub mod sets {
     /// Place on the lens.
     pub const LENS: u32 = (1 << 24) - 1;
 
+    /// When in the exposure.
+    pub const SHUTTER: u32 = (1 << 24) - 2;
+
     /// Which lobe, which direction, and, at the first surface, how many: at surface number `depth` of a path's `branch`.
     pub const fn scatter(branch: u32, depth: u32) -> u32 {
         branch * BRANCH + 1 + 2 * depth

@@ -235,7 +235,8 @@ impl<'a> Builder<'a> {
         let below = camera.pose().position.truncate();
         let reach = Vec2::splat(MOST_VIEW);
         let (lo, hi) = (lo.max(below - reach), hi.min(below + reach));
-        Ok(Rect::new(lo.x, lo.y, hi.x, hi.y))
+        // Rows' corners are seen in the middle of their exposures.
+        Ok(Rect::new(lo.x, lo.y, hi.x, hi.y).grown(camera.travel()))
     }
 
     /// Side of a pixel on the ground in the image's middle, metres; 1 mm where the camera does not look down.
@@ -294,6 +295,7 @@ impl<'a> Builder<'a> {
         known::number_kinds(&mut plants, &species);
         let conditions = Conditions {
             camera: self.scene.camera.record(),
+            sensor: self.desc.sensor.build(&mut self.stream(Purpose::Sensor, 0)).record(),
             lights: std::mem::take(&mut self.lights),
             soil: known,
             crops: self.crop_records()?,

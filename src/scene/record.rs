@@ -4,7 +4,7 @@ use super::build::Season;
 use super::tag::{Class, lowercase};
 use crate::light::LightRecord;
 use crate::scatter::{RowsRecord, WeedsRecord};
-use crate::sensor::CameraRecord;
+use crate::sensor::{CameraRecord, SensorRecord};
 use crate::soil::SoilRecord;
 use serde::{Deserialize, Serialize};
 
@@ -25,6 +25,9 @@ pub struct SpeciesRecord {
 pub struct Conditions {
     /// Who looks, at the size of the image.
     pub camera: CameraRecord,
+    /// What its sensor does beyond counting light; none where that is all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensor: Option<SensorRecord>,
     /// What shines, in the order of the page.
     pub lights: Vec<LightRecord>,
     /// The ground; none where the page has none.

@@ -14,19 +14,57 @@ impl Camera {
         let at = self.unproject(px);
         let inside = x >= 0 && y >= 0 && x < self.width as i32 && y < self.height as i32;
         if !inside && !self.distortion.is_none() {
-            let back = self.project_camera([at[0], at[1], 1.0])?;
+            let back = self.project_still([at[0], at[1], 1.0])?;
             let same = (back[0] - px[0]).abs() < 1e-6 && (back[1] - px[1]).abs() < 1e-6;
             if !same || self.distortion.stretch(at) <= 0.0 {
                 return None;
             }
         }
-        Some(self.through(at))
+        Some(self.through(at, px[1]))
     }
 
     /// A box that holds every pixel coordinate, in the image or beyond it, at which something of the triangle appears, and
     /// little more; `None` for a triangle behind the lens. Unbounded for one that reaches behind it.
     pub fn triangle_bounds(&self, corners: [Vec3; 3]) -> Option<PixelBox> {
         let seen = corners.map(|p| self.pose.point_to_camera(p));
+        if self.rolls() { self.rolling_bounds(seen) } else { self.still_bounds(seen, 0.0) }
+    }
+
+    /// The same of corners in the camera's frame, where rows see from different places. What a row may see lies between what the first
+    /// and the last row do that may see the triangle; which these are is known better each time. Within the image and as far beyond it as
+    /// it is high.
+    fn rolling_bounds(&self, corners: [[f64; 3]; 3]) -> Option<PixelBox> {
+        let height = f64::from(self.height);
+        let mut rows = [-height, 2.0 * height];
+        let mut bounds = [[f64::NEG_INFINITY; 2], [f64::INFINITY; 2]];
+        for _ in 0..5 {
+            let seen = rows.map(|row| corners.map(|p| self.seen_at(p, self.time(row))));
+            let moved = |i: usize| {
+                let [a, b] = [seen[0][i], seen[1][i]].map(|[x, y, z]| [x / z, y / z]);
+                (a[0] - b[0]).hypot(a[1] - b[1])
+            };
+            let way = (0..3).map(moved).fold(0.0, f64::max);
+            let [first, last] = seen.map(|seen| self.still_bounds(seen, way));
+            let (first, last) = match (first, last) {
+                (None, None) => return None,
+                (Some(first), Some(last)) => (first, last),
+                _ => return Some(bounds),
+            };
+            for axis in 0..2 {
+                bounds[0][axis] = first[0][axis].min(last[0][axis]);
+                bounds[1][axis] = first[1][axis].max(last[1][axis]);
+            }
+            rows = [rows[0].max(bounds[0][1]), rows[1].min(bounds[1][1])];
+            if rows[0] > rows[1] || bounds[0][0] == f64::NEG_INFINITY {
+                break;
+            }
+        }
+        Some(bounds)
+    }
+
+    /// The bounds of corners in the camera's frame of a camera at rest, and of all that lies between them and such a triangle `way` from it
+    /// on the plane at unit distance.
+    fn still_bounds(&self, seen: [[f64; 3]; 3], way: f64) -> Option<PixelBox> {
         if seen.iter().all(|p| p[2] <= 0.0) {
             return None;
         }
@@ -34,7 +72,7 @@ impl Camera {
             return Some([[f64::NEG_INFINITY; 2], [f64::INFINITY; 2]]);
         }
         let plane = seen.map(|[x, y, z]| [x / z, y / z]);
-        let (image, margin) = if self.distortion.is_none() { (plane, 0.0) } else { self.distorted_bounds(plane) };
+        let (image, margin) = if self.distortion.is_none() { (plane, 0.0) } else { self.distorted_bounds(plane, way) };
         let mut bounds = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
         for axis in 0..2 {
             for at in image {
@@ -50,7 +88,7 @@ impl Camera {
     ///
     /// A straight line between points at distance d leaves its chord by at most d²/8 times the lens's curvature. Where the
     /// triangle reaches past the horizon, nothing is farther from a corner's nearest point within than the lens's slope times d.
-    fn distorted_bounds(&self, corners: [[f64; 2]; 3]) -> ([[f64; 2]; 3], f64) {
+    fn distorted_bounds(&self, corners: [[f64; 2]; 3], way: f64) -> ([[f64; 2]; 3], f64) {
         let radius = self.horizon.sqrt();
         let size = (0..3)
             .map(|i| (corners[i], corners[(i + 1) % 3]))
@@ -62,9 +100,9 @@ impl Camera {
             self.distortion.distort([x * inward, y * inward])
         });
         let margin = if beyond {
-            self.distortion.slope(radius) * size
+            self.distortion.slope(radius) * (size + way)
         } else {
-            self.distortion.curvature(radius) * size * size / 8.0
+            self.distortion.curvature(radius) * (size * size + way * way) / 8.0
         };
         (image, margin)
     }

@@ -1,7 +1,9 @@
 //! A camera as a page writes it.
 
-use super::{Aperture, Camera, Distortion, Pose};
-use crate::math::vec3;
+use super::lens::DistortionDesc;
+use super::motion::MotionDesc;
+use super::pose::{PoseDesc, nadir, origin, zero};
+use super::{Aperture, Camera};
 use crate::sampling::rng::Stream;
 use crate::sampling::vary::{Finite, Num, Positive, PositiveCount, Vary};
 use crate::{Error, Result};
@@ -28,6 +30,8 @@ use serde::{Deserialize, Serialize};
 ///         intrinsics: Pixels(fx: 500, fy: 500, cx: 320, cy: 240),
 ///         pose: LookAt(position_m: (0, -1.5, 1), target_m: (0, 0, 0)),
 ///     )",
+///     "Phone(height_m: 0.5, motion: (speed_m_s: 0.2, heading_deg: 90))",
+///     "MachineVision(focal_mm: 8, f_number: 4)",
 ///     "Pinhole(size: (640, 480), intrinsics: FieldOfView(horizontal_deg: 60), pose: Nadir(height_m: 2))",
 /// ] {
 ///     let desc: CameraDesc = ron::from_str(page)?;
@@ -44,7 +48,7 @@ pub enum CameraDesc {
         #[serde(default = "jai_focal")]
         focal_mm: Vary<Positive>,
         /// Height above the ground's mean level; default 0.85.
-        #[serde(default = "jai_height")]
+        #[serde(default = "robot_height")]
         height_m: Vary<Positive>,
         /// Position on the ground, metres east and north; default the origin.
         #[serde(default = "origin")]
@@ -64,6 +68,69 @@ pub enum CameraDesc {
         /// Aperture, focused on the ground; default a pinhole, sharp everywhere.
         #[serde(default, with = "bare", skip_serializing_if = "Option::is_none")]
         f_number: Option<Vary<Positive>>,
+        /// How it drives; default at rest.
+        #[serde(default, skip_serializing_if = "MotionDesc::is_default")]
+        motion: MotionDesc,
+    },
+    /// A phone's main camera, 4032 × 3024 pixels of 1.4 µm, looking down. Everything has a default.
+    Phone {
+        /// Focal length, millimetres; default 4.25, as 26 mm are on 35 mm film.
+        #[serde(default = "phone_focal")]
+        focal_mm: Vary<Positive>,
+        /// Height above the ground's mean level; default 0.6.
+        #[serde(default = "phone_height")]
+        height_m: Vary<Positive>,
+        /// Position on the ground, metres east and north; default the origin.
+        #[serde(default = "origin")]
+        at_m: (Vary<Finite>, Vary<Finite>),
+        /// Turns the image's top clockwise from north; default 0.
+        #[serde(default = "zero")]
+        yaw_deg: Vary<Finite>,
+        /// Tilts the view towards the image's top; default 0.
+        #[serde(default = "zero")]
+        pitch_deg: Vary<Finite>,
+        /// Tilts the view towards the image's right; default 0.
+        #[serde(default = "zero")]
+        roll_deg: Vary<Finite>,
+        /// Lens distortion; default none.
+        #[serde(default)]
+        distortion: DistortionDesc,
+        /// Aperture, focused on the ground; default a pinhole, sharp everywhere.
+        #[serde(default, with = "bare", skip_serializing_if = "Option::is_none")]
+        f_number: Option<Vary<Positive>>,
+        /// How it drives; default at rest, with a rolling shutter that reads for 20 ms.
+        #[serde(default, skip_serializing_if = "MotionDesc::is_default")]
+        motion: MotionDesc,
+    },
+    /// A camera of machine vision with Sony's IMX250, 2448 × 2048 pixels of 3.45 µm, looking down. Everything has a default.
+    MachineVision {
+        /// Focal length, millimetres; default 12, which sees 598 × 500 mm from 0.85 m.
+        #[serde(default = "vision_focal")]
+        focal_mm: Vary<Positive>,
+        /// Height above the ground's mean level; default 0.85.
+        #[serde(default = "robot_height")]
+        height_m: Vary<Positive>,
+        /// Position on the ground, metres east and north; default the origin.
+        #[serde(default = "origin")]
+        at_m: (Vary<Finite>, Vary<Finite>),
+        /// Turns the image's top clockwise from north; default 0.
+        #[serde(default = "zero")]
+        yaw_deg: Vary<Finite>,
+        /// Tilts the view towards the image's top; default 0.
+        #[serde(default = "zero")]
+        pitch_deg: Vary<Finite>,
+        /// Tilts the view towards the image's right; default 0.
+        #[serde(default = "zero")]
+        roll_deg: Vary<Finite>,
+        /// Lens distortion; default none.
+        #[serde(default)]
+        distortion: DistortionDesc,
+        /// Aperture, focused on the ground; default a pinhole, sharp everywhere.
+        #[serde(default, with = "bare", skip_serializing_if = "Option::is_none")]
+        f_number: Option<Vary<Positive>>,
+        /// How it drives; default at rest.
+        #[serde(default, skip_serializing_if = "MotionDesc::is_default")]
+        motion: MotionDesc,
     },
     /// Any camera.
     Pinhole {
@@ -79,6 +146,9 @@ pub enum CameraDesc {
         /// A thin lens; default a pinhole. Needs a focal length in millimetres.
         #[serde(default, with = "bare", skip_serializing_if = "Option::is_none")]
         aperture: Option<ApertureDesc>,
+        /// How it drives; default at rest.
+        #[serde(default, skip_serializing_if = "MotionDesc::is_default")]
+        motion: MotionDesc,
     },
 }
 
@@ -112,52 +182,6 @@ pub enum IntrinsicsDesc {
     },
 }
 
-/// A pose, as it is written.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub enum PoseDesc {
-    /// Looking down: at yaw 0 the image's top is north, its right east.
-    Nadir {
-        /// Height above the ground's mean level.
-        height_m: Vary<Positive>,
-        /// Position on the ground, metres east and north; default the origin.
-        #[serde(default = "origin")]
-        at_m: (Vary<Finite>, Vary<Finite>),
-        /// Turns the image's top clockwise from north; default 0.
-        #[serde(default = "zero")]
-        yaw_deg: Vary<Finite>,
-        /// Tilts the view towards the image's top; default 0.
-        #[serde(default = "zero")]
-        pitch_deg: Vary<Finite>,
-        /// Tilts the view towards the image's right; default 0.
-        #[serde(default = "zero")]
-        roll_deg: Vary<Finite>,
-    },
-    /// From a point to a point, upright.
-    LookAt {
-        /// The lens, metres.
-        position_m: (Vary<Finite>, Vary<Finite>, Vary<Finite>),
-        /// What is in the image's middle, metres.
-        target_m: (Vary<Finite>, Vary<Finite>, Vary<Finite>),
-    },
-}
-
-/// Lens distortion, as it is written: OpenCV's coefficients, each 0 by default.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct DistortionDesc {
-    /// Radial, r².
-    pub k1: Vary<Finite>,
-    /// Radial, r⁴.
-    pub k2: Vary<Finite>,
-    /// Tangential, along y.
-    pub p1: Vary<Finite>,
-    /// Tangential, along x.
-    pub p2: Vary<Finite>,
-    /// Radial, r⁶.
-    pub k3: Vary<Finite>,
-}
-
 /// A thin lens, as it is written.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -169,15 +193,17 @@ pub struct ApertureDesc {
 }
 
 /// An option written without `Some`: the field is there or it is not.
-mod bare {
+pub(super) mod bare {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-    pub(super) fn deserialize<'de, D: Deserializer<'de>, T: Deserialize<'de>>(d: D) -> Result<Option<T>, D::Error> {
+    pub(in crate::sensor) fn deserialize<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
+        d: D,
+    ) -> Result<Option<T>, D::Error> {
         T::deserialize(d).map(Some)
     }
 
     #[expect(clippy::ref_option, reason = "serde calls it with a reference to the field")]
-    pub(super) fn serialize<S: Serializer, T: Serialize>(of: &Option<T>, s: S) -> Result<S::Ok, S::Error> {
+    pub(in crate::sensor) fn serialize<S: Serializer, T: Serialize>(of: &Option<T>, s: S) -> Result<S::Ok, S::Error> {
         match of {
             Some(of) => of.serialize(s),
             None => s.serialize_unit(),
@@ -185,69 +211,34 @@ mod bare {
     }
 }
 
-fn zero() -> Vary<Finite> {
-    Vary::fixed(0.0)
-}
-
-fn origin() -> (Vary<Finite>, Vary<Finite>) {
-    (zero(), zero())
-}
-
 fn jai_focal() -> Vary<Positive> {
     Vary::fixed(15.0)
 }
 
-fn jai_height() -> Vary<Positive> {
+fn phone_focal() -> Vary<Positive> {
+    Vary::fixed(4.25)
+}
+
+fn vision_focal() -> Vary<Positive> {
+    Vary::fixed(12.0)
+}
+
+fn robot_height() -> Vary<Positive> {
     Vary::fixed(0.85)
 }
 
-impl Default for DistortionDesc {
-    fn default() -> Self {
-        Self { k1: zero(), k2: zero(), p1: zero(), p2: zero(), k3: zero() }
-    }
+fn phone_height() -> Vary<Positive> {
+    Vary::fixed(0.6)
 }
 
-impl DistortionDesc {
-    fn draw(&self, stream: &mut Stream) -> Distortion {
-        let mut draw = |of: &Vary<Finite>| of.draw(stream);
-        Distortion {
-            k1: draw(&self.k1),
-            k2: draw(&self.k2),
-            p1: draw(&self.p1),
-            p2: draw(&self.p2),
-            k3: draw(&self.k3),
-        }
-    }
-}
-
-impl PoseDesc {
-    fn draw(&self, stream: &mut Stream) -> Result<Pose> {
-        match self {
-            Self::Nadir { height_m, at_m, yaw_deg, pitch_deg, roll_deg } => {
-                Ok(nadir(height_m, at_m, [yaw_deg, pitch_deg, roll_deg], stream))
-            }
-            Self::LookAt { position_m, target_m } => {
-                let mut point = |of: &(Vary<Finite>, Vary<Finite>, Vary<Finite>)| {
-                    vec3(of.0.draw32(stream), of.1.draw32(stream), of.2.draw32(stream))
-                };
-                let (position, target) = (point(position_m), point(target_m));
-                Pose::look_at(position, target).ok_or_else(|| {
-                    Error::Scene("the camera looks at its own position\n help: give target_m another point".into())
-                })
-            }
-        }
-    }
-}
-
-fn nadir(
-    height_m: &Vary<Positive>,
-    at_m: &(Vary<Finite>, Vary<Finite>),
-    turns: [&Vary<Finite>; 3],
-    stream: &mut Stream,
-) -> Pose {
-    let position = vec3(at_m.0.draw32(stream), at_m.1.draw32(stream), height_m.draw32(stream));
-    let [yaw, pitch, roll] = turns.map(|turn| turn.draw32(stream));
-    Pose::nadir(position, yaw, pitch, roll)
+/// What a camera with a name is made of.
+struct Model {
+    /// Pixels across and down.
+    size: (u32, u32),
+    /// Side of a pixel.
+    pixel_um: f64,
+    /// From the first row's exposure to the last one's.
+    readout_ms: f64,
 }
 
 impl CameraDesc {
@@ -255,20 +246,33 @@ impl CameraDesc {
     /// millimetres, a target at the camera's own place.
     pub fn build(&self, stream: &mut Stream) -> Result<Camera> {
         match self {
-            Self::JaiAd130 { focal_mm, height_m, at_m, yaw_deg, pitch_deg, roll_deg, distortion, f_number } => {
+            Self::JaiAd130 { focal_mm, height_m, at_m, yaw_deg, pitch_deg, roll_deg, distortion, f_number, motion }
+            | Self::Phone { focal_mm, height_m, at_m, yaw_deg, pitch_deg, roll_deg, distortion, f_number, motion }
+            | Self::MachineVision {
+                focal_mm,
+                height_m,
+                at_m,
+                yaw_deg,
+                pitch_deg,
+                roll_deg,
+                distortion,
+                f_number,
+                motion,
+            } => {
+                let Model { size, pixel_um, readout_ms } = self.model();
                 let focal = focal_mm.draw(stream);
                 let pose = nadir(height_m, at_m, [yaw_deg, pitch_deg, roll_deg], stream);
                 let distortion = distortion.draw(stream);
                 let aperture = f_number
                     .as_ref()
                     .map(|f| Aperture { radius: (focal * 1e-3 / (2.0 * f.draw(stream))) as f32, focus: pose.height() });
-                let pixels = focal * 1e3 / 3.75;
-                let camera = Camera::new((1296, 966), [pixels; 2], [648.0, 483.0], distortion, pose)?;
-                Ok(camera.with_aperture(aperture))
+                let pixels = focal * 1e3 / pixel_um;
+                let camera = Camera::new(size, [pixels; 2], middle(size), distortion, pose)?;
+                Ok(camera.with_aperture(aperture).with_motion(motion.draw(readout_ms, stream)))
             }
-            Self::Pinhole { size, intrinsics, pose, distortion, aperture } => {
+            Self::Pinhole { size, intrinsics, pose, distortion, aperture, motion } => {
                 let size = (size.0.get() as u32, size.1.get() as u32);
-                let middle = [f64::from(size.0) / 2.0, f64::from(size.1) / 2.0];
+                let middle = middle(size);
                 let (focal, centre, focal_mm) = match intrinsics {
                     IntrinsicsDesc::Pixels { fx, fy, cx, cy } => {
                         ([fx.draw(stream), fy.draw(stream)], [cx.draw(stream), cy.draw(stream)], None)
@@ -304,8 +308,24 @@ impl CameraDesc {
                         ));
                     }
                 };
-                Ok(Camera::new(size, focal, centre, distortion, pose)?.with_aperture(aperture))
+                let camera = Camera::new(size, focal, centre, distortion, pose)?;
+                Ok(camera.with_aperture(aperture).with_motion(motion.draw(0.0, stream)))
             }
         }
     }
+    /// What a camera with a name is made of; a camera without one reads all rows at once.
+    fn model(&self) -> Model {
+        match self {
+            Self::Phone { .. } => Model { size: (4032, 3024), pixel_um: 1.4, readout_ms: 20.0 },
+            Self::MachineVision { .. } => Model { size: (2448, 2048), pixel_um: 3.45, readout_ms: 0.0 },
+            Self::JaiAd130 { .. } | Self::Pinhole { .. } => {
+                Model { size: (1296, 966), pixel_um: 3.75, readout_ms: 0.0 }
+            }
+        }
+    }
+}
+
+/// The middle of an image of so many pixels.
+fn middle((width, height): (u32, u32)) -> [f64; 2] {
+    [f64::from(width) / 2.0, f64::from(height) / 2.0]
 }

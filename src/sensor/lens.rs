@@ -5,6 +5,10 @@
 //! y′ = y (1 + k1 r² + k2 r⁴ + k3 r⁶) + p1 (r² + 2y²) + 2 p2 x y.
 //! Source: Brown 1971, "Close-range camera calibration"; OpenCV, module calib3d.
 
+use crate::sampling::rng::Stream;
+use crate::sampling::vary::{Finite, Vary};
+use serde::{Deserialize, Serialize};
+
 /// The five coefficients; all zero is a pinhole.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Distortion {
@@ -93,5 +97,47 @@ impl Distortion {
             }
         }
         at
+    }
+}
+
+/// Lens distortion, as it is written: OpenCV's coefficients, each 0 by default.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DistortionDesc {
+    /// Radial, r².
+    pub k1: Vary<Finite>,
+    /// Radial, r⁴.
+    pub k2: Vary<Finite>,
+    /// Tangential, along y.
+    pub p1: Vary<Finite>,
+    /// Tangential, along x.
+    pub p2: Vary<Finite>,
+    /// Radial, r⁶.
+    pub k3: Vary<Finite>,
+}
+
+impl Default for DistortionDesc {
+    fn default() -> Self {
+        Self {
+            k1: Vary::fixed(0.0),
+            k2: Vary::fixed(0.0),
+            p1: Vary::fixed(0.0),
+            p2: Vary::fixed(0.0),
+            k3: Vary::fixed(0.0),
+        }
+    }
+}
+
+impl DistortionDesc {
+    /// Draws the distortion.
+    pub fn draw(&self, stream: &mut Stream) -> Distortion {
+        let mut draw = |of: &Vary<Finite>| of.draw(stream);
+        Distortion {
+            k1: draw(&self.k1),
+            k2: draw(&self.k2),
+            p1: draw(&self.p1),
+            p2: draw(&self.p2),
+            k3: draw(&self.k3),
+        }
     }
 }

@@ -1,26 +1,55 @@
 //! The camera: which ray belongs to a pixel, which pixel to a point; and the sensor that turns radiance into bytes.
 //!
+//! | file | idea |
+//! |---|---|
+//! | `desc`, `lens`, `pose`, `motion` | a camera: what it is, how it bends rays, where it stands, how it drives |
+//! | `settings`, `preset` | a sensor as a page writes it, and sensors by their names |
+//! | `response` | the sensor: its steps in their order |
+//! | `psf`, `exposure`, `noise`, `adc`, `balance`, `bayer`, `matrix`, `tone`, `sharpen`, `jpeg` | its steps, each by itself |
+//!
 //! OpenCV's conventions throughout: camera x right, y down, z forward; pixel (0, 0) covers 0 to 1 and has its centre at 0.5;
 //! intrinsics in pixels. Intrinsics are f64, rays f32.
 
+mod adc;
+mod balance;
+mod bayer;
 mod bounds;
 mod desc;
 mod exposure;
+mod given;
+mod jpeg;
 mod lens;
+mod matrix;
+mod motion;
+mod noise;
 mod pose;
+mod preset;
+mod psf;
 mod record;
 mod response;
+mod settings;
+mod sharpen;
 #[cfg(test)]
 mod tests;
 mod tone;
 
+pub use adc::{Adc, AdcDesc, Black, Depth};
+pub use balance::{WhiteBalance, WhiteBalanceDesc};
+pub use bayer::{Demosaic, MosaicDesc, Pattern};
 pub use bounds::PixelBox;
-pub use desc::{ApertureDesc, CameraDesc, DistortionDesc, IntrinsicsDesc, PoseDesc};
+pub use desc::{ApertureDesc, CameraDesc, IntrinsicsDesc};
 pub use exposure::{Exposure, ExposureDesc, Percent};
-pub use lens::Distortion;
-pub use pose::Pose;
-pub use record::{ApertureRecord, CameraRecord};
-pub use response::{Linear, Noise, NoiseDesc, Photograph, Sensor, SensorDesc, WhiteBalance, WhiteBalanceDesc};
+pub use jpeg::{Jpeg, JpegDesc, Quality};
+pub use lens::{Distortion, DistortionDesc};
+pub use matrix::{MatrixDesc, Row};
+pub use motion::{Motion, MotionDesc};
+pub use noise::{Noise, NoiseDesc};
+pub use pose::{Pose, PoseDesc};
+pub use psf::{Psf, PsfDesc};
+pub use record::{ApertureRecord, CameraRecord, MotionRecord, SensorRecord};
+pub use response::{Deep, Linear, Photograph, Sensor};
+pub use settings::SensorDesc;
+pub use sharpen::{Sharpen, SharpenDesc};
 pub use tone::Tone;
 
 use crate::math::{Vec2, Vec3, vec2, vec3};
@@ -50,6 +79,7 @@ pub struct Camera {
     horizon: f64,
     aperture: Option<Aperture>,
     pose: Pose,
+    motion: Motion,
 }
 
 impl Camera {
@@ -68,8 +98,8 @@ impl Camera {
                 "a camera of {width} × {height} pixels and focal lengths {focal:?} sees nothing\n help: all of them must be above 0"
             )));
         }
-        let mut camera =
-            Self { width, height, focal, centre, distortion, horizon: f64::INFINITY, aperture: None, pose };
+        let (horizon, aperture, motion) = (f64::INFINITY, None, Motion::default());
+        let mut camera = Self { width, height, focal, centre, distortion, horizon, aperture, pose, motion };
         if !distortion.is_none() {
             camera.horizon = camera.check_distortion()?;
         }
@@ -116,7 +146,7 @@ impl Camera {
         self.distortion
     }
 
-    /// Position and orientation.
+    /// Position and orientation; while it drives, those in the middle of the image's readout.
     pub fn pose(&self) -> &Pose {
         &self.pose
     }
@@ -127,29 +157,37 @@ impl Camera {
     }
 
     /// Origin and unit direction, world, of the ray through continuous pixel coordinates `px` (0.5, 0.5 is the first pixel's
-    /// centre) and the lens point that two numbers in [0, 1) choose; a pinhole does not look at them.
+    /// centre) and the lens point that two numbers in [0, 1) choose; a pinhole does not look at them. In the middle of the exposure.
     #[inline]
     pub fn ray(&self, px: Vec2, lens_u: [f32; 2]) -> (Vec3, Vec3) {
+        self.ray_during(px, lens_u, 0.5)
+    }
+
+    /// The same at a moment of the exposure, from 0 to 1; a camera at rest does not look at it.
+    #[inline]
+    pub fn ray_during(&self, px: Vec2, lens_u: [f32; 2], shutter_u: f32) -> (Vec3, Vec3) {
         let [x, y] = self.unproject([f64::from(px.x), f64::from(px.y)]);
+        let position = self.position(f64::from(px.y), (shutter_u - 0.5) * self.motion.exposure);
         let through = vec3(x as f32, y as f32, 1.0);
         let Some(Aperture { radius, focus }) = self.aperture else {
-            return (self.pose.position, self.pose.to_world(through).normalize());
+            return (position, self.pose.to_world(through).normalize());
         };
         let pupil = warp::disc(lens_u) * radius;
         let start = vec3(pupil.x, pupil.y, 0.0);
-        (self.pose.position + self.pose.to_world(start), self.pose.to_world(through * focus - start).normalize())
+        (position + self.pose.to_world(start), self.pose.to_world(through * focus - start).normalize())
     }
 
     /// The one ray through the centre of pixel (x, y) and the lens's centre: what labels are cast with.
     #[inline]
     pub fn centre_ray(&self, x: u32, y: u32) -> (Vec3, Vec3) {
-        self.through(self.unproject([f64::from(x) + 0.5, f64::from(y) + 0.5]))
+        let px = [f64::from(x) + 0.5, f64::from(y) + 0.5];
+        self.through(self.unproject(px), px[1])
     }
 
-    /// The ray through the lens's centre and a point of the plane at unit distance.
+    /// The ray through the lens's centre and a point of the plane at unit distance, for row coordinate `row`.
     #[inline]
-    fn through(&self, [x, y]: [f64; 2]) -> (Vec3, Vec3) {
-        (self.pose.position, self.pose.to_world(vec3(x as f32, y as f32, 1.0)).normalize())
+    fn through(&self, [x, y]: [f64; 2], row: f64) -> (Vec3, Vec3) {
+        (self.position(row, 0.0), self.pose.to_world(vec3(x as f32, y as f32, 1.0)).normalize())
     }
 
     /// The point at unit distance along the optical axis, camera frame (x/z, y/z), that a pixel sees.
@@ -160,7 +198,12 @@ impl Camera {
 
     /// The pixel that sees the point (x, y, z) of the camera frame; `None` behind the lens and, for a distorted image, far
     /// outside it.
-    pub fn project_camera(&self, [x, y, z]: [f64; 3]) -> Option<[f64; 2]> {
+    pub fn project_camera(&self, p: [f64; 3]) -> Option<[f64; 2]> {
+        if self.rolls() { self.project_rolling(p) } else { self.project_still(p) }
+    }
+
+    /// The same of a camera at rest.
+    fn project_still(&self, [x, y, z]: [f64; 3]) -> Option<[f64; 2]> {
         if z <= 0.0 {
             return None;
         }
@@ -168,8 +211,13 @@ impl Camera {
         if at[0] * at[0] + at[1] * at[1] > self.horizon {
             return None;
         }
+        Some(self.image(at))
+    }
+
+    /// The pixel at which the lens puts the point (x/z, y/z).
+    fn image(&self, at: [f64; 2]) -> [f64; 2] {
         let [x, y] = self.distortion.distort(at);
-        Some([x * self.focal[0] + self.centre[0], y * self.focal[1] + self.centre[1]])
+        [x * self.focal[0] + self.centre[0], y * self.focal[1] + self.centre[1]]
     }
 
     /// Continuous pixel coordinates of a world point, inside the image or not; `None` behind the lens and, for a distorted
@@ -197,11 +245,12 @@ impl Camera {
         for (seen, corner) in seen.iter_mut().zip([vec2(0.0, 0.0), vec2(w, 0.0), vec2(w, h), vec2(0.0, h)]) {
             let [x, y] = self.unproject([f64::from(corner.x), f64::from(corner.y)]);
             let dir = self.pose.to_world(vec3(x as f32, y as f32, 1.0));
-            let t = (ground - self.pose.position.z) / dir.z;
+            let position = self.position(f64::from(corner.y), 0.0);
+            let t = (ground - position.z) / dir.z;
             if !(t.is_finite() && t > 0.0) {
                 return None;
             }
-            let at = self.pose.position + dir * t;
+            let at = position + dir * t;
             *seen = vec2(at.x, at.y);
         }
         Some(seen)
@@ -222,7 +271,7 @@ impl Camera {
             let t = f64::from(k) / f64::from(STEPS);
             for px in [[t * w, 0.0], [t * w, h], [0.0, t * h], [w, t * h]] {
                 let at = self.unproject(px);
-                let back = self.project_camera([at[0], at[1], 1.0]).unwrap_or([f64::NAN; 2]);
+                let back = self.project_still([at[0], at[1], 1.0]).unwrap_or([f64::NAN; 2]);
                 let error = (back[0] - px[0]).abs().max((back[1] - px[1]).abs());
                 let folds = (0..=STEPS).any(|j| {
                     let s = f64::from(j) / f64::from(STEPS);

@@ -6,6 +6,10 @@
 //! roll towards the image's right; yaw is applied to the camera already pitched, pitch to the camera already rolled.
 
 use crate::math::{Mat3, Vec3, vec3};
+use crate::sampling::rng::Stream;
+use crate::sampling::vary::{Finite, Positive, Vary};
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
 
 /// A position and an orientation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,4 +64,74 @@ impl Default for Pose {
     fn default() -> Self {
         Self::nadir(vec3(0.0, 0.0, 1.0), 0.0, 0.0, 0.0)
     }
+}
+
+/// A pose, as it is written.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum PoseDesc {
+    /// Looking down: at yaw 0 the image's top is north, its right east.
+    Nadir {
+        /// Height above the ground's mean level.
+        height_m: Vary<Positive>,
+        /// Position on the ground, metres east and north; default the origin.
+        #[serde(default = "origin")]
+        at_m: (Vary<Finite>, Vary<Finite>),
+        /// Turns the image's top clockwise from north; default 0.
+        #[serde(default = "zero")]
+        yaw_deg: Vary<Finite>,
+        /// Tilts the view towards the image's top; default 0.
+        #[serde(default = "zero")]
+        pitch_deg: Vary<Finite>,
+        /// Tilts the view towards the image's right; default 0.
+        #[serde(default = "zero")]
+        roll_deg: Vary<Finite>,
+    },
+    /// From a point to a point, upright.
+    LookAt {
+        /// The lens, metres.
+        position_m: (Vary<Finite>, Vary<Finite>, Vary<Finite>),
+        /// What is in the image's middle, metres.
+        target_m: (Vary<Finite>, Vary<Finite>, Vary<Finite>),
+    },
+}
+
+pub(super) fn zero() -> Vary<Finite> {
+    Vary::fixed(0.0)
+}
+
+pub(super) fn origin() -> (Vary<Finite>, Vary<Finite>) {
+    (zero(), zero())
+}
+
+impl PoseDesc {
+    /// Draws the pose.
+    pub fn draw(&self, stream: &mut Stream) -> Result<Pose> {
+        match self {
+            Self::Nadir { height_m, at_m, yaw_deg, pitch_deg, roll_deg } => {
+                Ok(nadir(height_m, at_m, [yaw_deg, pitch_deg, roll_deg], stream))
+            }
+            Self::LookAt { position_m, target_m } => {
+                let mut point = |of: &(Vary<Finite>, Vary<Finite>, Vary<Finite>)| {
+                    vec3(of.0.draw32(stream), of.1.draw32(stream), of.2.draw32(stream))
+                };
+                let (position, target) = (point(position_m), point(target_m));
+                Pose::look_at(position, target).ok_or_else(|| {
+                    Error::Scene("the camera looks at its own position\n help: give target_m another point".into())
+                })
+            }
+        }
+    }
+}
+
+/// Draws a pose that looks down.
+pub(super) fn nadir(
+    height_m: &Vary<Positive>,
+    at_m: &(Vary<Finite>, Vary<Finite>),
+    turns: [&Vary<Finite>; 3],
+    stream: &mut Stream,
+) -> Pose {
+    let position = vec3(at_m.0.draw32(stream), at_m.1.draw32(stream), height_m.draw32(stream));
+    let [yaw, pitch, roll] = turns.map(|turn| turn.draw32(stream));
+    Pose::nadir(position, yaw, pitch, roll)
 }

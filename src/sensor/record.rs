@@ -1,6 +1,6 @@
-//! A camera as it was drawn, for those who measure in its images.
+//! A camera and its sensor as they were drawn, for those who measure in their images.
 
-use super::Camera;
+use super::{Camera, Sensor};
 use serde::Serialize;
 
 /// A camera in OpenCV's terms: x right, y down, z forward. A world point X (metres; x east, y north, z up) lies at
@@ -37,6 +37,20 @@ pub struct CameraRecord {
     pub world_to_camera: [[f64; 3]; 3],
     /// The thin lens; none for a pinhole.
     pub aperture: Option<ApertureRecord>,
+    /// How it drives; none at rest. The position is that in the middle of the readout.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub motion: Option<MotionRecord>,
+}
+
+/// A driving camera as it was drawn: row y of h is in the middle of its exposure at (y/h − ½) · readout.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MotionRecord {
+    /// Velocity in the world.
+    pub velocity_m_s: [f64; 3],
+    /// How long a row gathers light.
+    pub exposure_s: f32,
+    /// From the first row's exposure to the last one's; 0 for a global shutter.
+    pub readout_s: f32,
 }
 
 /// A thin lens as it was drawn.
@@ -48,12 +62,48 @@ pub struct ApertureRecord {
     pub focus_m: f32,
 }
 
+/// What was drawn of a sensor's steps behind the noise and before it; each is there where it was taken.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct SensorRecord {
+    /// Standard deviations of the blur, colour and NIR.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub psf_px: Option<[f32; 2]>,
+    /// How far outside their places red and blue lie in the corners.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shift_px: Option<[f32; 2]>,
+    /// The colour matrix, row by row.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub matrix: Option<[[f32; 3]; 3]>,
+    /// Amount of the sharpening, and its radius in pixels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sharpen: Option<[f32; 2]>,
+    /// Quality of the compression.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub jpeg_quality: Option<u32>,
+}
+
+impl Sensor {
+    /// What was drawn of its steps; `None` where none of them is taken.
+    pub fn record(&self) -> Option<SensorRecord> {
+        let record = SensorRecord {
+            psf_px: (self.psf.color > 0.0 || self.psf.nir > 0.0).then_some([self.psf.color, self.psf.nir]),
+            shift_px: (self.psf.shift != [0.0; 2]).then_some(self.psf.shift),
+            matrix: self.matrix,
+            sharpen: (self.sharpen.amount > 0.0).then_some([self.sharpen.amount, self.sharpen.radius]),
+            jpeg_quality: self.jpeg.map(|jpeg| jpeg.quality),
+        };
+        (record != SensorRecord::default()).then_some(record)
+    }
+}
+
 impl Camera {
     /// Everything that is known of it.
     pub fn record(&self) -> CameraRecord {
         let [fx_px, fy_px, cx_px, cy_px] = self.intrinsics();
         let lens = self.distortion();
         let pose = self.pose();
+        let motion = self.motion();
+        let moves = self.blurs() || self.rolls();
         CameraRecord {
             width_px: self.width(),
             height_px: self.height(),
@@ -69,6 +119,11 @@ impl Camera {
             position_m: pose.position.to_array().map(f64::from),
             world_to_camera: pose.axes.to_cols_array_2d().map(|axis| axis.map(f64::from)),
             aperture: self.aperture().map(|a| ApertureRecord { radius_m: a.radius, focus_m: a.focus }),
+            motion: moves.then(|| MotionRecord {
+                velocity_m_s: motion.velocity.to_array().map(f64::from),
+                exposure_s: motion.exposure,
+                readout_s: motion.readout,
+            }),
         }
     }
 }

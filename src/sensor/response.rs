@@ -1,168 +1,34 @@
 //! The sensor: linear film to an 8-bit colour image and an 8-bit NIR image.
 //!
-//! In the order in which a camera does it: radiance → vignetting → exposure → electrons with shot and read noise → full well →
-//! white balance → tone curve → 8 bits. The two images have exposures of their own, as the two sensors of the JAI AD-130 have.
+//! In the order in which a camera does it: radiance → blur of the optics → vignetting → exposure → electrons with shot and read noise,
+//! dark current and fixed pattern, full well → whole numbers above black → white balance → interpolation of the mosaic → colour matrix →
+//! tone curve → sharpening → 8 bits → what JPEG loses. The two images have exposures of their own, as the two sensors of the JAI AD-130
+//! have. A step that is off is not taken: it changes no bit.
 //!
 //! A linear value of 1 is white: 90 % of the full well, as that camera sets its output. The channels' responses to a radiance are
 //! 0.94, 1, 0.77, 0.93 in R, G, B, NIR, from its quantum efficiencies; so red and blue, amplified by the white balance, carry
-//! more noise than green. Further steps of a camera (mosaic and its interpolation, blur of the optics, motion) belong between
-//! the vignetting and the noise, in `Sensor::expose`.
+//! more noise than green.
+//!
+//! Noise and mosaic belong to the image's pixels, so a window has those of the whole image; blur, interpolation and sharpening look around,
+//! so a few pixels along a window's edge differ from the whole image's, and JPEG's blocks begin at its corner.
 
 use super::Camera;
-use super::exposure::{Exposure, ExposureDesc};
+use super::adc::Adc;
+use super::balance::WhiteBalance;
+use super::bayer::{Mosaic, MosaicDesc};
+use super::exposure::Exposure;
+use super::jpeg::Jpeg;
+use super::matrix;
+use super::noise::Noise;
+use super::psf::Psf;
+use super::sharpen::Sharpen;
 use super::tone::{CLIP, Tone};
 use crate::math::Spectrum;
-use crate::sampling::rng::{Purpose, Stream};
-use crate::sampling::vary::{Fraction, NonNegative, Num, Positive, Vary};
-use serde::{Deserialize, Serialize};
-use std::f32::consts::{FRAC_1_PI, TAU};
+use crate::sampling::rng::Stream;
+use std::f32::consts::FRAC_1_PI;
 
 /// Electrons per radiance, relative to G.
-const RESPONSE: Spectrum = Spectrum::new(0.94, 1.0, 0.77, 0.93);
-
-/// ASTM G173 global irradiance: what "daylight" balances for.
-const DAYLIGHT: Spectrum = Spectrum::new(1.437, 1.511, 1.464, 0.943);
-
-/// The white balance, as it is written.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub enum WhiteBalanceDesc {
-    /// A white card lying flat under the scene's light comes out neutral.
-    #[default]
-    Reflector,
-    /// A white card under the standard sun comes out neutral; evening light stays warm.
-    Daylight,
-    /// These gains on the channels.
-    Fixed {
-        /// Gain of R.
-        red: Vary<Positive>,
-        /// Gain of G.
-        green: Vary<Positive>,
-        /// Gain of B.
-        blue: Vary<Positive>,
-    },
-    /// None: the channels as the sensor gives them, greenish.
-    Raw,
-}
-
-/// Noise, as it is written. The defaults are those of the JAI AD-130: 52 dB in colour, 54 dB in NIR.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct NoiseDesc {
-    /// Whether there is any; default true.
-    pub on: bool,
-    /// Electrons that fill a pixel; default 7000.
-    pub full_well: Num<Positive>,
-    /// Standard deviation of reading a colour pixel, electrons; default 18.
-    pub read: Num<NonNegative>,
-    /// The same of a NIR pixel; default 14.
-    pub read_nir: Num<NonNegative>,
-}
-
-impl Default for NoiseDesc {
-    fn default() -> Self {
-        Self { on: true, full_well: Num::new(7000.0), read: Num::new(18.0), read_nir: Num::new(14.0) }
-    }
-}
-
-/// A sensor, as it is written. Every field has a default that makes a natural photograph.
-///
-/// ```
-/// use furrow::sampling::{Purpose, Stream};
-/// use furrow::sensor::SensorDesc;
-/// let desc: SensorDesc = ron::from_str(
-///     "(
-///         exposure: Auto(level: Uniform(0.15, 0.21)),
-///         nir_exposure: White(level: 0.8),
-///         white_balance: Fixed(red: 1.1, green: 1, blue: 1.4),
-///         natural_vignetting: true,
-///         corner_shading: 0.1,
-///         noise: (on: false),
-///         tone: Srgb,
-///     )",
-/// )?;
-/// let sensor = desc.build(&mut Stream::of(1, 0, Purpose::Sensor, 0));
-/// assert_eq!(ron::from_str::<SensorDesc>("()")?, SensorDesc::default());
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct SensorDesc {
-    /// Exposure of the colour image; default `Auto(level: 0.18)`.
-    pub exposure: ExposureDesc,
-    /// Exposure of the NIR image; default `Auto(level: 0.25)`.
-    pub nir_exposure: ExposureDesc,
-    /// White balance of the colour image; default `Reflector`.
-    pub white_balance: WhiteBalanceDesc,
-    /// Whether the image darkens by cos⁴ of the angle to the optical axis; default true.
-    pub natural_vignetting: bool,
-    /// Share of the light lost in the corners beyond that, growing with the square of the distance; default 0.05.
-    pub corner_shading: Vary<Fraction>,
-    /// Shot and read noise.
-    pub noise: NoiseDesc,
-    /// Tone curve of both images; default `Film`.
-    pub tone: Tone,
-}
-
-impl Default for SensorDesc {
-    fn default() -> Self {
-        Self {
-            exposure: ExposureDesc::Auto { level: Vary::fixed(0.18) },
-            nir_exposure: ExposureDesc::Auto { level: Vary::fixed(0.25) },
-            white_balance: WhiteBalanceDesc::default(),
-            natural_vignetting: true,
-            corner_shading: Vary::fixed(0.05),
-            noise: NoiseDesc::default(),
-            tone: Tone::default(),
-        }
-    }
-}
-
-impl SensorDesc {
-    /// Draws the sensor.
-    pub fn build(&self, stream: &mut Stream) -> Sensor {
-        Sensor {
-            exposure: self.exposure.draw(stream),
-            nir_exposure: self.nir_exposure.draw(stream),
-            white_balance: match &self.white_balance {
-                WhiteBalanceDesc::Reflector => WhiteBalance::Reflector,
-                WhiteBalanceDesc::Daylight => WhiteBalance::Gains(neutral_gains(DAYLIGHT)),
-                WhiteBalanceDesc::Fixed { red, green, blue } => {
-                    WhiteBalance::Gains([red.draw32(stream), green.draw32(stream), blue.draw32(stream)])
-                }
-                WhiteBalanceDesc::Raw => WhiteBalance::Gains([1.0; 3]),
-            },
-            natural_vignetting: self.natural_vignetting,
-            corner_shading: self.corner_shading.draw32(stream),
-            noise: self.noise.on.then(|| Noise {
-                full_well: self.noise.full_well.f32(),
-                read: self.noise.read.f32(),
-                read_nir: self.noise.read_nir.f32(),
-            }),
-            tone: self.tone,
-        }
-    }
-}
-
-/// A white balance; see [`WhiteBalanceDesc`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum WhiteBalance {
-    /// Neutral under the scene's light.
-    Reflector,
-    /// These gains on R, G, B.
-    Gains([f32; 3]),
-}
-
-/// Noise of a sensor, electrons.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Noise {
-    /// Electrons that fill a pixel.
-    pub full_well: f32,
-    /// Standard deviation of reading a colour pixel.
-    pub read: f32,
-    /// The same of a NIR pixel.
-    pub read_nir: f32,
-}
+pub(super) const RESPONSE: Spectrum = Spectrum::new(0.94, 1.0, 0.77, 0.93);
 
 /// A sensor with its settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -177,10 +43,24 @@ pub struct Sensor {
     pub natural_vignetting: bool,
     /// Share of the light lost in the corners beyond that.
     pub corner_shading: f32,
+    /// Blur of the optics.
+    pub psf: Psf,
     /// `None` for a sensor without noise.
     pub noise: Option<Noise>,
+    /// Which colours a pixel sees.
+    pub mosaic: MosaicDesc,
+    /// `None` for one that tells all levels.
+    pub adc: Option<Adc>,
+    /// Colours of the filters to colours of a screen, row by row.
+    pub matrix: Option<[[f32; 3]; 3]>,
     /// Tone curve.
     pub tone: Tone,
+    /// Sharpening of the colour image.
+    pub sharpen: Sharpen,
+    /// Bits of the finest picture.
+    pub bits: u32,
+    /// Compression of the 8-bit colour image.
+    pub jpeg: Option<Jpeg>,
 }
 
 /// Mean radiance of the pixels of a window of a camera's image, row by row.
@@ -207,12 +87,23 @@ pub struct Photograph {
     pub rgb: Vec<u8>,
     /// NIR of each pixel, row by row.
     pub nir: Vec<u8>,
+    /// The same before compression in more than 8 bits, where the page asks for them.
+    pub deep: Option<Deep>,
     /// Level per G radiance that the colour image was exposed with.
     pub gain: f32,
     /// Level per NIR radiance that the NIR image was exposed with.
     pub nir_gain: f32,
     /// Gains on R, G, B.
     pub white_balance: [f32; 3],
+}
+
+/// A photograph in more than 8 bits: steps of the depth, spread over 16 bits.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Deep {
+    /// R, G, B of each pixel, row by row.
+    pub rgb: Vec<u16>,
+    /// NIR of each pixel, row by row.
+    pub nir: Vec<u16>,
 }
 
 impl Sensor {
@@ -222,23 +113,17 @@ impl Sensor {
         let width = film.width.max(1);
         let height = (film.pixels.len() / width as usize) as u32;
         let place = |i: usize| (film.left + i as u32 % width, film.top + i as u32 / width);
-        let balance = match self.white_balance {
-            WhiteBalance::Reflector => neutral_gains(illuminant),
-            WhiteBalance::Gains(gains) => gains,
-        };
+        let balance = self.white_balance.gains(illuminant);
         let [r, g, b] = balance;
         let balanced = Spectrum::new(r, g, b, 1.0);
 
         // Electrons per exposure, before any clipping.
-        let signals: Vec<Spectrum> = film
-            .pixels
-            .iter()
-            .enumerate()
-            .map(|(i, &radiance)| {
-                let radiance = if radiance.is_finite() { radiance.clamp(0.0, f32::MAX) } else { Spectrum::ZERO };
-                radiance * RESPONSE * self.vignetting(camera, place(i))
-            })
-            .collect();
+        let known = |r: &Spectrum| if r.is_finite() { r.clamp(0.0, f32::MAX) } else { Spectrum::ZERO };
+        let mut signals: Vec<Spectrum> = film.pixels.iter().map(known).collect();
+        self.psf.spread(&mut signals, width, (film.left, film.top), (camera.width(), camera.height()));
+        for (i, signal) in signals.iter_mut().enumerate() {
+            *signal = *signal * RESPONSE * self.vignetting(camera, place(i));
+        }
 
         let white = illuminant * RESPONSE * FRAC_1_PI;
         let mut metered: Vec<f32> = signals.iter().map(|&s| (s * balanced).luminance()).collect();
@@ -249,22 +134,36 @@ impl Sensor {
         let nir_gain = self.nir_exposure.gain(&mut metered, white.to_array()[3]);
 
         let gains = Spectrum::new(gain, gain, gain, nir_gain);
-        let mut photograph = Photograph {
-            width,
-            height,
-            rgb: Vec::with_capacity(signals.len() * 3),
-            nir: Vec::with_capacity(signals.len()),
-            gain,
-            nir_gain: nir_gain * RESPONSE.to_array()[3],
-            white_balance: balance,
-        };
-        for (i, &signal) in signals.iter().enumerate() {
-            let level = self.read_out(signal * gains, place(i), stream) * balanced;
-            let [r, g, b, nir] = level.to_array().map(|level| self.tone.byte(level));
-            photograph.rgb.extend([r, g, b]);
-            photograph.nir.push(nir);
+        let mut values = signals;
+        for (i, value) in values.iter_mut().enumerate() {
+            *value = self.read_out(*value * gains, camera, place(i), stream) * balanced;
         }
-        photograph
+        self.interpolate(&mut values, width, (film.left, film.top));
+        if let Some(rows) = &self.matrix {
+            for value in &mut values {
+                let [r, g, b, nir] = value.to_array();
+                let [r, g, b] = matrix::apply(rows, [r, g, b]);
+                *value = Spectrum::new(r, g, b, nir);
+            }
+        }
+        for value in &mut values {
+            *value = value.map(|level| self.tone.apply(level));
+        }
+        self.sharpen.apply(&mut values, width);
+
+        let (mut rgb, mut nir) = (Vec::with_capacity(values.len() * 3), Vec::with_capacity(values.len()));
+        for value in &values {
+            // What is below 0 or above 255 ends there.
+            let [r, g, b, n] = value.to_array().map(|v| (v * 255.0 + 0.5) as u8);
+            rgb.extend([r, g, b]);
+            nir.push(n);
+        }
+        if let Some(jpeg) = self.jpeg {
+            jpeg.pass(&mut rgb, width);
+        }
+        let deep = (self.bits > 8).then(|| Deep::of(&values, self.bits));
+        let nir_gain = nir_gain * RESPONSE.to_array()[3];
+        Photograph { width, height, rgb, nir, deep, gain, nir_gain, white_balance: balance }
     }
 
     /// Share of the light that reaches a pixel.
@@ -277,40 +176,45 @@ impl Sensor {
         natural * (1.0 - self.corner_shading * share as f32)
     }
 
-    /// Electrons counted, with noise, up to the full well; as levels.
-    fn read_out(&self, level: Spectrum, (x, y): (u32, u32), stream: &Stream) -> Spectrum {
-        let Some(Noise { full_well, read, read_nir }) = self.noise else {
-            return level.clamp(0.0, CLIP);
+    /// Levels as they are read: counted with noise, up to the full well, as whole numbers. Below black there is nothing, unless a black
+    /// level leaves room for it.
+    fn read_out(&self, level: Spectrum, camera: &Camera, place: (u32, u32), stream: &Stream) -> Spectrum {
+        let least = if self.adc.is_some() { f32::NEG_INFINITY } else { 0.0 };
+        let level = match &self.noise {
+            Some(noise) => noise.count(level, place, camera.exposure(), least, stream),
+            None => level.clamp(0.0, CLIP),
         };
-        let mut stream = stream.child(Purpose::Sensor, u64::from(y) << 32 | u64::from(x));
-        let white = full_well / CLIP;
-        let noise = normals(&mut stream);
-        let mut levels = level.to_array();
-        for ((level, read), noise) in levels.iter_mut().zip([read, read, read, read_nir]).zip(noise) {
-            let electrons = (*level * white).min(full_well);
-            // A Poisson count of many electrons is a normal one.
-            *level = (electrons + (electrons + read * read).sqrt() * noise).clamp(0.0, full_well) / white;
+        match self.adc {
+            Some(adc) => level.map(|level| adc.convert(level)),
+            None => level,
         }
-        Spectrum::from(levels)
+    }
+
+    /// Leaves of each pixel the colour that it sees, and guesses the others.
+    fn interpolate(&self, levels: &mut [Spectrum], width: u32, corner: (u32, u32)) {
+        let MosaicDesc::Bayer { pattern, demosaic } = self.mosaic else { return };
+        let seen = |(i, level): (usize, &Spectrum)| {
+            level.to_array()[pattern.color(corner.0 + i as u32 % width, corner.1 + i as u32 / width)]
+        };
+        let values: Vec<f32> = levels.iter().enumerate().map(seen).collect();
+        let colors = Mosaic { values: &values, width, corner, pattern }.interpolate(demosaic);
+        for (level, [r, g, b]) in levels.iter_mut().zip(colors) {
+            *level = Spectrum::new(r, g, b, level.to_array()[3]);
+        }
     }
 }
 
-/// Four standard normal numbers, two from each pair. Source: Box & Muller 1958.
-fn normals(stream: &mut Stream) -> [f32; 4] {
-    let mut pair = || {
-        let radius = (-2.0 * (1.0 - stream.uniform32()).ln()).sqrt();
-        let (sin, cos) = (TAU * stream.uniform32()).sin_cos();
-        [radius * sin, radius * cos]
-    };
-    let ([a, b], [c, d]) = (pair(), pair());
-    [a, b, c, d]
-}
-
-/// Gains on R, G, B under which a white card under this irradiance is neutral, G unchanged; 1 for a channel without light.
-fn neutral_gains(irradiance: Spectrum) -> [f32; 3] {
-    let [r, g, b, _] = (irradiance * RESPONSE).to_array();
-    [r, g, b].map(|channel| {
-        let gain = g / channel;
-        if gain.is_finite() && gain > 0.0 { gain } else { 1.0 }
-    })
+impl Deep {
+    /// Stored values in so many bits.
+    fn of(values: &[Spectrum], bits: u32) -> Self {
+        let top = ((1_u32 << bits.min(16)) - 1) as f32;
+        let step = |v: f32| ((v * top + 0.5).floor().clamp(0.0, top) * (65535.0 / top) + 0.5) as u16;
+        let steps = values.iter().map(|value| value.to_array().map(step));
+        let (mut rgb, mut nir) = (Vec::with_capacity(values.len() * 3), Vec::with_capacity(values.len()));
+        for [r, g, b, n] in steps {
+            rgb.extend([r, g, b]);
+            nir.push(n);
+        }
+        Self { rgb, nir }
+    }
 }

@@ -18,6 +18,7 @@ fn cameras() -> Vec<Camera> {
          pose: LookAt(position_m: (0.5, -2, 1.5), target_m: (0, 0, 0.1)), distortion: (k1: -0.2, k2: 0.05))",
         "Pinhole(size: (320, 240), intrinsics: FieldOfView(horizontal_deg: 90), pose: Nadir(height_m: 2), \
          distortion: (k1: 0.05, p1: 0.002))",
+        "Phone(height_m: 0.4, yaw_deg: 70)",
     ]
     .map(|page| build(page).unwrap())
     .to_vec()
@@ -249,4 +250,73 @@ fn corners_are_darker_by_the_fourth_power_of_the_cosine() {
     assert!((ratio - expected).abs() < 0.01 && expected < 0.95, "{ratio} {expected}");
     let shaded = expose(&sensor(&page.replace("corner_shading: 0", "corner_shading: 0.2")), &flat, Spectrum::ONE);
     assert!(f32::from(shaded.nir[0]) < 0.85 * f32::from(shot.nir[0]));
+}
+
+/// Rationale: steps act one after another, and what each is tested for must hold of what comes out. Expected: under any light and for
+/// every named sensor a white card is neutral and as bright as its exposure says, equal bytes come twice, and noise stays with its
+/// pixel in a window, but for the few pixels at the window's edge that look around.
+#[test]
+fn a_white_card_is_neutral_through_every_chain() {
+    let exposed =
+        "exposure: White(level: 0.5), nir_exposure: White(level: 0.5), natural_vignetting: false, corner_shading: 0";
+    for name in ["JaiAd130", "Phone", "MachineVision"] {
+        let sensor = sensor(&format!("{name}({exposed}, tone: Srgb, jpeg: Off)"));
+        let card = vec![EVENING * (1.0 / std::f32::consts::PI); 48 * 32];
+        let shot = expose(&sensor, &card, EVENING);
+        assert_eq!(shot, expose(&sensor, &card, EVENING));
+        for band in 0..3 {
+            let mean = shot.rgb.iter().skip(band).step_by(3).map(|v| f64::from(*v)).sum::<f64>() / 1536.0;
+            // Linear 0.5 is 188 in sRGB; the mean of noisy values lies a little below it.
+            assert!((mean - 187.7).abs() < 1.0, "{name}: {mean}");
+        }
+        let window = Linear { pixels: &card[..400], width: 20, left: 5, top: 7 };
+        let part = sensor.expose(window, &small(), EVENING, &Stream::of(3, 0, Purpose::Sensor, 0));
+        let (inner, whole) = ((10 * 20 + 10) * 3, ((7 + 10) * 48 + 5 + 10) * 3);
+        assert_eq!(part.rgb[inner..inner + 3], shot.rgb[whole..whole + 3], "{name}");
+        assert_eq!(shot.deep.is_some(), name == "MachineVision");
+    }
+}
+
+/// Expected: of the colour image only what the mosaic sees is known, NIR is as it was without one; noise of neighbours then has in common
+/// what interpolation gives it (`bayer`): 0.4 in green, two thirds in red.
+#[test]
+fn a_mosaic_spreads_noise_in_colour_and_leaves_nir() {
+    let page = "(tone: Linear, natural_vignetting: false, corner_shading: 0, white_balance: Raw, exposure: Fixed(gain: 0.5), \
+                nir_exposure: Fixed(gain: 0.5), noise: (full_well: 300, read: 8), mosaic: MOSAIC)";
+    let flat = vec![Spectrum::ONE; 48 * 32];
+    let with = expose(&sensor(&page.replace("MOSAIC", "Bayer()")), &flat, Spectrum::ONE);
+    let without = expose(&sensor(&page.replace("MOSAIC", "Off")), &flat, Spectrum::ONE);
+    assert_eq!(with.nir, without.nir);
+    for (band, expected) in [(0, 2.0 / 3.0), (1, 0.4)] {
+        let of = |shot: &Photograph| {
+            let values: Vec<f64> = shot.rgb.iter().skip(band).step_by(3).map(|v| f64::from(*v)).collect();
+            let mean = values.iter().sum::<f64>() / 1536.0;
+            let pairs = values.chunks(48).flat_map(|row| row.windows(2).map(|p| (p[0] - mean, p[1] - mean)));
+            let (both, one) = pairs.fold((0.0, 0.0), |(b, o), (x, y)| (b + x * y, o + 0.5 * (x * x + y * y)));
+            both / one
+        };
+        assert!(
+            (of(&with) - expected).abs() < 0.1 && of(&without).abs() < 0.1,
+            "{band}: {} {}",
+            of(&with),
+            of(&without)
+        );
+    }
+}
+
+/// Expected: twelve bits tell more than eight, in steps of 65535/4095.
+#[test]
+fn a_deep_photograph_has_its_steps() {
+    let ramp: Vec<Spectrum> = (0..48 * 32).map(|i| Spectrum::splat(i as f32 / 1536.0)).collect();
+    let page = "(tone: Linear, noise: (on: false), exposure: Fixed(gain: 1), nir_exposure: Fixed(gain: 1), \
+                natural_vignetting: false, corner_shading: 0, bits: 12)";
+    let shot = expose(&sensor(page), &ramp, Spectrum::ONE);
+    let nir = shot.deep.unwrap().nir;
+    assert!(nir.is_sorted() && nir.iter().collect::<std::collections::BTreeSet<_>>().len() > 1200);
+    assert!(nir.iter().all(|v| {
+        (f64::from(*v) * 4095.0 / 65535.0).fract().min(1.0 - (f64::from(*v) * 4095.0 / 65535.0).fract()) < 0.04
+    }));
+    assert!(
+        nir.iter().zip(&shot.nir).all(|(fine, coarse)| (f32::from(*fine) / 257.0 - f32::from(*coarse)).abs() < 0.6)
+    );
 }

@@ -6,6 +6,11 @@ use furrow::film::Film;
 use furrow::render::LabelMap;
 use furrow::scene::Scene;
 
+/// What the files of a field say that cannot be drawn of it.
+pub(crate) fn left_out(scene: &Scene) -> Option<&'static str> {
+    scene.camera.blurs().then_some("motion blur: left out, rows are drawn in the middle of their exposures")
+}
+
 /// A card that draws, and what it leaves out.
 #[cfg(feature = "raster")]
 pub(crate) struct Card {

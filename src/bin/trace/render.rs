@@ -3,7 +3,7 @@
 use crate::engine::Engine;
 use crate::field::FieldArgs;
 use crate::quality::QualityArgs;
-use crate::raster::Card;
+use crate::raster::{Card, left_out};
 use crate::technique::TechniqueArgs;
 use clap::ValueEnum;
 use furrow::ablation::{Drawing, Edit, FULL};
@@ -248,6 +248,10 @@ fn rasterize(
     let start = Instant::now();
     let (film, labels) = card.draw(&field.scene)?;
     let drawn = start.elapsed();
+    let left_out = left_out(&field.scene);
+    if let Some(words) = left_out.filter(|_| !args.quiet) {
+        eprintln!("warning: {words}");
+    }
     let (film, labels) = (film.cut(window), labels.cut(window));
     let labels = edit.labels(labels, &film, &field.scene.tags());
     let provenance = Provenance {
@@ -256,7 +260,7 @@ fn rasterize(
         index: field.index,
         spp: Spp::Uniform(1),
         integrator: Engine::Raster.name().into(),
-        deviations: deviations(&args.technique, edit),
+        deviations: deviations(&args.technique, edit).into_iter().chain(left_out.map(String::from)).collect(),
         kernels: card.name().into(),
     };
     let paths = output::write_image(out, &film, &labels, &edit.photograph(field, &film), &provenance)?;

@@ -253,6 +253,9 @@ fn camera_warnings(scene: &Scene) -> Vec<String> {
     if !camera.distortion().is_none() {
         warnings.push("the lens distortion is left out: Mitsuba's cameras have none".into());
     }
+    if camera.blurs() || camera.rolls() {
+        warnings.push("the camera stands still: its motion is left out".into());
+    }
     if (fx / fy - 1.0).abs() > 1e-6 {
         warnings.push(format!("pixels {:.4} times as high as wide are written as square", fx / fy));
     }

@@ -1,6 +1,6 @@
 //! Who draws what a recipe asks for.
 
-use crate::raster::Card;
+use crate::raster::{Card, left_out};
 use crate::render::deviations;
 use crate::technique::TechniqueArgs;
 use furrow::ablation::{Edit, FULL};
@@ -93,7 +93,9 @@ impl Engine for Rasterizer {
     }
 
     fn provenance(&self, field: &Field) -> Provenance {
-        provenance(field, 1, "raster", &self.deviations, self.card.name())
+        let deviations: Vec<String> =
+            self.deviations.iter().cloned().chain(left_out(&field.scene).map(String::from)).collect();
+        provenance(field, 1, "raster", &deviations, self.card.name())
     }
 }
 

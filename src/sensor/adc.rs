@@ -1,0 +1,103 @@
+//! Electrons to numbers of so many bits, above a black level that keeps the noise of dark pixels on both sides of zero.
+//!
+//! Of the numbers' range the black level takes a share; white, 90 % of the full well, lies at 87 % of it: the JAI AD-130 puts them at
+//! 33 and 890 of 1023, or at 8 and 222 of 255 (manual of its sister AD-131GE).
+
+use crate::sampling::vary::{Bound, Num};
+use serde::{Deserialize, Serialize};
+
+/// Bits of a number.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Depth;
+
+impl Bound for Depth {
+    const MIN: f64 = 8.0;
+    const MAX: f64 = 16.0;
+    const WHOLE: bool = true;
+    const WORDS: &'static str = "a whole number from 8 to 16";
+}
+
+/// A black level.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Black;
+
+impl Bound for Black {
+    const MIN: f64 = 0.0;
+    const MAX: f64 = 0.5;
+    const WORDS: &'static str = "a share of the range, between 0 and 0.5";
+}
+
+/// A converter, as it is written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum AdcDesc {
+    /// None: every electron is told from the next.
+    #[default]
+    Off,
+    /// Whole numbers.
+    Bits {
+        /// 8 to 16.
+        bits: Num<Depth>,
+        /// What a pixel without light reads, as a share of the range; default 0.032.
+        #[serde(default = "black")]
+        black: Num<Black>,
+    },
+}
+
+const fn black() -> Num<Black> {
+    Num::new(0.032)
+}
+
+/// Where white lies in the range.
+const WHITE: f32 = 0.87;
+
+/// A converter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Adc {
+    /// The number of no light.
+    pub black: f32,
+    /// The number of white.
+    pub white: f32,
+    /// The largest number.
+    pub top: f32,
+}
+
+impl AdcDesc {
+    /// The converter; `None` where there is none.
+    pub fn build(&self) -> Option<Adc> {
+        let Self::Bits { bits, black } = self else { return None };
+        let top = (1_u32 << bits.get() as u32) as f32 - 1.0;
+        Some(Adc { black: (black.f32() * top).round(), white: (WHITE * top).round(), top })
+    }
+}
+
+impl Adc {
+    /// The level (1 is white, 0 black) that is left of one.
+    pub fn convert(&self, level: f32) -> f32 {
+        let range = self.white - self.black;
+        ((self.black + level * range).round().clamp(0.0, self.top) - self.black) / range
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn levels_are_counted_in_steps_above_black() {
+        for (bits, black, white) in [(8, 8.0, 222.0), (10, 33.0, 890.0), (12, 131.0, 3563.0)] {
+            let desc: AdcDesc = ron::from_str(&format!("Bits(bits: {bits})")).unwrap();
+            let adc = desc.build().unwrap();
+            assert_eq!((adc.black, adc.white), (black, white), "{bits} bits");
+            assert_eq!((adc.convert(0.0), adc.convert(1.0)), (0.0, 1.0));
+            let levels: BTreeSet<u32> = (0..200_000)
+                .map(|i| (adc.convert(i as f32 / 100_000.0 - 0.5) * (white - black)).round().to_bits())
+                .collect();
+            assert_eq!(levels.len(), 1 << bits, "{bits} bits");
+            assert!(adc.convert(-0.01) < 0.0 && adc.convert(-9.0) == -black / (white - black));
+        }
+        assert!(AdcDesc::default().build().is_none());
+        assert!(ron::from_str::<AdcDesc>("Bits(bits: 7)").is_err());
+    }
+}

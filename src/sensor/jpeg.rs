@@ -1,0 +1,249 @@
+//! What JPEG loses of a picture: blocks of 8 × 8 pixels in cosines rounded by the standard's tables, and colour at half the resolution.
+//!
+//! Only that part of the format is here. What the entropy coder writes is read back as it was, so no bytes need be made, and the
+//! pictures' files stay PNG. Source: ITU-T T.81 (1992), annexes A and K; tables are scaled by quality as the Independent JPEG Group does,
+//! colours are those of JFIF 1.02. Blocks begin at the window's first pixel.
+
+use crate::sampling::rng::Stream;
+use crate::sampling::vary::{Bound, Vary};
+use serde::{Deserialize, Serialize};
+use std::f32::consts::{FRAC_1_SQRT_2, PI};
+
+/// A quality of the Independent JPEG Group.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Quality;
+
+impl Bound for Quality {
+    const MIN: f64 = 1.0;
+    const MAX: f64 = 100.0;
+    const WHOLE: bool = true;
+    const WORDS: &'static str = "a whole number from 1 to 100";
+}
+
+/// Compression of the colour image, as it is written.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum JpegDesc {
+    /// None.
+    #[default]
+    Off,
+    /// As a JPEG of this quality.
+    On {
+        /// 1 to 100: 95 hardly shows, 50 does.
+        quality: Vary<Quality>,
+        /// Whether colour has the full resolution (4:4:4) and not half of it (4:2:0); default false.
+        #[serde(default)]
+        full_color: bool,
+    },
+}
+
+impl JpegDesc {
+    /// Draws the compression; `None` where there is none.
+    pub fn draw(&self, stream: &mut Stream) -> Option<Jpeg> {
+        let Self::On { quality, full_color } = self else { return None };
+        Some(Jpeg { quality: quality.draw(stream) as u32, full_color: *full_color })
+    }
+}
+
+/// A compression.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Jpeg {
+    /// 1 to 100.
+    pub quality: u32,
+    /// Whether colour has the full resolution.
+    pub full_color: bool,
+}
+
+/// Side of a block.
+const SIDE: usize = 8;
+type Block = [[f32; SIDE]; SIDE];
+
+/// Steps of luminance at quality 50 (table K.1).
+const LUMINANCE: [[u32; SIDE]; SIDE] = [
+    [16, 11, 10, 16, 24, 40, 51, 61],
+    [12, 12, 14, 19, 26, 58, 60, 55],
+    [14, 13, 16, 24, 40, 57, 69, 56],
+    [14, 17, 22, 29, 51, 87, 80, 62],
+    [18, 22, 37, 56, 68, 109, 103, 77],
+    [24, 35, 55, 64, 81, 104, 113, 92],
+    [49, 64, 78, 87, 103, 121, 120, 101],
+    [72, 92, 95, 98, 112, 100, 103, 99],
+];
+/// Steps of colour at quality 50 (table K.2); what is not here is 99.
+const COLOR: [[u32; 4]; 4] = [[17, 18, 24, 47], [18, 21, 26, 66], [24, 26, 56, 99], [47, 66, 99, 99]];
+
+impl Jpeg {
+    /// Compresses R, G, B of 8 bits, row by row, and reads them back.
+    pub fn pass(&self, rgb: &mut [u8], width: u32) {
+        let width = width as usize;
+        let pixels = rgb.as_chunks_mut::<3>().0;
+        let plane = |weights: [f32; 3], zero: f32| {
+            let of = |p: &[u8; 3]| (0..3).map(|c| weights[c] * f32::from(p[c])).sum::<f32>() + zero;
+            Plane { width, values: pixels.iter().map(|p| of(p).round()).collect() }
+        };
+        let luminance = plane([0.299, 0.587, 0.114], 0.0);
+        let colors = [plane([-0.168_736, -0.331_264, 0.5], 128.0), plane([0.5, -0.418_688, -0.081_312], 128.0)];
+        let luminance = luminance.coded(&self.steps(|u, v| LUMINANCE[v][u]));
+        let of_color = self.steps(|u, v| COLOR.get(v).and_then(|row| row.get(u)).copied().unwrap_or(99));
+        let height = pixels.len() / width;
+        let [blue, red] = colors.map(|plane| {
+            if self.full_color {
+                plane.coded(&of_color)
+            } else {
+                plane.halved().coded(&of_color).doubled(width, height)
+            }
+        });
+        for (i, pixel) in pixels.iter_mut().enumerate() {
+            let (y, b, r) = (luminance.values[i], blue.values[i] - 128.0, red.values[i] - 128.0);
+            let color = [y + 1.402 * r, y - 0.344_136 * b - 0.714_136 * r, y + 1.772 * b];
+            *pixel = color.map(|v| v.round().clamp(0.0, 255.0) as u8);
+        }
+    }
+
+    /// A table at this quality.
+    fn steps(self, base: impl Fn(usize, usize) -> u32) -> Block {
+        let scale = if self.quality < 50 { 5000 / self.quality.max(1) } else { 200 - 2 * self.quality.min(100) };
+        let step = |u, v| ((base(u, v) * scale + 50) / 100).clamp(1, 255) as f32;
+        std::array::from_fn(|v| std::array::from_fn(|u| step(u, v)))
+    }
+}
+
+/// One component of a picture.
+struct Plane {
+    width: usize,
+    values: Vec<f32>,
+}
+
+impl Plane {
+    fn height(&self) -> usize {
+        self.values.len() / self.width
+    }
+
+    /// The value at a place, or of the nearest one.
+    fn at(&self, x: usize, y: usize) -> f32 {
+        self.values[y.min(self.height() - 1) * self.width + x.min(self.width - 1)]
+    }
+
+    /// Means of two by two.
+    fn halved(&self) -> Self {
+        let (width, height) = (self.width.div_ceil(2), self.height().div_ceil(2));
+        let mean =
+            |x: usize, y: usize| (self.at(x, y) + self.at(x + 1, y) + self.at(x, y + 1) + self.at(x + 1, y + 1)) / 4.0;
+        let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        Self { width, values: places.map(|(x, y)| mean(2 * x, 2 * y).round()).collect() }
+    }
+
+    /// Twice as fine, three quarters from the nearest and a quarter from the next, in both directions.
+    fn doubled(&self, width: usize, height: usize) -> Self {
+        let next = |x: usize| if x.is_multiple_of(2) { (x / 2).saturating_sub(1) } else { x / 2 + 1 };
+        let value = |x: usize, y: usize| {
+            let row = |y: usize| 0.75 * self.at(x / 2, y) + 0.25 * self.at(next(x), y);
+            0.75 * row(y / 2) + 0.25 * row(next(y))
+        };
+        let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        Self { width, values: places.map(|(x, y)| value(x, y).round()).collect() }
+    }
+
+    /// Each block in steps of its cosines.
+    fn coded(&self, steps: &Block) -> Self {
+        let cosines = cosines();
+        let mut coded = Self { width: self.width, values: vec![0.0; self.values.len()] };
+        for top in (0..self.height()).step_by(SIDE) {
+            for left in (0..self.width).step_by(SIDE) {
+                let block: Block = std::array::from_fn(|y| std::array::from_fn(|x| self.at(left + x, top + y) - 128.0));
+                // On columns, then on rows, and back.
+                let mut seen = product(&product(&cosines, &block), &transposed(&cosines));
+                for (row, steps) in seen.iter_mut().zip(steps) {
+                    for (value, step) in row.iter_mut().zip(steps) {
+                        *value = (*value / step).round() * step;
+                    }
+                }
+                let block = product(&product(&transposed(&cosines), &seen), &cosines);
+                for (y, row) in (top..self.height()).zip(&block) {
+                    for (x, value) in (left..self.width).zip(row) {
+                        coded.values[y * self.width + x] = (value + 128.0).round().clamp(0.0, 255.0);
+                    }
+                }
+            }
+        }
+        coded
+    }
+}
+
+/// The orthonormal cosines: frequency by place.
+fn cosines() -> Block {
+    let cosine = |u: usize, x: usize| {
+        let scale = if u == 0 { FRAC_1_SQRT_2 } else { 1.0 };
+        0.5 * scale * ((2 * x + 1) as f32 * u as f32 * PI / 16.0).cos()
+    };
+    std::array::from_fn(|u| std::array::from_fn(|x| cosine(u, x)))
+}
+
+fn product(a: &Block, b: &Block) -> Block {
+    std::array::from_fn(|i| std::array::from_fn(|j| (0..SIDE).map(|k| a[i][k] * b[k][j]).sum()))
+}
+
+fn transposed(a: &Block) -> Block {
+    std::array::from_fn(|i| std::array::from_fn(|j| a[j][i]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::Purpose;
+    use image::ExtendedColorType::Rgb8;
+    use image::codecs::jpeg::JpegEncoder;
+
+    const SIZE: (usize, usize) = (37, 29);
+
+    fn picture() -> Vec<u8> {
+        let mut noise = Stream::of(4, 0, Purpose::Test, 0);
+        let of = |i: usize| {
+            let (x, y) = ((i % SIZE.0) as f32, (i / SIZE.0) as f32);
+            [120.0 + 80.0 * (0.5 * x).sin(), 100.0 + 2.0 * y, if x > 18.0 { 40.0 } else { 140.0 }]
+        };
+        (0..SIZE.0 * SIZE.1).flat_map(of).map(|v| (v + noise.range32(-9.0, 9.0)) as u8).collect()
+    }
+
+    fn pass(quality: u32, full_color: bool, rgb: &[u8]) -> Vec<u8> {
+        let mut seen = rgb.to_vec();
+        Jpeg { quality, full_color }.pass(&mut seen, SIZE.0 as u32);
+        seen
+    }
+
+    fn differ(a: &[u8], b: &[u8]) -> (f64, u8) {
+        let all = || a.iter().zip(b).map(|(a, b)| a.abs_diff(*b));
+        (all().map(|d| f64::from(d).powi(2)).sum::<f64>().sqrt() / (a.len() as f64).sqrt(), all().max().unwrap())
+    }
+
+    /// Expected: what an encoder and a decoder of others make of the picture, but for the rounding of their whole-number cosines.
+    #[test]
+    fn it_loses_what_a_file_loses() {
+        let picture = picture();
+        for quality in [30, 75, 92] {
+            let mut bytes = Vec::new();
+            let (w, h) = (SIZE.0 as u32, SIZE.1 as u32);
+            JpegEncoder::new_with_quality(&mut bytes, quality).encode(&picture, w, h, Rgb8).unwrap();
+            let theirs = image::load_from_memory(&bytes).unwrap().into_rgb8().into_raw();
+            let ours = pass(u32::from(quality), true, &picture);
+            let ((far, _), (lost, _)) = (differ(&ours, &theirs), differ(&ours, &picture));
+            assert!(far < 0.35 * lost && far < 2.0, "quality {quality}: {far} apart, {lost} lost");
+        }
+    }
+
+    #[test]
+    fn quality_tells_how_much_is_lost_and_a_second_pass_loses_little() {
+        let picture = picture();
+        let lost = [95, 75, 30].map(|quality| differ(&pass(quality, false, &picture), &picture).0);
+        assert!(lost.is_sorted() && lost[2] > 1.4 * lost[0], "{lost:?}");
+        assert!(differ(&pass(100, true, &picture), &picture).1 <= 3);
+        for full_color in [true, false] {
+            let once = pass(80, full_color, &picture);
+            let again = differ(&pass(80, full_color, &once), &once).0;
+            assert!(again < 0.6 * differ(&once, &picture).0, "{again} after {}", differ(&once, &picture).0);
+            assert_eq!(once, pass(80, full_color, &picture));
+        }
+        let flat = vec![100; SIZE.0 * SIZE.1 * 3];
+        assert!(differ(&pass(50, false, &flat), &flat).1 <= 1);
+    }
+}

@@ -1,0 +1,300 @@
+//! A camera that drives: where it is while a row is exposed.
+//!
+//! It moves straight on at one speed and does not turn. Its pose is that at the middle of the image's readout; row coordinate y of an image of
+//! h rows is in the middle of its exposure at t = (y/h − ½) · readout, and every row is exposed for as long. A global shutter has a readout of
+//! 0. Labels, projected points and bounds are those of each row's middle, so they lean as the image does and are not blurred; the path
+//! tracer spreads its samples over the exposure.
+
+use super::Camera;
+use crate::math::{Vec3, vec3};
+use crate::sampling::rng::{Purpose, Stream};
+use crate::sampling::vary::{Finite, NonNegative, Vary};
+use serde::{Deserialize, Serialize};
+
+/// Motion and shutter of a camera, as they are written; at rest by default.
+///
+/// ```
+/// use furrow::sensor::{CameraDesc, MotionDesc};
+/// let motion: MotionDesc = ron::from_str("(speed_m_s: Uniform(0.1, 0.5), heading_deg: 0, exposure_ms: 2)").unwrap();
+/// ron::from_str::<CameraDesc>("Phone(height_m: 0.5, motion: (speed_m_s: 0.4, readout_ms: 15))").unwrap();
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MotionDesc {
+    /// Speed over the ground, m/s; default 0.
+    pub speed_m_s: Vary<Finite>,
+    /// Where to, degrees clockwise from north; default 0. At yaw 0 that is the image's top.
+    pub heading_deg: Vary<Finite>,
+    /// How long a row gathers light; default that of the camera, 1 ms.
+    #[serde(with = "super::desc::bare", skip_serializing_if = "Option::is_none")]
+    pub exposure_ms: Option<Vary<NonNegative>>,
+    /// From the first row's exposure to the last one's; default that of the camera, 0 unless it rolls.
+    #[serde(with = "super::desc::bare", skip_serializing_if = "Option::is_none")]
+    pub readout_ms: Option<Vary<NonNegative>>,
+}
+
+impl Default for MotionDesc {
+    fn default() -> Self {
+        Self { speed_m_s: Vary::fixed(0.0), heading_deg: Vary::fixed(0.0), exposure_ms: None, readout_ms: None }
+    }
+}
+
+impl MotionDesc {
+    /// Whether nothing is written.
+    pub fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Draws the motion of a camera with such a readout of its own, from numbers of its own.
+    pub fn draw(&self, readout_ms: f64, stream: &Stream) -> Motion {
+        let mut stream = stream.child(Purpose::Motion, 0);
+        let (speed, heading) = (self.speed_m_s.draw32(&mut stream), self.heading_deg.draw32(&mut stream).to_radians());
+        let mut seconds = |of: &Option<Vary<NonNegative>>, own: f64| {
+            (of.as_ref().map_or(own, |ms| ms.draw(&mut stream)) * 1e-3) as f32
+        };
+        Motion {
+            velocity: vec3(heading.sin(), heading.cos(), 0.0) * speed,
+            exposure: seconds(&self.exposure_ms, EXPOSURE_MS),
+            readout: seconds(&self.readout_ms, readout_ms),
+        }
+    }
+}
+
+/// How long a row gathers light unless a page says so: the JAI AD-130 at f/4 under the sun.
+const EXPOSURE_MS: f64 = 1.0;
+
+/// Motion and shutter of a camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// m/s, world.
+    pub velocity: Vec3,
+    /// How long a row gathers light, seconds.
+    pub exposure: f32,
+    /// From the first row's exposure to the last one's, seconds.
+    pub readout: f32,
+}
+
+/// At rest.
+impl Default for Motion {
+    fn default() -> Self {
+        Self { velocity: Vec3::ZERO, exposure: EXPOSURE_MS as f32 * 1e-3, readout: 0.0 }
+    }
+}
+
+impl Motion {
+    fn moves(&self) -> bool {
+        self.velocity != Vec3::ZERO
+    }
+}
+
+/// Most secants towards the row that sees a point.
+const STEPS: usize = 24;
+
+impl Camera {
+    /// The same camera, driving.
+    #[must_use]
+    pub fn with_motion(mut self, motion: Motion) -> Self {
+        self.motion = motion;
+        self
+    }
+
+    /// How it drives.
+    pub fn motion(&self) -> &Motion {
+        &self.motion
+    }
+
+    /// How long a row gathers light, seconds.
+    pub fn exposure(&self) -> f32 {
+        self.motion.exposure
+    }
+
+    /// Whether a still thing leaves a trail in the image.
+    pub fn blurs(&self) -> bool {
+        self.motion.moves() && self.motion.exposure > 0.0
+    }
+
+    /// Whether rows see from different places.
+    pub fn rolls(&self) -> bool {
+        self.motion.moves() && self.motion.readout > 0.0
+    }
+
+    /// Whether straight things may look bent: by the lens, or by rows that see from different places.
+    pub fn bends_lines(&self) -> bool {
+        !self.distortion.is_none() || self.rolls()
+    }
+
+    /// How far it drives while one image is taken, metres.
+    pub fn travel(&self) -> f32 {
+        self.motion.velocity.length() * (self.motion.exposure + self.motion.readout)
+    }
+
+    /// When row coordinate y is in the middle of its exposure, seconds from the image's middle.
+    pub(super) fn time(&self, y: f64) -> f64 {
+        (y / f64::from(self.height) - 0.5) * f64::from(self.motion.readout)
+    }
+
+    /// The lens's centre for row coordinate y, and `after` seconds from the middle of its exposure; world.
+    #[inline]
+    pub(super) fn position(&self, y: f64, after: f32) -> Vec3 {
+        if !self.motion.moves() {
+            return self.pose.position;
+        }
+        self.pose.position + self.motion.velocity * (self.time(y) as f32 + after)
+    }
+
+    /// The point (x, y, z) of the camera's frame in its frame at a time.
+    pub(super) fn seen_at(&self, p: [f64; 3], time: f64) -> [f64; 3] {
+        let axes = self.pose.axes;
+        let along = |axis: Vec3| f64::from(axis.dot(self.motion.velocity)) * time;
+        [p[0] - along(axes.x_axis), p[1] - along(axes.y_axis), p[2] - along(axes.z_axis)]
+    }
+
+    /// The pixel that sees a point of the camera's frame while rows see from different places: the row decides when, and when decides
+    /// the row. By secants, which are exact at once where the image moves evenly.
+    pub(super) fn project_rolling(&self, p: [f64; 3]) -> Option<[f64; 2]> {
+        // Where the image is not known yet, on the way, its lens is followed beyond.
+        let off = |row: f64| {
+            let [x, y, z] = self.seen_at(p, self.time(row));
+            (z > 0.0).then(|| self.image([x / z, y / z])[1] - row)
+        };
+        let mut row = f64::from(self.height) / 2.0;
+        let mut before = (row, off(row)?);
+        row += before.1;
+        for _ in 0..STEPS {
+            let off = off(row)?;
+            if off.abs() < 1e-9 {
+                return self.project_still(self.seen_at(p, self.time(row)));
+            }
+            let next = row - off * (row - before.0) / (off - before.1);
+            before = (row, off);
+            row = next;
+        }
+        // It drives as fast as its rows are read: no one row sees the point.
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{CameraDesc, Distortion, Pose};
+    use super::*;
+    use crate::math::{Vec2, vec2};
+
+    fn camera(page: &str) -> Camera {
+        ron::from_str::<CameraDesc>(page).unwrap().build(&mut Stream::of(1, 0, Purpose::Test, 0)).unwrap()
+    }
+
+    const DRIVING: &str =
+        "JaiAd130(height_m: 1, motion: (speed_m_s: 0.5, heading_deg: 90, exposure_ms: 4, readout_ms: 30))";
+
+    /// Expected: a still thing leaves a trail of speed × exposure × pixels a metre: 0.5 m/s · 4 ms · 4000 px/m = 8 pixels, evenly in time
+    /// and against the heading; without speed not a bit differs.
+    #[test]
+    fn a_trail_is_as_long_as_the_way_driven() {
+        let camera = camera(DRIVING);
+        let ground = |shutter: f32| {
+            let (origin, dir) = camera.ray_during(vec2(700.0, 483.0), [0.5; 2], shutter);
+            (origin - dir * (origin.z / dir.z)).x
+        };
+        // Where on the ground a pixel looks, early and late: so far are images of one point apart.
+        assert!(((ground(1.0) - ground(0.0)) * 4000.0 - 8.0).abs() < 0.01, "{}", (ground(1.0) - ground(0.0)) * 4000.0);
+        assert!((ground(0.5) - 0.5 * (ground(0.25) + ground(0.75))).abs() < 1e-7);
+        let still = self::camera("JaiAd130(height_m: 1, motion: (exposure_ms: 4, readout_ms: 30))");
+        let plain = self::camera("JaiAd130(height_m: 1)");
+        for shutter in [0.0, 0.3, 1.0] {
+            let px = vec2(20.3, 900.1);
+            assert_eq!(still.ray_during(px, [0.2, 0.9], shutter), plain.ray(px, [0.2, 0.9]));
+        }
+        assert!(!still.blurs() && !still.rolls() && camera.blurs() && camera.rolls());
+    }
+
+    /// Expected: an upright line on the ground leans by speed × row time × pixels a metre: 0.5 m/s · 30 ms · 4000 px/m = 60 pixels from the
+    /// first row to the last, in what is projected and in the rays of labels alike.
+    #[test]
+    fn a_rolling_shutter_leans_the_image_and_its_labels() {
+        let camera = camera(DRIVING);
+        let at = |y: f32| camera.project(vec3(0.0, y, 0.0)).unwrap();
+        let (top, bottom) = (at(0.1), at(-0.1));
+        let lean = (bottom.x - top.x) / (bottom.y - top.y) * 966.0;
+        // East is right, and later rows see from farther east.
+        assert!((lean + 60.0).abs() < 0.02, "{lean}");
+        let (first, last) = (camera.centre_ray(600, 0).0, camera.centre_ray(600, 965).0);
+        assert!(((last.x - first.x) / 965.0 * 966.0 - 0.015).abs() < 1e-6 && (first.y - last.y).abs() < 1e-6);
+    }
+
+    /// Expected: whatever drives and however it looks, a pixel's ray passes through the points that are projected to the pixel.
+    #[test]
+    fn projection_and_rays_agree_while_driving() {
+        let pages = [
+            DRIVING,
+            "JaiAd130(height_m: 0.6, yaw_deg: 30, pitch_deg: 8, roll_deg: -4, distortion: (k1: -0.1, p1: 0.002), \
+             motion: (speed_m_s: 1.5, heading_deg: 200, readout_ms: 40))",
+            "Phone(height_m: 0.5, pitch_deg: 20, motion: (speed_m_s: 2, heading_deg: 20))",
+        ];
+        let mut s = Stream::of(2, 0, Purpose::Test, 0);
+        for page in pages {
+            let camera = camera(page).with_size(640, 480);
+            for _ in 0..500 {
+                let px = vec2(s.range32(0.0, 640.0), s.range32(0.0, 480.0));
+                let (origin, dir) = camera.ray(px, [0.5; 2]);
+                let back = camera.project(origin + dir * s.range32(0.3, 0.9)).unwrap();
+                assert!((back - px).length() < 0.01, "{page}: {px} {back}");
+            }
+        }
+    }
+
+    /// Rationale: a pixel that is not asked is a hole. Expected: points of triangles lie in their bounds, also where rows see from
+    /// different places.
+    #[test]
+    fn bounds_hold_what_a_rolling_shutter_sees() {
+        let lens = Distortion { k1: -0.2, k2: 0.05, p1: 1e-3, ..Distortion::default() };
+        let pose = Pose::look_at(vec3(0.1, -0.6, 0.9), Vec3::ZERO).unwrap();
+        let motion = Motion { velocity: vec3(1.0, 1.5, 0.0), exposure: 1e-3, readout: 0.05 };
+        let mut s = Stream::of(11, 0, Purpose::Test, 0);
+        let mut inside = 0;
+        for lens in [Distortion::default(), lens] {
+            let camera = Camera::new((160, 120), [150.0, 148.0], [82.3, 58.9], lens, pose).unwrap().with_motion(motion);
+            for round in 0..2000 {
+                let size = [0.01, 0.1, 0.4][round % 3];
+                let mut near = |r: f32| vec3(s.range32(-r, r), s.range32(-r, r), s.range32(-0.2, 0.2) * r);
+                let middle = near(0.5);
+                let corners = [(); 3].map(|()| middle + near(size));
+                let Some([lo, hi]) = camera.triangle_bounds(corners) else { continue };
+                let mut hull = [f64::INFINITY, f64::NEG_INFINITY];
+                let before = inside;
+                for _ in 0..60 {
+                    let (mut u, mut v) = (s.range32(0.0, 1.0), s.range32(0.0, 1.0));
+                    if u + v > 1.0 {
+                        (u, v) = (1.0 - u, 1.0 - v);
+                    }
+                    let p = corners[0] * (1.0 - u - v) + corners[1] * u + corners[2] * v;
+                    let Some(px) = camera.project(p).filter(|px| camera.contains(*px)) else { continue };
+                    let px = [f64::from(px.x), f64::from(px.y)];
+                    for axis in 0..2 {
+                        assert!(px[axis] > lo[axis] - 1e-3 && px[axis] < hi[axis] + 1e-3, "{px:?} {lo:?} {hi:?}");
+                    }
+                    hull = [hull[0].min(px[0]), hull[1].max(px[0])];
+                    inside += 1;
+                }
+                let width = hull[1] - hull[0];
+                assert!(
+                    size > 0.01 || inside < before + 60 || hi[0] - lo[0] < 2.0 * width + 0.5,
+                    "{} for {width}",
+                    hi[0] - lo[0]
+                );
+            }
+        }
+        assert!(inside > 10_000, "{inside}");
+    }
+
+    #[test]
+    fn where_it_drives_is_counted_from_north() {
+        let velocity = |heading: u32| {
+            camera(&format!("JaiAd130(motion: (speed_m_s: 2, heading_deg: {heading}))")).motion().velocity
+        };
+        assert!((velocity(0) - vec3(0.0, 2.0, 0.0)).length() < 1e-6);
+        assert!((velocity(90) - vec3(2.0, 0.0, 0.0)).length() < 1e-6);
+        let image: Vec2 = camera("Phone()").project(vec3(0.0, 0.0, 0.0)).unwrap();
+        assert!((image - vec2(2016.0, 1512.0)).length() < 1e-2);
+    }
+}

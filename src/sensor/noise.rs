@@ -1,0 +1,189 @@
+//! Electrons: what light and warmth free, how many a pixel holds, and what reading them adds.
+//!
+//! The model is EMVA 1288's (release 4.0, §2). A pixel counts μ = (1 + PRNU) · light + dark current · exposure, with the variance of a
+//! Poisson number, up to its full well; reading adds a normal error and the pixel's own offset (DSNU). Both non-uniformities are normal
+//! and belong to the camera's body: they are drawn from its number and a pixel's place, so all images and all pages of one body share them.
+
+use super::given::{Given, layered};
+use super::tone::CLIP;
+use crate::math::Spectrum;
+use crate::sampling::rng::{Purpose, Stream};
+use crate::sampling::vary::{Count, Fraction, NonNegative, Num, Positive};
+use serde::Serialize;
+use std::f32::consts::TAU;
+
+layered! {
+    /// Noise, as it is written. The defaults are those of the JAI AD-130: 52 dB in colour, 54 dB in NIR; neither dark current nor a fixed
+    /// pattern.
+    #[derive(Clone, Debug, PartialEq, Serialize)]
+    pub struct NoiseDesc, NoiseWritten = "NoiseDesc" {
+        /// Whether there is any; default true.
+        pub on: bool = Given<bool>,
+        /// Electrons that fill a pixel; default 7000.
+        pub full_well: Num<Positive> = Given<Num<Positive>>,
+        /// Standard deviation of reading a colour pixel, electrons; default 18.
+        pub read: Num<NonNegative> = Given<Num<NonNegative>>,
+        /// The same of a NIR pixel; default 14.
+        pub read_nir: Num<NonNegative> = Given<Num<NonNegative>>,
+        /// Electrons a second that warmth frees in a pixel, over the camera's exposure time; default 0.
+        pub dark_current: Num<NonNegative> = Given<Num<NonNegative>>,
+        /// Standard deviation of the pixels' offsets, electrons; default 0.
+        pub dsnu: Num<NonNegative> = Given<Num<NonNegative>>,
+        /// Standard deviation of the pixels' responses, as a share; default 0.
+        pub prnu: Num<Fraction> = Given<Num<Fraction>>,
+        /// Which camera of its kind: another number has another fixed pattern; default 0.
+        pub body: Num<Count> = Given<Num<Count>>,
+    }
+}
+
+impl Default for NoiseDesc {
+    fn default() -> Self {
+        Self {
+            on: true,
+            full_well: Num::new(7000.0),
+            read: Num::new(18.0),
+            read_nir: Num::new(14.0),
+            dark_current: Num::new(0.0),
+            dsnu: Num::new(0.0),
+            prnu: Num::new(0.0),
+            body: Num::new(0.0),
+        }
+    }
+}
+
+impl NoiseDesc {
+    /// The noise; `None` where it is off.
+    pub fn build(&self) -> Option<Noise> {
+        self.on.then(|| Noise {
+            full_well: self.full_well.f32(),
+            read: self.read.f32(),
+            read_nir: self.read_nir.f32(),
+            dark_current: self.dark_current.f32(),
+            dsnu: self.dsnu.f32(),
+            prnu: self.prnu.f32(),
+            body: self.body.get() as u64,
+        })
+    }
+}
+
+/// Noise of a sensor, electrons.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Noise {
+    /// Electrons that fill a pixel.
+    pub full_well: f32,
+    /// Standard deviation of reading a colour pixel.
+    pub read: f32,
+    /// The same of a NIR pixel.
+    pub read_nir: f32,
+    /// Electrons a second in the dark.
+    pub dark_current: f32,
+    /// Standard deviation of the pixels' offsets.
+    pub dsnu: f32,
+    /// Standard deviation of the pixels' responses, as a share.
+    pub prnu: f32,
+    /// Which camera of its kind.
+    pub body: u64,
+}
+
+impl Noise {
+    /// Levels (1 is white: 90 % of the full well) as a pixel of the image counts them in `exposure` seconds, down to `least`. Each pixel
+    /// has a part of `stream` of its own.
+    pub(super) fn count(
+        &self,
+        level: Spectrum,
+        (x, y): (u32, u32),
+        exposure: f32,
+        least: f32,
+        stream: &Stream,
+    ) -> Spectrum {
+        let place = u64::from(y) << 32 | u64::from(x);
+        let white = self.full_well / CLIP;
+        let noise = normals(&mut stream.child(Purpose::Sensor, place));
+        let (response, offset) = self.pattern(place);
+        let read = [self.read, self.read, self.read, self.read_nir];
+        let dark = self.dark_current * exposure;
+        let levels = level.to_array();
+        Spectrum::from(std::array::from_fn::<f32, 4, _>(|i| {
+            let electrons = (levels[i] * white * response[i] + dark).min(self.full_well);
+            // A Poisson count of many electrons is a normal one.
+            let counted = electrons + (electrons + read[i] * read[i]).sqrt() * noise[i];
+            (counted + offset[i]).clamp(least * white, self.full_well) / white
+        }))
+    }
+
+    /// Response, relative to the mean one, and offset of a pixel on each sensor.
+    fn pattern(&self, place: u64) -> ([f32; 4], [f32; 4]) {
+        if self.prnu == 0.0 && self.dsnu == 0.0 {
+            return ([1.0; 4], [0.0; 4]);
+        }
+        let mut stream = Stream::of(self.body, 0, Purpose::Body, 0).child(Purpose::Body, place);
+        let response = normals(&mut stream).map(|n| (1.0 + self.prnu * n).max(0.0));
+        (response, normals(&mut stream).map(|n| self.dsnu * n))
+    }
+}
+
+/// Four standard normal numbers, two from each pair. Source: Box & Muller 1958.
+fn normals(stream: &mut Stream) -> [f32; 4] {
+    let mut pair = || {
+        let radius = (-2.0 * (1.0 - stream.uniform32()).ln()).sqrt();
+        let (sin, cos) = (TAU * stream.uniform32()).sin_cos();
+        [radius * sin, radius * cos]
+    };
+    let ([a, b], [c, d]) = (pair(), pair());
+    [a, b, c, d]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NOISE: Noise =
+        Noise { full_well: 5000.0, read: 10.0, read_nir: 6.0, dark_current: 0.0, dsnu: 0.0, prnu: 0.0, body: 3 };
+
+    /// Mean and variance, in electrons, of many pixels at a level.
+    fn counted(noise: Noise, level: f32, exposure: f32, image: u64) -> (f64, f64, Vec<f64>) {
+        let stream = Stream::of(1, image, Purpose::Test, 0);
+        let electrons = |i: u32| {
+            let level = noise.count(Spectrum::splat(level), (i % 200, i / 200), exposure, -1.0, &stream);
+            f64::from(level.to_array()[1] * noise.full_well / CLIP)
+        };
+        let all: Vec<f64> = (0..40_000).map(electrons).collect();
+        let mean = all.iter().sum::<f64>() / 4e4;
+        (mean, all.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / 4e4, all)
+    }
+
+    /// Expected of a flat field: mean light + dark current × time, variance that + read² + DSNU² + (PRNU · light)². Source: EMVA 1288.
+    #[test]
+    fn a_flat_field_has_the_variance_of_the_standard() {
+        let all = Noise { dark_current: 400.0, dsnu: 12.0, prnu: 0.02, ..NOISE };
+        for (noise, level, time) in [(NOISE, 0.3, 0.5), (all, 0.3, 0.5), (all, 0.0, 2.0), (all, 0.05, 0.01)] {
+            let (light, dark) = (f64::from(level) * 4500.0, f64::from(noise.dark_current * time));
+            let [read, dsnu, prnu] = [noise.read, noise.dsnu, noise.prnu].map(f64::from);
+            let expected = light + dark + read.powi(2) + dsnu.powi(2) + (prnu * light).powi(2);
+            let (mean, variance, _) = counted(noise, level, time, 0);
+            assert!((mean - light - dark).abs() < 4.0 * (expected / 4e4).sqrt(), "{mean} for {}", light + dark);
+            assert!((variance / expected - 1.0).abs() < 0.03, "{variance} for {expected}");
+        }
+    }
+
+    /// Expected: what two images of one camera have in common is its pattern; two cameras have nothing in common.
+    #[test]
+    fn the_fixed_pattern_belongs_to_the_camera() {
+        let noise = Noise { dsnu: 9.0, prnu: 0.015, ..NOISE };
+        let common = |a: Noise, b: Noise| {
+            let ((mean, _, first), (other, _, second)) = (counted(a, 0.2, 0.0, 0), counted(b, 0.2, 0.0, 1));
+            first.iter().zip(second).map(|(a, b)| (a - mean) * (b - other)).sum::<f64>() / 4e4
+        };
+        let expected = 81.0 + (0.015 * 900.0_f64).powi(2);
+        let same = common(noise, noise);
+        assert!((same / expected - 1.0).abs() < 0.1, "{same} for {expected}");
+        assert!(common(noise, Noise { body: 4, ..noise }).abs() < 0.06 * expected);
+        assert!(common(NOISE, NOISE).abs() < 0.06 * expected, "noise alone has nothing in common");
+    }
+
+    #[test]
+    fn a_full_pixel_holds_no_more() {
+        let (mean, variance, all) = counted(NOISE, 3.0, 0.0, 0);
+        assert!(mean <= 5000.0 && variance < 0.4 * 5100.0 && all.iter().all(|e| *e <= 5000.5), "{mean} {variance}");
+    }
+}

@@ -1,0 +1,81 @@
+//! A driving camera, traced: trails and leaning rows, and labels that lean with them and are not blurred.
+//!
+//! Rationale: a robot's pictures are taken while it drives; what moves in them must move in their labels, and nothing else. Expected: an edge
+//! on the ground becomes a ramp of speed × exposure × pixels a metre; with a rolling shutter it leans by speed × readout × pixels a metre
+//! over the image's height, in light and labels alike; any number of threads gives the same bits. Source: geometry.
+
+mod common;
+
+use common::scenes::{camera, scene, shoot, square, with_world};
+use furrow::accel::EmbreeAccel;
+use furrow::bsdf::{Bsdf, OrenNayar};
+use furrow::film::Film;
+use furrow::geometry::Window;
+use furrow::integrator::Path;
+use furrow::math::{Spectrum, Vec3, vec3};
+use furrow::render::label::NONE;
+use furrow::render::{self, Settings, label};
+use furrow::sampling::Points;
+use furrow::scene::Scene;
+use furrow::sensor::Motion;
+
+const SIZE: (u32, u32) = (64, 48);
+
+/// The ground ends at x = 0, in the image's middle; pixels a metre there.
+fn edge(motion: Motion) -> (Scene, f64) {
+    let eye = camera(SIZE, vec3(0.0, 0.0, 1.0), Vec3::ZERO, 60.0).with_motion(motion);
+    let ground = (square(vec3(-4.0, 0.0, 0.0), 8.0), Bsdf::OrenNayar(OrenNayar::new(Spectrum::splat(0.5), 0.0)));
+    (scene(vec![ground], Vec::new(), eye), eye.intrinsics()[0])
+}
+
+/// Share of the samples of each pixel that met the ground, row by row.
+fn shares(film: &Film) -> Vec<Vec<f64>> {
+    let share = |p: &furrow::film::Pixel| p.tally.iter().map(|(_, n)| f64::from(n)).sum::<f64>() / f64::from(p.samples);
+    film.pixels.chunks(SIZE.0 as usize).map(|row| row.iter().map(share).collect()).collect()
+}
+
+#[test]
+fn a_moving_edge_is_as_wide_as_the_way_driven() {
+    let pixels_a_metre = edge(Motion::default()).1;
+    let motion =
+        Motion { velocity: vec3(0.5, 0.2, 0.0), exposure: (16.0 / (0.5 * pixels_a_metre)) as f32, readout: 0.0 };
+    let (scene, _) = edge(motion);
+    for row in shares(&shoot(&scene, &Path::default(), 256, 1)) {
+        for (x, share) in row.iter().enumerate() {
+            // From 8 pixels before the edge's place in the middle of the exposure to 8 behind it.
+            let expected = ((40.0 - (x as f64 + 0.5)) / 16.0).clamp(0.0, 1.0);
+            assert!((share - expected).abs() < 0.03, "pixel {x}: {share} for {expected}");
+        }
+    }
+}
+
+#[test]
+fn a_rolling_shutter_leans_light_and_labels_alike() {
+    let pixels_a_metre = edge(Motion::default()).1;
+    let lean = 20.0;
+    let motion = Motion { velocity: vec3(1.0, 0.0, 0.0), exposure: 0.0, readout: (lean / pixels_a_metre) as f32 };
+    let (scene, _) = edge(motion);
+    let film = shoot(&scene, &Path::default(), 64, 1);
+    let geometry = EmbreeAccel::build(&scene.surfaces(), 1).expect("an accelerator");
+    let labels = label(&geometry, &scene.parts, &scene.camera, Window::full(SIZE.0, SIZE.1));
+    for (y, (row, labels)) in shares(&film).iter().zip(labels.parts.chunks(SIZE.0 as usize)).enumerate() {
+        let expected = 32.0 - lean * ((y as f64 + 0.5) / f64::from(SIZE.1) - 0.5);
+        let seen = row.iter().sum::<f64>();
+        assert!((seen - expected).abs() < 0.06, "row {y}: {seen} for {expected}");
+        let labelled = labels.iter().filter(|part| **part != NONE).count() as f64;
+        assert!((labelled - expected).abs() < 0.502, "row {y}: {labelled} for {expected}");
+    }
+}
+
+#[test]
+fn a_driving_camera_gives_the_same_bits_on_any_number_of_threads() {
+    let (scene, _) = edge(Motion { velocity: vec3(0.4, -0.7, 0.0), exposure: 0.1, readout: 0.2 });
+    let film = |threads| {
+        with_world(&scene, threads, |world, watch| {
+            let window = Window::full(SIZE.0, SIZE.1);
+            let settings = Settings { spp: 8, seed: 5, window, points: Points::Sobol };
+            render::render(world, &Path::default(), &settings, watch).expect("a film")
+        })
+    };
+    assert_eq!(film(1), film(3));
+}
