@@ -79,7 +79,10 @@ const DOORS: &[(&str, &str)] = &[
     ("ron", "page.rs sampling/fault.rs"),
     ("serde", "*"),
     // glTF documents, read and written; records and formats of datasets.
-    ("serde_json", "model/document.rs model/gltf.rs output/gltf/ dataset/ compare/table.rs train/"),
+    (
+        "serde_json",
+        "model/document.rs model/gltf.rs output/gltf/ dataset/ compare/table.rs compare/gap/table.rs train/",
+    ),
     // Weights, as every trainer reads them.
     ("safetensors", "train/weights.rs"),
     ("sha2", "scene/library.rs dataset/ train/run.rs train/weights.rs"),
