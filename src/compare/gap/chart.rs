@@ -19,7 +19,7 @@ type Curve = Vec<(f64, f64)>;
 pub(super) fn charts(title: &str, small: &str, real: &Pool, synthetic: &Pool, tile: Option<usize>) -> String {
     match (real, synthetic) {
         (Pool::Counts(a), Pool::Counts(b)) => {
-            let letters: &[&str] = if a.len() == 3 { &[" L*", " a*", " b*"] } else { &[""] };
+            let letters: &[&str] = if a.len() == 3 { &[": L*", ": a*", ": b*"] } else { &[""] };
             let one = |((a, b), letter): ((&Histogram, &Histogram), &&str)| {
                 let (a, b) = density(a, b);
                 draw(&format!("{title}{letter}"), small, [&a, &b], (0.0, top(&a, &b)), &|x| number(x))

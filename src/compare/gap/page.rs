@@ -1,6 +1,7 @@
 //! Distances, curves and pictures side by side on one HTML page that asks for nothing.
 
 use super::chart::charts;
+use super::feature::Feature;
 use super::sets::{Distance, Gap, Set};
 use super::table::{cells, named, verdict};
 use super::window::Window;
@@ -9,6 +10,9 @@ use crate::html::{count, document, escape, inside, keyed, section, whole};
 use std::fmt::Write;
 
 const STYLE: &str = include_str!("page.css");
+
+/// Whole pictures of each set: a row of a page.
+const WHOLES: usize = 3;
 
 /// How to read the table.
 const READING: &str = "<p class=\"reading\">A distance is the 1-D Wasserstein distance of two distributions: by how much values move on \
@@ -98,7 +102,8 @@ fn beside(of: &Gap) -> String {
     }
     let mut wholes = String::new();
     for (set, words) in sets {
-        let pictures: String = set.windows.iter().map(|w| image(&w.whole, w.whole_size, &w.name)).collect();
+        let pictures: String =
+            set.windows.iter().take(WHOLES).map(|w| image(&w.whole, w.whole_size, &w.name)).collect();
         let _ = write!(wholes, "<h3>{words}, whole pictures at a quarter</h3><div class=\"wholes\">{pictures}</div>\n");
     }
     format!(
@@ -111,7 +116,12 @@ fn curves(of: &Gap) -> String {
     for distance in &of.distances {
         let pools = (of.real.pools.get(&distance.feature), of.synthetic.pools.get(&distance.feature));
         if let (Some(real), Some(synthetic)) = pools {
-            let (title, small) = (escape(&named(distance)), escape(distance.feature.words()));
+            // Channels of colours have letters of their own, and units with these.
+            let title = match distance.feature {
+                Feature::Color(_) => distance.feature.name(),
+                _ => named(distance),
+            };
+            let (title, small) = (escape(&title), escape(distance.feature.words()));
             out += &charts(&title, &small, real, synthetic, of.tile);
         }
     }

@@ -145,6 +145,10 @@ pub(super) fn verdict(of: &Gap) -> String {
     let all = count(judged, "distance", "distances");
     match names.len() {
         0 => format!("None of {all} is more than twice that of two halves of the real set."),
-        n => format!("{n} of {all} are more than twice those of two halves of the real set: {}.", names.join("; ")),
+        1 => format!("1 of {all} is more than twice that of two halves of the real set: {}.", names[0]),
+        n => format!(
+            "{n} of {all} are more than twice those of two halves of the real set, the largest first: {}.",
+            names.join("; ")
+        ),
     }
 }
