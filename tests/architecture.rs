@@ -53,7 +53,8 @@ const DOORS: &[(&str, &str)] = &[
     ("bytemuck", "raster/"),
     ("clap", "bin/"),
     ("embree3", "accel/embree.rs"),
-    ("exr", "output/exr/mod.rs"),
+    // Layers out, pictures of light in.
+    ("exr", "output/exr/mod.rs texture/panorama.rs"),
     // Vectors are re-exported by `math`; two files sum in double precision.
     ("glam", "math/ film/ accel/brute.rs"),
     ("humantime", "bin/"),
