@@ -183,13 +183,13 @@ impl Surround {
 
     /// A coarse one with a bright spot, for tests that run over all lights.
     pub(super) fn example() -> Option<Self> {
-        let (width, height) = (32, 16);
+        let (width, height) = (24, 12);
         let color = |k: usize| match (k % width, k / width) {
-            (21, 5) => [40.0, 38.0, 30.0],
-            (x, y) => [0.2 + 0.01 * x as f32, 0.3 + 0.02 * y as f32, if y < 8 { 0.9 } else { 0.1 }],
+            (16, 4) => [12.0, 11.0, 9.0],
+            (x, y) => [0.2 + 0.01 * x as f32, 0.3 + 0.02 * y as f32, if y < 6 { 0.9 } else { 0.1 }],
         };
         let picture = Panorama { width, height, rgb: (0..width * height).map(color).collect(), nir: None };
-        Self::new(Arc::new(Table::new(&picture, Infrared::Sky).ok()?), Spectrum::new(1.0, 1.0, 1.0, 0.8), 40.0)
+        Self::new(Arc::new(Table::new(&picture, Infrared::Sky).ok()?), Spectrum::new(1.0, 1.0, 1.0, 0.8), 36.0)
     }
 
     /// World to the picture's own axes.

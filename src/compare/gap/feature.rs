@@ -159,7 +159,9 @@ impl Pool {
             }
         }
         if let Some(Self::Power(sums)) = &mut pool {
-            sums.iter_mut().for_each(|sum| *sum /= f64::from(pictures));
+            for sum in sums {
+                *sum /= f64::from(pictures);
+            }
         }
         pool
     }

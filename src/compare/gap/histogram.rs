@@ -113,7 +113,9 @@ mod tests {
         assert_eq!(distance(&[0.0], &[0.0, 1.0, 0.0, 1.0]), 0.5);
         let histogram = |values: &[f64]| {
             let mut h = Histogram::new(-10.0, 10.0, 200);
-            values.iter().for_each(|v| h.add(*v + 0.05));
+            for v in values {
+                h.add(v + 0.05);
+            }
             h
         };
         assert!((histogram(&values).distance(&histogram(&moved)) - 2.5).abs() < 1e-9);
@@ -123,7 +125,9 @@ mod tests {
     #[test]
     fn values_beyond_the_ends_are_held_there() {
         let mut h = Histogram::new(0.0, 1.0, 4);
-        [-7.0, f64::NAN, 0.3, 1.0, 9.0].into_iter().for_each(|v| h.add(v));
+        for v in [-7.0, f64::NAN, 0.3, 1.0, 9.0] {
+            h.add(v);
+        }
         assert_eq!(h.counts, [2, 1, 0, 2]);
     }
 

@@ -76,7 +76,9 @@ fn light(samples: &mut Samples, picture: &Picture, (width, height): (usize, usiz
     let mean = luminance.iter().map(|y| f64::from(*y)).sum::<f64>() / luminance.len().max(1) as f64;
     let mean = mean.max(BLACK);
     samples.insert(Feature::Exposure, Sample::Value(mean.log2()));
-    luminance.iter_mut().for_each(|y| *y = (f64::from(*y) / mean) as f32);
+    for y in &mut luminance {
+        *y = (f64::from(*y) / mean) as f32;
+    }
 
     let mut gradients = empty(GRADIENT);
     for y in 1..height.saturating_sub(1) {
@@ -113,7 +115,9 @@ fn plants(samples: &mut Samples, region: Region, colors: &[[f32; 3]], labels: &[
     samples.insert(Feature::BlobCount(region), Sample::Value(density));
     if !areas.is_empty() {
         let mut sizes = empty(AREA);
-        areas.iter().for_each(|area| sizes.add((*area as f64).log10()));
+        for area in areas {
+            sizes.add((area as f64).log10());
+        }
         samples.insert(Feature::BlobSize(region), Sample::Counts(vec![sizes]));
     }
     let near = regions::near(&mask, width, AROUND);

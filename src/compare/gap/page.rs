@@ -104,7 +104,7 @@ fn beside(of: &Gap) -> String {
     for (set, words) in sets {
         let pictures: String =
             set.windows.iter().take(WHOLES).map(|w| image(&w.whole, w.whole_size, &w.name)).collect();
-        let _ = write!(wholes, "<h3>{words}, whole pictures at a quarter</h3><div class=\"wholes\">{pictures}</div>\n");
+        let _ = writeln!(wholes, "<h3>{words}, whole pictures at a quarter</h3><div class=\"wholes\">{pictures}</div>");
     }
     format!(
         "<p class=\"reading\">Parts of pictures pixel by pixel, where most plants are.</p>\n{wholes}<div class=\"beside\">{out}</div>\n"

@@ -182,12 +182,12 @@ fn set(
         all.push(samples);
         windows.extend(window);
     }
-    let pools = pools(all.iter());
+    let pools = pools(&all.iter());
     Ok((all, Set { name, photos, pools, windows }))
 }
 
 /// What several pictures say together.
-fn pools<'a>(pictures: impl Iterator<Item = &'a Samples> + Clone) -> BTreeMap<Feature, Pool> {
+fn pools<'a>(pictures: &(impl Iterator<Item = &'a Samples> + Clone)) -> BTreeMap<Feature, Pool> {
     let pool = |feature| Some((feature, Pool::of(pictures.clone().filter_map(|samples| samples.get(&feature)))?));
     Feature::all().into_iter().filter_map(pool).collect()
 }
@@ -204,7 +204,7 @@ fn halves(pictures: &[Samples]) -> BTreeMap<Feature, f64> {
             order.swap(end, stream.index(end + 1));
         }
         let (left, right) = order.split_at(order.len() / 2);
-        let [left, right] = [left, right].map(|places| pools(places.iter().map(|k| &pictures[*k])));
+        let [left, right] = [left, right].map(|places| pools(&places.iter().map(|k| &pictures[*k])));
         let distance = |(feature, pool): (&Feature, &Pool)| Some((*feature, pool.distance(right.get(feature)?)));
         left.iter().filter_map(distance).collect::<Vec<_>>()
     };
