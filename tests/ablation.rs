@@ -97,6 +97,7 @@ fn lights(field: &Field) -> Vec<String> {
         Light::Sun(sun) => format!("{sun:?}"),
         Light::Sky(sky) => format!("sky {:?}", sky.horizontal_irradiance()),
         Light::Environment(environment) => format!("{environment:?}"),
+        Light::Surround(surround) => format!("surround {:?}", surround.horizontal_irradiance()),
         Light::Lamp(lamp) => format!("{lamp:?}"),
     };
     field.scene.lights.iter().map(told).collect()

@@ -53,7 +53,8 @@ const DOORS: &[(&str, &str)] = &[
     ("bytemuck", "raster/"),
     ("clap", "bin/"),
     ("embree3", "accel/embree.rs"),
-    ("exr", "output/exr/mod.rs"),
+    // Layers out, pictures of light in.
+    ("exr", "output/exr/mod.rs texture/panorama.rs"),
     // Vectors are re-exported by `math`; two files sum in double precision.
     ("glam", "math/ film/ accel/brute.rs"),
     ("humantime", "bin/"),
@@ -79,7 +80,10 @@ const DOORS: &[(&str, &str)] = &[
     ("ron", "page.rs sampling/fault.rs"),
     ("serde", "*"),
     // glTF documents, read and written; records and formats of datasets.
-    ("serde_json", "model/document.rs model/gltf.rs output/gltf/ dataset/ compare/table.rs train/"),
+    (
+        "serde_json",
+        "model/document.rs model/gltf.rs output/gltf/ dataset/ compare/table.rs compare/gap/table.rs train/",
+    ),
     // Weights, as every trainer reads them.
     ("safetensors", "train/weights.rs"),
     ("sha2", "scene/library.rs dataset/ train/run.rs train/weights.rs"),

@@ -15,6 +15,17 @@ pub fn ciede2000(a: [f64; 3], b: [f64; 3]) -> f64 {
     lab(a).difference(lab(b))
 }
 
+/// CIELAB of 8-bit sRGB, of its white, D65: L*, a*, b*.
+pub(super) fn lab([r, g, b]: [u8; 3]) -> [f32; 3] {
+    let lab: Lab<D65, f32> = Srgb::new(r, g, b).into_format::<f32>().into_color();
+    [lab.l, lab.a, lab.b]
+}
+
+/// Linear values of the codes of 8-bit sRGB, 0 to 1.
+pub(super) fn linear() -> [f32; 256] {
+    std::array::from_fn(|code| Srgb::new(code as u8, 0, 0).into_linear::<f32>().red)
+}
+
 /// ΔE₀₀ of each pixel; CIELAB of the white of sRGB, D65. The pictures are of one size.
 pub(super) fn map(a: &Picture, b: &Picture) -> Vec<f32> {
     let lab = |[r, g, b]: [u8; 3]| -> Lab<D65, f64> { Srgb::new(r, g, b).into_format::<f64>().into_color() };

@@ -48,7 +48,7 @@ impl Region {
     }
 
     /// Whether pixels of this label are in it.
-    fn holds(self, label: u8) -> bool {
+    pub(super) fn holds(self, label: u8) -> bool {
         let is = |class: Class| label == class as u8;
         match self {
             Self::All => true,

@@ -22,11 +22,13 @@
 //! | `summary` | many pairs: means and their intervals |
 //! | `comparison` | all of it, from paths to files |
 //! | `table`, `shot`, `page` | how it is written: JSON, Markdown, CSV; pictures; one HTML page |
+//! | [`gap`] | sets whose pictures are of different things: how far synthetic ones are from real ones |
 
 mod color;
 mod comparison;
 mod figures;
 mod flip;
+pub mod gap;
 mod page;
 mod pairs;
 mod picture;

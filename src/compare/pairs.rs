@@ -135,7 +135,7 @@ impl Pairs {
 }
 
 /// The first names of a list.
-fn told(names: &[String]) -> String {
+pub(super) fn told(names: &[String]) -> String {
     let first = names.iter().take(TOLD).map(String::as_str).collect::<Vec<_>>().join(", ");
     match names.len().saturating_sub(TOLD) {
         0 => first,
@@ -143,7 +143,7 @@ fn told(names: &[String]) -> String {
     }
 }
 
-fn there(path: &Path) -> Result<()> {
+pub(super) fn there(path: &Path) -> Result<()> {
     if path.exists() {
         return Ok(());
     }
@@ -175,7 +175,7 @@ fn source(path: &Path) -> Result<Source> {
 }
 
 /// Every picture below a folder, by its name there.
-fn walk(folder: &Path, prefix: &str, found: &mut BTreeMap<String, PathBuf>) -> Result<()> {
+pub(super) fn walk(folder: &Path, prefix: &str, found: &mut BTreeMap<String, PathBuf>) -> Result<()> {
     let entries = std::fs::read_dir(folder).and_then(Iterator::collect::<std::io::Result<Vec<_>>>);
     for entry in entries.map_err(Error::io(folder))? {
         let path = entry.path();
@@ -206,12 +206,12 @@ fn walk(folder: &Path, prefix: &str, found: &mut BTreeMap<String, PathBuf>) -> R
     Ok(())
 }
 
-fn stem(path: &Path) -> String {
+pub(super) fn stem(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// What else is known of the picture `rgb.png` (or `rgb_denoised.png`): the file beside it whose name begins with something else.
-fn beside_rgb(picture: &Path, other: &str) -> Option<PathBuf> {
+pub(super) fn beside_rgb(picture: &Path, other: &str) -> Option<PathBuf> {
     let rest = stem(picture).strip_prefix("rgb")?.to_owned();
     first([picture.with_file_name(format!("{other}{rest}.png"))])
 }
@@ -221,7 +221,7 @@ fn infrared(a: &Path, b: &Path) -> Option<(PathBuf, PathBuf)> {
 }
 
 /// `semantics.png` beside `rgb.png` and what was made of it.
-fn beside(picture: &Path) -> Option<PathBuf> {
+pub(super) fn beside(picture: &Path) -> Option<PathBuf> {
     stem(picture).starts_with("rgb").then(|| first([picture.with_file_name("semantics.png")])).flatten()
 }
 
@@ -248,12 +248,12 @@ fn given_to_many(given: &Path, name: &str) -> Option<PathBuf> {
 }
 
 /// The first that is a file.
-fn first<const N: usize>(paths: [PathBuf; N]) -> Option<PathBuf> {
+pub(super) fn first<const N: usize>(paths: [PathBuf; N]) -> Option<PathBuf> {
     paths.into_iter().find(|path| path.is_file())
 }
 
 /// As much of two paths' ends as tells them apart; files hold no more of a path.
-fn names(a: &Path, b: &Path) -> (String, String) {
+pub(super) fn names(a: &Path, b: &Path) -> (String, String) {
     let parts = |path: &Path| -> Vec<String> {
         let whole = std::fs::canonicalize(path).unwrap_or_else(|_| path.into());
         let names = whole.components().filter(|c| matches!(c, Component::Normal(_)));

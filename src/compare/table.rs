@@ -203,7 +203,7 @@ fn missing(k: usize) -> String {
 }
 
 /// Rows, the first of them the head, as a table in Markdown whose columns are aligned.
-fn columns(rows: &[Vec<String>]) -> String {
+pub(super) fn columns(rows: &[Vec<String>]) -> String {
     let width = |k: usize| rows.iter().map(|row| row[k].chars().count()).max().unwrap_or(0).max(2);
     let widths: Vec<usize> = (0..rows[0].len()).map(width).collect();
     let line = |row: &Vec<String>| {

@@ -1,4 +1,4 @@
-//! Light: sun, sky, constant environment, lamps; how a page writes them and how a path tracer draws from them.
+//! Light: sun, sky, constant and photographed environments, lamps; how a page writes them and how a path tracer draws from them.
 //!
 //! `sample.rs` holds the promise, each variant keeps it in a file of its own, the enum here only chooses. Radiance is
 //! W·m⁻²·sr⁻¹·nm⁻¹ and irradiance W·m⁻²·nm⁻¹, both in the four bands R, G, B, NIR.
@@ -8,6 +8,7 @@ mod daylight;
 mod environment;
 pub mod hosek;
 mod lamp;
+mod panorama;
 mod position;
 mod record;
 mod sample;
@@ -17,6 +18,7 @@ mod sun;
 pub use daylight::{AboveHorizon, Latitude, Longitude, SunDesc, Turbidity, daylight, overcast_irradiance};
 pub use environment::Environment;
 pub use lamp::{GlowDesc, Lamp, Outline, PointDesc, ShapeDesc};
+pub use panorama::{Infrared, InfraredDesc, Surround, Table};
 pub use position::{SunPosition, Utc, sun_position};
 pub use record::LightRecord;
 pub use sample::{Emitter, LampHit, LightSample};
@@ -26,8 +28,13 @@ pub use sun::{HALF_ANGLE_DEG, Sun};
 use crate::Result;
 use crate::math::{Frame, Spectrum, Vec2, Vec3, vec3};
 use crate::sampling::rng::Stream;
-use crate::sampling::vary::{Fraction, NonNegative, Positive, Vary};
+use crate::sampling::vary::{Finite, Fraction, NonNegative, Positive, Vary};
 use serde::{Deserialize, Serialize};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Reads a picture of all directions that a page names.
+pub type Open<'a> = dyn FnMut(&str, Infrared) -> Result<Arc<Table>> + 'a;
 
 /// A light.
 #[derive(Clone, Debug)]
@@ -38,6 +45,8 @@ pub enum Light {
     Sky(Box<Sky>),
     /// The same radiance from everywhere.
     Environment(Environment),
+    /// A picture of all directions.
+    Surround(Surround),
     /// A rectangle or disc that shines on one side.
     Lamp(Lamp),
 }
@@ -48,6 +57,7 @@ macro_rules! of {
             Light::Sun($inner) => $call,
             Light::Sky($inner) => $call,
             Light::Environment($inner) => $call,
+            Light::Surround($inner) => $call,
             Light::Lamp($inner) => $call,
         }
     };
@@ -118,6 +128,7 @@ impl Light {
         of.extend(overcast.map(|sky| ("overcast sky", Self::Sky(Box::new(sky)))));
         of.push(("uniform sun", Self::Sun(Sun::uniform(vec3(0.6, 0.0, 0.8), Spectrum::ONE))));
         of.push(("constant environment", Self::Environment(Environment::new(Spectrum::new(0.5, 1.0, 2.0, 4.0)))));
+        of.extend(Surround::example().map(|light| ("surround", Self::Surround(light))));
         let radiance = Spectrum::new(2.0, 3.0, 1.0, 0.5);
         let lamp = |outline, centre: Vec3, axis: Vec3| {
             Self::Lamp(Lamp::new(outline, centre, Frame::about(axis.normalize()), radiance))
@@ -185,6 +196,20 @@ pub enum LightDesc {
         /// Radiance in R, G, B, NIR, W·m⁻²·sr⁻¹·nm⁻¹.
         radiance: (Vary<NonNegative>, Vary<NonNegative>, Vary<NonNegative>, Vary<NonNegative>),
     },
+    /// A picture of all directions: light as it was photographed.
+    Environment {
+        /// A .exr or .hdr file, equirectangular, linear, the zenith in its first row; its path counts from the page's folder.
+        file: String,
+        /// By what its values become radiance, W·m⁻²·sr⁻¹·nm⁻¹; default 1.
+        #[serde(default = "panorama::as_it_is")]
+        scale: Vary<Positive>,
+        /// Where its middle column is, degrees clockwise from north; default 0.
+        #[serde(default = "panorama::north")]
+        rotate_deg: Vary<Finite>,
+        /// Its near infrared; by default the file's channel NIR, or as of a sky where it has none.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        nir: Option<InfraredDesc>,
+    },
     /// An area that shines on one side.
     Lamp {
         /// The area.
@@ -200,13 +225,15 @@ pub enum LightDesc {
 }
 
 impl LightDesc {
-    /// Draws the lights: two for a day with sun and sky, one for the others, none for one that is black.
+    /// Draws the lights: two for a day with sun and sky, one for the others, none for one that is black. Files are looked for from the
+    /// working directory.
     pub fn build(&self, stream: &mut Stream) -> Result<Vec<Light>> {
-        Ok(self.draw(stream)?.1)
+        let mut open = |file: &str, infrared| Table::load(Path::new(file), infrared).map(Arc::new);
+        Ok(self.draw(stream, &mut open)?.1)
     }
 
-    /// Draws the lights as [`LightDesc::build`] does, and tells what was drawn.
-    pub fn draw(&self, stream: &mut Stream) -> Result<(LightRecord, Vec<Light>)> {
+    /// Draws the lights as [`LightDesc::build`] does, and tells what was drawn. `open` reads a file that the page names.
+    pub fn draw(&self, stream: &mut Stream, open: &mut Open<'_>) -> Result<(LightRecord, Vec<Light>)> {
         let sky = |sky: Option<Sky>| sky.map(|sky| Light::Sky(Box::new(sky)));
         let given = |light: Option<&Light>| light.map_or(Spectrum::ZERO, Light::horizontal_irradiance);
         Ok(match self {
@@ -236,6 +263,15 @@ impl LightDesc {
                 let light = (!radiance.is_black()).then(|| Light::Environment(Environment::new(radiance)));
                 let record =
                     LightRecord::Constant { radiance_w_m2_sr_nm: radiance, irradiance_w_m2_nm: given(light.as_ref()) };
+                (record, light.into_iter().collect())
+            }
+            Self::Environment { file, scale, rotate_deg, nir } => {
+                let (scale, rotate_deg) = (scale.draw32(stream), rotate_deg.draw32(stream));
+                let (infrared, share) = panorama::draw_infrared(nir.as_ref(), stream);
+                let bands = Spectrum::new(1.0, 1.0, 1.0, share) * scale;
+                let light = Surround::new(open(file, infrared)?, bands, rotate_deg).map(Light::Surround);
+                let irradiance_w_m2_nm = given(light.as_ref());
+                let record = LightRecord::Environment { file: file.clone(), scale, rotate_deg, irradiance_w_m2_nm };
                 (record, light.into_iter().collect())
             }
             Self::Lamp { shape, position_m, look_at_m, glow } => {

@@ -40,6 +40,17 @@ pub enum LightRecord {
         /// What it gives the ground.
         irradiance_w_m2_nm: Spectrum,
     },
+    /// A picture of all directions.
+    Environment {
+        /// The file, as the page names it.
+        file: String,
+        /// By what its values became radiance.
+        scale: f32,
+        /// Where its middle column is, clockwise from north.
+        rotate_deg: f32,
+        /// What it gives the ground.
+        irradiance_w_m2_nm: Spectrum,
+    },
     /// An area that shines on one side.
     Lamp {
         /// Horizontal and other side of a rectangle; twice the radius of a disc.
@@ -84,6 +95,7 @@ impl LightRecord {
             }
             Self::Overcast { irradiance_w_m2_nm, .. }
             | Self::Constant { irradiance_w_m2_nm, .. }
+            | Self::Environment { irradiance_w_m2_nm, .. }
             | Self::Lamp { irradiance_w_m2_nm, .. } => *irradiance_w_m2_nm,
         }
     }

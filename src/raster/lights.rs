@@ -40,7 +40,7 @@ impl Lights {
                 Light::Lamp(lamp) => {
                     each.push(lamplight(lamp.centre(), lamp.frame(), lamp.radiance() * lamp.area()));
                 }
-                Light::Sky(_) | Light::Environment(_) => {
+                Light::Sky(_) | Light::Environment(_) | Light::Surround(_) => {
                     let of = if settings.has(super::Effect::Harmonics) { harmonics(light) } else { even(light) };
                     for (sum, add) in ambient.iter_mut().zip(of) {
                         *sum += add;

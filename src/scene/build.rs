@@ -170,7 +170,7 @@ struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    fn new(page: &'a Page, desc: &'a FieldDesc, options: &Options, library: Library) -> Result<Self> {
+    fn new(page: &'a Page, desc: &'a FieldDesc, options: &Options, mut library: Library) -> Result<Self> {
         let (seed, index) = (options.seed.unwrap_or(desc.seed), options.index);
         let mut stream = Stream::of(seed, index, Purpose::Page, 0);
         let camera = desc.camera.build(&mut stream).map_err(|e| page.blame(&[Step::Field("camera")], e))?;
@@ -193,7 +193,8 @@ impl<'a> Builder<'a> {
         }
         let (mut lights, mut light_records) = (Vec::new(), Vec::new());
         for (i, light) in desc.lights.iter().enumerate() {
-            let drawn = light.draw(&mut Stream::of(seed, index, Purpose::Page, 1 + i as u64));
+            let mut open = |file: &str, infrared| library.surround(page, file, infrared);
+            let drawn = light.draw(&mut Stream::of(seed, index, Purpose::Page, 1 + i as u64), &mut open);
             let (record, drawn) = drawn.map_err(|e| page.blame(&[Step::Field("lights"), Step::Item(i)], e))?;
             light_records.push(record);
             lights.extend(drawn);

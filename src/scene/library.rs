@@ -3,6 +3,7 @@
 use super::build::Growing;
 use super::desc::SpeciesDesc;
 use crate::geometry::AlphaMask;
+use crate::light::{Infrared, Table};
 use crate::material::{LeafMaterial, Picture};
 use crate::math::Vec2;
 use crate::model::{Model, Up};
@@ -39,6 +40,7 @@ pub(super) struct Library {
     species: BTreeMap<PathBuf, Arc<Species>>,
     models: BTreeMap<(PathBuf, bool), Arc<Model>>,
     layers: BTreeMap<(PathBuf, PathBuf), Arc<Layer>>,
+    surrounds: BTreeMap<(PathBuf, Infrared), Arc<Table>>,
     /// How species grow otherwise than their pages say.
     pub(super) growing: Growing,
 }
@@ -150,6 +152,26 @@ impl Library {
         }
         self.models.insert(key, model.clone());
         Ok(model)
+    }
+
+    /// The light of all directions that `page` names.
+    pub(super) fn surround(&mut self, page: &Page, path: &str, infrared: Infrared) -> Result<Arc<Table>> {
+        let full = page.need_file(path)?;
+        let key = (full.clone(), infrared);
+        if let Some(known) = self.surrounds.get(&key) {
+            return Ok(known.clone());
+        }
+        self.note(&full)?;
+        let table = Arc::new(Table::load(&full, infrared).map_err(|error| match error {
+            Error::Image { what, .. } => {
+                let name = full.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                let help = "name an equirectangular .exr or .hdr; `nir` says where near infrared comes from: Channel, Sky or OfRed(0.8)";
+                page.about(path, format!("`{name}` cannot be used: {what}"), help)
+            }
+            other => other,
+        })?);
+        self.surrounds.insert(key, table.clone());
+        Ok(table)
     }
 
     /// A soil layer's textures.

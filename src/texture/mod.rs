@@ -9,7 +9,9 @@ pub mod draw;
 mod height;
 pub mod maps;
 pub mod noise;
+pub mod panorama;
 mod pyramid;
+mod rgbe;
 mod srgb;
 
 pub use height::Height;

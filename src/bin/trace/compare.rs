@@ -1,29 +1,37 @@
-//! `trace compare`: how far pictures are from others of the same things.
+//! `trace compare`: how far pictures are from others of the same things; with `--real` and `--synthetic`, how far one set is from another.
 
 use crate::dataset::progress::Progress;
 use crate::render::threads;
-use furrow::compare::{Comparison, Options, PIXELS_PER_DEGREE, Pairs};
-use furrow::{Result, cli, render};
-use std::path::PathBuf;
+use furrow::compare::{Comparison, Options, PIXELS_PER_DEGREE, Pairs, gap};
+use furrow::{Error, Result, cli, render};
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// What is compared, and how.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// The reference: a PNG or JPEG, a folder of such, a rendered image's folder, or a dataset.
-    a: PathBuf,
+    #[arg(required_unless_present = "real", requires = "b")]
+    a: Option<PathBuf>,
     /// What is measured against it; of folders, pictures of the same name are pairs.
-    b: PathBuf,
+    b: Option<PathBuf>,
+    /// Real pictures, of which none shows what a synthetic one does: a folder with images/ and, if known, labels/ and nir/; or a dataset.
+    /// Writes how far colours, spectra, noise, plants are, beside the same between halves of the real set: gap.json, .csv and .html.
+    #[arg(long, value_name = "DIR", requires = "synthetic", conflicts_with_all = ["a", "labels", "ppd"])]
+    real: Option<PathBuf>,
+    /// The pictures that are to be like the real ones: a folder of the same kind, as a rule a dataset.
+    #[arg(long, value_name = "DIR", requires = "real")]
+    synthetic: Option<PathBuf>,
     /// Labels as PNG files (0 soil, 1 crop, 2 weed, 255 none), for figures of each class; semantics.png beside the reference unless given.
     #[arg(long, value_name = "PATH")]
     labels: Option<PathBuf>,
-    /// Folder for compare.json, .csv, .md and .html.
+    /// Folder for compare.json, .csv, .md and .html, or gap.json, .csv and .html.
     #[arg(long, value_name = "DIR", default_value = "out/compare")]
     out: PathBuf,
     /// Pixels in a degree of the view of the eye that FLIP imagines; 67 is a 4K screen of 0.7 m at 0.7 m.
     #[arg(long, value_name = "N", default_value_t = PIXELS_PER_DEGREE, value_parser = pixels_per_degree)]
     ppd: f32,
-    /// Most pairs that the page shows, those of the largest FLIP.
+    /// Most pairs that the page shows, those of the largest FLIP; of sets, pictures of each.
     #[arg(long, value_name = "N", default_value_t = 12)]
     show: usize,
     /// Threads; 0 for one on each core.
@@ -39,10 +47,35 @@ fn pixels_per_degree(text: &str) -> Result<f32, String> {
     text.parse().ok().filter(|n| (1.0..=500.0).contains(n)).ok_or_else(|| "write a number from 1 to 500".into())
 }
 
-/// Measures every pair, writes tables and a page, and shows the means.
+/// Measures what was asked for, writes tables and a page, and shows the figures.
 pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     cli::check_folder(&args.out)?;
-    let found = Pairs::find(&args.a, &args.b, args.labels.as_deref())?;
+    match (args.real.as_deref(), args.synthetic.as_deref(), args.a.as_deref(), args.b.as_deref()) {
+        (Some(real), Some(synthetic), ..) => sets(args, real, synthetic),
+        (.., Some(a), Some(b)) => pairs(args, a, b),
+        _ => Err(Error::Compare("nothing to compare\n help: give two paths, or --real and --synthetic".into())),
+    }
+}
+
+fn sets(args: &Args, real: &Path, synthetic: &Path) -> Result<Vec<PathBuf>> {
+    let progress = Progress::new(Instant::now(), args.quiet);
+    let options = gap::Options { shown: args.show };
+    let start = |pictures: usize| progress.expect(pictures as u64);
+    let pool = render::pool(args.threads)?;
+    let gap = pool.install(|| gap::Gap::of(real, synthetic, &options, &start, &|| progress.add()))?;
+    progress.finish();
+    for warning in &gap.warnings {
+        eprintln!("warning: {warning}");
+    }
+    let paths = gap.write(&args.out)?;
+    if !args.quiet {
+        eprint!("{}", gap.table());
+    }
+    Ok(paths)
+}
+
+fn pairs(args: &Args, a: &Path, b: &Path) -> Result<Vec<PathBuf>> {
+    let found = Pairs::find(a, b, args.labels.as_deref())?;
     for warning in found.warnings() {
         eprintln!("warning: {warning}");
     }

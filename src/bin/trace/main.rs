@@ -46,6 +46,7 @@ Examples:
   trace ablate --scene scenes/field.ron --count 100 --out ab      the same hundred with one thing changed at a time
   trace export --scene scenes/field.ron --format gltf   the same field for another program
   trace compare out/field out/noisy                     how far one image is from another: PSNR, SSIM, FLIP, by class
+  trace compare --real photos --synthetic data          how far a dataset is from photographs: colour, spectra, noise, plants
   trace texture textures/leaf/sugar_beet.ron            draw a texture from its recipe
   trace catalogue --species sugar_beet,galium           plants at every stage, with a scale, to look at
 

@@ -42,7 +42,7 @@ impl Lights {
                     of.suns.push((Frame::about(-sun.direction()), half, stem));
                 }
                 Light::Lamp(lamp) => of.lamps.push(*lamp),
-                Light::Sky(_) | Light::Environment(_) => around.push(light),
+                Light::Sky(_) | Light::Environment(_) | Light::Surround(_) => around.push(light),
             }
         }
         let radiance = |d: Vec3| around.iter().fold(Spectrum::ZERO, |sum, l| sum + l.le(d));

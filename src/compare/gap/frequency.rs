@@ -1,0 +1,158 @@
+//! How much of a picture's contrast lies at which spatial frequency.
+//!
+//! Tiles of a power of two of pixels, their mean taken off, each under a Hann window; |FFT|² / Σ w² is the power spectral density, averaged
+//! over tiles (Welch 1967) and over all directions in bands of a third of an octave, from 2 cycles a tile to half a cycle a pixel. White
+//! noise of variance σ² has σ² in each band; photographs of fields fall by 6 to 9 dB an octave (Field 1987).
+
+use std::f64::consts::TAU;
+
+/// Most pixels of a tile's side, and the fewest that can tell bands apart.
+pub(super) const TILES: (u32, u32) = (256, 32);
+/// Bands in an octave.
+const BANDS: f64 = 3.0;
+/// Power of nothing at all, so that it has a logarithm: −120 dB.
+const FLOOR: f64 = 1e-12;
+
+/// The side of the largest tile that fits into pictures with no side shorter than `least`; `None` where they are too small.
+pub(super) fn tile(least: u32) -> Option<usize> {
+    (least >= TILES.1).then(|| 1 << least.min(TILES.0).ilog2())
+}
+
+/// Frequency in the middle of each band, cycles a pixel.
+pub(super) fn frequencies(tile: usize) -> Vec<f64> {
+    (0..bands(tile)).map(|b| 2.0 * 2.0_f64.powf((b as f64 + 0.5) / BANDS) / tile as f64).collect()
+}
+
+fn bands(tile: usize) -> usize {
+    (f64::from((tile as u32 / 4).ilog2()) * BANDS) as usize
+}
+
+/// Decibels of a power.
+pub(super) fn decibels(power: f64) -> f64 {
+    10.0 * power.max(FLOOR).log10()
+}
+
+/// Power spectral density of each band of a picture's values; the whole tiles in its middle. The picture holds one at least.
+pub(super) fn power(values: &[f32], (width, height): (usize, usize), tile: usize) -> Vec<f64> {
+    let window: Vec<f64> = (0..tile).map(|k| 0.5 - 0.5 * (TAU * (k as f64 + 0.5) / tile as f64).cos()).collect();
+    let weight = window.iter().map(|w| w * w).sum::<f64>().powi(2);
+    let band = |x: usize, y: usize| {
+        let signed = |k: usize| if k > tile / 2 { tile as f64 - k as f64 } else { k as f64 };
+        let radius = signed(x).hypot(signed(y));
+        let inside = radius >= 2.0 && radius < tile as f64 / 2.0;
+        inside.then(|| ((BANDS * (radius / 2.0).log2()) as usize).min(bands(tile) - 1))
+    };
+    let places: Vec<Option<usize>> = (0..tile * tile).map(|k| band(k % tile, k / tile)).collect();
+    let (mut sums, mut cells) = (vec![0.0; bands(tile)], vec![0_u64; bands(tile)]);
+    let turns: Vec<(f64, f64)> = (0..tile / 2).map(|k| (-TAU * k as f64 / tile as f64).sin_cos()).collect();
+    let (left, top) = (width % tile / 2, height % tile / 2);
+    let mut cell = vec![(0.0, 0.0); tile * tile];
+    for (tx, ty) in (0..height / tile).flat_map(|ty| (0..width / tile).map(move |tx| (tx, ty))) {
+        let row = |y: usize| &values[(top + ty * tile + y) * width + left + tx * tile..][..tile];
+        let mean = (0..tile).flat_map(row).map(|v| f64::from(*v)).sum::<f64>() / (tile * tile) as f64;
+        for y in 0..tile {
+            for (x, value) in row(y).iter().enumerate() {
+                cell[y * tile + x] = ((f64::from(*value) - mean) * window[x] * window[y], 0.0);
+            }
+        }
+        transform_both(&mut cell, tile, &turns);
+        for (place, (re, im)) in places.iter().zip(&cell) {
+            if let Some(band) = place {
+                sums[*band] += re * re + im * im;
+                cells[*band] += 1;
+            }
+        }
+    }
+    sums.iter().zip(cells).map(|(sum, n)| sum / (n.max(1) as f64 * weight)).collect()
+}
+
+/// Fourier transform along rows, then columns.
+fn transform_both(cell: &mut [(f64, f64)], tile: usize, turns: &[(f64, f64)]) {
+    for _ in 0..2 {
+        for row in cell.chunks_exact_mut(tile) {
+            transform(row, turns);
+        }
+        for y in 1..tile {
+            for x in 0..y {
+                cell.swap(y * tile + x, x * tile + y);
+            }
+        }
+    }
+}
+
+/// Fourier transform in place, of a power of two. Source: Cooley & Tukey 1965, radix 2, decimation in time.
+fn transform(row: &mut [(f64, f64)], turns: &[(f64, f64)]) {
+    let n = row.len();
+    let unused = usize::BITS - n.ilog2();
+    for k in 0..n {
+        let other = k.reverse_bits() >> unused;
+        if other > k {
+            row.swap(k, other);
+        }
+    }
+    let mut half = 1;
+    while half < n {
+        for block in row.chunks_exact_mut(2 * half) {
+            let (low, high) = block.split_at_mut(half);
+            for (k, (a, b)) in low.iter_mut().zip(high).enumerate() {
+                let (sin, cos) = turns[k * (n / 2 / half)];
+                let turned = (b.0 * cos - b.1 * sin, b.0 * sin + b.1 * cos);
+                *b = (a.0 - turned.0, a.1 - turned.1);
+                *a = (a.0 + turned.0, a.1 + turned.1);
+            }
+        }
+        half *= 2;
+    }
+}
+
+/// Slope of log power over log frequency, least squares: −2 falls by 6 dB an octave. The highest octave, which is noise and the lens, and
+/// the lowest, which is the window, stay out.
+pub(super) fn slope(power: &[f64], tile: usize) -> f64 {
+    let octave = BANDS as usize;
+    let frequencies = frequencies(tile);
+    let points: Vec<(f64, f64)> =
+        (octave..power.len() - octave).map(|b| (frequencies[b].log10(), power[b].max(FLOOR).log10())).collect();
+    let n = points.len() as f64;
+    let (mx, my) = points.iter().fold((0.0, 0.0), |(sx, sy), (x, y)| (sx + x / n, sy + y / n));
+    let (xy, xx) = points.iter().fold((0.0, 0.0), |(xy, xx), (x, y)| (xy + (x - mx) * (y - my), xx + (x - mx).powi(2)));
+    xy / xx
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::rng::{Purpose, Stream};
+
+    #[test]
+    fn tiles_fit() {
+        assert_eq!([31, 32, 63, 300, 5000].map(tile), [None, Some(32), Some(32), Some(256), Some(256)]);
+        assert_eq!(frequencies(256).len(), 18);
+        assert!(frequencies(32).iter().all(|f| *f > 2.0 / 32.0 && *f < 0.5));
+    }
+
+    /// Of white noise each band has the variance.
+    #[test]
+    fn white_noise_is_flat() {
+        let mut stream = Stream::of(3, 0, Purpose::Test, 1);
+        let size = (1034, 1030);
+        let values: Vec<f32> = (0..size.0 * size.1).map(|_| 7.0 + 0.3 * stream.normal() as f32).collect();
+        let power = power(&values, size, 256);
+        assert!(slope(&power, 256).abs() < 0.06, "{}", slope(&power, 256));
+        for (f, p) in frequencies(256).iter().zip(&power).skip(3) {
+            assert!((decibels(*p) - decibels(0.09)).abs() < 0.8, "{f}: {p}");
+        }
+    }
+
+    /// A wave of f cycles a pixel is in f's band, and nearly nowhere else.
+    #[test]
+    fn a_wave_lies_in_its_band() {
+        let wave =
+            |f: f64| -> Vec<f32> { (0..128 * 128).map(|k| (TAU * f * f64::from(k % 128)).sin() as f32).collect() };
+        for (band, f) in frequencies(128).into_iter().enumerate().skip(6) {
+            let power = power(&wave(f), (128, 128), 128);
+            let most = (0..power.len()).max_by(|a, b| power[*a].total_cmp(&power[*b]));
+            assert_eq!(most, Some(band), "{f}");
+            assert!(power.iter().enumerate().all(|(b, p)| b.abs_diff(band) < 2 || *p < 1e-2 * power[band]));
+        }
+    }
+}

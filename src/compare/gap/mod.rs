@@ -1,0 +1,47 @@
+//! How far a set of made-up pictures is from a set of real ones: `trace compare --real DIR --synthetic DIR`.
+//!
+//! No picture of one set shows what one of the other does, so distributions are compared, one distance a feature, which falls as a scene
+//! comes nearer. What distance is small is told by the real set alone: it is cut at random into halves, and the median of their distances
+//! stands beside. At a ratio of 1 the sets are as near as two halves of the real one; more than twice that is a gap.
+//!
+//! | feature | of | distance |
+//! |---|---|---|
+//! | exposure | each picture's mean luminance, stops | W₁ |
+//! | colour | L*, a*, b* of pixels, by class | mean of three W₁, ΔE |
+//! | NDVI | (NIR − R) / (NIR + R) of coded values, by class | W₁ |
+//! | gradients | luminance over its mean, dB | W₁ |
+//! | power spectrum, its slope | the same, by thirds of octaves | RMS difference, dB; W₁ |
+//! | noise | deviation in flat ground, 8-bit levels | W₁ |
+//! | cover, blobs and their sizes | labels | W₁ |
+//! | contrast | a class and the soil around it, L* and a*b* | W₁ |
+//!
+//! W₁ is the Wasserstein distance of `histogram`. Classes are compared where both sets have labels, NDVI where both have near infrared.
+//!
+//! | file | idea |
+//! |---|---|
+//! | `source` | which pictures there are |
+//! | `feature` | what is measured, and how sets differ in it |
+//! | `measure` | one picture, measured |
+//! | `histogram`, `frequency`, `noise`, `regions` | how |
+//! | `sets` | all of it, from two folders to distances |
+//! | `window` | what the page shows of a picture |
+//! | `table`, `chart`, `page` | how it is written: JSON, CSV, text; curves; one HTML page |
+
+mod chart;
+mod feature;
+mod frequency;
+mod histogram;
+mod measure;
+mod noise;
+mod page;
+mod regions;
+mod sets;
+mod source;
+mod table;
+mod window;
+
+pub use feature::{Feature, Pool};
+pub use histogram::Histogram;
+pub use sets::{Distance, FILES, Gap, LARGE, Options, Set};
+pub use source::{Photo, photos};
+pub use window::Window;

@@ -1,0 +1,103 @@
+//! The noise of a camera, as far as one picture shows it.
+//!
+//! Differences of second differences, rows and columns alike (Immerkaer 1996), answer to noise and to nothing that is straight in either
+//! direction; of white noise with deviation σ they have 6 σ. They are taken in blocks that are flat at a coarser scale, and their median
+//! stands for them (σ = median / 0.6745, as of a normal distribution), so that edges do not count. Texture of the size of a pixel counts:
+//! no single picture tells it from noise.
+
+/// Side of a block, and of the cells in it whose means tell how flat it is, pixels.
+const BLOCK: (usize, usize) = (16, 4);
+/// Share of blocks that is flat.
+const FLAT: f64 = 0.2;
+/// Means of blocks that may be measured: darker and brighter ones are cut off and have no noise. Coded, 0 to 255.
+const USABLE: std::ops::RangeInclusive<f32> = 4.0..=251.0;
+/// Median of the absolute value of a standard normal.
+const MEDIAN: f64 = 0.674_489_75;
+
+/// σ of a picture's noise in the values' unit; `None` where it holds no block that is neither black nor white.
+pub(super) fn level(values: &[f32], (width, height): (usize, usize)) -> Option<f64> {
+    let at = |x: usize, y: usize| values[y * width + x];
+    // Blocks keep off the edge by a pixel, for the mask.
+    let blocks = (1..height.saturating_sub(BLOCK.0)).step_by(BLOCK.0).flat_map(|y| {
+        let columns = (1..width.saturating_sub(BLOCK.0)).step_by(BLOCK.0);
+        columns.map(move |x| (x, y))
+    });
+    let mut rough: Vec<(f32, usize, usize)> = blocks
+        .filter_map(|(x, y)| {
+            let (mean, spread) = means(&at, x, y);
+            USABLE.contains(&mean).then_some((spread, x, y))
+        })
+        .collect();
+    rough.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.2, a.1).cmp(&(b.2, b.1))));
+    rough.truncate(((rough.len() as f64 * FLAT).ceil() as usize).max(1));
+    let mut answers = vec![0_u64; (16.0 * 255.0) as usize + 2];
+    for (_, left, top) in &rough {
+        for (x, y) in (*top..top + BLOCK.0).flat_map(|y| (*left..left + BLOCK.0).map(move |x| (x, y))) {
+            let row = |y: usize| at(x - 1, y) - 2.0 * at(x, y) + at(x + 1, y);
+            answers[(row(y - 1) - 2.0 * row(y) + row(y + 1)).abs().round() as usize] += 1;
+        }
+    }
+    Some(median(&answers)? / (6.0 * MEDIAN))
+}
+
+/// Median of values that were rounded to their places, spread evenly over what is rounded to one; 0 where most are 0, `None` of none.
+fn median(counts: &[u64]) -> Option<f64> {
+    let half = 0.5 * counts.iter().sum::<u64>() as f64;
+    let mut below = 0.0;
+    for (value, n) in counts.iter().enumerate() {
+        let n = *n as f64;
+        if n > 0.0 && below + n >= half {
+            return Some(if value == 0 { 0.0 } else { value as f64 - 0.5 + (half - below) / n });
+        }
+        below += n;
+    }
+    None
+}
+
+/// Mean of a block, and the variance of its cells' means.
+fn means(at: &impl Fn(usize, usize) -> f32, left: usize, top: usize) -> (f32, f32) {
+    let (side, cell) = BLOCK;
+    let cells = (side / cell) * (side / cell);
+    let (mut sum, mut squares) = (0.0, 0.0);
+    for k in 0..cells {
+        let (x0, y0) = (left + k % (side / cell) * cell, top + k / (side / cell) * cell);
+        let mean = (0..cell * cell).map(|p| at(x0 + p % cell, y0 + p / cell)).sum::<f32>() / (cell * cell) as f32;
+        sum += mean;
+        squares += mean * mean;
+    }
+    let mean = sum / cells as f32;
+    (mean, (squares / cells as f32 - mean * mean).max(0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::rng::{Purpose, Stream};
+
+    /// A slope and an edge around flat ground do not count as noise.
+    #[test]
+    fn sigma_is_found_again() {
+        let (width, height) = (320, 240);
+        for sigma in [0.8, 3.0, 9.0] {
+            let mut stream = Stream::of(5, 0, Purpose::Test, 2);
+            let values: Vec<f32> = (0..width * height)
+                .map(|k| {
+                    let (x, y) = ((k % width) as f32, (k / width) as f32);
+                    let scene = if x > 200.0 { 140.0 } else { 70.0 + 0.1 * y };
+                    (scene + sigma * stream.normal() as f32).round()
+                })
+                .collect();
+            // Rounding to whole values adds a variance of 1/12.
+            let expected = (f64::from(sigma).powi(2) + 1.0 / 12.0).sqrt();
+            let found = level(&values, (width, height)).unwrap();
+            assert!((found / expected - 1.0).abs() < 0.05, "{found} for {expected}");
+        }
+    }
+
+    #[test]
+    fn black_white_and_tiny_pictures_tell_nothing() {
+        assert_eq!(level(&[255.0; 64 * 64], (64, 64)), None);
+        assert_eq!(level(&[90.0; 64], (8, 8)), None);
+        assert_eq!(level(&[90.0; 64 * 64], (64, 64)), Some(0.0));
+    }
+}

@@ -1,0 +1,154 @@
+//! Distances as JSON and CSV for programs, as text for people.
+
+use super::feature::Pool;
+use super::frequency;
+use super::sets::{Distance, Gap, Set};
+use crate::compare::table::columns;
+use crate::html::{count, number};
+use crate::{Error, Result};
+use serde::Serialize;
+use std::fmt::Write;
+
+#[derive(Serialize)]
+struct Document<'a> {
+    furrow: &'static str,
+    real: About<'a>,
+    synthetic: About<'a>,
+    /// Middles of the bands of `spectrum`, cycles a pixel.
+    frequencies: Vec<f64>,
+    distances: Vec<Row>,
+    warnings: &'a [String],
+}
+
+#[derive(Serialize)]
+struct About<'a> {
+    name: &'a str,
+    images: usize,
+    labelled: usize,
+    near_infrared: usize,
+}
+
+#[derive(Serialize)]
+struct Row {
+    key: String,
+    unit: &'static str,
+    distance: f64,
+    halves: Option<f64>,
+    /// `null` too where it is infinite: halves do not differ at all.
+    ratio: Option<f64>,
+    large: bool,
+    real_mean: Vec<f64>,
+    synthetic_mean: Vec<f64>,
+}
+
+impl<'a> About<'a> {
+    fn of(set: &'a Set) -> Self {
+        Self {
+            name: &set.name,
+            images: set.photos.len(),
+            labelled: set.photos.iter().filter(|photo| photo.labels.is_some()).count(),
+            near_infrared: set.photos.iter().filter(|photo| photo.nir.is_some()).count(),
+        }
+    }
+}
+
+fn rows(of: &Gap) -> Vec<Row> {
+    let row = |distance: &Distance| Row {
+        key: distance.feature.key(),
+        unit: distance.feature.unit(),
+        distance: distance.distance,
+        halves: distance.halves,
+        ratio: distance.ratio().filter(|ratio| ratio.is_finite()),
+        large: distance.is_large(),
+        real_mean: means(&of.real, distance),
+        synthetic_mean: means(&of.synthetic, distance),
+    };
+    of.distances.iter().map(row).collect()
+}
+
+fn means(set: &Set, distance: &Distance) -> Vec<f64> {
+    set.pools.get(&distance.feature).map(Pool::means).unwrap_or_default()
+}
+
+/// All of it; `null` is what does not exist.
+pub(super) fn json(of: &Gap) -> Result<String> {
+    let document = Document {
+        furrow: env!("CARGO_PKG_VERSION"),
+        real: About::of(&of.real),
+        synthetic: About::of(&of.synthetic),
+        frequencies: of.tile.map(frequency::frequencies).unwrap_or_default(),
+        distances: rows(of),
+        warnings: &of.warnings,
+    };
+    let text = serde_json::to_string_pretty(&document);
+    text.map(|text| text + "\n").map_err(|e| Error::Compare(format!("cannot write figures as JSON: {e}")))
+}
+
+/// A row for each distance; means of several channels are apart by spaces.
+pub(super) fn csv(of: &Gap) -> String {
+    let mut out = "feature,unit,distance,halves,ratio,large,real_mean,synthetic_mean\n".to_owned();
+    let value = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
+    let list = |values: &[f64]| values.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
+    for (row, distance) in rows(of).iter().zip(&of.distances) {
+        let (halves, ratio) = (value(row.halves), value(distance.ratio()));
+        let (real, synthetic) = (list(&row.real_mean), list(&row.synthetic_mean));
+        let (key, unit) = (&row.key, row.unit);
+        let _ = writeln!(out, "{key},{unit},{},{halves},{ratio},{},{real},{synthetic}", row.distance, row.large);
+    }
+    out
+}
+
+/// The table, then what is large.
+pub(super) fn text(of: &Gap) -> String {
+    let head = ["", "distance", "halves", "ratio", "real", "synthetic"].map(str::to_owned).to_vec();
+    let row = |distance: &Distance| [vec![named(distance)], cells(of, distance)].concat();
+    let rows: Vec<Vec<String>> = [head].into_iter().chain(of.distances.iter().map(row)).collect();
+    columns(&rows) + "\n" + &verdict(of) + "\n"
+}
+
+/// Feature and unit.
+pub(super) fn named(distance: &Distance) -> String {
+    let (name, unit) = (distance.feature.name(), distance.feature.unit());
+    if unit.is_empty() { name } else { format!("{name} [{unit}]") }
+}
+
+/// Distance, that of halves, their ratio, and the means of both sets, as people read them.
+pub(super) fn cells(of: &Gap, distance: &Distance) -> Vec<String> {
+    let ratio = distance.ratio().map(|ratio| if ratio.is_finite() { number(ratio) } else { "∞".into() });
+    let shown = |set: &Set| match set.pools.get(&distance.feature) {
+        Some(Pool::Power(_)) | None => "–".into(),
+        Some(pool) => pool.means().into_iter().map(tenths).collect::<Vec<_>>().join(" "),
+    };
+    let halves = distance.halves.map(number);
+    let missing = || "–".to_owned();
+    vec![
+        number(distance.distance),
+        halves.unwrap_or_else(missing),
+        ratio.unwrap_or_else(missing),
+        shown(&of.real),
+        shown(&of.synthetic),
+    ]
+}
+
+/// Means: a tenth is enough of large ones.
+fn tenths(value: f64) -> String {
+    let text = if value.abs() < 10.0 { format!("{value:.2}") } else { format!("{value:.1}") };
+    text.replace('-', "−")
+}
+
+/// Which distances are large, in a sentence.
+pub(super) fn verdict(of: &Gap) -> String {
+    let judged = of.distances.iter().filter(|distance| distance.ratio().is_some()).count() as u64;
+    let mut large: Vec<&Distance> = of.distances.iter().filter(|distance| distance.is_large()).collect();
+    large.sort_by(|a, b| b.ratio().unwrap_or(0.0).total_cmp(&a.ratio().unwrap_or(0.0)));
+    let names: Vec<String> = large.iter().map(|distance| distance.feature.name()).collect();
+    let all = count(judged, "distance", "distances");
+    match names.len() {
+        0 => format!("None of {all} is more than twice that of two halves of the real set."),
+        1 => format!("1 of {all} is more than twice that of two halves of the real set: {}.", names[0]),
+        n => format!(
+            "{n} of {all} are more than twice those of two halves of the real set, the largest first: {}.",
+            names.join("; ")
+        ),
+    }
+}

@@ -1,0 +1,171 @@
+//! `trace compare --real … --synthetic …`: distances of sets are what was done to them, and what cannot be compared is told.
+//!
+//! Rationale: scenes are tuned by these numbers. Expected: none between a set and itself; a known shift gives its size; sets of one kind
+//! are as far apart as halves of one; the same files whatever the threads; one clear error, exit code 2 and nothing written where folders
+//! hold no sets. Source: closed forms of what is drawn here.
+
+mod common;
+
+use common::program::trace;
+use furrow::compare::Region;
+use furrow::compare::gap::{Distance, FILES, Feature, Gap, Options};
+use furrow::output::{Picture as Png, write_png};
+use furrow::sampling::{Purpose, Stream};
+use serde_json::Value;
+use std::path::Path;
+use std::process::Output;
+
+const SIZE: (u32, u32) = (96, 64);
+
+/// A set as people lay it out: brown ground with green squares, their number, size and colour from a stream; with labels and near infrared.
+fn set(folder: &Path, seed: u64, pictures: u64, lift: i32) {
+    let (width, height) = SIZE;
+    for name in ["images", "labels", "nir"] {
+        std::fs::create_dir_all(folder.join(name)).unwrap();
+    }
+    for k in 0..pictures {
+        let mut stream = Stream::of(seed, k, Purpose::Test, 0);
+        let (light, green) = (stream.range(0.8, 1.2), stream.range(90.0, 140.0));
+        let squares: Vec<(u32, u32, u32, u8)> = (0..2 + stream.index(4))
+            .map(|_| {
+                let side = 4 + stream.index(12) as u32;
+                let class = if stream.chance(0.6) { 1 } else { 2 };
+                (stream.index(80) as u32, stream.index(48) as u32, side, class)
+            })
+            .collect();
+        let label = |x: u32, y: u32| {
+            let inside = |(l, t, s, _): &&(u32, u32, u32, u8)| (*l..l + s).contains(&x) && (*t..t + s).contains(&y);
+            squares.iter().find(inside).map_or(0, |square| square.3)
+        };
+        let labels: Vec<u8> = (0..width * height).map(|p| label(p % width, p / width)).collect();
+        let mut code = |mean: f64| ((light * mean + 6.0 * stream.normal()) as i32 + lift).clamp(0, 255) as u8;
+        let mut pixel = |label: u8| if label == 0 { [100.0, 80.0, 60.0] } else { [60.0, green, 40.0] }.map(&mut code);
+        let rgb: Vec<[u8; 3]> = labels.iter().map(|label| pixel(*label)).collect();
+        let nir: Vec<u8> = labels.iter().map(|label| if *label == 0 { 110 } else { 200 }).collect();
+        let write = |part: &str, picture: &Png<'_>| {
+            write_png(&folder.join(format!("{part}/{k:03}.png")), width, height, picture, "").unwrap();
+        };
+        write("images", &Png::Rgb(&rgb));
+        write("nir", &Png::Gray(&nir));
+        write("labels", &Png::Gray(&labels));
+    }
+}
+
+fn compared(real: &Path, synthetic: &Path) -> Gap {
+    Gap::of(real, synthetic, &Options { shown: 0 }, &|_| (), &|| ()).unwrap()
+}
+
+fn run(folder: &Path, arguments: &[&str]) -> Output {
+    trace(&["compare", "--out", "out"]).current_dir(folder).args(arguments).output().unwrap()
+}
+
+#[test]
+fn a_set_is_no_distance_from_itself() {
+    let folder = tempfile::tempdir().unwrap();
+    set(folder.path(), 1, 4, 0);
+    let gap = compared(folder.path(), folder.path());
+    let measured: Vec<Feature> = gap.distances.iter().map(|d| d.feature).collect();
+    assert_eq!(measured, Feature::all(), "everything is measured where labels and near infrared are there");
+    for Distance { feature, distance, halves } in &gap.distances {
+        assert_eq!(*distance, 0.0, "{feature:?}");
+        assert!(halves.is_some());
+    }
+    assert!(gap.warnings.is_empty(), "{:?}", gap.warnings);
+}
+
+/// L* of gray is 116 f(Y) − 16, of which ten more are a Wasserstein distance of 10 in one channel of three, and no distance in structure.
+#[test]
+fn a_shift_in_lightness_is_its_distance() {
+    let folder = tempfile::tempdir().unwrap();
+    let code = |l: f64| {
+        let y = ((l + 16.0) / 116.0).powi(3);
+        (255.0 * (1.055 * y.powf(1.0 / 2.4) - 0.055)).round() as u8
+    };
+    for (name, lift) in [("a", 0.0), ("b", 10.0)] {
+        std::fs::create_dir(folder.path().join(name)).unwrap();
+        for k in 0..3 {
+            let l = |p: u32| 30.0 + f64::from((p * 7 + k * 13) % 400) / 10.0 + lift;
+            let rgb: Vec<[u8; 3]> = (0..64 * 64).map(|p| [code(l(p)); 3]).collect();
+            write_png(&folder.path().join(format!("{name}/{k}.png")), 64, 64, &Png::Rgb(&rgb), "").unwrap();
+        }
+    }
+    let gap = compared(&folder.path().join("a"), &folder.path().join("b"));
+    let color = gap.distance(Feature::Color(Region::All)).unwrap();
+    assert!((3.0 * color.distance - 10.0).abs() < 0.15, "{}", color.distance);
+    assert!(gap.distance(Feature::Color(Region::Crop)).is_none() && gap.distance(Feature::Ndvi(Region::All)).is_none());
+    assert!(color.is_large());
+}
+
+/// Two sets of one kind, as large as each other: halves of one are smaller, so a little further apart.
+#[test]
+fn sets_of_one_kind_are_as_near_as_halves() {
+    let folder = tempfile::tempdir().unwrap();
+    let [a, b, far] = ["a", "b", "far"].map(|name| folder.path().join(name));
+    set(&a, 1, 24, 0);
+    set(&b, 2, 24, 0);
+    set(&far, 3, 24, 40);
+    let near = compared(&a, &b);
+    let mut ratios: Vec<f64> = near.distances.iter().filter_map(Distance::ratio).collect();
+    ratios.sort_by(f64::total_cmp);
+    let median = ratios[ratios.len() / 2];
+    assert!((0.4..1.4).contains(&median), "{ratios:?}");
+    assert!(ratios[ratios.len() - 1] < 4.0, "{ratios:?}");
+    let far = compared(&a, &far);
+    for feature in [Feature::Exposure, Feature::Color(Region::Soil), Feature::Color(Region::Crop)] {
+        assert!(far.distance(feature).unwrap().is_large(), "{feature:?}");
+    }
+    assert!(!far.distance(Feature::Cover(Region::Vegetation)).unwrap().is_large());
+}
+
+#[test]
+fn files_say_the_same_whatever_the_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    set(&folder.path().join("real"), 1, 5, 0);
+    set(&folder.path().join("made"), 2, 3, 20);
+    let read = |threads: &str| {
+        let output = run(folder.path(), &["--real", "real", "--synthetic", "made", "--threads", threads]);
+        let words = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success(), "{words}");
+        assert!(words.contains("| exposure [stops]") && words.contains("of two halves of the real set"), "{words}");
+        FILES.map(|name| std::fs::read_to_string(folder.path().join("out").join(name)).unwrap())
+    };
+    let (one, two) = (read("1"), read("2"));
+    assert_eq!(one, two);
+    let [json, csv, page] = one;
+    let json: Value = serde_json::from_str(&json).unwrap();
+    let distances = json["distances"].as_array().unwrap();
+    assert_eq!((json["real"]["images"].as_u64(), json["synthetic"]["labelled"].as_u64()), (Some(5), Some(3)));
+    assert_eq!((distances.len(), csv.lines().count()), (Feature::all().len(), Feature::all().len() + 1));
+    for (row, line) in distances.iter().zip(csv.lines().skip(1)) {
+        let cells: Vec<&str> = line.split(',').collect();
+        assert_eq!(row["key"].as_str(), Some(cells[0]));
+        assert_eq!(row["distance"].as_f64(), cells[2].parse().ok(), "{line}");
+    }
+    // Nothing is asked of a network; a part of each picture is there, and curves.
+    assert!(!page.contains("http") && page.matches("<img").count() == 2 * 8 - 2 && page.contains("<polyline"));
+}
+
+#[test]
+fn what_is_no_set_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    set(&folder.path().join("good"), 1, 2, 0);
+    set(&folder.path().join("bad"), 1, 2, 0);
+    std::fs::create_dir(folder.path().join("empty")).unwrap();
+    write_png(&folder.path().join("bad/labels/001.png"), 8, 8, &Png::Gray(&[0; 64]), "").unwrap();
+    for (real, synthetic, words) in [
+        ("good", "nothing", "--synthetic nothing: there is no such folder"),
+        ("empty", "good", "--real empty: there is no PNG or JPEG in this folder"),
+        ("good/images/000.png", "good", "this is no folder"),
+        ("bad", "good", "001.png: it has 8 × 8 pixels, its picture 96 × 64"),
+    ] {
+        let output = run(folder.path(), &["--real", real, "--synthetic", synthetic]);
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{told}");
+        assert!(told.contains(words), "{told}");
+    }
+    for arguments in [&["--real", "good"][..], &["good"], &["good", "bad", "--real", "good", "--synthetic", "bad"], &[]]
+    {
+        assert_eq!(run(folder.path(), arguments).status.code(), Some(2), "{arguments:?}");
+    }
+    assert!(!folder.path().join("out").exists());
+}
