@@ -43,6 +43,18 @@ impl AlphaMask {
         Self { width, height, tiles_x, tiles }
     }
 
+    /// The same mask without the texels for which `gone` is true of their middle, as uv.
+    #[must_use]
+    pub fn without(&self, gone: impl Fn(Vec2) -> bool) -> Self {
+        let middle = |x: u32, y: u32| vec2((x as f32 + 0.5) / self.width as f32, (y as f32 + 0.5) / self.height as f32);
+        Self::new(self.width, self.height, |x, y| self.texel(x as i32, y as i32) && !gone(middle(x, y)))
+    }
+
+    /// Number of opaque texels.
+    pub fn count(&self) -> u64 {
+        self.tiles.iter().map(|t| u64::from(t.count_ones())).sum()
+    }
+
     /// Width and height in texels.
     pub fn size(&self) -> (u32, u32) {
         (self.width, self.height)

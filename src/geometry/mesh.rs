@@ -89,6 +89,65 @@ impl Mesh {
         }
     }
 
+    /// The pieces that share no corner, in the order of their first triangles; corners that no triangle has are dropped.
+    pub fn pieces(&self) -> Vec<Self> {
+        let mut of: Vec<u32> = (0..self.positions.len() as u32).collect();
+        let root = |of: &mut Vec<u32>, mut i: u32| {
+            while of[i as usize] != i {
+                of[i as usize] = of[of[i as usize] as usize];
+                i = of[i as usize];
+            }
+            i
+        };
+        for t in &self.triangles {
+            let roots = t.map(|i| root(&mut of, i));
+            let least = roots.into_iter().min().unwrap_or(0);
+            roots.into_iter().for_each(|r| of[r as usize] = least);
+        }
+        let mut pieces: Vec<Self> = Vec::new();
+        // Piece of each root, and place of each corner in its piece.
+        let (mut piece, mut place) = (vec![u32::MAX; of.len()], vec![u32::MAX; of.len()]);
+        for t in &self.triangles {
+            let root = root(&mut of, t[0]) as usize;
+            if piece[root] == u32::MAX {
+                piece[root] = pieces.len() as u32;
+                pieces.push(Self::default());
+            }
+            let into = &mut pieces[piece[root] as usize];
+            let corners = t.map(|i| {
+                let i = i as usize;
+                if place[i] == u32::MAX {
+                    place[i] = into.positions.len() as u32;
+                    into.positions.push(self.positions[i]);
+                    into.normals.push(self.normals[i]);
+                    into.uvs.push(self.uvs[i]);
+                }
+                place[i]
+            });
+            into.triangles.push(corners);
+        }
+        pieces
+    }
+
+    /// Mean lengths of ∂p/∂u and ∂p/∂v by area, metres: how large the texture's image lies on the mesh. `None` where it does not.
+    pub fn image_size(&self) -> Option<Vec2> {
+        let (mut sum, mut total) = (Vec2::ZERO, 0.0);
+        for t in &self.triangles {
+            let [a, b, c] = t.map(|i| i as usize);
+            let (e1, e2) = (self.positions[b] - self.positions[a], self.positions[c] - self.positions[a]);
+            let (t1, t2) = (self.uvs[b] - self.uvs[a], self.uvs[c] - self.uvs[a]);
+            let determinant = t1.perp_dot(t2);
+            if determinant.abs() > 1e-12 {
+                let area = e1.cross(e2).length();
+                let u = ((e1 * t2.y - e2 * t1.y) / determinant).length();
+                let v = ((e2 * t1.x - e1 * t2.x) / determinant).length();
+                sum += Vec2::new(u, v) * area;
+                total += area;
+            }
+        }
+        (total > 0.0).then(|| sum / total)
+    }
+
     /// Adds another mesh's triangles.
     pub fn append(&mut self, other: &Self) {
         let base = self.positions.len() as u32;
