@@ -5,7 +5,7 @@
 //! |---|---|
 //! | yellow, s | Cab × (1 − 0.85 s), Car × (1 − 0.45 s), N + 0.15 s: chlorophyll goes before carotenoids |
 //! | dead | N 2.2, Cab 1, Car 2, brown 1.1, water 0.003 cm |
-//! | rim | brown 0.5, anthocyanin + 10, Cab × 0.3 |
+//! | rim | brown 0.9, anthocyanin + 10, Cab × 0.3 |
 //! | red | anthocyanin as the condition has it |
 //!
 //! Sources: Féret et al. 2017 (PROSPECT-D) for what pigments do; contents are estimates. A place of a picture keeps its own
@@ -61,7 +61,7 @@ impl Tones {
         let more = |anthocyanin: f64| Num::new(base.anthocyanin.get() + anthocyanin);
         let rim = Pigments {
             chlorophyll: Num::new(base.chlorophyll.get() * 0.3),
-            brown: Num::new(0.5),
+            brown: Num::new(0.9),
             anthocyanin: more(10.0),
             ..*base
         };
