@@ -50,6 +50,27 @@ impl AlphaMask {
         Self::new(self.width, self.height, |x, y| self.texel(x as i32, y as i32) && !gone(middle(x, y)))
     }
 
+    /// What of it hangs together with its foot, the lowest opaque texel of the middle column: what was cut off has fallen.
+    #[must_use]
+    pub fn hanging(&self) -> Self {
+        let (w, h) = (self.width as i32, self.height as i32);
+        let Some(foot) = (0..h).rev().find(|y| self.texel(w / 2, *y)) else { return self.clone() };
+        let place = |x: i32, y: i32| (y * w + x) as usize;
+        let mut kept = vec![false; (w * h) as usize];
+        let mut open = vec![(w / 2, foot)];
+        kept[place(w / 2, foot)] = true;
+        while let Some((x, y)) = open.pop() {
+            for (nx, ny) in [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)] {
+                // `texel` is false outside, so the place is asked for inside only.
+                if self.texel(nx, ny) && !kept[place(nx, ny)] {
+                    kept[place(nx, ny)] = true;
+                    open.push((nx, ny));
+                }
+            }
+        }
+        Self::new(self.width, self.height, |x, y| kept[place(x as i32, y as i32)])
+    }
+
     /// Number of opaque texels.
     pub fn count(&self) -> u64 {
         self.tiles.iter().map(|t| u64::from(t.count_ones())).sum()
@@ -192,6 +213,17 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn what_is_cut_off_falls() {
+        let mask = disc();
+        assert_eq!(mask.hanging(), mask);
+        // A cut through the middle: the lower half has the foot.
+        let cut = mask.without(|uv| (uv.y - 0.47).abs() < 0.04);
+        let left = cut.hanging();
+        assert!(left.count() < cut.count() && left.texel(18, 35) && !left.texel(18, 15));
+        assert!((left.count() as f32 / cut.count() as f32 - 0.5).abs() < 0.1);
     }
 
     #[test]

@@ -157,3 +157,33 @@ impl Mesh {
         self.triangles.extend(other.triangles.iter().map(|t| t.map(|i| i + base)));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{vec2, vec3};
+
+    fn square(at: f32, side: f32) -> Mesh {
+        let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
+        let positions = corners.map(|(x, y)| vec3(at + side * x, 0.5 * side * y, 0.0)).to_vec();
+        Mesh::smooth(positions, corners.map(|(x, y)| vec2(x, y)).to_vec(), vec![[0, 1, 2], [0, 2, 3]])
+    }
+
+    #[test]
+    fn pieces_are_what_was_put_together() {
+        let (a, b) = (square(0.0, 1.0), square(3.0, 2.0));
+        let mut both = a.clone();
+        both.append(&b);
+        assert_eq!(both.pieces(), [a.clone(), b]);
+        assert_eq!(a.pieces(), std::slice::from_ref(&a));
+    }
+
+    #[test]
+    fn an_image_is_as_large_as_it_lies() {
+        let size = square(0.0, 0.4).image_size().unwrap();
+        assert!((size - vec2(0.4, 0.2)).length() < 1e-6, "{size}");
+        let mut bare = square(0.0, 1.0);
+        bare.uvs.fill(Vec2::ZERO);
+        assert_eq!(bare.image_size(), None);
+    }
+}

@@ -234,6 +234,7 @@ mod tests {
         let bearer = Bearer {
             age: 1.0,
             cotyledon: false,
+            share: 1.0,
             height: 0.0,
             image_mm: vec2(60.0, 100.0),
             mask: None,

@@ -35,6 +35,8 @@ pub struct Bearer<'a> {
     pub age: f32,
     /// Whether it is a seed leaf.
     pub cotyledon: bool,
+    /// Share of the leaf that it is: a leaflet is one of several.
+    pub share: f32,
     /// Height of its middle over the soil, metres.
     pub height: f32,
     /// Width and height of its image on it, mm.
@@ -137,9 +139,10 @@ impl Marks {
     pub fn draw(desc: &ConditionDesc, condition: &Condition, bearer: &Bearer<'_>, stream: &Stream) -> Self {
         let of = |k: u64| stream.child(Purpose::Condition, k);
         let worn = lerp(YOUNG, 1.0, bearer.age);
+        let often = worn * bearer.share;
         let on_leaf = |radii: &Vary<Positive>, mean: f32, k: u64| {
             let mut s = of(k);
-            let n = s.poisson(f64::from(mean * worn));
+            let n = s.poisson(f64::from(mean * often));
             (0..n).filter_map(|_| patch(bearer, radii, &mut s)).collect::<Vec<Patch>>()
         };
         let mut holes = on_leaf(&desc.hole_mm, condition.holes, 1);
@@ -147,11 +150,11 @@ impl Marks {
         holes.extend(on_leaf(&desc.shot_hole_mm, shots, 2));
         let whole = holes.len();
         let mut s = of(3);
-        for _ in 0..s.poisson(f64::from(condition.bites * worn)) {
+        for _ in 0..s.poisson(f64::from(condition.bites * often)) {
             bite(bearer, &desc.bite_mm, &mut holes, &mut s);
         }
         let mut s = of(4);
-        let tears = (0..s.poisson(f64::from(condition.tears * worn))).filter_map(|_| tear(bearer, &mut s)).collect();
+        let tears = (0..s.poisson(f64::from(condition.tears * often))).filter_map(|_| tear(bearer, &mut s)).collect();
         let low = (-bearer.height.max(0.0) / LOW).exp();
         let mut s = of(7);
         let uneven = |s: &mut Stream| (0.4 * s.normal() as f32).exp();
@@ -218,14 +221,16 @@ impl Marks {
             let p = self.place(uv);
             self.holes.iter().any(|h| h.at(p, &noise) < 1.0) || self.tears.iter().any(|t| t.holds(p, &noise))
         };
-        match mask {
+        let left = match mask {
             Some(mask) => mask.without(gone),
             None => {
                 // As fine as a drawn texture: about 6 texels a mm.
                 let texels = |mm: f32| ((mm * 6.0) as u32).clamp(64, 1024);
                 AlphaMask::new(texels(self.image_mm.x), texels(self.image_mm.y), |_, _| true).without(gone)
             }
-        }
+        };
+        // Holes seldom cut anything off; bites and tears may.
+        if self.bites > 0 || !self.tears.is_empty() { left.hanging() } else { left }
     }
 
     /// The noise that [`Marks::tissue`] asks for; slow to make, so make it once.
@@ -371,7 +376,7 @@ mod tests {
     }
 
     fn leaf(mask: &AlphaMask) -> Bearer<'_> {
-        Bearer { age: 1.0, cotyledon: false, height: 0.0, image_mm: IMAGE, mask: Some(mask), margin: None }
+        Bearer { age: 1.0, cotyledon: false, share: 1.0, height: 0.0, image_mm: IMAGE, mask: Some(mask), margin: None }
     }
 
     fn stream(k: u64) -> Stream {

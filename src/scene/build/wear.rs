@@ -74,10 +74,11 @@ impl<'a> Ailing<'a> {
             Some(_) if blade && bare.choice.pictured => grown.part.mesh.pieces(),
             _ => vec![grown.part.mesh.clone()],
         };
+        let share = 1.0 / pieces.len().max(1) as f32;
         let mut dressed = Vec::with_capacity(pieces.len());
         for (k, mesh) in pieces.into_iter().enumerate() {
             let of_piece = stream.child(Purpose::Condition, 100 + k as u64);
-            let marks = blade.then(|| self.marks(&mesh, age, bare, &of_piece));
+            let marks = blade.then(|| self.marks(&mesh, (age, share), bare, &of_piece));
             let mut one = Grown { material: own.clone(), ..grown.with(mesh) };
             if let Some(marks) = marks.as_ref().filter(|m| m.cuts()) {
                 one.part.mask = Some(Arc::new(marks.cut(one.part.mask.as_deref())));
@@ -93,12 +94,13 @@ impl<'a> Ailing<'a> {
         dressed
     }
 
-    fn marks(&self, mesh: &Mesh, age: f32, bare: &Bare<'_>, stream: &Stream) -> Marks {
+    fn marks(&self, mesh: &Mesh, (age, share): (f32, f32), bare: &Bare<'_>, stream: &Stream) -> Marks {
         let middle = mesh.positions.iter().map(|p| p.z).sum::<f32>() / mesh.positions.len().max(1) as f32;
         let image = mesh.image_size().filter(|_| bare.choice.pictured);
         let bearer = Bearer {
             age,
             cotyledon: bare.kind == OrganKind::Cotyledon,
+            share,
             height: middle - bare.ground,
             image_mm: image.map_or(NO_IMAGE_MM, |size| (size * 1e3).max(Vec2::splat(0.1))),
             mask: bare.choice.mask.as_deref(),
