@@ -28,12 +28,12 @@ fn plants(size: (u32, u32), entries: &[(&str, u32, &str)]) -> Field {
     };
     let all: String = entries.iter().enumerate().map(entry).collect();
     let text = format!(
-        r#"Field(
+        "Field(
             seed: 12,
             camera: Pinhole(size: ({w}, {h}), intrinsics: FieldOfView(horizontal_deg: 34), pose: Nadir(height_m: 0.7)),
             lights: [Constant(radiance: (1, 1, 1, 1))],
             plants: [{all}],
-        )"#
+        )"
     );
     field(&text, &Options::default())
 }
@@ -73,7 +73,13 @@ fn labels_lose_what_is_eaten_and_nothing_else() {
     let before = {
         // Posture and width are drawn by an ordinary condition too: the meshes are those of the eaten plant.
         let parts = whole(&eaten, &flawless);
-        let scene = furrow::scene::Scene { parts, materials: Vec::new(), lights: Vec::new(), camera: camera.clone(), ..flawless.scene };
+        let scene = furrow::scene::Scene {
+            parts,
+            materials: Vec::new(),
+            lights: Vec::new(),
+            camera: *camera,
+            ..flawless.scene
+        };
         let geometry = EmbreeAccel::build(&scene.surfaces(), 1).expect("an accelerator");
         label(&geometry, &scene.parts, camera, window)
     };
@@ -108,7 +114,8 @@ fn labels_lose_what_is_eaten_and_nothing_else() {
     assert!(lost > 200 && lost < shown / 3, "{lost} of {shown}");
     // As much of the picture as of the masks: blades are seen at all angles, and overlap.
     let share = |parts: &[Part], of: &[Part]| {
-        let count = |parts: &[Part]| parts.iter().filter_map(|p| p.mask.as_ref()).map(|m| m.count()).sum::<u64>() as f64;
+        let count =
+            |parts: &[Part]| parts.iter().filter_map(|p| p.mask.as_ref()).map(|m| m.count()).sum::<u64>() as f64;
         1.0 - count(parts) / count(of)
     };
     let cut = share(&eaten.scene.parts, &whole(&eaten, &plants((48, 24), &[("sugar_beet", 16, "")])));

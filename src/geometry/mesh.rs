@@ -102,7 +102,9 @@ impl Mesh {
         for t in &self.triangles {
             let roots = t.map(|i| root(&mut of, i));
             let least = roots.into_iter().min().unwrap_or(0);
-            roots.into_iter().for_each(|r| of[r as usize] = least);
+            for r in roots {
+                of[r as usize] = least;
+            }
         }
         let mut pieces: Vec<Self> = Vec::new();
         // Piece of each root, and place of each corner in its piece.

@@ -25,9 +25,9 @@ const STEPS: usize = 12;
 /// Share of soil above which no wax of the leaf is seen.
 const BURIED: f32 = 0.5;
 /// Width of the strip along veins that keeps its green, and of what it is told from, mm.
-const VEIN_MM: (f32, f32) = (0.8, 7.0);
+const VEIN_MM: (f32, f32) = (1.6, 9.0);
 /// How much paler than its surroundings a vein's strip is.
-const VEIN_CONTRAST: (f32, f32) = (1.03, 1.25);
+const VEIN_CONTRAST: (f32, f32) = (1.015, 1.1);
 /// GGX roughness that full cover of dust adds.
 const DULL: f32 = 0.5;
 

@@ -16,8 +16,8 @@ use crate::geometry::Mesh;
 use crate::light::LightRecord;
 use crate::material::{Ground as GroundMaterial, GroundSkin, Material, Solid};
 use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3, vec2};
-use crate::page::Page;
 use crate::optics::soil::LOESS;
+use crate::page::Page;
 use crate::plant::{self, ConditionDesc, LeafAxis, OrganKind};
 use crate::sampling::place::Step;
 use crate::sampling::rng::mix;
@@ -602,7 +602,7 @@ fn grow(s: &Seedling, number: u16, floor: Option<Floor<'_>>, dust: Spectrum) -> 
             own: false,
         };
         match &ailing {
-            Some(ailing) => ailing.dress(grown, &bare),
+            Some(ailing) => ailing.dress(&grown, &bare),
             None => vec![grown],
         }
     });

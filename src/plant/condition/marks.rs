@@ -221,13 +221,12 @@ impl Marks {
             let p = self.place(uv);
             self.holes.iter().any(|h| h.at(p, &noise) < 1.0) || self.tears.iter().any(|t| t.holds(p, &noise))
         };
-        let left = match mask {
-            Some(mask) => mask.without(gone),
-            None => {
-                // As fine as a drawn texture: about 6 texels a mm.
-                let texels = |mm: f32| ((mm * 6.0) as u32).clamp(64, 1024);
-                AlphaMask::new(texels(self.image_mm.x), texels(self.image_mm.y), |_, _| true).without(gone)
-            }
+        let left = if let Some(mask) = mask {
+            mask.without(gone)
+        } else {
+            // As fine as a drawn texture: about 6 texels a mm.
+            let texels = |mm: f32| ((mm * 6.0) as u32).clamp(64, 1024);
+            AlphaMask::new(texels(self.image_mm.x), texels(self.image_mm.y), |_, _| true).without(gone)
         };
         // Holes seldom cut anything off; bites and tears may.
         if self.bites > 0 || !self.tears.is_empty() { left.hanging() } else { left }
@@ -241,7 +240,8 @@ impl Marks {
     /// What the leaf is like at `uv`.
     pub fn tissue(&self, uv: Vec2, noise: &Perlin) -> Tissue {
         let p = self.place(uv);
-        let n = |scale: f32, shift: f32| noise.at2(f64::from(p.x / scale + shift), f64::from(p.y / scale - shift)) as f32;
+        let n =
+            |scale: f32, shift: f32| noise.at2(f64::from(p.x / scale + shift), f64::from(p.y / scale - shift)) as f32;
         let mut t = Tissue { shade: 1.0, ..Tissue::default() };
         if self.chlorosis > 0.0 {
             // Patchy over a cm or two.
@@ -340,7 +340,10 @@ fn edge(bearer: &Bearer<'_>, s: &mut Stream) -> Option<(Vec2, f32)> {
     let y = s.range32(0.12, 0.92) * bearer.image_mm.y;
     let half = 0.5 * bearer.image_mm.x;
     let steps = 200;
-    (0..steps).map(|i| vec2(side * half * (1.0 - i as f32 / steps as f32), y)).find(|p| there(bearer, *p)).map(|p| (p, side))
+    (0..steps)
+        .map(|i| vec2(side * half * (1.0 - i as f32 / steps as f32), y))
+        .find(|p| there(bearer, *p))
+        .map(|p| (p, side))
 }
 
 /// Mouthfuls side by side along the margin.

@@ -37,7 +37,8 @@ impl<'a> Posture<'a> {
             leaf.twist = (self.desc.twist_sd_deg.f32() * normal()).to_radians();
             if self.wilt > 0.0 {
                 // No two leaves of a plant are equally limp, and the youngest are the last to be.
-                let wilt = self.wilt * lerp(1.0, 0.4, f32::from(leaf.number) / f32::from(last)) * (0.35 * normal()).exp();
+                let wilt =
+                    self.wilt * lerp(1.0, 0.4, f32::from(leaf.number) / f32::from(last)) * (0.35 * normal()).exp();
                 droop(leaf, wilt.min(1.0));
             }
         }

@@ -57,7 +57,7 @@ impl<'a> Ailing<'a> {
     }
 
     /// The organ as its condition has it: one part, or one for each leaflet.
-    pub(super) fn dress(&self, grown: Grown, bare: &Bare<'_>) -> Vec<Grown> {
+    pub(super) fn dress(&self, grown: &Grown, bare: &Bare<'_>) -> Vec<Grown> {
         let leaf = grown.part.tag.leaf;
         let age = match leaf {
             0 => 1.0,
