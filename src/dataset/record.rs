@@ -2,6 +2,7 @@
 
 use super::rle::{Box2, Rle};
 use super::split::Split;
+use crate::plant::Condition;
 use crate::scene::tag::{Class, lowercase};
 use serde::{Deserialize, Serialize};
 
@@ -112,6 +113,9 @@ pub struct Grown {
     pub radius_m: f32,
     /// Number of its leaves, seed leaves included, seen or not.
     pub leaves: u16,
+    /// How far it was from flawless, where its page said so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<Condition>,
 }
 
 /// One leaf in an image.

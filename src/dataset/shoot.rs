@@ -212,5 +212,6 @@ fn described(grown: &PlantRecord) -> Grown {
         height_m: grown.height,
         radius_m: grown.radius,
         leaves: grown.leaves,
+        condition: grown.condition,
     }
 }

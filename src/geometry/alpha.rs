@@ -43,6 +43,39 @@ impl AlphaMask {
         Self { width, height, tiles_x, tiles }
     }
 
+    /// The same mask without the texels for which `gone` is true of their middle, as uv.
+    #[must_use]
+    pub fn without(&self, gone: impl Fn(Vec2) -> bool) -> Self {
+        let middle = |x: u32, y: u32| vec2((x as f32 + 0.5) / self.width as f32, (y as f32 + 0.5) / self.height as f32);
+        Self::new(self.width, self.height, |x, y| self.texel(x as i32, y as i32) && !gone(middle(x, y)))
+    }
+
+    /// What of it hangs together with its foot, the lowest opaque texel of the middle column: what was cut off has fallen.
+    #[must_use]
+    pub fn hanging(&self) -> Self {
+        let (w, h) = (self.width as i32, self.height as i32);
+        let Some(foot) = (0..h).rev().find(|y| self.texel(w / 2, *y)) else { return self.clone() };
+        let place = |x: i32, y: i32| (y * w + x) as usize;
+        let mut kept = vec![false; (w * h) as usize];
+        let mut open = vec![(w / 2, foot)];
+        kept[place(w / 2, foot)] = true;
+        while let Some((x, y)) = open.pop() {
+            for (nx, ny) in [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)] {
+                // `texel` is false outside, so the place is asked for inside only.
+                if self.texel(nx, ny) && !kept[place(nx, ny)] {
+                    kept[place(nx, ny)] = true;
+                    open.push((nx, ny));
+                }
+            }
+        }
+        Self::new(self.width, self.height, |x, y| kept[place(x as i32, y as i32)])
+    }
+
+    /// Number of opaque texels.
+    pub fn count(&self) -> u64 {
+        self.tiles.iter().map(|t| u64::from(t.count_ones())).sum()
+    }
+
     /// Width and height in texels.
     pub fn size(&self) -> (u32, u32) {
         (self.width, self.height)
@@ -180,6 +213,17 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn what_is_cut_off_falls() {
+        let mask = disc();
+        assert_eq!(mask.hanging(), mask);
+        // A cut through the middle: the lower half has the foot.
+        let cut = mask.without(|uv| (uv.y - 0.47).abs() < 0.04);
+        let left = cut.hanging();
+        assert!(left.count() < cut.count() && left.texel(18, 35) && !left.texel(18, 15));
+        assert!((left.count() as f32 / cut.count() as f32 - 0.5).abs() < 0.1);
     }
 
     #[test]

@@ -89,6 +89,67 @@ impl Mesh {
         }
     }
 
+    /// The pieces that share no corner, in the order of their first triangles; corners that no triangle has are dropped.
+    pub fn pieces(&self) -> Vec<Self> {
+        let mut of: Vec<u32> = (0..self.positions.len() as u32).collect();
+        let root = |of: &mut Vec<u32>, mut i: u32| {
+            while of[i as usize] != i {
+                of[i as usize] = of[of[i as usize] as usize];
+                i = of[i as usize];
+            }
+            i
+        };
+        for t in &self.triangles {
+            let roots = t.map(|i| root(&mut of, i));
+            let least = roots.into_iter().min().unwrap_or(0);
+            for r in roots {
+                of[r as usize] = least;
+            }
+        }
+        let mut pieces: Vec<Self> = Vec::new();
+        // Piece of each root, and place of each corner in its piece.
+        let (mut piece, mut place) = (vec![u32::MAX; of.len()], vec![u32::MAX; of.len()]);
+        for t in &self.triangles {
+            let root = root(&mut of, t[0]) as usize;
+            if piece[root] == u32::MAX {
+                piece[root] = pieces.len() as u32;
+                pieces.push(Self::default());
+            }
+            let into = &mut pieces[piece[root] as usize];
+            let corners = t.map(|i| {
+                let i = i as usize;
+                if place[i] == u32::MAX {
+                    place[i] = into.positions.len() as u32;
+                    into.positions.push(self.positions[i]);
+                    into.normals.push(self.normals[i]);
+                    into.uvs.push(self.uvs[i]);
+                }
+                place[i]
+            });
+            into.triangles.push(corners);
+        }
+        pieces
+    }
+
+    /// Mean lengths of ∂p/∂u and ∂p/∂v by area, metres: how large the texture's image lies on the mesh. `None` where it does not.
+    pub fn image_size(&self) -> Option<Vec2> {
+        let (mut sum, mut total) = (Vec2::ZERO, 0.0);
+        for t in &self.triangles {
+            let [a, b, c] = t.map(|i| i as usize);
+            let (e1, e2) = (self.positions[b] - self.positions[a], self.positions[c] - self.positions[a]);
+            let (t1, t2) = (self.uvs[b] - self.uvs[a], self.uvs[c] - self.uvs[a]);
+            let determinant = t1.perp_dot(t2);
+            if determinant.abs() > 1e-12 {
+                let area = e1.cross(e2).length();
+                let u = ((e1 * t2.y - e2 * t1.y) / determinant).length();
+                let v = ((e2 * t1.x - e1 * t2.x) / determinant).length();
+                sum += Vec2::new(u, v) * area;
+                total += area;
+            }
+        }
+        (total > 0.0).then(|| sum / total)
+    }
+
     /// Adds another mesh's triangles.
     pub fn append(&mut self, other: &Self) {
         let base = self.positions.len() as u32;
@@ -96,5 +157,35 @@ impl Mesh {
         self.normals.extend_from_slice(&other.normals);
         self.uvs.extend_from_slice(&other.uvs);
         self.triangles.extend(other.triangles.iter().map(|t| t.map(|i| i + base)));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{vec2, vec3};
+
+    fn square(at: f32, side: f32) -> Mesh {
+        let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
+        let positions = corners.map(|(x, y)| vec3(at + side * x, 0.5 * side * y, 0.0)).to_vec();
+        Mesh::smooth(positions, corners.map(|(x, y)| vec2(x, y)).to_vec(), vec![[0, 1, 2], [0, 2, 3]])
+    }
+
+    #[test]
+    fn pieces_are_what_was_put_together() {
+        let (a, b) = (square(0.0, 1.0), square(3.0, 2.0));
+        let mut both = a.clone();
+        both.append(&b);
+        assert_eq!(both.pieces(), [a.clone(), b]);
+        assert_eq!(a.pieces(), std::slice::from_ref(&a));
+    }
+
+    #[test]
+    fn an_image_is_as_large_as_it_lies() {
+        let size = square(0.0, 0.4).image_size().unwrap();
+        assert!((size - vec2(0.4, 0.2)).length() < 1e-6, "{size}");
+        let mut bare = square(0.0, 1.0);
+        bare.uvs.fill(Vec2::ZERO);
+        assert_eq!(bare.image_size(), None);
     }
 }

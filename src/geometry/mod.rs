@@ -2,6 +2,7 @@
 
 pub mod alpha;
 mod interaction;
+mod margin;
 pub mod mesh;
 pub mod outline;
 mod ray;
@@ -9,6 +10,7 @@ mod window;
 
 pub use alpha::AlphaMask;
 pub use interaction::Interaction;
+pub use margin::Margin;
 pub use mesh::Mesh;
 pub use ray::{Hit, Intersect, PACKET, Ray};
 pub use window::Window;

@@ -2,11 +2,12 @@
 
 use super::shading::{bump, grained_frame};
 use super::swatch::{Grain, Swatch, Tone, centre};
+use super::wear::{Wear, Worn};
 use super::{Feature, Varies};
 use crate::bsdf::{self, Bsdf, Side};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec2, Vec3};
-use crate::optics::{LeafOptics, Pigments};
+use crate::optics::{Leaf, LeafOptics, Pigments};
 use crate::sampling::vary::{Bound, Fraction, NonNegative, Num, Pick};
 use crate::texture::{Maps, Texture};
 use serde::{Deserialize, Serialize};
@@ -96,6 +97,8 @@ pub struct LeafMaterial {
     transmits: bool,
     /// Whether the picture gives the colour, not the pigments alone.
     pictured: bool,
+    /// What its condition has made of it.
+    wear: Option<Wear>,
 }
 
 impl LeafMaterial {
@@ -115,6 +118,7 @@ impl LeafMaterial {
             tint: Vec3::ONE,
             transmits: true,
             pictured: true,
+            wear: None,
         }
     }
 
@@ -123,6 +127,19 @@ impl LeafMaterial {
     pub fn with_chlorophyll(&self, base: f32, factor: f32) -> Self {
         let rgb = |c: f32| self.optics.with_chlorophyll(c).reflectance.0.truncate().max(Vec3::splat(1e-3));
         Self { tint: rgb(base * factor) / rgb(base), ..self.clone() }
+    }
+
+    /// The same leaf in a condition; `gloss` is a factor on the roughness of its upper side.
+    #[must_use]
+    pub fn worn(&self, wear: Wear, gloss: f32) -> Self {
+        let upper = match self.upper.coat() {
+            Some(coat) => {
+                let alpha = coat.alpha.map(|a| wear.dulled((a * gloss).clamp(0.02, 0.9)));
+                if alpha == coat.alpha { self.upper } else { Side::new(coat.ior, alpha, Spectrum::ZERO) }
+            }
+            None => self.upper,
+        };
+        Self { upper, wear: Some(wear), ..self.clone() }
     }
 
     pub(super) fn leave_out(&mut self, feature: Feature) {
@@ -140,6 +157,46 @@ impl LeafMaterial {
         self.optics.plain().reflectance.0.truncate()
     }
 
+    /// A place as its condition has it.
+    fn worn_at(&self, leaf: Leaf, uv: Vec2) -> Worn {
+        match &self.wear {
+            None => Worn { tissue: leaf, upper: leaf, waxy: true },
+            Some(wear) => {
+                let picture = self.picture.as_ref().filter(|_| self.pictured);
+                wear.at(leaf, uv, picture.map(|p| &p.color))
+            }
+        }
+    }
+
+    /// The swatch of a leaf in a condition: a picture of its own, tinted already.
+    fn worn_swatch<'a>(&'a self, picture: &'a Picture, wear: &Wear, roughness: f32) -> Swatch<'a> {
+        let size = wear.picture_size((picture.color.width(), picture.color.height()));
+        let lod = picture.color.lod(1.0 / size.0.max(size.1) as f32);
+        let tone = move |uv: Vec2| {
+            let [r, g, b, _] = picture.color.sample(uv, lod);
+            let leaf = self.optics.at((Vec3::new(r, g, b) * self.tint).to_array());
+            let Leaf { reflectance, transmittance } = self.worn_at(leaf, uv).upper;
+            Tone { reflectance, transmittance: if self.transmits { transmittance } else { Spectrum::ZERO } }
+        };
+        // The mean over what is opaque, of a grid of places.
+        let places = (0..1024).map(|i| Vec2::new((i % 32) as f32 + 0.5, (i / 32) as f32 + 0.5) / 32.0);
+        let there = |uv: &Vec2| picture.color.sample(*uv, lod)[3] > 0.5;
+        let (mut sum, mut count) = (Tone { reflectance: Spectrum::ZERO, transmittance: Spectrum::ZERO }, 0.0);
+        for uv in places.filter(there) {
+            let one = tone(uv);
+            sum.reflectance += one.reflectance;
+            sum.transmittance += one.transmittance;
+            count += 1.0;
+        }
+        let share = 1.0 / f32::max(count, 1.0);
+        let mean = Tone { reflectance: sum.reflectance * share, transmittance: sum.transmittance * share };
+        let key = [wear.key(), Arc::as_ptr(&self.optics) as usize];
+        Swatch::pictured(key, size, move |x, y| tone(centre(size, x, y)), mean, roughness)
+            .raised(move |x, y| picture.maps.normal.sample(centre(size, x, y), lod), self.relief)
+            .grained(move |x, y| Grain { open: picture.maps.occlusion.sample(centre(size, x, y), lod), film: 0.0 })
+            .paler_below(self.back_paleness)
+    }
+
     pub(super) fn swatch(&self) -> Swatch<'_> {
         let read = |color: Vec3| {
             let leaf = self.optics.at(color.to_array());
@@ -148,8 +205,14 @@ impl LeafMaterial {
         };
         let roughness = self.upper.coat().map_or(1.0, |coat| (coat.alpha[0] * coat.alpha[1]).sqrt());
         let Some(picture) = self.picture.as_ref().filter(|_| self.pictured) else {
-            return Swatch::plain(read(self.plain() * self.tint), roughness).paler_below(self.back_paleness);
+            let leaf = self.worn_at(self.optics.at((self.plain() * self.tint).to_array()), Vec2::splat(0.5)).upper;
+            let transmittance = if self.transmits { leaf.transmittance } else { Spectrum::ZERO };
+            let tone = Tone { reflectance: leaf.reflectance, transmittance };
+            return Swatch::plain(tone, roughness).paler_below(self.back_paleness);
         };
+        if let Some(wear) = &self.wear {
+            return self.worn_swatch(picture, wear, roughness);
+        }
         let color = |[r, g, b, _]: [f32; 4]| Vec3::new(r, g, b);
         let texel = move |x, y| read(color(picture.color.texel(x, y)));
         // The picture's coarsest level is its mean over what is opaque.
@@ -191,14 +254,15 @@ impl LeafMaterial {
                 (self.optics.at((color * self.tint).to_array()), bump(at, tangents, slope))
             }
         };
-        let upper = leaf.reflectance;
-        // The lower side scatters more visible light back, never more than the sheet has left.
+        let Worn { tissue, upper: leaf, waxy } = self.worn_at(leaf, at.uv);
+        // The lower side scatters more visible light back, never more than the sheet has left; no soil falls on it.
         let room = Spectrum::splat(0.99) - leaf.transmittance;
-        let [r, g, b, nir] = upper.to_array();
+        let [r, g, b, nir] = tissue.reflectance.to_array();
         let paler = Spectrum::new(r * self.back_paleness, g * self.back_paleness, b * self.back_paleness, nir);
         let lower = Spectrum(paler.0.min(room.0));
         let transmittance = if self.transmits { leaf.transmittance } else { Spectrum::ZERO };
-        let bsdf = bsdf::Leaf::new(self.upper.with(upper), self.lower.with(lower), transmittance);
+        let upper = if waxy { self.upper.with(leaf.reflectance) } else { Side::bare(leaf.reflectance) };
+        let bsdf = bsdf::Leaf::new(upper, self.lower.with(lower), transmittance);
         (Bsdf::Leaf(bsdf), grained_frame(at, normal, tangents.0, wo))
     }
 }

@@ -7,6 +7,7 @@ mod painted;
 mod shading;
 mod solid;
 pub mod swatch;
+mod wear;
 
 use crate::bsdf::Bsdf;
 use crate::geometry::Interaction;
@@ -17,6 +18,7 @@ pub use ground::{Ground, GroundSkin};
 pub use leaf::{LeafDesc, LeafMaterial, Picture};
 pub use painted::{Painted, Repaint};
 pub use solid::Solid;
+pub use wear::{Wear, tissues};
 
 /// What a part is made of.
 #[derive(Clone, Debug)]

@@ -143,7 +143,7 @@ fn stand(leaf: &LeafNow<'_>, seat: Seat, stream: &mut Stream) -> Pose {
 /// added to the joint's angle; so are the random bends.
 fn pose(skeleton: &mut Skeleton, leaf: &LeafNow<'_>, root: Pose, stream: &mut Stream) {
     let wobble = leaf.kind.wobble_deg.f32().to_radians();
-    let stalk_bend = leaf.kind.stalk_bend_deg.draw32(stream).to_radians();
+    let stalk_bend = leaf.kind.stalk_bend_deg.draw32(stream).to_radians() + leaf.arch;
     let base = skeleton.base();
     let along: Vec<f32> = skeleton.along().to_vec();
     let shape = |t: f32| match leaf.kind.shape {
@@ -211,7 +211,7 @@ fn relief(leaf: &LeafNow<'_>, stream: &mut Stream) -> Relief {
         slant: if angle > 0.1 { angle.tan().recip() } else { 0.0 },
         asymmetry: kind.asymmetry.draw32(stream),
         sway: kind.sway.draw32(stream),
-        twist: kind.twist_deg.draw32(stream).to_radians(),
+        twist: kind.twist_deg.draw32(stream).to_radians() + leaf.twist,
         seed: stream.seed32(),
     };
     // A rachis is straight; what bows and turns are its leaflets, each by itself.

@@ -13,6 +13,7 @@
 //! | `skin` | relief, linear blend skinning |
 //! | `tube`, `axis`, `leaf` | stems and stalks; the growth axis; one whole leaf |
 //! | `leaflets`, `dissected`, `fern` | compound and divided blades |
+//! | `condition` | age, health and damage of a plant and its leaves |
 //! | `rosette`, `whorl`, `erect`, `dissected`, `tuft`, `cane`, `runner` | growth forms |
 //!
 //! A new growth form is a file with a `grow(&Growth) -> Vec<Organ>` and one line in [`Form`].
@@ -20,6 +21,7 @@
 mod axis;
 pub mod blade;
 mod cane;
+pub mod condition;
 mod dissected;
 mod erect;
 mod fern;
@@ -36,6 +38,7 @@ mod tube;
 mod tuft;
 mod whorl;
 
+pub use condition::{Condition, ConditionDesc};
 pub use kind::{LeafKind, Shape};
 pub use organ::{LeafAxis, Organ, OrganKind};
 pub use stage::{BUD, LayerDesc, StageDesc};
@@ -296,9 +299,22 @@ pub fn turn(stream: &Stream) -> f32 {
 
 /// Grows one plant.
 pub fn grow(desc: &PlantDesc, stage: Stage, stream: &Stream) -> Plant {
-    let Some(growth) = stage::growth(desc, stage, stream) else {
+    grow_in(desc, stage, stream, None)
+}
+
+/// Grows one plant that holds its leaves as its condition has them.
+pub fn grow_in(
+    desc: &PlantDesc,
+    stage: Stage,
+    stream: &Stream,
+    condition: Option<(&ConditionDesc, &Condition)>,
+) -> Plant {
+    let Some(mut growth) = stage::growth(desc, stage, stream) else {
         return Plant { organs: Vec::new(), bbch: 0, age_days: 0.0, height: 0.0, radius: 0.0 };
     };
+    if let Some((desc, condition)) = condition {
+        condition::Posture::new(desc, condition, stream).apply(&mut growth.leaves);
+    }
     let organs = desc.form.grow(&growth);
     let corners = || organs.iter().flat_map(|o| &o.mesh.positions);
     let height = corners().fold(0.0_f32, |h, p| h.max(p.z));

@@ -100,6 +100,10 @@ pub(super) struct LeafNow<'a> {
     pub(super) pitch: f32,
     pub(super) bend: f32,
     pub(super) fold: f32,
+    /// Twist beyond the kind's.
+    pub(super) twist: f32,
+    /// Arch of the stalk beyond the kind's.
+    pub(super) arch: f32,
     /// This leaf's own numbers.
     pub(super) stream: Stream,
 }
@@ -218,6 +222,8 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream) 
                 pitch: between.draw(ends, None, &stream, 5, |l| &l.pitch_deg).to_radians(),
                 bend: between.draw(ends, Some(0.0), &stream, 6, |l| &l.bend_deg).to_radians(),
                 fold: lerp(fold.max(0.9), fold, grown),
+                twist: 0.0,
+                arch: 0.0,
                 stream,
             });
         }

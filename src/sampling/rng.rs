@@ -32,6 +32,8 @@ pub enum Purpose {
     Training = 10,
     /// Which images a resample of the bootstrap holds.
     Resample = 11,
+    /// Age, health and damage of a plant.
+    Condition = 12,
     /// The sensor's steps behind the noise.
     Chain = 20,
     /// How the camera drives.

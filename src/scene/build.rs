@@ -5,6 +5,7 @@ mod growing;
 mod known;
 mod models;
 mod season;
+mod wear;
 
 use super::desc::{FieldDesc, Growth, SpeciesDesc};
 use super::library::{Layer, Library, Species};
@@ -14,9 +15,10 @@ use super::{Part, PlantRecord, Scene};
 use crate::geometry::Mesh;
 use crate::light::LightRecord;
 use crate::material::{Ground as GroundMaterial, GroundSkin, Material, Solid};
-use crate::math::{Frame, Mat3, Vec2, Vec3, vec2};
+use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3, vec2};
+use crate::optics::soil::LOESS;
 use crate::page::Page;
-use crate::plant::{self, LeafAxis, OrganKind};
+use crate::plant::{self, ConditionDesc, LeafAxis, OrganKind};
 use crate::sampling::place::Step;
 use crate::sampling::rng::mix;
 use crate::sampling::{Purpose, Stream};
@@ -30,6 +32,7 @@ use rayon::prelude::*;
 pub use season::Season;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
+use wear::{Ailing, Bare};
 
 /// What the command line adds to a page.
 #[derive(Clone, Copy, Debug, Default)]
@@ -125,6 +128,17 @@ struct Seedling {
     stream: Stream,
     /// Whose shape and age it has, where all of its species are alike.
     individual: Option<Individual>,
+    condition: Option<ConditionDesc>,
+}
+
+impl Seedling {
+    /// The same in the condition that its entry on the page has, if any.
+    fn conditioned(self, condition: Option<&ConditionDesc>) -> Self {
+        match condition {
+            Some(own) => Self { condition: Some(own.clone()), ..self },
+            None => self,
+        }
+    }
 }
 
 /// The ground while it is being covered.
@@ -407,7 +421,8 @@ impl<'a> Builder<'a> {
             let places = scatter::rows_looked_at(&crop.rows, area, &self.stream(Purpose::Scatter, k as u64));
             self.check_number(places, all.len(), ["crops", "rows"], k)?;
             for spot in scatter::rows(&crop.rows, area, stones, &self.stream(Purpose::Scatter, k as u64)) {
-                all.push(self.seedling(&species, &crop.growth, spot, 1 + k as u64));
+                let seedling = self.seedling(&species, &crop.growth, spot, 1 + k as u64);
+                all.push(seedling.conditioned(crop.condition.as_ref()));
             }
         }
         for (k, weed) in desc.weeds.iter().enumerate() {
@@ -415,14 +430,15 @@ impl<'a> Builder<'a> {
             let places = scatter::weeds_looked_at(&weed.spread, area, &self.stream(Purpose::Scatter, 1000 + k as u64));
             self.check_number(places, all.len(), ["weeds", "spread"], k)?;
             for spot in scatter::weeds(&weed.spread, area, stones, &self.stream(Purpose::Scatter, 1000 + k as u64)) {
-                all.push(self.seedling(&species, &weed.growth, spot, 1001 + k as u64));
+                let seedling = self.seedling(&species, &weed.growth, spot, 1001 + k as u64);
+                all.push(seedling.conditioned(weed.condition.as_ref()));
             }
         }
         for (k, placed) in desc.plants.iter().enumerate() {
             let species = self.library.species(page, &placed.species)?;
             let mut stream = self.stream(Purpose::Scatter, 2000 + k as u64);
             let position = vec2(placed.position_m.0.draw32(&mut stream), placed.position_m.1.draw32(&mut stream));
-            all.push(Seedling {
+            let seedling = Seedling {
                 species: species.clone(),
                 growth: placed.growth.clone(),
                 season: self.season.place(),
@@ -431,7 +447,9 @@ impl<'a> Builder<'a> {
                 only_leaf: placed.only_leaf.map(|l| l.get() as u16),
                 stream: stream.child(Purpose::Plant, 0),
                 individual: self.individual(&species.desc),
-            });
+                condition: species.desc.condition.clone(),
+            };
+            all.push(seedling.conditioned(placed.condition.as_ref()));
         }
         self.check_number(0.0, all.len(), ["plants", ""], 0)?;
         Ok(all)
@@ -462,6 +480,15 @@ impl<'a> Builder<'a> {
             only_leaf: None,
             stream: self.stream(Purpose::Plant, population).child(Purpose::Plant, spot.key),
             individual: self.individual(&species.desc),
+            condition: species.desc.condition.clone(),
+        }
+    }
+
+    /// Reflectance of the dry soil that lies on leaves.
+    fn dust(&mut self) -> Result<Spectrum> {
+        match self.desc.soil.as_ref().and_then(|soil| soil.layers.first()) {
+            Some(layer) => Ok(self.library.layer(self.page, layer)?.mean()),
+            None => Ok(LOESS),
         }
     }
 
@@ -472,8 +499,9 @@ impl<'a> Builder<'a> {
         floor: Option<Floor<'_>>,
         view: Option<Rect>,
     ) -> Result<Vec<PlantRecord>> {
+        let dust = self.dust()?;
         let grown: Vec<(PlantRecord, Vec<Grown>)> =
-            seedlings.par_iter().enumerate().map(|(i, s)| grow(s, i as u16 + 1, floor)).collect();
+            seedlings.par_iter().enumerate().map(|(i, s)| grow(s, i as u16 + 1, floor, dust)).collect();
         let mut records = Vec::with_capacity(grown.len());
         for (record, organs) in grown {
             // Grown to know its size, dropped where neither it nor its shadow reaches the view.
@@ -481,7 +509,7 @@ impl<'a> Builder<'a> {
             if view.is_some_and(|v| !v.grown(reach).contains(record.position.truncate())) {
                 continue;
             }
-            // One material a plant and skin: plants differ in their green.
+            // One material a plant and skin: plants differ in their green, and leaves that have met something in more.
             let mut made: Vec<(String, usize, u32)> = Vec::new();
             for organ in organs {
                 if let Some(fault) = organ.part.mesh.fault() {
@@ -491,10 +519,13 @@ impl<'a> Builder<'a> {
                         self.page.path.display()
                     )));
                 }
-                let known = made.iter().find(|(s, c, _)| *s == organ.skin && *c == organ.choice).map(|m| m.2);
+                let same = |m: &&(String, usize, u32)| !organ.own && m.0 == organ.skin && m.1 == organ.choice;
+                let known = made.iter().find(same).map(|m| m.2);
                 let material = known.unwrap_or_else(|| {
                     let material = self.material(Material::Leaf(organ.material));
-                    made.push((organ.skin, organ.choice, material));
+                    if !organ.own {
+                        made.push((organ.skin, organ.choice, material));
+                    }
                     material
                 });
                 self.scene.parts.push(Part { material, ..organ.part });
@@ -516,10 +547,21 @@ struct Grown {
     skin: String,
     choice: usize,
     material: crate::material::LeafMaterial,
+    /// Whether no other organ of the plant has this material.
+    own: bool,
+}
+
+impl Grown {
+    /// The same of another shape.
+    fn with(&self, mesh: Mesh) -> Self {
+        let Part { mask, material, tag, .. } = &self.part;
+        let part = Part { mesh, mask: mask.clone(), material: *material, tag: *tag };
+        Self { part, skin: self.skin.clone(), material: self.material.clone(), ..*self }
+    }
 }
 
 /// Grows one plant, in its own stream, and stands it on the ground.
-fn grow(s: &Seedling, number: u16, floor: Option<Floor<'_>>) -> (PlantRecord, Vec<Grown>) {
+fn grow(s: &Seedling, number: u16, floor: Option<Floor<'_>>, dust: Spectrum) -> (PlantRecord, Vec<Grown>) {
     let desc: &SpeciesDesc = &s.species.desc;
     let mut stream = s.stream.clone();
     let stage = s.growth.draw(s.season, &mut stream);
@@ -527,11 +569,13 @@ fn grow(s: &Seedling, number: u16, floor: Option<Floor<'_>>) -> (PlantRecord, Ve
     let (x, y) = (s.position.x, s.position.y);
     let (z, normal) = floor.map_or((0.0, Vec3::Z), |f| (f.height(x, y), f.ground.trend(x, y, STANCE)));
     let axis = scatter::axis(normal, AXIS_NOISE_DEG, &mut stream);
-    let plant = match &s.individual {
-        Some(individual) => individual.plant(desc, &s.growth, s.season, &stream),
-        None => plant::grow(&desc.plant, stage, &stream),
-    };
     let shape = s.individual.as_ref().map_or(&stream, Individual::shape);
+    let ailing = s.condition.as_ref().map(|condition| Ailing::new(condition, shape, dust));
+    let posture = ailing.as_ref().map(Ailing::posture);
+    let plant = match &s.individual {
+        Some(individual) => individual.plant(desc, (&s.growth, s.season), &stream, posture),
+        None => plant::grow_in(&desc.plant, stage, &stream, posture),
+    };
     let foot = Vec3::new(x, y, z);
     // Plant coordinates: y to the north before the turn, z along the axis. Growing has given it a turn of its own.
     let ahead = Vec3::new(s.turn.sin(), s.turn.cos(), 0.0);
@@ -544,24 +588,31 @@ fn grow(s: &Seedling, number: u16, floor: Option<Floor<'_>>) -> (PlantRecord, Ve
     let mut leaf_axes: Vec<LeafAxis> =
         axes.map(|a| LeafAxis { base: to_world(a.base), tip: to_world(a.tip), ..a }).collect();
     leaf_axes.sort_by_key(|a| a.leaf);
-    let organs = plant.organs.into_iter().filter(|o| kept(o.leaf)).map(|organ| {
+    let last = plant.organs.iter().map(|o| o.leaf).max().unwrap_or(0);
+    let organs = plant.organs.into_iter().filter(|o| kept(o.leaf)).flat_map(|organ| {
         let mut mesh = organ.mesh;
         mesh.transform(rotation, foot);
         let choices = &s.species.skins[&organ.skin];
         let choice = shape.child(Purpose::Leaf, 1 << 20 | u64::from(organ.leaf)).index(choices.len());
-        let (material, mask) = &choices[choice];
-        let base = desc.skins[&organ.skin].pigments.chlorophyll.f32();
+        let skin = &choices[choice];
+        let pigments = &desc.skins[&organ.skin].pigments;
         let cut = matches!(organ.kind, OrganKind::Blade | OrganKind::Cotyledon);
-        Grown {
+        let bare = Bare { kind: organ.kind, choice: skin, pigments, green, ground: z, last };
+        let grown = Grown {
             part: Part {
                 mesh,
-                mask: if cut { mask.clone() } else { None },
+                mask: if cut { skin.mask.clone() } else { None },
                 material: 0,
                 tag: Tag { class, plant: number, leaf: organ.leaf },
             },
             skin: organ.skin,
             choice,
-            material: material.with_chlorophyll(base, green),
+            material: skin.material.with_chlorophyll(pigments.chlorophyll.f32(), green),
+            own: false,
+        };
+        match &ailing {
+            Some(ailing) => ailing.dress(&grown, &bare),
+            None => vec![grown],
         }
     });
     let organs: Vec<Grown> = organs.collect();
@@ -579,6 +630,7 @@ fn grow(s: &Seedling, number: u16, floor: Option<Floor<'_>>) -> (PlantRecord, Ve
         radius: plant.radius,
         leaves: organs.iter().map(|o| o.part.tag.leaf).max().unwrap_or(0),
         leaf_axes,
+        condition: ailing.as_ref().map(Ailing::drawn),
     };
     (record, organs)
 }

@@ -4,7 +4,7 @@ use crate::film::Filter;
 use crate::light::LightDesc;
 use crate::material::LeafDesc;
 use crate::model::Up;
-use crate::plant::{PlantDesc, Stage};
+use crate::plant::{ConditionDesc, PlantDesc, Stage};
 use crate::sampling::Stream;
 use crate::sampling::vary::{Finite, Fraction, NonNegative, Num, Pick, Positive, PositiveCount, Vary};
 use crate::scatter::{RowsDesc, WeedsDesc};
@@ -108,6 +108,9 @@ pub struct CropDesc {
     pub growth: Growth,
     /// Where they stand.
     pub rows: RowsDesc,
+    /// Age, health and damage of its plants; as the species' page has it unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<ConditionDesc>,
 }
 
 /// A weed.
@@ -121,6 +124,9 @@ pub struct WeedDesc {
     /// How many and how they gather.
     #[serde(default)]
     pub spread: WeedsDesc,
+    /// Age, health and damage of its plants; as the species' page has it unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<ConditionDesc>,
 }
 
 /// One plant in its place.
@@ -140,6 +146,9 @@ pub struct PlacedDesc {
     /// Only this leaf of it, counted from 1 with the seed leaves; the whole plant unless given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub only_leaf: Option<Num<PositiveCount>>,
+    /// Age, health and damage of it; as the species' page has it unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<ConditionDesc>,
 }
 
 /// A model from disk in its place: a scanned plant, a stone, a tool. Each is one plant, or one thing, in the labels.
@@ -216,6 +225,9 @@ pub struct SpeciesDesc {
     /// Relative spread of the chlorophyll from plant to plant.
     #[serde(default = "spread")]
     pub chlorophyll_sd: Num<Fraction>,
+    /// Age, health and damage of its plants; flawless unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<ConditionDesc>,
     /// Whether all its plants are one individual: of one shape in all fields, of one age in each, so that a field has one mesh of it
     /// many times. Place, lean, turn and green stay each plant's own. Pages do not say so, experiments do.
     #[serde(skip)]

@@ -2,11 +2,12 @@
 
 use super::build::Growing;
 use super::desc::SpeciesDesc;
-use crate::geometry::AlphaMask;
+use crate::geometry::{AlphaMask, Margin};
 use crate::light::{Infrared, Table};
 use crate::material::{LeafMaterial, Picture};
-use crate::math::Vec2;
+use crate::math::{Spectrum, Vec2};
 use crate::model::{Model, Up};
+use crate::optics::soil;
 use crate::page::Page;
 use crate::sampling::fault::choose;
 use crate::sampling::place::Step;
@@ -20,16 +21,29 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// A picture with the mask that it cuts.
-pub(super) type Cut = (Arc<Picture>, Option<Arc<AlphaMask>>);
+#[derive(Clone)]
+pub(super) struct Cut {
+    picture: Arc<Picture>,
+    mask: Option<Arc<AlphaMask>>,
+    margin: Option<Arc<Margin>>,
+}
 
-/// A skin's choices, each with its mask.
-pub(super) type Choices = Vec<(LeafMaterial, Option<Arc<AlphaMask>>)>;
+/// One choice of a skin.
+pub(super) struct Choice {
+    pub(super) material: LeafMaterial,
+    /// What of a blade is there.
+    pub(super) mask: Option<Arc<AlphaMask>>,
+    /// How far its places are from where it ends.
+    pub(super) margin: Option<Arc<Margin>>,
+    /// Whether it has a picture.
+    pub(super) pictured: bool,
+}
 
 /// A species with its materials ready.
 pub(super) struct Species {
     pub(super) desc: SpeciesDesc,
     /// By the skin's name.
-    pub(super) skins: BTreeMap<String, Choices>,
+    pub(super) skins: BTreeMap<String, Vec<Choice>>,
 }
 
 /// What was read so far. Every file's bytes go into the hash in the order of their paths.
@@ -98,12 +112,16 @@ impl Library {
         let mut skins = BTreeMap::new();
         for (name, skin) in &desc.skins {
             let choices = match &skin.texture {
-                None => vec![(LeafMaterial::new(skin, None), None)],
+                None => {
+                    let material = LeafMaterial::new(skin, None);
+                    vec![Choice { material, mask: None, margin: None, pictured: false }]
+                }
                 Some(of) => {
                     let mut choices = Vec::new();
                     for path in of.all() {
-                        let (picture, mask) = self.picture(&own, path, skin.relief_range.f32())?;
-                        choices.push((LeafMaterial::new(skin, Some(picture)), mask));
+                        let Cut { picture, mask, margin } = self.picture(&own, path, skin.relief_range.f32())?;
+                        let material = LeafMaterial::new(skin, Some(picture));
+                        choices.push(Choice { material, mask, margin, pictured: true });
                     }
                     choices
                 }
@@ -134,7 +152,8 @@ impl Library {
             Maps::derive(&color, &Relief::LEAF)
         };
         let mask = color.alpha_mask().map(Arc::new);
-        let cut = (Arc::new(Picture { color, maps }), mask);
+        let margin = mask.as_deref().map(|m| Arc::new(Margin::of(m)));
+        let cut = Cut { picture: Arc::new(Picture { color, maps }), mask, margin };
         self.pictures.insert(full, cut.clone());
         Ok(cut)
     }
@@ -240,6 +259,14 @@ fn at_its_place(page: &Page, literal: &str, error: Error) -> Error {
 pub(super) struct Layer {
     albedo: Texture,
     height: Height,
+}
+
+impl Layer {
+    /// Mean colour of the dry soil, in four bands.
+    pub(super) fn mean(&self) -> Spectrum {
+        let [r, g, b, _] = self.albedo.sample(Vec2::splat(0.5), 32.0);
+        soil::at([r, g, b], soil::LOESS)
+    }
 }
 
 impl LayerMaps for Layer {

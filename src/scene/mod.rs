@@ -12,7 +12,7 @@ use crate::geometry::{AlphaMask, Mesh};
 use crate::light::Light;
 use crate::material::Material;
 use crate::math::Vec3;
-use crate::plant::LeafAxis;
+use crate::plant::{Condition, LeafAxis};
 use crate::sensor::Camera;
 use std::sync::Arc;
 use tag::{Class, Tag};
@@ -61,6 +61,8 @@ pub struct PlantRecord {
     pub leaves: u16,
     /// Base and tip of its leaves' blades, metres, world, by rising leaf; none of a model from disk, which has no midribs.
     pub leaf_axes: Vec<LeafAxis>,
+    /// Its condition; none where no page says any.
+    pub condition: Option<Condition>,
 }
 
 /// One field.

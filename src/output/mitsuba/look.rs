@@ -83,10 +83,11 @@ impl Look {
 }
 
 impl Kind {
-    /// What holds for texels of both kinds: some of a ground may lie under water.
+    /// What holds for texels of both kinds: some of a ground may lie under water, some of a leaf's wax under soil.
     fn and(self, other: Self) -> Self {
         match (self, other) {
             (Self::Soil { shape, film: None }, Self::Soil { film, .. }) => Self::Soil { shape, film },
+            (Self::Sheet { coats: [a, b] }, Self::Sheet { coats: [c, d] }) => Self::Sheet { coats: [a.or(c), b.or(d)] },
             (known, _) => known,
         }
     }

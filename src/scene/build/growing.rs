@@ -3,7 +3,7 @@
 
 use super::Builder;
 use crate::math::{Mat3, Vec3};
-use crate::plant::{self, Plant};
+use crate::plant::{self, Condition, ConditionDesc, Plant};
 use crate::sampling::rng::mix;
 use crate::sampling::{Purpose, Stream};
 use crate::scene::desc::{FieldDesc, Growth, SpeciesDesc};
@@ -42,9 +42,15 @@ impl Individual {
     }
 
     /// Grows it to the age that the field draws, turned as the plant of `own` would be.
-    pub(super) fn plant(&self, desc: &SpeciesDesc, growth: &Growth, season: usize, own: &Stream) -> Plant {
+    pub(super) fn plant(
+        &self,
+        desc: &SpeciesDesc,
+        (growth, season): (&Growth, usize),
+        own: &Stream,
+        condition: Option<(&ConditionDesc, &Condition)>,
+    ) -> Plant {
         let stage = growth.draw(season, &mut self.age.clone());
-        let mut plant = plant::grow(&desc.plant, stage, &self.shape);
+        let mut plant = plant::grow_in(&desc.plant, stage, &self.shape, condition);
         // Azimuths run clockwise seen from above.
         let turn = Mat3::from_rotation_z(plant::turn(&self.shape) - plant::turn(own));
         for organ in &mut plant.organs {

@@ -1,0 +1,95 @@
+//! How far a point of a mask is from where the mask ends.
+
+use super::AlphaMask;
+use crate::math::Vec2;
+
+/// Rows that a mask is read on.
+const ROWS: u32 = 192;
+
+/// Distances to the nearest transparent texel of a mask, read on a coarse grid.
+///
+/// Two passes of the 5 × 5 chamfer (steps of 1, 1.4, 2.2): at most 2 % off. Source: Borgefors 1986, "Distance transformations in digital images".
+#[derive(Clone, Debug, PartialEq)]
+pub struct Margin {
+    width: usize,
+    height: usize,
+    /// In heights of the mask.
+    distances: Vec<f32>,
+}
+
+impl Margin {
+    /// Of a mask; beyond its edges nothing is opaque.
+    pub fn of(mask: &AlphaMask) -> Self {
+        let (w, h) = mask.size();
+        let step = (h as f32 / ROWS as f32).max(1.0);
+        let cells = |n: u32| ((n as f32 / step).round() as usize).max(1);
+        let (width, height) = (cells(w), cells(h));
+        let texel = |i: usize| ((i as f32 + 0.5) * step) as i32;
+        let far = (width + height) as f32;
+        let mut d: Vec<f32> = (0..width * height)
+            .map(|i| if mask.texel(texel(i % width), texel(i / width)) { far } else { 0.0 })
+            .collect();
+        for k in 0..width * height {
+            relax(&mut d, (width, height), k, 1);
+        }
+        for k in (0..width * height).rev() {
+            relax(&mut d, (width, height), k, -1);
+        }
+        let distances = d.into_iter().map(|v| v / height as f32).collect();
+        Self { width, height, distances }
+    }
+
+    /// Distance at `uv`, in heights of the mask; 0 outside it. Bilinear.
+    pub fn at(&self, uv: Vec2) -> f32 {
+        let p = Vec2::new(uv.x * self.width as f32, uv.y * self.height as f32) - 0.5;
+        let (floor, part) = (p.floor(), p - p.floor());
+        let at = |x: f32, y: f32| {
+            let inside = x >= 0.0 && y >= 0.0 && x < self.width as f32 && y < self.height as f32;
+            if inside { self.distances[y as usize * self.width + x as usize] } else { 0.0 }
+        };
+        let row = |y: f32| at(floor.x, y) * (1.0 - part.x) + at(floor.x + 1.0, y) * part.x;
+        row(floor.y) * (1.0 - part.y) + row(floor.y + 1.0) * part.y
+    }
+}
+
+/// Takes what the neighbours that a pass has been at already say; `way` is 1 forwards, −1 backwards.
+fn relax(d: &mut [f32], (width, height): (usize, usize), k: usize, way: i64) {
+    const NEAR: [(i64, i64, f32); 8] = [
+        (-1, 0, 1.0),
+        (0, -1, 1.0),
+        (-1, -1, 1.4),
+        (1, -1, 1.4),
+        (-2, -1, 2.2),
+        (2, -1, 2.2),
+        (-1, -2, 2.2),
+        (1, -2, 2.2),
+    ];
+    if d[k] == 0.0 {
+        return;
+    }
+    let (x, y) = ((k % width) as i64, (k / width) as i64);
+    for (dx, dy, cost) in NEAR {
+        let (nx, ny) = (x + way * dx, y + way * dy);
+        let inside = nx >= 0 && ny >= 0 && nx < width as i64 && ny < height as i64;
+        let there = if inside { d[ny as usize * width + nx as usize] } else { 0.0 };
+        d[k] = d[k].min(there + cost);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::vec2;
+
+    #[test]
+    fn a_discs_margin_is_as_far_as_geometry_says() {
+        let mask = AlphaMask::new(400, 400, |x, y| (x as f32 - 199.5).hypot(y as f32 - 199.5) < 160.0);
+        let margin = Margin::of(&mask);
+        for (x, y) in [(0.5, 0.5), (0.7, 0.5), (0.3, 0.35), (0.5, 0.85), (0.62, 0.6)] {
+            let truth = 0.4 - (x - 0.5_f32).hypot(y - 0.5);
+            assert!((margin.at(vec2(x, y)) - truth).abs() < 0.02, "{x} {y}: {} for {truth}", margin.at(vec2(x, y)));
+        }
+        assert_eq!(margin.at(vec2(0.02, 0.02)), 0.0);
+        assert_eq!(margin.at(vec2(-3.0, 0.5)), 0.0);
+    }
+}

@@ -1,0 +1,491 @@
+//! What one leaf has met: what is gone of it, and what the rest is like, place by place.
+//!
+//! Places are mm on the flat leaf's image, x to the right of the midrib, y up from the image's lower edge, so that a hole of
+//! 2 mm is one on a leaf of any size. Nothing is stored as a picture: a few discs, cuts and noises answer for any place.
+
+use super::Condition;
+use crate::geometry::{AlphaMask, Margin};
+use crate::math::{Vec2, lerp, smoothstep, vec2};
+use crate::plant::ConditionDesc;
+use crate::sampling::rng::mix;
+use crate::sampling::vary::{Positive, Vary};
+use crate::sampling::{Purpose, Stream};
+use crate::texture::noise::Perlin;
+use std::sync::Arc;
+
+/// Share of the oldest leaf's marks that the youngest has.
+const YOUNG: f32 = 0.2;
+/// Share of a seed leaf's flea-beetle holes that a true leaf has.
+const BEETLE: f32 = 0.33;
+/// Width of the dead rim of a hole, mm.
+const RIM_MM: f32 = 0.35;
+/// Height over the soil at which splash has fallen to 1/e, and dust to 1/e of what it has more there than at the top, metres.
+const LOW: f32 = 0.06;
+/// Dust on leaves far above the soil over that on leaves at it.
+const HIGH_DUST: f32 = 0.15;
+/// Side of the squares that each may hold one speck of soil, mm: 0.3–2 mm specks fit in.
+const SPECK_MM: f32 = 2.4;
+/// How much an outline strays from its ellipse.
+const RAGGED: f32 = 0.25;
+
+/// A leaf as its marks need to know it.
+#[derive(Clone, Copy, Debug)]
+pub struct Bearer<'a> {
+    /// 0 the youngest of its plant, 1 the oldest.
+    pub age: f32,
+    /// Whether it is a seed leaf.
+    pub cotyledon: bool,
+    /// Share of the leaf that it is: a leaflet is one of several.
+    pub share: f32,
+    /// Height of its middle over the soil, metres.
+    pub height: f32,
+    /// Width and height of its image on it, mm.
+    pub image_mm: Vec2,
+    /// What there is of it before anything is eaten; everything without one.
+    pub mask: Option<&'a AlphaMask>,
+    /// Distances to its margin, of the same mask.
+    pub margin: Option<&'a Arc<Margin>>,
+}
+
+/// An ellipse with a ragged outline.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Patch {
+    centre: Vec2,
+    radius: f32,
+    /// Its axes: a direction times the reciprocal of how far it is stretched along it.
+    turn: Vec2,
+    stretch: f32,
+    phase: Vec2,
+}
+
+impl Patch {
+    fn new(centre: Vec2, radius: f32, s: &mut Stream) -> Self {
+        let angle = s.range32(0.0, std::f32::consts::TAU);
+        let (turn, stretch) = (vec2(angle.cos(), angle.sin()), s.range32(1.0, 1.35));
+        Self { centre, radius, turn, stretch, phase: vec2(s.range32(0.0, 99.0), s.range32(0.0, 99.0)) }
+    }
+
+    /// Distance from its middle, 1 on its outline; more than 1.6 is not told apart.
+    fn at(&self, p: Vec2, noise: &Perlin) -> f32 {
+        let q = (p - self.centre) / self.radius;
+        if q.length_squared() > 6.0 {
+            return f32::MAX;
+        }
+        let q = vec2(q.dot(self.turn) / self.stretch, q.perp_dot(self.turn) * self.stretch);
+        let n = noise.at2(f64::from(q.x * 1.3 + self.phase.x), f64::from(q.y * 1.3 + self.phase.y));
+        q.length() / (1.0 + RAGGED * n as f32)
+    }
+}
+
+/// A tear: a wedge from the margin inwards.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Tear {
+    from: Vec2,
+    /// Unit, inwards.
+    along: Vec2,
+    length: f32,
+    width: f32,
+}
+
+impl Tear {
+    fn holds(&self, p: Vec2, noise: &Perlin) -> bool {
+        let q = p - self.from;
+        let s = q.dot(self.along) / self.length;
+        if !(-0.6..1.0).contains(&s) {
+            return false;
+        }
+        let stray = 0.8 * noise.at2(f64::from(p.x * 0.35), f64::from(p.y * 0.35)) as f32 * s.max(0.0);
+        (q.perp_dot(self.along) + stray).abs() < 0.5 * self.width * (1.0 - s.max(0.0))
+    }
+}
+
+/// What a place of a leaf is like; each 0–1.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tissue {
+    /// Yellowness between veins.
+    pub interveinal: f32,
+    /// Yellowness whatever the veins.
+    pub yellow: f32,
+    /// Dead tissue.
+    pub brown: f32,
+    /// The reddish rim round it.
+    pub rim: f32,
+    /// Share under soil.
+    pub soil: f32,
+    /// How dark dead tissue and soil are here, about 1.
+    pub shade: f32,
+}
+
+/// The marks of one leaf, and what cuts it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Marks {
+    image_mm: Vec2,
+    seed: u32,
+    holes: Vec<Patch>,
+    bites: usize,
+    tears: Vec<Tear>,
+    blotches: Vec<Patch>,
+    spots: Vec<Patch>,
+    chlorosis: f32,
+    scorch_mm: f32,
+    dust: f32,
+    /// Specks in a square of [`SPECK_MM`].
+    splash: f32,
+    margin: Option<Arc<Margin>>,
+}
+
+impl Marks {
+    /// Draws the marks of a leaf; `stream` is the leaf's, see [`super::leaf_stream`].
+    pub fn draw(desc: &ConditionDesc, condition: &Condition, bearer: &Bearer<'_>, stream: &Stream) -> Self {
+        let of = |k: u64| stream.child(Purpose::Condition, k);
+        let worn = lerp(YOUNG, 1.0, bearer.age);
+        let often = worn * bearer.share;
+        let on_leaf = |radii: &Vary<Positive>, mean: f32, k: u64| {
+            let mut s = of(k);
+            let n = s.poisson(f64::from(mean * often));
+            (0..n).filter_map(|_| patch(bearer, radii, &mut s)).collect::<Vec<Patch>>()
+        };
+        let mut holes = on_leaf(&desc.hole_mm, condition.holes, 1);
+        let shots = condition.shot_holes * if bearer.cotyledon { 1.0 / worn } else { BEETLE };
+        holes.extend(on_leaf(&desc.shot_hole_mm, shots, 2));
+        let whole = holes.len();
+        let mut s = of(3);
+        for _ in 0..s.poisson(f64::from(condition.bites * often)) {
+            bite(bearer, &desc.bite_mm, &mut holes, &mut s);
+        }
+        let mut s = of(4);
+        let tears = (0..s.poisson(f64::from(condition.tears * often))).filter_map(|_| tear(bearer, &mut s)).collect();
+        let low = (-bearer.height.max(0.0) / LOW).exp();
+        let mut s = of(7);
+        let uneven = |s: &mut Stream| (0.4 * s.normal() as f32).exp();
+        // Old leaves yellow first, and of two equally old ones one more than the other.
+        let chlorosis = (condition.chlorosis * bearer.age.powf(1.5) * uneven(&mut s)).min(1.0);
+        let scorch_mm = condition.scorch_mm * bearer.age.powi(2) * uneven(&mut s);
+        let dust = (condition.dust * lerp(HIGH_DUST, 1.0, low) * uneven(&mut s)).min(0.9);
+        let splash = condition.splash * low * SPECK_MM * SPECK_MM / 100.0;
+        Self {
+            image_mm: bearer.image_mm,
+            seed: of(8).seed32(),
+            bites: holes.len() - whole,
+            holes,
+            tears,
+            blotches: on_leaf(&desc.blotch_mm, condition.blotches, 5),
+            spots: on_leaf(&desc.spot_mm, condition.spots, 6),
+            chlorosis,
+            scorch_mm,
+            dust,
+            splash,
+            margin: bearer.margin.cloned(),
+        }
+    }
+
+    /// Number of holes within the leaf.
+    pub fn holes(&self) -> usize {
+        self.holes.len() - self.bites
+    }
+
+    /// Whether anything is gone of the leaf.
+    pub fn cuts(&self) -> bool {
+        !(self.holes.is_empty() && self.tears.is_empty())
+    }
+
+    /// Whether the leaf is all there and healthy and clean.
+    pub fn nothing(&self) -> bool {
+        let none = [self.chlorosis, self.scorch_mm, self.dust, self.splash].iter().all(|x| *x <= 0.0);
+        none && !self.cuts() && self.blotches.is_empty() && self.spots.is_empty()
+    }
+
+    /// Cover of dust, 0–1, on the mean of the leaf.
+    pub fn dust(&self) -> f32 {
+        self.dust
+    }
+
+    /// Whether tissue between veins differs from that along them.
+    pub fn interveinal(&self) -> bool {
+        self.chlorosis > 0.0
+    }
+
+    /// Width and height of the leaf's image, mm.
+    pub fn image_mm(&self) -> Vec2 {
+        self.image_mm
+    }
+
+    fn place(&self, uv: Vec2) -> Vec2 {
+        vec2(uv.x - 0.5, 1.0 - uv.y) * self.image_mm
+    }
+
+    /// What is left of a mask; of a leaf without one, a mask of its own.
+    pub fn cut(&self, mask: Option<&AlphaMask>) -> AlphaMask {
+        let noise = Perlin::new(self.seed);
+        let gone = |uv: Vec2| {
+            let p = self.place(uv);
+            self.holes.iter().any(|h| h.at(p, &noise) < 1.0) || self.tears.iter().any(|t| t.holds(p, &noise))
+        };
+        let left = if let Some(mask) = mask {
+            mask.without(gone)
+        } else {
+            // As fine as a drawn texture: about 6 texels a mm.
+            let texels = |mm: f32| ((mm * 6.0) as u32).clamp(64, 1024);
+            AlphaMask::new(texels(self.image_mm.x), texels(self.image_mm.y), |_, _| true).without(gone)
+        };
+        // Holes seldom cut anything off; bites and tears may.
+        if self.bites > 0 || !self.tears.is_empty() { left.hanging() } else { left }
+    }
+
+    /// The noise that [`Marks::tissue`] asks for; slow to make, so make it once.
+    pub fn noise(&self) -> Perlin {
+        Perlin::new(self.seed)
+    }
+
+    /// What the leaf is like at `uv`.
+    pub fn tissue(&self, uv: Vec2, noise: &Perlin) -> Tissue {
+        let p = self.place(uv);
+        let n =
+            |scale: f32, shift: f32| noise.at2(f64::from(p.x / scale + shift), f64::from(p.y / scale - shift)) as f32;
+        let mut t = Tissue { shade: 1.0, ..Tissue::default() };
+        if self.chlorosis > 0.0 {
+            // Patchy over a cm or two.
+            t.interveinal = (self.chlorosis * (1.0 + 0.6 * n(14.0, 3.1))).clamp(0.0, 1.0);
+        }
+        for b in &self.blotches {
+            let d = b.at(p, noise);
+            t.yellow = t.yellow.max(0.75 * smoothstep(1.25, 0.45, d));
+        }
+        for s in &self.spots {
+            let d = s.at(p, noise);
+            t.brown = t.brown.max(smoothstep(0.95, 0.7, d));
+            t.rim = t.rim.max(smoothstep(0.6, 0.8, d) * smoothstep(1.2, 0.95, d));
+            t.yellow = t.yellow.max(0.6 * smoothstep(1.55, 1.1, d));
+        }
+        for h in &self.holes {
+            let d = h.at(p, noise);
+            if d < f32::MAX {
+                let mm = (d - 1.0) * h.radius;
+                t.brown = t.brown.max(0.8 * smoothstep(RIM_MM, 0.3 * RIM_MM, mm));
+                t.yellow = t.yellow.max(0.35 * smoothstep(4.0 * RIM_MM, RIM_MM, mm));
+            }
+        }
+        if let Some(margin) = self.margin.as_ref().filter(|_| self.scorch_mm > 0.0) {
+            let inward = margin.at(uv) * self.image_mm.y;
+            let width = self.scorch_mm * (1.0 + 1.1 * n(9.0, 7.7)).max(0.0);
+            t.brown = t.brown.max(smoothstep(width + 0.2, 0.7 * width, inward));
+            t.yellow = t.yellow.max(0.8 * smoothstep(3.0 * width + 0.5, width, inward));
+        }
+        if self.dust > 0.0 {
+            // Lies in drifts of a few mm, with grain.
+            t.soil = (self.dust * (1.0 + 0.8 * n(5.0, 11.0) + 0.6 * n(0.7, 23.0))).clamp(0.0, 0.95);
+        }
+        if self.splash > 0.0 {
+            t.soil = t.soil.max(self.speck(p, noise));
+        }
+        if t.brown > 0.0 || t.soil > 0.3 {
+            t.shade = 1.0 + 0.3 * n(0.9, 31.0) + 0.15 * n(0.3, 5.0);
+        }
+        t
+    }
+
+    /// How far under a speck of soil a place is: jittered dots in squares.
+    fn speck(&self, p: Vec2, noise: &Perlin) -> f32 {
+        let cell = (p / SPECK_MM).floor();
+        let mut most = 0.0_f32;
+        for j in -1..=1 {
+            for i in -1..=1 {
+                let c = cell + vec2(i as f32, j as f32);
+                let key = mix(mix(u64::from(self.seed) ^ (c.x as i64 as u64)) ^ (c.y as i64 as u64));
+                let unit = |k: u32| (mix(key.wrapping_add(u64::from(k))) >> 40) as f32 / (1u64 << 24) as f32;
+                if unit(0) >= self.splash {
+                    continue;
+                }
+                // Small specks are many: radii 0.15–1 mm, uniform in log.
+                let radius = 0.15 * (unit(1) * 1.9).exp();
+                let centre = (c + vec2(unit(2), unit(3))) * SPECK_MM;
+                let speck = Patch { centre, radius, turn: Vec2::X, stretch: 1.0, phase: vec2(unit(4), unit(5)) * 99.0 };
+                most = most.max(0.95 * smoothstep(1.1, 0.75, speck.at(p, noise)));
+            }
+        }
+        most
+    }
+}
+
+/// Smaller of the leaf's sides, mm.
+fn narrow(bearer: &Bearer<'_>) -> f32 {
+    bearer.image_mm.min_element()
+}
+
+fn there(bearer: &Bearer<'_>, p: Vec2) -> bool {
+    let uv = vec2(0.5 + p.x / bearer.image_mm.x, 1.0 - p.y / bearer.image_mm.y);
+    bearer.mask.is_none_or(|m| m.opaque_at(uv))
+}
+
+/// A patch on the blade, off the midrib where there is room; none on a leaf too thin to be met in 40 tries.
+fn patch(bearer: &Bearer<'_>, radii: &Vary<Positive>, s: &mut Stream) -> Option<Patch> {
+    let radius = radii.draw32(s).min(0.2 * narrow(bearer));
+    let half = 0.5 * bearer.image_mm;
+    let mut last = None;
+    for _ in 0..40 {
+        let p = vec2(s.range32(-half.x, half.x), s.range32(0.0, bearer.image_mm.y));
+        if there(bearer, p) {
+            last = Some(p);
+            if p.x.abs() > 0.8 * radius {
+                break;
+            }
+        }
+    }
+    last.map(|p| Patch::new(p, radius, s))
+}
+
+/// A place on the margin, on either side, and its side.
+fn edge(bearer: &Bearer<'_>, s: &mut Stream) -> Option<(Vec2, f32)> {
+    let side = if s.chance(0.5) { 1.0 } else { -1.0 };
+    let y = s.range32(0.12, 0.92) * bearer.image_mm.y;
+    let half = 0.5 * bearer.image_mm.x;
+    let steps = 200;
+    (0..steps)
+        .map(|i| vec2(side * half * (1.0 - i as f32 / steps as f32), y))
+        .find(|p| there(bearer, *p))
+        .map(|p| (p, side))
+}
+
+/// Mouthfuls side by side along the margin.
+fn bite(bearer: &Bearer<'_>, radii: &Vary<Positive>, holes: &mut Vec<Patch>, s: &mut Stream) {
+    let Some((mut at, side)) = edge(bearer, s) else { return };
+    for _ in 0..=s.index(4) {
+        let radius = radii.draw32(s).min(0.22 * narrow(bearer));
+        holes.push(Patch::new(at, radius, s));
+        let y = at.y + 1.1 * radius;
+        let reach = (0..200).map(|i| vec2(side * 0.5 * bearer.image_mm.x * (1.0 - i as f32 / 200.0), y));
+        let Some(next) = reach.into_iter().find(|p| there(bearer, *p)) else { return };
+        at = next;
+    }
+}
+
+/// A tear runs in between two secondary veins: inwards and down.
+fn tear(bearer: &Bearer<'_>, s: &mut Stream) -> Option<Tear> {
+    let (from, side) = edge(bearer, s)?;
+    let angle = s.range32(0.3, 0.9);
+    let along = vec2(-side * angle.cos(), -angle.sin());
+    let length = from.x.abs() * s.range32(0.35, 0.85) / angle.cos();
+    Some(Tear { from, along, length, width: s.range32(0.06, 0.22) * length })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const IMAGE: Vec2 = vec2(60.0, 100.0);
+
+    fn oval() -> AlphaMask {
+        AlphaMask::new(300, 500, |x, y| ((x as f32 - 149.5) / 140.0).hypot((y as f32 - 249.5) / 235.0) < 1.0)
+    }
+
+    fn leaf(mask: &AlphaMask) -> Bearer<'_> {
+        Bearer { age: 1.0, cotyledon: false, share: 1.0, height: 0.0, image_mm: IMAGE, mask: Some(mask), margin: None }
+    }
+
+    fn stream(k: u64) -> Stream {
+        Stream::of(1, 0, Purpose::Test, k)
+    }
+
+    fn marks(condition: &Condition, bearer: &Bearer<'_>, k: u64) -> Marks {
+        Marks::draw(&ConditionDesc::flawless(), condition, bearer, &stream(k))
+    }
+
+    #[test]
+    fn no_condition_leaves_no_mark() {
+        let mask = oval();
+        assert!((0..50).all(|k| marks(&Condition::default(), &leaf(&mask), k).nothing()));
+    }
+
+    /// Expected: a Poisson's mean and variance, 4 standard errors of 600 leaves; a fifth of it on the youngest.
+    #[test]
+    fn holes_are_counted_as_a_poisson_counts() {
+        let mask = oval();
+        let condition = Condition { holes: 3.0, ..Condition::default() };
+        let of = |age: f32| -> Vec<f64> {
+            let bearer = Bearer { age, ..leaf(&mask) };
+            (0..600).map(|k| marks(&condition, &bearer, k).holes() as f64).collect()
+        };
+        let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+        let old = of(1.0);
+        let m = mean(&old);
+        let variance = old.iter().map(|x| (x - m).powi(2)).sum::<f64>() / old.len() as f64;
+        assert!((m - 3.0).abs() < 0.29 && (variance / 3.0 - 1.0).abs() < 0.25, "{m} {variance}");
+        let young = mean(&of(0.0));
+        assert!((young - 0.6).abs() < 0.13, "{young}");
+    }
+
+    /// Rationale: what a page calls a radius must be one. Expected: π r² within 15 % over 60 leaves of holes that do not overlap.
+    #[test]
+    fn holes_remove_the_area_of_their_radius() {
+        let mask = oval();
+        let desc = ConditionDesc { hole_mm: Vary::fixed(3.0), ..ConditionDesc::flawless() };
+        let condition = Condition { holes: 1.0, ..Condition::default() };
+        let (mut removed, mut holes) = (0.0, 0);
+        for k in 0..400 {
+            let m = Marks::draw(&desc, &condition, &leaf(&mask), &stream(k));
+            let centred = m.holes.iter().all(|h| (h.centre / vec2(28.0, 47.0) - vec2(0.0, 50.0 / 47.0)).length() < 0.8);
+            if m.holes() == 1 && centred {
+                removed += (mask.count() - m.cut(Some(&mask)).count()) as f32 * 0.04;
+                holes += 1;
+            }
+        }
+        let area = removed / holes as f32 / (std::f32::consts::PI * 9.0);
+        assert!(holes > 50 && (area - 1.0).abs() < 0.15, "{area} of {holes}");
+    }
+
+    #[test]
+    fn bites_and_tears_cut_the_margin_and_not_more_than_a_third_of_the_leaf() {
+        let mask = oval();
+        let condition = Condition { bites: 3.0, tears: 1.0, ..Condition::default() };
+        for k in 0..40 {
+            let m = marks(&condition, &leaf(&mask), k);
+            let left = m.cut(Some(&mask)).count() as f32 / mask.count() as f32;
+            assert!(m.cuts() == (left < 1.0) && left > 0.67, "{k}: {left}");
+        }
+    }
+
+    /// Expected: the mean cover is the one asked for, at the soil, and falls with height.
+    #[test]
+    fn dust_covers_what_it_should() {
+        let mask = oval();
+        let condition = Condition { dust: 0.2, ..Condition::default() };
+        let cover = |height: f32| {
+            let mut sum = 0.0;
+            for k in 0..60 {
+                let m = marks(&condition, &Bearer { height, ..leaf(&mask) }, k);
+                let noise = m.noise();
+                let at = |i: usize| m.tissue(vec2((i % 20) as f32 / 20.0, (i / 20) as f32 / 20.0), &noise).soil;
+                sum += (0..400).map(at).sum::<f32>() / 400.0;
+            }
+            sum / 60.0
+        };
+        let (low, high) = (cover(0.0), cover(0.1));
+        assert!((low - 0.21).abs() < 0.05, "{low}");
+        assert!(high < 0.5 * low && high > 0.1 * low, "{high}");
+    }
+
+    #[test]
+    fn splash_covers_more_the_more_of_it_there_is() {
+        let mask = oval();
+        let cover = |splash: f32| {
+            let m = marks(&Condition { splash, ..Condition::default() }, &leaf(&mask), 3);
+            let noise = m.noise();
+            let at = |i: usize| m.tissue(vec2((i % 100) as f32 / 100.0, (i / 100) as f32 / 100.0), &noise).soil;
+            (0..10_000).map(at).sum::<f32>() / 10_000.0
+        };
+        let all = [0.5, 2.0, 8.0].map(cover);
+        assert!(all[0] < all[1] && all[1] < all[2] && all[2] < 0.3, "{all:?}");
+        // Eight specks a cm² of 0.15–1 mm radius, uniform in log: 8 · π · 0.25 mm² of 100 mm².
+        assert!((all[2] - 0.065).abs() < 0.025, "{all:?}");
+    }
+
+    #[test]
+    fn marks_are_the_same_every_time() {
+        let mask = oval();
+        let condition = Condition { holes: 4.0, bites: 1.0, spots: 5.0, splash: 3.0, ..Condition::default() };
+        let (a, b) = (marks(&condition, &leaf(&mask), 5), marks(&condition, &leaf(&mask), 5));
+        assert_eq!(a, b);
+        assert_eq!(a.cut(Some(&mask)), b.cut(Some(&mask)));
+        assert_ne!(a, marks(&condition, &leaf(&mask), 6));
+    }
+}

@@ -1,0 +1,114 @@
+//! Plants in a condition: leaf by leaf, what is cut out of it and what its tissue has become.
+
+use super::Grown;
+use crate::geometry::Mesh;
+use crate::material::Wear;
+use crate::math::{Spectrum, Vec2};
+use crate::optics::Pigments;
+use crate::plant::condition::{Bearer, Marks, leaf_stream};
+use crate::plant::{Condition, ConditionDesc, OrganKind};
+use crate::sampling::{Purpose, Stream};
+use crate::scene::library::Choice;
+use std::sync::Arc;
+
+/// Size of the image of a blade that has none, mm: what varies over it does so too little to be seen.
+const NO_IMAGE_MM: Vec2 = Vec2::splat(30.0);
+
+/// A plant's condition as it was drawn.
+pub(super) struct Ailing<'a> {
+    desc: &'a ConditionDesc,
+    drawn: Condition,
+    /// The plant's.
+    stream: &'a Stream,
+    /// Reflectance of the soil that lies on leaves.
+    soil: Spectrum,
+}
+
+/// An organ before its condition.
+pub(super) struct Bare<'a> {
+    /// What it is.
+    pub(super) kind: OrganKind,
+    /// Its skin.
+    pub(super) choice: &'a Choice,
+    /// What its skin is made of.
+    pub(super) pigments: &'a Pigments,
+    /// Factor on its chlorophyll.
+    pub(super) green: f32,
+    /// Height of the plant's foot.
+    pub(super) ground: f32,
+    /// Number of the plant's last leaf.
+    pub(super) last: u16,
+}
+
+impl<'a> Ailing<'a> {
+    /// Draws the condition of the plant of `stream`.
+    pub(super) fn new(desc: &'a ConditionDesc, stream: &'a Stream, soil: Spectrum) -> Self {
+        Self { desc, drawn: desc.draw(stream), stream, soil }
+    }
+
+    /// As growing asks for it.
+    pub(super) fn posture(&self) -> (&ConditionDesc, &Condition) {
+        (self.desc, &self.drawn)
+    }
+
+    /// As it was drawn.
+    pub(super) fn drawn(&self) -> Condition {
+        self.drawn
+    }
+
+    /// The organ as its condition has it: one part, or one for each leaflet.
+    pub(super) fn dress(&self, grown: &Grown, bare: &Bare<'_>) -> Vec<Grown> {
+        let leaf = grown.part.tag.leaf;
+        let age = match leaf {
+            0 => 1.0,
+            _ => 1.0 - f32::from(leaf - 1) / f32::from(bare.last.max(2) - 1),
+        };
+        let stream = leaf_stream(self.stream, leaf);
+        let green = if leaf == 0 { 1.0 } else { self.desc.green(&self.drawn, age, &stream) };
+        let gloss = if leaf == 0 { 1.0 } else { self.desc.gloss(&stream) };
+        let base = bare.pigments.chlorophyll.f32();
+        let own = bare.choice.material.with_chlorophyll(base, bare.green * green);
+        let blade = matches!(bare.kind, OrganKind::Blade | OrganKind::Cotyledon);
+        // What stands apart is eaten apart: leaflets share a picture, not their holes.
+        let pieces = match grown.part.mesh.image_size() {
+            Some(_) if blade && bare.choice.pictured => grown.part.mesh.pieces(),
+            _ => vec![grown.part.mesh.clone()],
+        };
+        let share = 1.0 / pieces.len().max(1) as f32;
+        let mut dressed = Vec::with_capacity(pieces.len());
+        for (k, mesh) in pieces.into_iter().enumerate() {
+            let of_piece = stream.child(Purpose::Condition, 100 + k as u64);
+            let marks = blade.then(|| self.marks(&mesh, (age, share), bare, &of_piece));
+            let mut one = Grown { material: own.clone(), ..grown.with(mesh) };
+            if let Some(marks) = marks.as_ref().filter(|m| m.cuts()) {
+                one.part.mask = Some(Arc::new(marks.cut(one.part.mask.as_deref())));
+            }
+            let marked = marks.as_ref().is_some_and(|m| !m.nothing());
+            let wears = marked || self.drawn.reddening > 0.0 || gloss != 1.0;
+            one.own = wears || green != 1.0;
+            if wears {
+                one.material = own.worn(Wear::new(bare.pigments, marks, self.drawn.reddening, self.soil), gloss);
+            }
+            dressed.push(one);
+        }
+        dressed
+    }
+
+    fn marks(&self, mesh: &Mesh, (age, share): (f32, f32), bare: &Bare<'_>, stream: &Stream) -> Marks {
+        let middle = mesh.positions.iter().map(|p| p.z).sum::<f32>() / mesh.positions.len().max(1) as f32;
+        let image = mesh.image_size().filter(|_| bare.choice.pictured);
+        let bearer = Bearer {
+            age,
+            cotyledon: bare.kind == OrganKind::Cotyledon,
+            share,
+            height: middle - bare.ground,
+            image_mm: image.map_or(NO_IMAGE_MM, |size| (size * 1e3).max(Vec2::splat(0.1))),
+            mask: bare.choice.mask.as_deref(),
+            margin: bare.choice.margin.as_ref(),
+        };
+        // A ribbon is too narrow to be bitten or spotted, and has no places to tell apart.
+        let all_over = Condition { chlorosis: self.drawn.chlorosis, dust: self.drawn.dust, ..Condition::default() };
+        let drawn = if image.is_some() { &self.drawn } else { &all_over };
+        Marks::draw(self.desc, drawn, &bearer, stream)
+    }
+}
