@@ -3,7 +3,7 @@
 use super::response::RESPONSE;
 use crate::math::Spectrum;
 use crate::sampling::rng::Stream;
-use crate::sampling::vary::{Positive, Vary};
+use crate::sampling::vary::{Fraction, Positive, Vary};
 use serde::{Deserialize, Serialize};
 
 /// ASTM G173 global irradiance: what "daylight" balances for.
@@ -18,6 +18,12 @@ pub enum WhiteBalanceDesc {
     Reflector,
     /// A white card under the standard sun comes out neutral; evening light stays warm.
     Daylight,
+    /// Part of the way, in powers of the gains, from `Reflector` to where the picture's mean is grey: what an automatic white balance
+    /// does that knows nothing of the light.
+    GreyWorld {
+        /// 0 is `Reflector`, 1 a grey mean.
+        strength: Vary<Fraction>,
+    },
     /// These gains on the channels.
     Fixed {
         /// Gain of R.
@@ -36,6 +42,7 @@ impl WhiteBalanceDesc {
     pub fn draw(&self, stream: &mut Stream) -> WhiteBalance {
         match self {
             Self::Reflector => WhiteBalance::Reflector,
+            Self::GreyWorld { strength } => WhiteBalance::GreyWorld { strength: strength.draw32(stream) },
             Self::Daylight => WhiteBalance::Gains(neutral_gains(DAYLIGHT)),
             Self::Fixed { red, green, blue } => {
                 WhiteBalance::Gains([red.draw32(stream), green.draw32(stream), blue.draw32(stream)])
@@ -50,15 +57,31 @@ impl WhiteBalanceDesc {
 pub enum WhiteBalance {
     /// Neutral under the scene's light.
     Reflector,
+    /// Part of the way from there to a grey mean.
+    GreyWorld {
+        /// 0 to 1.
+        strength: f32,
+    },
     /// These gains on R, G, B.
     Gains([f32; 3]),
 }
 
 impl WhiteBalance {
-    /// Gains on R, G, B under lights of this horizontal irradiance.
-    pub fn gains(self, illuminant: Spectrum) -> [f32; 3] {
+    /// Gains on R, G, B under lights of this horizontal irradiance, for a picture of these signals.
+    pub fn gains(self, illuminant: Spectrum, signals: &[Spectrum]) -> [f32; 3] {
         match self {
             Self::Reflector => neutral_gains(illuminant),
+            Self::GreyWorld { strength } => {
+                let mut sums = [0.0_f64; 3];
+                for signal in signals {
+                    for (sum, band) in sums.iter_mut().zip(signal.to_array()) {
+                        *sum += f64::from(band);
+                    }
+                }
+                let grey = neutral(sums.map(|sum| sum as f32));
+                let white = neutral_gains(illuminant);
+                [0, 1, 2].map(|i| white[i].powf(1.0 - strength) * grey[i].powf(strength))
+            }
             Self::Gains(gains) => gains,
         }
     }
@@ -67,6 +90,11 @@ impl WhiteBalance {
 /// Gains on R, G, B under which a white card under this irradiance is neutral, G unchanged; 1 for a channel without light.
 fn neutral_gains(irradiance: Spectrum) -> [f32; 3] {
     let [r, g, b, _] = (irradiance * RESPONSE).to_array();
+    neutral([r, g, b])
+}
+
+/// Gains that bring R and B to G.
+fn neutral([r, g, b]: [f32; 3]) -> [f32; 3] {
     [r, g, b].map(|channel| {
         let gain = g / channel;
         if gain.is_finite() && gain > 0.0 { gain } else { 1.0 }

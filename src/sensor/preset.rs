@@ -1,6 +1,7 @@
 //! Sensors by their names. Each has a camera of the same name, with its pixels, lens and shutter.
 
 use super::adc::AdcDesc;
+use super::balance::WhiteBalanceDesc;
 use super::bayer::{Demosaic, MosaicDesc, Pattern};
 use super::jpeg::JpegDesc;
 use super::matrix::MatrixDesc;
@@ -63,6 +64,9 @@ fn jai_ad130() -> SensorDesc {
 /// Estimates for its class; without an infrared filter NIR would be the same sensor's.
 fn phone() -> SensorDesc {
     SensorDesc {
+        // The fall of light towards the corners is taken out before anybody sees it.
+        natural_vignetting: false,
+        white_balance: WhiteBalanceDesc::GreyWorld { strength: Vary::fixed(0.6) },
         corner_shading: Vary::fixed(0.1),
         psf: psf(0.6, 0.8, 0.3, -0.3),
         noise: NoiseDesc {
@@ -76,7 +80,7 @@ fn phone() -> SensorDesc {
         },
         mosaic: MosaicDesc::Bayer { pattern: Pattern::Rggb, demosaic: Demosaic::MalvarHeCutler },
         adc: bits(10.0),
-        matrix: MatrixDesc::Saturation(Vary::fixed(1.35)),
+        matrix: MatrixDesc::Saturation(Vary::fixed(1.25)),
         tone: Tone::SCurve,
         sharpen: SharpenDesc { amount: Vary::fixed(0.7), radius_px: Vary::fixed(1.0) },
         jpeg: JpegDesc::On { quality: Vary::fixed(90.0), full_color: false },

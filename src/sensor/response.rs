@@ -113,10 +113,6 @@ impl Sensor {
         let width = film.width.max(1);
         let height = (film.pixels.len() / width as usize) as u32;
         let place = |i: usize| (film.left + i as u32 % width, film.top + i as u32 / width);
-        let balance = self.white_balance.gains(illuminant);
-        let [r, g, b] = balance;
-        let balanced = Spectrum::new(r, g, b, 1.0);
-
         // Electrons per exposure, before any clipping.
         let known = |r: &Spectrum| if r.is_finite() { r.clamp(0.0, f32::MAX) } else { Spectrum::ZERO };
         let mut signals: Vec<Spectrum> = film.pixels.iter().map(known).collect();
@@ -125,6 +121,9 @@ impl Sensor {
             *signal = *signal * RESPONSE * self.vignetting(camera, place(i));
         }
 
+        let balance = self.white_balance.gains(illuminant, &signals);
+        let [r, g, b] = balance;
+        let balanced = Spectrum::new(r, g, b, 1.0);
         let white = illuminant * RESPONSE * FRAC_1_PI;
         let mut metered: Vec<f32> = signals.iter().map(|&s| (s * balanced).luminance()).collect();
         let gain = self.exposure.gain(&mut metered, (white * balanced).luminance());

@@ -320,3 +320,21 @@ fn a_deep_photograph_has_its_steps() {
         nir.iter().zip(&shot.nir).all(|(fine, coarse)| (f32::from(*fine) / 257.0 - f32::from(*coarse)).abs() < 0.6)
     );
 }
+
+/// Expected: at strength 1 the picture's mean is grey, at 0 a white card is, in between the gains' logarithms lie in between.
+#[test]
+fn a_grey_world_goes_part_of_the_way_to_a_grey_mean() {
+    let scene: Vec<Spectrum> =
+        (0..48 * 32).map(|i| EVENING * Spectrum::new(0.3, 0.2, 0.1, 0.3) * (1.0 + (i % 7) as f32)).collect();
+    let gains = |strength: f32| {
+        let page = format!("(noise: (on: false), white_balance: GreyWorld(strength: {strength}))");
+        expose(&sensor(&page), &scene, EVENING).white_balance
+    };
+    let white = expose(&sensor("(noise: (on: false))"), &scene, EVENING).white_balance;
+    let (none, half, all) = (gains(0.0), gains(0.5), gains(1.0));
+    for band in 0..3 {
+        assert!((none[band] / white[band] - 1.0).abs() < 1e-5);
+        assert!((all[band] / white[band] / [2.0 / 3.0, 1.0, 2.0][band] - 1.0).abs() < 1e-3, "{all:?} {white:?}");
+        assert!((half[band] * half[band] / (none[band] * all[band]) - 1.0).abs() < 1e-5);
+    }
+}

@@ -104,7 +104,7 @@ fn list() {
     for edit in [&FULL].into_iter().chain(EDITS) {
         let labels = if edit.keeps_labels { "" } else { " (other labels)" };
         // A closed pipe is no failure.
-        let _ = writeln!(out, "{:<16} {}{labels}", edit.name, edit.about);
+        let _ = writeln!(out, "{:<20} {}{labels}", edit.name, edit.about);
     }
 }
 
