@@ -41,6 +41,10 @@ pub enum AdcDesc {
         /// What a pixel without light reads, as a share of the range; default 0.032.
         #[serde(default = "black")]
         black: Num<Black>,
+        /// Whether pictures show the numbers as they are, black level and all, where the tone curve is `Linear`: cameras that leave
+        /// everything to the computer do. Default false.
+        #[serde(default)]
+        kept: bool,
     },
 }
 
@@ -60,18 +64,25 @@ pub struct Adc {
     pub white: f32,
     /// The largest number.
     pub top: f32,
+    /// Whether pictures show the numbers.
+    pub kept: bool,
 }
 
 impl AdcDesc {
     /// The converter; `None` where there is none.
     pub fn build(&self) -> Option<Adc> {
-        let Self::Bits { bits, black } = self else { return None };
+        let Self::Bits { bits, black, kept } = *self else { return None };
         let top = (1_u32 << bits.get() as u32) as f32 - 1.0;
-        Some(Adc { black: (black.f32() * top).round(), white: (WHITE * top).round(), top })
+        Some(Adc { black: (black.f32() * top).round(), white: (WHITE * top).round(), top, kept })
     }
 }
 
 impl Adc {
+    /// The share of the range at which a level stands, where pictures show the numbers; else the level.
+    pub fn shown(&self, level: f32) -> f32 {
+        if self.kept { (self.black + level * (self.white - self.black)) / self.top } else { level }
+    }
+
     /// The level (1 is white, 0 black) that is left of one.
     pub fn convert(&self, level: f32) -> f32 {
         let range = self.white - self.black;
@@ -97,6 +108,10 @@ mod tests {
             assert_eq!(levels.len(), 1 << bits, "{bits} bits");
             assert!(adc.convert(-0.01) < 0.0 && adc.convert(-9.0) == -black / (white - black));
         }
+        // Kept, the picture holds the numbers: 33 of 1023 without light, 890 at white.
+        let desc: AdcDesc = ron::from_str("Bits(bits: 10, kept: true)").unwrap();
+        let adc = desc.build().unwrap();
+        assert!([(0.0, 33.0), (1.0, 890.0)].iter().all(|(level, n)| (adc.shown(*level) * 1023.0 - n).abs() < 1e-3));
         assert!(AdcDesc::default().build().is_none());
         assert!(ron::from_str::<AdcDesc>("Bits(bits: 7)").is_err());
     }

@@ -36,7 +36,7 @@ fn psf(color: f64, nir: f64, red: f64, blue: f64) -> PsfDesc {
 }
 
 const fn bits(bits: f64) -> AdcDesc {
-    AdcDesc::Bits { bits: Num::new(bits), black: Num::new(0.032) }
+    AdcDesc::Bits { bits: Num::new(bits), black: Num::new(0.032), kept: false }
 }
 
 /// The JAI AD-130GE: two CCDs of Sony's ICX445 class behind a prism, 10 bits. Signal to noise 52 dB in colour and 54 dB in NIR, from its data

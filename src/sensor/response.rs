@@ -146,7 +146,7 @@ impl Sensor {
             }
         }
         for value in &mut values {
-            *value = value.map(|level| self.tone.apply(level));
+            *value = value.map(|level| self.tone.apply(self.adc.map_or(level, |adc| adc.shown(level))));
         }
         self.sharpen.apply(&mut values, width);
 
