@@ -18,7 +18,7 @@ pub use ground::{Ground, GroundSkin};
 pub use leaf::{LeafDesc, LeafMaterial, Picture};
 pub use painted::{Painted, Repaint};
 pub use solid::Solid;
-pub use wear::{Wear, tissues};
+pub use wear::{Tones, Wear, tissues};
 
 /// What a part is made of.
 #[derive(Clone, Debug)]

@@ -31,18 +31,18 @@ const VEIN_CONTRAST: (f32, f32) = (1.015, 1.1);
 /// GGX roughness that full cover of dust adds.
 const DULL: f32 = 0.5;
 
-/// The tissues of a kind of leaf.
+/// The tissues of a kind of leaf: the leaf model is run for them once, not for every leaf.
 #[derive(Clone, Debug)]
-struct Tones {
+pub struct Tones {
     /// By yellowness.
     yellow: [Leaf; STEPS + 1],
     dead: Leaf,
     rim: Leaf,
-    red: Leaf,
 }
 
 impl Tones {
-    fn new(base: &Pigments, reddening: f32) -> Self {
+    /// Of a leaf made of `base`.
+    pub fn new(base: &Pigments) -> Self {
         let yellow = |i: usize| {
             let s = i as f64 / STEPS as f64;
             let n = (base.n.get() + 0.15 * s).min(4.0);
@@ -58,15 +58,13 @@ impl Tones {
             water: Num::new(0.003),
             ..*base
         };
-        let more = |anthocyanin: f64| Num::new(base.anthocyanin.get() + anthocyanin);
         let rim = Pigments {
             chlorophyll: Num::new(base.chlorophyll.get() * 0.3),
             brown: Num::new(0.9),
-            anthocyanin: more(10.0),
+            anthocyanin: Num::new(base.anthocyanin.get() + 10.0),
             ..*base
         };
-        let red = Pigments { anthocyanin: more(f64::from(reddening)), ..*base };
-        Self { yellow: std::array::from_fn(yellow), dead: dead.bands(), rim: rim.bands(), red: red.bands() }
+        Self { yellow: std::array::from_fn(yellow), dead: dead.bands(), rim: rim.bands() }
     }
 
     /// `leaf` made yellow: moved as far as the leaf's mean would be, less where it is pale already.
@@ -92,17 +90,22 @@ impl Tones {
         }
     }
 
-    /// `leaf` made redder, by a weight.
-    fn reddened(&self, leaf: Leaf, weight: f32) -> Leaf {
+    /// `leaf` made redder, by a weight; `red` is what the leaf's mean becomes.
+    fn reddened(&self, leaf: Leaf, red: Leaf, weight: f32) -> Leaf {
         let from = self.yellow[0];
         let ratio = |own: Spectrum, red: Spectrum, from: Spectrum| {
             own * Spectrum(Vec4::ONE.lerp(red.0 / from.0.max(Vec4::splat(1e-3)), weight).min(Vec4::ONE))
         };
         Leaf {
-            reflectance: ratio(leaf.reflectance, self.red.reflectance, from.reflectance),
-            transmittance: ratio(leaf.transmittance, self.red.transmittance, from.transmittance),
+            reflectance: ratio(leaf.reflectance, red.reflectance, from.reflectance),
+            transmittance: ratio(leaf.transmittance, red.transmittance, from.transmittance),
         }
     }
+}
+
+/// The mean of a leaf made of `base` with `more` anthocyanin, µg/cm².
+fn red(base: &Pigments, more: f32) -> Leaf {
+    Pigments { anthocyanin: Num::new(base.anthocyanin.get() + f64::from(more)), ..*base }.bands()
 }
 
 fn mix(a: Leaf, b: Leaf, t: f32) -> Leaf {
@@ -128,17 +131,24 @@ pub struct Wear(Arc<Inner>);
 struct Inner {
     marks: Option<Marks>,
     noise: Perlin,
-    tones: Tones,
-    reddening: f32,
+    tones: Arc<Tones>,
+    /// What the mean of veins and stalks becomes, where they redden.
+    red: Option<Leaf>,
     soil: Spectrum,
 }
 
 impl Wear {
-    /// Of a leaf made of `pigments`: its marks, none for a stalk; anthocyanin beyond the page's, µg/cm²; reflectance of the
+    /// Of a leaf made of `pigments`, with its tissues: its marks, none for a stalk; anthocyanin beyond the page's, µg/cm²; reflectance of the
     /// soil that lies on it.
-    pub fn new(pigments: &Pigments, marks: Option<Marks>, reddening: f32, soil: Spectrum) -> Self {
+    pub fn new(
+        (pigments, tones): (&Pigments, Arc<Tones>),
+        marks: Option<Marks>,
+        reddening: f32,
+        soil: Spectrum,
+    ) -> Self {
         let noise = marks.as_ref().map_or_else(|| Perlin::new(0), Marks::noise);
-        Self(Arc::new(Inner { marks, noise, tones: Tones::new(pigments, reddening), reddening, soil }))
+        let red = (reddening > 0.0).then(|| red(pigments, reddening));
+        Self(Arc::new(Inner { marks, noise, tones, red, soil }))
     }
 
     /// Roughness α of the upper side's coat under the leaf's dust.
@@ -162,7 +172,7 @@ impl Wear {
     fn vein(&self, picture: Option<&Texture>, uv: Vec2) -> f32 {
         let inner = &*self.0;
         let Some(marks) = &inner.marks else { return 1.0 };
-        let Some(picture) = picture.filter(|_| marks.interveinal() || inner.reddening > 0.0) else { return 0.0 };
+        let Some(picture) = picture.filter(|_| marks.interveinal() || inner.red.is_some()) else { return 0.0 };
         let luminance = |mm: f32| {
             let [r, g, b, _] = picture.sample(uv, picture.lod(mm / marks.image_mm().max_element()));
             Vec3::new(r, g, b).dot(Vec3::new(0.2126, 0.7152, 0.0722))
@@ -176,8 +186,8 @@ impl Wear {
         let inner = &*self.0;
         let vein = self.vein(picture, uv);
         let mut tissue = leaf;
-        if inner.reddening > 0.0 {
-            tissue = inner.tones.reddened(tissue, vein);
+        if let Some(red) = inner.red {
+            tissue = inner.tones.reddened(tissue, red, vein);
         }
         let Some(marks) = &inner.marks else { return Worn { tissue, upper: tissue, waxy: true } };
         let t = marks.tissue(uv, &inner.noise);
@@ -211,7 +221,7 @@ fn held(leaf: Leaf) -> LeafBands {
 
 /// The yellowing, dead and rim tissue of pigments, for those that ask what they look like: yellow by `s`, dead, rim.
 pub fn tissues(pigments: &Pigments, s: f32) -> [Leaf; 3] {
-    let tones = Tones::new(pigments, 0.0);
+    let tones = Tones::new(pigments);
     [held(tones.yellowed(LeafOptics::new(pigments).plain(), s)), held(tones.dead), held(tones.rim)]
 }
 
@@ -242,7 +252,8 @@ mod tests {
         };
         let stream = Stream::of(seed, 0, Purpose::Test, 0);
         let marks = Marks::draw(&ConditionDesc::flawless(), condition, &bearer, &stream);
-        Wear::new(&Pigments::default(), Some(marks), condition.reddening, LOESS)
+        let pigments = Pigments::default();
+        Wear::new((&pigments, Arc::new(Tones::new(&pigments))), Some(marks), condition.reddening, LOESS)
     }
 
     fn mean_ndvi(condition: &Condition) -> f32 {
@@ -279,9 +290,9 @@ mod tests {
 
     #[test]
     fn reddening_darkens_green_and_leaves_red_and_near_infrared() {
-        let tones = Tones::new(&Pigments::default(), 8.0);
-        let leaf = Pigments::default().bands();
-        let [r, g, _, nir] = tones.reddened(leaf, 1.0).reflectance.to_array();
+        let base = Pigments::default();
+        let leaf = base.bands();
+        let [r, g, _, nir] = Tones::new(&base).reddened(leaf, red(&base, 8.0), 1.0).reflectance.to_array();
         let [r0, g0, _, nir0] = leaf.reflectance.to_array();
         assert!(g < 0.8 * g0 && r > 0.75 * r0 && (nir - nir0).abs() < 0.01, "{r} {g} {nir}");
     }

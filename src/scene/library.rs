@@ -4,10 +4,10 @@ use super::build::Growing;
 use super::desc::SpeciesDesc;
 use crate::geometry::{AlphaMask, Margin};
 use crate::light::{Infrared, Table};
-use crate::material::{LeafMaterial, Picture};
+use crate::material::{LeafMaterial, Picture, Tones};
 use crate::math::{Spectrum, Vec2};
 use crate::model::{Model, Up};
-use crate::optics::soil;
+use crate::optics::{Pigments, soil};
 use crate::page::Page;
 use crate::sampling::fault::choose;
 use crate::sampling::place::Step;
@@ -18,7 +18,7 @@ use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// A picture with the mask that it cuts.
 #[derive(Clone)]
@@ -37,6 +37,14 @@ pub(super) struct Choice {
     pub(super) margin: Option<Arc<Margin>>,
     /// Whether it has a picture.
     pub(super) pictured: bool,
+    tones: OnceLock<Arc<Tones>>,
+}
+
+impl Choice {
+    /// What its tissue becomes, worked out when the first leaf asks; `pigments` are its own.
+    pub(super) fn tones(&self, pigments: &Pigments) -> Arc<Tones> {
+        self.tones.get_or_init(|| Arc::new(Tones::new(pigments))).clone()
+    }
 }
 
 /// A species with its materials ready.
@@ -114,14 +122,14 @@ impl Library {
             let choices = match &skin.texture {
                 None => {
                     let material = LeafMaterial::new(skin, None);
-                    vec![Choice { material, mask: None, margin: None, pictured: false }]
+                    vec![Choice { material, mask: None, margin: None, pictured: false, tones: OnceLock::new() }]
                 }
                 Some(of) => {
                     let mut choices = Vec::new();
                     for path in of.all() {
                         let Cut { picture, mask, margin } = self.picture(&own, path, skin.relief_range.f32())?;
                         let material = LeafMaterial::new(skin, Some(picture));
-                        choices.push(Choice { material, mask, margin, pictured: true });
+                        choices.push(Choice { material, mask, margin, pictured: true, tones: OnceLock::new() });
                     }
                     choices
                 }

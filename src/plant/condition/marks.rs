@@ -268,8 +268,9 @@ impl Marks {
         if let Some(margin) = self.margin.as_ref().filter(|_| self.scorch_mm > 0.0) {
             let inward = margin.at(uv) * self.image_mm.y;
             let width = self.scorch_mm * (1.0 + 1.1 * n(9.0, 7.7)).max(0.0);
-            t.brown = t.brown.max(smoothstep(width + 0.2, 0.7 * width, inward));
-            t.yellow = t.yellow.max(0.8 * smoothstep(3.0 * width + 0.5, width, inward));
+            // A strip too narrow to be seen whole is seen weakly.
+            t.brown = t.brown.max(smoothstep(width + 0.2, 0.7 * width, inward) * (width / 0.3).min(1.0));
+            t.yellow = t.yellow.max(0.8 * smoothstep(3.0 * width + 0.2, width, inward) * (width / 0.6).min(1.0));
         }
         if self.dust > 0.0 {
             // Lies in drifts of a few mm, with grain.

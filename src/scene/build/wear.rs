@@ -87,7 +87,8 @@ impl<'a> Ailing<'a> {
             let wears = marked || self.drawn.reddening > 0.0 || gloss != 1.0;
             one.own = wears || green != 1.0;
             if wears {
-                one.material = own.worn(Wear::new(bare.pigments, marks, self.drawn.reddening, self.soil), gloss);
+                let of = (bare.pigments, bare.choice.tones(bare.pigments));
+                one.material = own.worn(Wear::new(of, marks, self.drawn.reddening, self.soil), gloss);
             }
             dressed.push(one);
         }
