@@ -5,7 +5,7 @@
 
 mod common;
 
-use common::program::{SMALL, field, small_text};
+use common::program::{SMALL, field, shoot, small_text};
 use furrow::light::LightRecord;
 use furrow::math::{Spectrum, vec3};
 use furrow::scene::build::{self, Options};
@@ -232,4 +232,47 @@ fn conditions_are_written_with_their_units() {
     assert_eq!(json["camera"]["width_px"], field.scene.camera.width());
     assert!(json["soil"]["moisture"]["mean"].is_number() && json["crops"][0]["rows"]["azimuth_deg"].is_number());
     assert_eq!(serde_json::to_value(&field.species[0]).unwrap()["class"], "crop");
+}
+
+/// Rationale: a network that learns from near infrared takes the bands' relation for granted. Expected: under equal light in all bands the
+/// NDVI of what is rendered lies within that of measured leaves, bare soils and straw or wood. Source: `tests/ref/measured_ndvi.csv`.
+#[test]
+fn leaf_soil_and_straw_have_the_ndvi_of_measured_spectra() {
+    let text = std::fs::read_to_string("tests/ref/measured_ndvi.csv").unwrap();
+    let soil = r#"layers: [(albedo: "textures/soil/dirt.png", size_m: 0.5, height_mm: (-1, 1))], moisture: (mean: 0.1)"#;
+    let page = |soil: &str| {
+        format!(
+            r#"Field(
+                seed: 4,
+                camera: Pinhole(size: (96, 72), intrinsics: FieldOfView(horizontal_deg: 30), pose: Nadir(height_m: 0.6)),
+                lights: [Constant(radiance: (1, 1, 1, 1))],
+                soil: ({soil}),
+                plants: [(species: "scenes/species/sugar_beet.ron", growth: Bbch(16), position_m: (0, 0))],
+            )"#
+        )
+    };
+    let bare = page(&format!("{soil}, litter: (straw_cover: 0, sticks_per_m2: 0, bits_per_m2: 0)"));
+    let strewn = page(&format!(
+        "{soil}, clods: (over_5mm_per_m2: 0), litter: (straw_cover: 0.5, sticks_per_m2: 0, bits_per_m2: 0)"
+    ));
+    let mut loess = bare.clone();
+    loess.insert_str(loess.find("moisture").unwrap(), "colors: [Humic, Sandy], ");
+    let cases: [(&str, &str, &dyn Fn(u32, Class) -> bool); 4] = [
+        ("leaf", &bare, &|_, class| class == Class::Crop),
+        ("soil", &bare, &|_, class| class == Class::Soil),
+        ("soil", &loess, &|_, class| class == Class::Soil),
+        // The ground is the first part; what else there is on it is straw.
+        ("straw", &strewn, &|part, class| part > 0 && class == Class::Soil),
+    ];
+    for (what, page, is) in cases {
+        let line = text.lines().find(|line| line.starts_with(what)).unwrap();
+        let bound: Vec<f32> = line.split(',').skip(1).take(2).map(|n| n.parse().unwrap()).collect();
+        let field = field(page, &Options::default());
+        let (film, labels) = shoot(&field, 16, 2);
+        let seen = |i: &usize| is(labels.parts[*i], labels.tags[*i].class);
+        let pixels: Vec<Spectrum> = (0..film.pixels.len()).filter(seen).map(|i| film.pixels[i].mean).collect();
+        let [red, _, _, infrared] = pixels.iter().fold(Spectrum::ZERO, |sum, p| sum + *p).to_array();
+        let ndvi = (infrared - red) / (infrared + red);
+        assert!(pixels.len() > 100 && (bound[0]..bound[1]).contains(&ndvi), "{what}: {ndvi} of {}", pixels.len());
+    }
 }

@@ -1,6 +1,6 @@
 //! The written form of the ground: what a page says about soil, clods, stones and litter.
 
-use super::SoilColor;
+use super::{SoilColor, WheelDesc};
 use crate::math::Spectrum;
 use crate::sampling::vary::{Count, Finite, Fraction, NonNegative, Num, Positive, PositiveCount, Vary};
 use serde::{Deserialize, Serialize};
@@ -18,7 +18,7 @@ use std::path::PathBuf;
 ///     ],
 ///     colors: [Loess, Sandy],
 ///     blend: (scale_m: 0.25, octaves: 3, sharpness: 6),
-///     relief: (rms_mm: Uniform(5, 10), hurst: 0.7, row: (depth_mm: Uniform(5, 15), width_mm: 60)),
+///     relief: (rms_mm: Uniform(5, 10), hurst: 0.7, row: (depth_mm: Uniform(5, 15), width_mm: 60), wheels: [(offset_m: 0.25)]),
 ///     moisture: (mean: Uniform(0.1, 0.5)),
 ///     clods: (over_5mm_per_m2: 9400, min_mm: 2.5, max_mm: 45),
 ///     stones: [(cover: Uniform(0, 0.03)), (cover: 0.0002, median_mm: 1.5, min_mm: 1, max_mm: 3, albedo: (0.7, 0.7, 0.68, 0.75))],
@@ -130,6 +130,8 @@ pub struct ReliefDesc {
     pub tilt_deg: Vary<NonNegative>,
     /// What seeder and plough leave along the rows.
     pub row: RowReliefDesc,
+    /// Tracks of wheels along the rows; default none.
+    pub wheels: Vec<WheelDesc>,
 }
 
 impl Default for ReliefDesc {
@@ -140,6 +142,7 @@ impl Default for ReliefDesc {
             longest_m: Vary::fixed(0.3),
             tilt_deg: Vary::uniform(0.0, 2.0),
             row: RowReliefDesc::default(),
+            wheels: Vec::new(),
         }
     }
 }

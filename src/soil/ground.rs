@@ -131,7 +131,7 @@ impl Ground {
                 if fine.is_some() {
                     self.fine.noise.push(noise);
                     self.fine.detail.push(detail);
-                    self.fine.share.push(self.blend.clods(weights));
+                    self.fine.share.push(self.blend.clods(weights) * relief.left(p));
                 }
             }
         }

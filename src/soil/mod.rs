@@ -25,6 +25,7 @@ mod skin;
 mod stone;
 #[cfg(test)]
 mod tests;
+mod wheel;
 
 pub use canopy::Canopy;
 pub use clod::{Clods, clods};
@@ -36,9 +37,12 @@ pub use desc::{
 pub use ground::{Ground, SeedRows, Site};
 pub use litter::litter;
 pub use pile::Pile;
-pub use record::{ClodsRecord, LayerRecord, LitterRecord, MoistureRecord, ReliefRecord, RowReliefRecord, SoilRecord};
+pub use record::{
+    ClodsRecord, LayerRecord, LitterRecord, MoistureRecord, ReliefRecord, RowReliefRecord, SoilRecord, WheelRecord,
+};
 pub use skin::Skin;
 pub use stone::stones;
+pub use wheel::WheelDesc;
 
 use crate::geometry::Mesh;
 use crate::math::{Spectrum, Vec2, Vec3, vec2};

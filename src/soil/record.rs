@@ -46,6 +46,19 @@ pub struct LayerRecord {
     pub share: f32,
 }
 
+/// One wheel's track.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct WheelRecord {
+    /// From the world's origin to the middle of the track, across the rows.
+    pub middle_m: f32,
+    /// Width.
+    pub width_mm: f32,
+    /// Depth of the floor.
+    pub depth_mm: f32,
+    /// From lug to lug; 0 for a smooth tyre.
+    pub lugs_mm: f32,
+}
+
 /// The shape of one ground.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ReliefRecord {
@@ -59,6 +72,9 @@ pub struct ReliefRecord {
     pub tilt_deg: f32,
     /// Side towards which it rises, clockwise from north.
     pub tilt_azimuth_deg: f32,
+    /// Tracks of wheels.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub wheels: Vec<WheelRecord>,
     /// The print of the press wheel along the rows; none where nothing was sown.
     pub row: Option<RowReliefRecord>,
 }

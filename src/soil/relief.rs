@@ -4,6 +4,7 @@
 //! from the longest wavelength down, each 2^−H as high as the one before, give both.
 
 use super::record::{ReliefRecord, RowReliefRecord};
+use super::wheel::Wheel;
 use super::{ReliefDesc, SeedRows};
 use crate::math::{Vec2, smoothstep, vec2};
 use crate::sampling::{Purpose, Stream};
@@ -24,6 +25,7 @@ pub(super) struct Relief {
     longest: f32,
     tilt: Vec2,
     rows: Option<Rows>,
+    wheels: Vec<Wheel>,
     /// What was drawn.
     pub(super) record: ReliefRecord,
 }
@@ -58,6 +60,10 @@ impl Relief {
             width_mm: desc.row.width_mm.draw32(&mut child(6)),
             ridge_mm: desc.row.ridge_mm.draw32(&mut child(7)),
         });
+        let (across, offset) = rows.map_or((Vec2::X, 0.0), |r| (vec2(r.azimuth.cos(), -r.azimuth.sin()), r.offset_m));
+        let wheels: Vec<Wheel> = (desc.wheels.iter().enumerate())
+            .map(|(k, wheel)| Wheel::draw(wheel, across, offset, &mut child(50 + k as u64)))
+            .collect();
         Self {
             noise: Perlin::new(child(0).seed32()),
             amplitude: rms_mm * 1e-3 / (PERLIN_SD * energy.sqrt()),
@@ -79,14 +85,22 @@ impl Relief {
                 longest_m: longest,
                 tilt_deg,
                 tilt_azimuth_deg: tilt.x.atan2(tilt.y).to_degrees().rem_euclid(360.0),
+                wheels: wheels.iter().map(Wheel::record).collect(),
                 row,
             },
+            wheels,
         }
     }
 
     /// Height at `p`, leaving out what is finer than two cells.
     pub(super) fn height(&self, p: Vec2, cell: f32) -> f32 {
-        self.tilt.dot(p) + self.fbm(p, cell) + self.row(p)
+        let tracks: f32 = self.wheels.iter().map(|w| w.height(p)).sum();
+        self.tilt.dot(p) + self.left(p) * (self.fbm(p, cell) + self.row(p)) + tracks
+    }
+
+    /// Share of roughness and of clods that wheels have left.
+    pub(super) fn left(&self, p: Vec2) -> f32 {
+        self.wheels.iter().map(|w| w.left(p)).product()
     }
 
     fn fbm(&self, p: Vec2, cell: f32) -> f32 {

@@ -50,7 +50,7 @@ impl Skin {
 /// Depth of a pit between crumbs that hides half of the sky, metres.
 const HALF_SKY_M: f32 = 0.0005;
 
-/// Side of the square of matter that clods show, metres: more than the longest clod that a page asks for as a rule.
+/// Side of the square of matter that clods show, metres ([`Ground::fabric`] says it too): more than the longest clod that a page asks for as a rule.
 const FABRIC_M: f32 = 0.12;
 
 /// How much wetter such a pit is.
@@ -111,8 +111,8 @@ impl Ground {
         skin
     }
 
-    /// What clods are made of: a square of [`FABRIC_M`] of the ground's own matter without crumbs or relief, all of it as wet as
-    /// `moisture`, 0..1. [`Ground::fabric_uv`] reads it.
+    /// What clods are made of: a square of 12 cm of the ground's own matter without crumbs or relief, all of it as wet as
+    /// `moisture`, 0..1. Clods read it, each from a place of its own.
     pub fn fabric<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32, moisture: f32) -> Skin {
         let side = ((FABRIC_M / texel_m) as usize).clamp(16, 1024);
         let texel = FABRIC_M / side as f32;

@@ -1,0 +1,130 @@
+//! The tracks of wheels: a pressed band along the rows, with the prints of lugs, where few clods are left.
+
+use super::record::WheelRecord;
+use crate::math::{Vec2, smoothstep, vec2};
+use crate::sampling::Stream;
+use crate::sampling::vary::{Finite, NonNegative, Positive, Vary};
+use serde::{Deserialize, Serialize};
+
+/// One wheel's track. A tractor's are 20–50 mm deep and 300–500 mm wide; a light robot's or a seeder's press less.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct WheelDesc {
+    /// From the first row's line to the middle of the track, towards the row's right-hand side; from the world's origin where nothing is
+    /// sown, to the east.
+    pub offset_m: Vary<Finite>,
+    /// Width.
+    pub width_mm: Vary<Positive>,
+    /// Depth of the floor.
+    pub depth_mm: Vary<NonNegative>,
+    /// From lug to lug; 0 for a smooth tyre.
+    pub lugs_mm: Vary<NonNegative>,
+}
+
+impl Default for WheelDesc {
+    fn default() -> Self {
+        Self {
+            offset_m: Vary::fixed(0.3),
+            width_mm: Vary::uniform(300.0, 500.0),
+            depth_mm: Vary::uniform(10.0, 40.0),
+            lugs_mm: Vary::uniform(90.0, 180.0),
+        }
+    }
+}
+
+/// Share of its width over which a track's side rises.
+const SIDE: f32 = 0.12;
+/// Share of the clods that a wheel leaves whole, and of the roughness that it leaves.
+const LEFT: f32 = 0.15;
+/// Depth of a lug's print below the floor, of the floor's depth, and its width, of the way from lug to lug.
+const LUG: (f32, f32) = (0.5, 0.35);
+/// Slant of the lugs: how far ahead they reach at the side, of the half-width.
+const SLANT: f32 = 0.8;
+
+/// One track.
+#[derive(Clone, Debug)]
+pub(super) struct Wheel {
+    across: Vec2,
+    middle: f32,
+    half_width: f32,
+    depth: f32,
+    lugs: f32,
+}
+
+impl Wheel {
+    /// Draws the track of rows whose right-hand side is `across` and whose first lies `offset` that way.
+    pub(super) fn draw(desc: &WheelDesc, across: Vec2, offset: f32, stream: &mut Stream) -> Self {
+        Self {
+            across,
+            middle: offset + desc.offset_m.draw32(stream),
+            half_width: 0.5e-3 * desc.width_mm.draw32(stream),
+            depth: 1e-3 * desc.depth_mm.draw32(stream),
+            lugs: 1e-3 * desc.lugs_mm.draw32(stream),
+        }
+    }
+
+    /// How much of a place the wheel pressed: 1 on its floor, 0 beside it.
+    pub(super) fn pressed(&self, p: Vec2) -> f32 {
+        let d = (p.dot(self.across) - self.middle).abs() / self.half_width;
+        1.0 - smoothstep(1.0 - SIDE, 1.0 + SIDE, d)
+    }
+
+    /// Share of roughness and of clods that is left at a place.
+    pub(super) fn left(&self, p: Vec2) -> f32 {
+        1.0 - (1.0 - LEFT) * self.pressed(p)
+    }
+
+    /// Height beside that of the ground, metres: the floor, the lugs' prints in it, and what was pushed up at the sides.
+    pub(super) fn height(&self, p: Vec2) -> f32 {
+        let x = (p.dot(self.across) - self.middle) / self.half_width;
+        let rim = (-((x.abs() - 1.0 - 1.5 * SIDE) / SIDE).powi(2)).exp();
+        let lug = if self.lugs > 0.0 {
+            // Bars slant forward from the middle and alternate from side to side.
+            let along = p.dot(vec2(self.across.y, -self.across.x)) + SLANT * self.half_width * x.abs();
+            let turn = (along / self.lugs + if x < 0.0 { 0.5 } else { 0.0 }).rem_euclid(1.0);
+            1.0 - smoothstep(0.5 * LUG.1, 0.5 * LUG.1 + 0.12, (turn - 0.5).abs())
+        } else {
+            0.0
+        };
+        self.depth * (0.15 * rim - self.pressed(p) * (1.0 + LUG.0 * lug))
+    }
+
+    /// What was drawn.
+    pub(super) fn record(&self) -> WheelRecord {
+        WheelRecord {
+            middle_m: self.middle,
+            width_mm: 2e3 * self.half_width,
+            depth_mm: 1e3 * self.depth,
+            lugs_mm: 1e3 * self.lugs,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::Purpose;
+
+    #[test]
+    fn a_track_is_as_deep_and_wide_as_asked_and_ends_beside_it() {
+        let desc: WheelDesc = ron::from_str("(offset_m: 0.3, width_mm: 400, depth_mm: 30, lugs_mm: 0)").unwrap();
+        let wheel = Wheel::draw(&desc, Vec2::X, 0.1, &mut Stream::of(1, 0, Purpose::Test, 0));
+        for y in [-0.7, 0.0, 0.4] {
+            assert!((wheel.height(vec2(0.4, y)) + 0.030).abs() < 1e-6);
+            // Half of it at the side, nothing two hands beside it, and a rim between.
+            assert!((wheel.pressed(vec2(0.6, y)) - 0.5).abs() < 1e-5);
+            assert!(wheel.height(vec2(0.8, y)).abs() < 1e-5 && wheel.left(vec2(0.8, y)) == 1.0);
+            assert!(wheel.height(vec2(0.636, y)) > 0.002);
+            assert!((wheel.left(vec2(0.4, y)) - LEFT).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn lugs_print_as_often_as_asked() {
+        let desc: WheelDesc = ron::from_str("(offset_m: 0, width_mm: 300, depth_mm: 20, lugs_mm: 125)").unwrap();
+        let wheel = Wheel::draw(&desc, Vec2::X, 0.0, &mut Stream::of(1, 0, Purpose::Test, 0));
+        let deep = |k: i32| wheel.height(vec2(0.05, 1e-3 * k as f32)) < -0.025;
+        let starts = (0..1000).filter(|k| deep(k + 1) && !deep(*k)).count();
+        assert_eq!(starts, 8);
+    }
+}
