@@ -239,7 +239,8 @@ fn conditions_are_written_with_their_units() {
 #[test]
 fn leaf_soil_and_straw_have_the_ndvi_of_measured_spectra() {
     let text = std::fs::read_to_string("tests/ref/measured_ndvi.csv").unwrap();
-    let soil = r#"layers: [(albedo: "textures/soil/dirt.png", size_m: 0.5, height_mm: (-1, 1))], moisture: (mean: 0.1)"#;
+    let soil =
+        r#"layers: [(albedo: "textures/soil/dirt.png", size_m: 0.5, height_mm: (-1, 1))], moisture: (mean: 0.1)"#;
     let page = |soil: &str| {
         format!(
             r#"Field(

@@ -70,6 +70,8 @@ pub struct Aperture {
 pub struct Camera {
     width: u32,
     height: u32,
+    /// Pixels across, of those that the sensor has: below 1 the image is binned.
+    scale: f32,
     /// fx, fy: pixels per unit of x/z, y/z.
     focal: [f64; 2],
     /// cx, cy: the optical axis, pixels.
@@ -99,7 +101,7 @@ impl Camera {
             )));
         }
         let (horizon, aperture, motion) = (f64::INFINITY, None, Motion::default());
-        let mut camera = Self { width, height, focal, centre, distortion, horizon, aperture, pose, motion };
+        let mut camera = Self { width, height, scale: 1.0, focal, centre, distortion, horizon, aperture, pose, motion };
         if !distortion.is_none() {
             camera.horizon = camera.check_distortion()?;
         }
@@ -121,9 +123,15 @@ impl Camera {
             self.focal[axis] *= scale;
             self.centre[axis] *= scale;
         }
+        self.scale *= width as f32 / self.width as f32;
         self.width = width;
         self.height = height;
         self
+    }
+
+    /// Pixels across, of those that the sensor has: 1, but for an image in another size than the camera's own.
+    pub fn scale(&self) -> f32 {
+        self.scale
     }
 
     /// Pixels across.

@@ -13,7 +13,8 @@ layered! {
     /// A point spread, as it is written; nothing by default.
     #[derive(Clone, Debug, PartialEq, Serialize)]
     pub struct PsfDesc, PsfWritten = "PsfDesc" {
-        /// Standard deviation of the blur of the colour image, pixels; default 0.
+        /// Standard deviation of the blur of the colour image, pixels of the camera's own: an image in another size has the blur of the same
+        /// lens; default 0.
         pub color_px: Vary<NonNegative> = Given<Vary<NonNegative>>,
         /// The same of the NIR image; default 0.
         pub nir_px: Vary<NonNegative> = Given<Vary<NonNegative>>,
@@ -61,6 +62,12 @@ impl PsfDesc {
 }
 
 impl Psf {
+    /// The same optics over an image of `scale` times as many pixels across.
+    #[must_use]
+    pub fn scaled(self, scale: f32) -> Self {
+        Self { color: self.color * scale, nir: self.nir * scale, shift: self.shift.map(|s| s * scale) }
+    }
+
     /// Spreads the radiance of a window whose first pixel is `corner` of an image of `size` pixels; leaves it as it is, to the last bit,
     /// where there is no spread.
     pub fn spread(&self, pixels: &mut Vec<Spectrum>, width: u32, corner: (u32, u32), size: (u32, u32)) {

@@ -116,7 +116,12 @@ impl Sensor {
         // Electrons per exposure, before any clipping.
         let known = |r: &Spectrum| if r.is_finite() { r.clamp(0.0, f32::MAX) } else { Spectrum::ZERO };
         let mut signals: Vec<Spectrum> = film.pixels.iter().map(known).collect();
-        self.psf.spread(&mut signals, width, (film.left, film.top), (camera.width(), camera.height()));
+        self.psf.scaled(camera.scale()).spread(
+            &mut signals,
+            width,
+            (film.left, film.top),
+            (camera.width(), camera.height()),
+        );
         for (i, signal) in signals.iter_mut().enumerate() {
             *signal = *signal * RESPONSE * self.vignetting(camera, place(i));
         }
@@ -137,7 +142,10 @@ impl Sensor {
         for (i, value) in values.iter_mut().enumerate() {
             *value = self.read_out(*value * gains, camera, place(i), stream) * balanced;
         }
-        self.interpolate(&mut values, width, (film.left, film.top));
+        // Where each pixel is of two by two or more, it has seen all colours.
+        if camera.scale() > 0.5 {
+            self.interpolate(&mut values, width, (film.left, film.top));
+        }
         if let Some(rows) = &self.matrix {
             for value in &mut values {
                 let [r, g, b, nir] = value.to_array();

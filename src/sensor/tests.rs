@@ -160,7 +160,34 @@ fn sensor(page: &str) -> Sensor {
 }
 
 fn small() -> Camera {
-    cameras()[0].with_size(48, 32)
+    Camera { scale: 1.0, ..cameras()[0].with_size(48, 32) }
+}
+
+/// Rationale: pages are drawn in fewer pixels for networks and for a look. Expected: the blur of the same lens, in the new pixels; no mosaic
+/// where pixels are of two by two.
+#[test]
+fn a_smaller_image_is_blurred_by_the_same_lens() {
+    let page = |more: &str| {
+        sensor(&format!(
+            "(noise: (on: false), natural_vignetting: false, corner_shading: 0, tone: Linear, exposure: Fixed(gain: 1), \
+             white_balance: Raw, bits: 16, psf: (color_px: 3), {more})"
+        ))
+    };
+    let spread = |more: &str, camera: &Camera| {
+        let mut pixels = vec![Spectrum::ZERO; 48 * 32];
+        pixels[16 * 48 + 24] = Spectrum::splat(20.0);
+        let film = Linear { pixels: &pixels, width: 48, left: 0, top: 0 };
+        let shot = page(more).expose(film, camera, Spectrum::ONE, &Stream::of(3, 0, Purpose::Sensor, 0));
+        let green: Vec<f64> = shot.deep.unwrap().rgb.chunks(3).map(|c| f64::from(c[1])).collect();
+        let of = |i: usize| green[i] * ((i % 48) as f64 - 24.0).powi(2);
+        ((0..green.len()).map(of).sum::<f64>() / green.iter().sum::<f64>()).sqrt()
+    };
+    let half = Camera { scale: 0.5, ..small() };
+    assert!((spread("", &small()) - 3.0).abs() < 0.05, "{}", spread("", &small()));
+    assert!((spread("", &half) - 1.5).abs() < 0.03, "{}", spread("", &half));
+    let bayer = "mosaic: Bayer(pattern: Rggb, demosaic: Bilinear)";
+    assert!(spread(bayer, &small()) != spread("", &small()) && spread(bayer, &half) == spread("", &half));
+    assert_eq!(cameras()[0].with_size(648, 483).scale(), 0.5);
 }
 
 fn expose(sensor: &Sensor, pixels: &[Spectrum], illuminant: Spectrum) -> Photograph {
