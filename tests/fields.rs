@@ -258,12 +258,12 @@ fn leaf_soil_and_straw_have_the_ndvi_of_measured_spectra() {
     ));
     let mut loess = bare.clone();
     loess.insert_str(loess.find("moisture").unwrap(), "colors: [Humic, Sandy], ");
-    let cases: [(&str, &str, &dyn Fn(u32, Class) -> bool); 4] = [
-        ("leaf", &bare, &|_, class| class == Class::Crop),
-        ("soil", &bare, &|_, class| class == Class::Soil),
-        ("soil", &loess, &|_, class| class == Class::Soil),
+    let cases: [(&str, &str, fn(u32, Class) -> bool); 4] = [
+        ("leaf", &bare, |_, class| class == Class::Crop),
+        ("soil", &bare, |_, class| class == Class::Soil),
+        ("soil", &loess, |_, class| class == Class::Soil),
         // The ground is the first part; what else there is on it is straw.
-        ("straw", &strewn, &|part, class| part > 0 && class == Class::Soil),
+        ("straw", &strewn, |part, class| part > 0 && class == Class::Soil),
     ];
     for (what, page, is) in cases {
         let line = text.lines().find(|line| line.starts_with(what)).unwrap();
