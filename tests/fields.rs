@@ -234,6 +234,9 @@ fn conditions_are_written_with_their_units() {
     assert_eq!(serde_json::to_value(&field.species[0]).unwrap()["class"], "crop");
 }
 
+/// Which parts are asked about: number of the part, class.
+type Seen = fn(u32, Class) -> bool;
+
 /// Rationale: a network that learns from near infrared takes the bands' relation for granted. Expected: under equal light in all bands the
 /// NDVI of what is rendered lies within that of measured leaves, bare soils and straw or wood. Source: `tests/ref/measured_ndvi.csv`.
 #[test]
@@ -258,7 +261,7 @@ fn leaf_soil_and_straw_have_the_ndvi_of_measured_spectra() {
     ));
     let mut loess = bare.clone();
     loess.insert_str(loess.find("moisture").unwrap(), "colors: [Humic, Sandy], ");
-    let cases: [(&str, &str, fn(u32, Class) -> bool); 4] = [
+    let cases: [(&str, &str, Seen); 4] = [
         ("leaf", &bare, |_, class| class == Class::Crop),
         ("soil", &bare, |_, class| class == Class::Soil),
         ("soil", &loess, |_, class| class == Class::Soil),

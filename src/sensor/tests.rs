@@ -175,7 +175,7 @@ fn a_smaller_image_is_blurred_by_the_same_lens() {
     };
     let spread = |more: &str, camera: &Camera| {
         let mut pixels = vec![Spectrum::ZERO; 48 * 32];
-        pixels[16 * 48 + 24] = Spectrum::splat(20.0);
+        pixels[16 * 48 + 24] = Spectrum::splat(10.0);
         let film = Linear { pixels: &pixels, width: 48, left: 0, top: 0 };
         let shot = page(more).expose(film, camera, Spectrum::ONE, &Stream::of(3, 0, Purpose::Sensor, 0));
         let green: Vec<f64> = shot.deep.unwrap().rgb.chunks(3).map(|c| f64::from(c[1])).collect();
