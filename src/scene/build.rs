@@ -1,6 +1,7 @@
 //! Page + seed + index → one field.
 
 mod field;
+mod ground;
 mod growing;
 mod known;
 mod models;
@@ -8,24 +9,24 @@ mod season;
 mod wear;
 
 use super::desc::{FieldDesc, Growth, SpeciesDesc};
-use super::library::{Layer, Library, Species};
+use super::library::{Library, Species};
 use super::record::Conditions;
 use super::tag::Tag;
 use super::{Part, PlantRecord, Scene};
 use crate::geometry::Mesh;
 use crate::light::LightRecord;
-use crate::material::{Ground as GroundMaterial, GroundSkin, Material, Solid};
+use crate::material::{GroundSkin, Material};
 use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3, vec2};
 use crate::optics::soil::LOESS;
 use crate::page::Page;
 use crate::plant::{self, ConditionDesc, LeafAxis, OrganKind};
 use crate::sampling::place::Step;
-use crate::sampling::rng::mix;
 use crate::sampling::{Purpose, Stream};
-use crate::scatter::{self, Disc, Rows, Spot};
-use crate::soil::{self, Canopy, Clods, Debris, Ground, Pile, Rect, SeedRows, Site, SoilDesc, SoilRecord};
+use crate::scatter::{self, Disc, Spot};
+use crate::soil::{Ground, Rect};
 use crate::{Error, Result};
 pub use field::Field;
+use ground::{Earth, Skins};
 pub use growing::Growing;
 use growing::Individual;
 use rayon::prelude::*;
@@ -49,17 +50,10 @@ pub struct Options {
 
 /// Room around the view in which plants are grown: they lean in and throw shadows.
 const PLANT_MARGIN: f32 = 0.35;
-/// Room around the view with fine ground.
-const GROUND_MARGIN: f32 = 0.04;
-/// How far the coarse ground goes on.
-const GROUND_REACH: f32 = 2.5;
 /// Length of the longest shadow that counts, in plant heights: that of a sun 20° above the horizon.
 const SHADOW: f32 = 2.75;
 /// Address of the season's stream, behind those of any number of lights.
 const SEASON: u64 = 1 << 32;
-/// Addresses of what lies on the ground.
-const STONES: u64 = 0;
-const LITTER: u64 = 1;
 /// Most pixels of an image.
 const MOST_PIXELS: u64 = 1 << 28;
 /// Most plants that a field can number.
@@ -139,20 +133,6 @@ impl Seedling {
             None => self,
         }
     }
-}
-
-/// The ground while it is being covered.
-struct Earth {
-    ground: Ground,
-    maps: Vec<Arc<Layer>>,
-    pile: Pile,
-    stones: Vec<Debris>,
-}
-
-/// What the ground shows, and what its clods show: dry ones and damp ones.
-struct Skins {
-    ground: Arc<GroundSkin>,
-    clods: [Arc<GroundSkin>; 2],
 }
 
 /// What plants and models stand on.
@@ -333,72 +313,6 @@ impl<'a> Builder<'a> {
         Ok((field, self.library))
     }
 
-    /// The ground and the stones in it: what must be known before plants can be placed.
-    fn break_ground(&mut self, desc: &SoilDesc, view: Rect) -> Result<Earth> {
-        let mut maps: Vec<Arc<Layer>> = Vec::new();
-        for layer in &desc.layers {
-            maps.push(self.library.layer(self.page, layer)?);
-        }
-        let pixel = self.ground_pixel();
-        let rows = self.desc.crops.first().map(|c| {
-            let rows = Rows::draw(&c.rows, &self.stream(Purpose::Scatter, 0));
-            SeedRows { spacing_m: rows.spacing_m, azimuth: rows.azimuth, offset_m: rows.offset_m }
-        });
-        let site = Site {
-            area: view.grown(GROUND_MARGIN),
-            grid_m: (2.5 * pixel).clamp(8e-4, 4e-3),
-            margin_m: GROUND_REACH,
-            rows,
-        };
-        let ground = Ground::new(desc, &maps, &site, &self.stream(Purpose::Soil, 0))
-            .map_err(|e| self.page.blame(&[Step::Field("soil")], e))?;
-        let mut pile = Pile::new(&ground);
-        let stones = soil::stones(&desc.stones, &ground, &mut pile, &self.stream(Purpose::Debris, STONES));
-        Ok(Earth { ground, maps, pile, stones })
-    }
-
-    /// The ground as it was drawn.
-    fn soil_record(&self, desc: &SoilDesc, ground: &Ground) -> SoilRecord {
-        ground.record(desc, &self.stream(Purpose::Debris, STONES), &self.stream(Purpose::Debris, LITTER))
-    }
-
-    /// Clods under the plants, and litter, which joins the `debris`.
-    fn cover(&self, desc: &SoilDesc, ground: &Ground, pile: &mut Pile, debris: &mut Vec<Debris>) -> Vec<Clods> {
-        let mut canopy = Canopy::none(ground);
-        for part in self.scene.parts.iter().filter(|_| !desc.flat) {
-            canopy.add(&part.mesh);
-        }
-        let clods = soil::clods(ground, pile, &canopy);
-        debris.extend(soil::litter(&desc.litter, ground, pile, &self.stream(Purpose::Debris, LITTER)));
-        if !desc.flat {
-            return clods;
-        }
-        for thing in debris {
-            thing.lower(ground);
-        }
-        Vec::new()
-    }
-
-    /// Makes parts of everything of the ground; they come before those of the plants.
-    fn lay(&mut self, floor: Floor<'_>, clods: Vec<Clods>, debris: Vec<Debris>, skins: &Skins) {
-        let plants = std::mem::take(&mut self.scene.parts);
-        let material = self.material(Material::Ground(GroundMaterial::new(skins.ground.clone())));
-        let mesh = if floor.flat { floor.ground.levelled().mesh() } else { floor.ground.mesh() };
-        self.part(mesh, material);
-        for group in clods {
-            let skin = skins.clods[usize::from(group.damp)].clone();
-            let material = self.material(Material::Ground(GroundMaterial::clods(skin, group.tint)));
-            self.part(group.mesh, material);
-        }
-        for (i, thing) in debris.into_iter().enumerate() {
-            let solid = Solid::new(thing.albedo * thing.tint, DEBRIS_SIGMA);
-            let solid = solid.with_grain(mix(i as u64) as u32, thing.radius.max(1e-3) * 0.5, 0.35);
-            let material = self.material(Material::Solid(solid));
-            self.part(thing.mesh, material);
-        }
-        self.scene.parts.extend(plants);
-    }
-
     /// Plants and models.
     fn populate(
         &mut self,
@@ -538,8 +452,6 @@ impl<'a> Builder<'a> {
 
 /// Most that a view may measure from the point below the camera, metres.
 const MOST_VIEW: f32 = 1.5;
-/// Slope angle of the facets of stones, straw and wood, radians.
-const DEBRIS_SIGMA: f32 = 0.3;
 
 /// An organ that stands in the field.
 struct Grown {

@@ -1,0 +1,110 @@
+//! The ground of a field: broken, covered with what lies on it, and laid as parts.
+
+use super::{Builder, Floor};
+use crate::Result;
+use crate::material::{Ground as GroundMaterial, GroundSkin, Material, Solid};
+use crate::sampling::Purpose;
+use crate::sampling::place::Step;
+use crate::sampling::rng::mix;
+use crate::scatter::Rows;
+use crate::scene::library::Layer;
+use crate::soil::{self, Canopy, Clods, Debris, Ground, Pile, Rect, SeedRows, Site, SoilDesc, SoilRecord};
+use std::sync::Arc;
+
+/// Room around the view with fine ground.
+const GROUND_MARGIN: f32 = 0.04;
+/// How far the coarse ground goes on.
+const GROUND_REACH: f32 = 2.5;
+/// Addresses of what lies on the ground.
+const STONES: u64 = 0;
+const LITTER: u64 = 1;
+/// Slope angle of the facets of stones, straw and wood, radians.
+const DEBRIS_SIGMA: f32 = 0.3;
+
+/// The ground while it is being covered.
+pub(super) struct Earth {
+    pub(super) ground: Ground,
+    pub(super) maps: Vec<Arc<Layer>>,
+    pub(super) pile: Pile,
+    pub(super) stones: Vec<Debris>,
+}
+
+/// What the ground shows, and what its clods show: dry ones and damp ones.
+pub(super) struct Skins {
+    pub(super) ground: Arc<GroundSkin>,
+    pub(super) clods: [Arc<GroundSkin>; 2],
+}
+
+impl Builder<'_> {
+    /// The ground and the stones in it: what must be known before plants can be placed.
+    pub(super) fn break_ground(&mut self, desc: &SoilDesc, view: Rect) -> Result<Earth> {
+        let mut maps: Vec<Arc<Layer>> = Vec::new();
+        for layer in &desc.layers {
+            maps.push(self.library.layer(self.page, layer)?);
+        }
+        let pixel = self.ground_pixel();
+        let rows = self.desc.crops.first().map(|c| {
+            let rows = Rows::draw(&c.rows, &self.stream(Purpose::Scatter, 0));
+            SeedRows { spacing_m: rows.spacing_m, azimuth: rows.azimuth, offset_m: rows.offset_m }
+        });
+        let site = Site {
+            area: view.grown(GROUND_MARGIN),
+            grid_m: (2.5 * pixel).clamp(8e-4, 4e-3),
+            margin_m: GROUND_REACH,
+            rows,
+        };
+        let ground = Ground::new(desc, &maps, &site, &self.stream(Purpose::Soil, 0))
+            .map_err(|e| self.page.blame(&[Step::Field("soil")], e))?;
+        let mut pile = Pile::new(&ground);
+        let stones = soil::stones(&desc.stones, &ground, &mut pile, &self.stream(Purpose::Debris, STONES));
+        Ok(Earth { ground, maps, pile, stones })
+    }
+
+    /// The ground as it was drawn.
+    pub(super) fn soil_record(&self, desc: &SoilDesc, ground: &Ground) -> SoilRecord {
+        ground.record(desc, &self.stream(Purpose::Debris, STONES), &self.stream(Purpose::Debris, LITTER))
+    }
+
+    /// Clods under the plants, and litter, which joins the `debris`.
+    pub(super) fn cover(
+        &self,
+        desc: &SoilDesc,
+        ground: &Ground,
+        pile: &mut Pile,
+        debris: &mut Vec<Debris>,
+    ) -> Vec<Clods> {
+        let mut canopy = Canopy::none(ground);
+        for part in self.scene.parts.iter().filter(|_| !desc.flat) {
+            canopy.add(&part.mesh);
+        }
+        let clods = soil::clods(ground, pile, &canopy);
+        debris.extend(soil::litter(&desc.litter, ground, pile, &self.stream(Purpose::Debris, LITTER)));
+        if !desc.flat {
+            return clods;
+        }
+        for thing in debris {
+            thing.lower(ground);
+        }
+        Vec::new()
+    }
+
+    /// Makes parts of everything of the ground; they come before those of the plants.
+    pub(super) fn lay(&mut self, floor: Floor<'_>, clods: Vec<Clods>, debris: Vec<Debris>, skins: &Skins) {
+        let plants = std::mem::take(&mut self.scene.parts);
+        let material = self.material(Material::Ground(GroundMaterial::new(skins.ground.clone())));
+        let mesh = if floor.flat { floor.ground.levelled().mesh() } else { floor.ground.mesh() };
+        self.part(mesh, material);
+        for group in clods {
+            let skin = skins.clods[usize::from(group.damp)].clone();
+            let material = self.material(Material::Ground(GroundMaterial::clods(skin, group.tint)));
+            self.part(group.mesh, material);
+        }
+        for (i, thing) in debris.into_iter().enumerate() {
+            let solid = Solid::new(thing.albedo * thing.tint, DEBRIS_SIGMA);
+            let solid = solid.with_grain(mix(i as u64) as u32, thing.radius.max(1e-3) * 0.5, 0.35);
+            let material = self.material(Material::Solid(solid));
+            self.part(thing.mesh, material);
+        }
+        self.scene.parts.extend(plants);
+    }
+}
