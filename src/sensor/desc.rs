@@ -313,6 +313,7 @@ impl CameraDesc {
             }
         }
     }
+
     /// What a camera with a name is made of; a camera without one reads all rows at once.
     fn model(&self) -> Model {
         match self {

@@ -82,7 +82,9 @@ impl Wheel {
             // Bars slant forward from the middle and alternate from side to side.
             let along = p.dot(vec2(self.across.y, -self.across.x)) + SLANT * self.half_width * x.abs();
             let turn = (along / self.lugs + if x < 0.0 { 0.5 } else { 0.0 }).rem_euclid(1.0);
-            1.0 - smoothstep(0.5 * LUG.1, 0.5 * LUG.1 + 0.12, (turn - 0.5).abs())
+            let bar = 1.0 - smoothstep(0.5 * LUG.1, 0.5 * LUG.1 + 0.12, (turn - 0.5).abs());
+            // They end before the middle, where those of the two sides would meet in a step.
+            bar * smoothstep(0.04, 0.16, x.abs())
         } else {
             0.0
         };
@@ -126,5 +128,9 @@ mod tests {
         let deep = |k: i32| wheel.height(vec2(0.05, 1e-3 * k as f32)) < -0.025;
         let starts = (0..1000).filter(|k| deep(k + 1) && !deep(*k)).count();
         assert_eq!(starts, 8);
+        // No step in the middle.
+        let jump =
+            |k: i32| (wheel.height(vec2(-1e-4, 1e-3 * k as f32)) - wheel.height(vec2(1e-4, 1e-3 * k as f32))).abs();
+        assert!((0..1000).all(|k| jump(k) < 1e-5));
     }
 }
