@@ -9,7 +9,7 @@
 mod common;
 
 use common::chi2::check_sphere;
-use furrow::bsdf::{Bsdf, Leaf, OrenNayar, Scatter, Side, Wet, fresnel};
+use furrow::bsdf::{Bsdf, Leaf, OrenNayar, Scatter, Side, Veil, Wet, fresnel};
 use furrow::math::{Spectrum, Vec3, direction, vec3};
 use furrow::sampling::{Purpose, Sampler, Stream};
 use proptest::prelude::*;
@@ -249,6 +249,57 @@ fn a_white_bare_leaf_passes_on_everything() {
     }
 }
 
+/// Rationale: hairs and wax absorb nothing, so a white leaf stays white but for what goes to and fro between tissue and layer.
+/// Expected: never more than 1, and no less than 1 − τ at every angle; over black, what single scattering gives along the normal,
+/// ½ ∫ μ (1 − e^{−τ(1 + 1/μ)}) / (1 + μ) dμ.
+#[test]
+fn a_veil_hides_and_scatters_but_takes_nothing() {
+    for hairs in [0.02_f32, 0.1, 0.3] {
+        let tau = -(1.0 - hairs).ln();
+        let under = |r: f32, t: f32| {
+            let side = Side::bare(Spectrum::splat(r)).veiled(Veil::new(hairs, 0.0));
+            Leaf::new(side, side, Spectrum::splat(t))
+        };
+        for (r, t) in [(1.0, 0.0), (0.5, 0.5)] {
+            for wo in eyes() {
+                let [(back, e), (through, f)] = albedo(&under(r, t), wo, 4096);
+                let (all, slack) = ((back + through).max(), 4.0 * (e + f) + 1e-3);
+                assert!(all <= 1.0 + slack && all >= 1.0 - tau - slack, "τ {tau}, R {r} from {wo}: {all} ± {slack}");
+            }
+        }
+        let over_black = (0..10_000).map(|i| {
+            let mu = (f64::from(i) + 0.5) / 1e4;
+            0.5 * mu * (1.0 - (-f64::from(tau) * (1.0 + 1.0 / mu)).exp()) / (1.0 + mu) / 1e4
+        });
+        let expected = over_black.sum::<f64>();
+        let [(back, e), _] = albedo(&under(0.0, 0.0), Vec3::Z, 8192);
+        let got = f64::from(back.max());
+        assert!((got / expected - 1.0).abs() < 0.005 + 4.0 * f64::from(e) / expected, "τ {tau}: {got} for {expected}");
+    }
+}
+
+/// Expected: a bloom makes a leaf bluer, hairs make it paler in all bands alike; both take gloss; none is no veil at all.
+#[test]
+fn bloom_is_blue_and_hairs_are_white() {
+    let black = |hairs, bloom| {
+        Leaf::new(
+            Side::bare(Spectrum::ZERO).veiled(Veil::new(hairs, bloom)),
+            Side::bare(Spectrum::ZERO),
+            Spectrum::ZERO,
+        )
+    };
+    let [r, g, b, nir] = black(0.0, 0.1).eval(Vec3::Z, vec3(0.0, 0.6, 0.8)).to_array();
+    assert!(b > g && g > r && r > nir && nir > 0.5 * b, "{r} {g} {b} {nir}");
+    let [r, g, b, nir] = black(0.1, 0.0).eval(Vec3::Z, vec3(0.0, 0.6, 0.8)).to_array();
+    assert!(r == g && g == b && b == nir && r > 0.0, "{r} {g} {b} {nir}");
+    let glossy = |veil| {
+        Leaf::new(Side::new(1.45, [0.1; 2], Spectrum::ZERO).veiled(veil), Side::bare(Spectrum::ZERO), Spectrum::ZERO)
+    };
+    let mirror = |veil| glossy(veil).eval(vec3(0.6, 0.0, 0.8), vec3(-0.6, 0.0, 0.8)).max();
+    assert!(mirror(Veil::new(0.3, 0.0)) < 0.8 * mirror(None));
+    assert!(Veil::new(0.0, 0.0).is_none());
+}
+
 /// Source: Oren & Nayar's qualitative model leaves out what facets pass to each other.
 #[test]
 fn rough_soil_never_returns_more_than_a_lambert_surface() {
@@ -310,10 +361,12 @@ proptest! {
     #[test]
     fn no_leaf_gains_energy(
         ior in 1.3_f32..1.6, front in prop::array::uniform2(0.1_f32..0.6), back in prop::array::uniform2(0.1_f32..0.6),
-        r in prop::array::uniform2(0.06_f32..1.0), t in 0.0_f32..1.0, wo in eye(),
+        r in prop::array::uniform2(0.06_f32..1.0), t in 0.0_f32..1.0, hairs in 0.0_f32..0.9, bloom in 0.0_f32..0.5, wo in eye(),
     ) {
         let t = t * (1.0 - r[0].max(r[1]));
-        let side = |alpha, r| Side::new(ior, alpha, Spectrum::new(r, 0.06, r * 0.5 + 0.03, r));
+        let side = |alpha, r| {
+            Side::new(ior, alpha, Spectrum::new(r, 0.06, r * 0.5 + 0.03, r)).veiled(Veil::new(hairs, bloom))
+        };
         keeps_energy(&Leaf::new(side(front, r[0]), side(back, r[1]), Spectrum::splat(t)), wo, 2e-3)?;
     }
 

@@ -4,7 +4,7 @@ use super::shading::{bump, grained_frame};
 use super::swatch::{Grain, Swatch, Tone, centre};
 use super::wear::{Wear, Worn};
 use super::{Feature, Varies};
-use crate::bsdf::{self, Bsdf, Side};
+use crate::bsdf::{self, Bsdf, Side, Veil};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec2, Vec3};
 use crate::optics::{Leaf, LeafOptics, Pigments};
@@ -46,6 +46,12 @@ pub struct LeafDesc {
     pub roughness_along: Option<Num<Fraction>>,
     /// Index of refraction of the coat.
     pub ior: Num<Index>,
+    /// Share of the light from straight above that meets a hair: 0.05 downy, 0.3 felted; default none.
+    #[serde(skip_serializing_if = "Num::is_zero")]
+    pub hairs: Num<Fraction>,
+    /// Share that meets a crystal of wax or a bladder of meal: 0.03 bluish, 0.1 mealy; default none. They scatter blue the most.
+    #[serde(skip_serializing_if = "Num::is_zero")]
+    pub bloom: Num<Fraction>,
     /// How much more visible light the lower side reflects: 1.3–1.8 on most dicots.
     pub back_paleness: Num<NonNegative>,
     /// Strength of the relief; 1 takes the height map as it is, or reads a vein relief of 0.2 mm on a leaf of 100 mm off
@@ -65,6 +71,8 @@ impl Default for LeafDesc {
             roughness_back: Num::new(0.5),
             roughness_along: None,
             ior: Num::new(1.45),
+            hairs: Num::new(0.0),
+            bloom: Num::new(0.0),
             back_paleness: Num::new(1.4),
             relief: Num::new(1.0),
             relief_range: Num::new(0.023),
@@ -108,11 +116,12 @@ impl LeafMaterial {
         let along = desc.roughness_along.map_or(across, |r| r.f32().max(0.02));
         let back = desc.roughness_back.f32().max(0.02);
         let ior = desc.ior.f32();
+        let veil = Veil::new(desc.hairs.f32(), desc.bloom.f32());
         Self {
             picture,
             optics: Arc::new(LeafOptics::new(&desc.pigments)),
-            upper: Side::new(ior, [across, along], Spectrum::ZERO),
-            lower: Side::new(ior, [back, along.max(back)], Spectrum::ZERO),
+            upper: Side::new(ior, [across, along], Spectrum::ZERO).veiled(veil),
+            lower: Side::new(ior, [back, along.max(back)], Spectrum::ZERO).veiled(veil),
             back_paleness: desc.back_paleness.f32(),
             relief: desc.relief.f32(),
             tint: Vec3::ONE,
@@ -135,7 +144,11 @@ impl LeafMaterial {
         let upper = match self.upper.coat() {
             Some(coat) => {
                 let alpha = coat.alpha.map(|a| wear.dulled((a * gloss).clamp(0.02, 0.9)));
-                if alpha == coat.alpha { self.upper } else { Side::new(coat.ior, alpha, Spectrum::ZERO) }
+                if alpha == coat.alpha {
+                    self.upper
+                } else {
+                    Side::new(coat.ior, alpha, Spectrum::ZERO).veiled(self.upper.veil())
+                }
             }
             None => self.upper,
         };
@@ -145,7 +158,10 @@ impl LeafMaterial {
     pub(super) fn leave_out(&mut self, feature: Feature) {
         match feature {
             Feature::Transmission => self.transmits = false,
-            Feature::Coat => (self.upper, self.lower) = (Side::bare(Spectrum::ZERO), Side::bare(Spectrum::ZERO)),
+            Feature::Coat => {
+                [self.upper, self.lower] =
+                    [self.upper, self.lower].map(|side| Side::bare(Spectrum::ZERO).veiled(side.veil()));
+            }
             Feature::Relief => self.relief = 0.0,
             Feature::Picture => self.pictured = false,
             Feature::Facets => {}
@@ -168,6 +184,15 @@ impl LeafMaterial {
         }
     }
 
+    /// What a picture of the upper side shows of a tissue, hairs and bloom where there is wax.
+    fn tone(&self, leaf: Leaf, waxy: bool) -> Tone {
+        let transmittance = if self.transmits { leaf.transmittance } else { Spectrum::ZERO };
+        match self.upper.veil().filter(|_| waxy) {
+            Some(veil) => Tone { reflectance: veil.over(leaf.reflectance), transmittance: veil.below(transmittance) },
+            None => Tone { reflectance: leaf.reflectance, transmittance },
+        }
+    }
+
     /// The swatch of a leaf in a condition: a picture of its own, tinted already.
     fn worn_swatch<'a>(&'a self, picture: &'a Picture, wear: &Wear, roughness: f32) -> Swatch<'a> {
         let size = wear.picture_size((picture.color.width(), picture.color.height()));
@@ -175,8 +200,8 @@ impl LeafMaterial {
         let tone = move |uv: Vec2| {
             let [r, g, b, _] = picture.color.sample(uv, lod);
             let leaf = self.optics.at((Vec3::new(r, g, b) * self.tint).to_array());
-            let Leaf { reflectance, transmittance } = self.worn_at(leaf, uv).upper;
-            Tone { reflectance, transmittance: if self.transmits { transmittance } else { Spectrum::ZERO } }
+            let Worn { upper, waxy, .. } = self.worn_at(leaf, uv);
+            self.tone(upper, waxy)
         };
         // The mean over what is opaque, of a grid of places.
         let places = (0..1024).map(|i| Vec2::new((i % 32) as f32 + 0.5, (i / 32) as f32 + 0.5) / 32.0);
@@ -198,17 +223,12 @@ impl LeafMaterial {
     }
 
     pub(super) fn swatch(&self) -> Swatch<'_> {
-        let read = |color: Vec3| {
-            let leaf = self.optics.at(color.to_array());
-            let transmittance = if self.transmits { leaf.transmittance } else { Spectrum::ZERO };
-            Tone { reflectance: leaf.reflectance, transmittance }
-        };
+        let read = |color: Vec3| self.tone(self.optics.at(color.to_array()), true);
         let roughness = self.upper.coat().map_or(1.0, |coat| (coat.alpha[0] * coat.alpha[1]).sqrt());
         let Some(picture) = self.picture.as_ref().filter(|_| self.pictured) else {
-            let leaf = self.worn_at(self.optics.at((self.plain() * self.tint).to_array()), Vec2::splat(0.5)).upper;
-            let transmittance = if self.transmits { leaf.transmittance } else { Spectrum::ZERO };
-            let tone = Tone { reflectance: leaf.reflectance, transmittance };
-            return Swatch::plain(tone, roughness).paler_below(self.back_paleness);
+            let leaf = self.optics.at((self.plain() * self.tint).to_array());
+            let Worn { upper, waxy, .. } = self.worn_at(leaf, Vec2::splat(0.5));
+            return Swatch::plain(self.tone(upper, waxy), roughness).paler_below(self.back_paleness);
         };
         if let Some(wear) = &self.wear {
             return self.worn_swatch(picture, wear, roughness);

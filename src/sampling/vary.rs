@@ -123,6 +123,11 @@ impl<B: Bound> Num<B> {
         self.0
     }
 
+    /// Whether it is nothing: what a page need not write where that is the default.
+    pub fn is_zero(&self) -> bool {
+        self.0 == 0.0
+    }
+
     /// The number, single precision.
     pub const fn f32(self) -> f32 {
         self.0 as f32

@@ -55,6 +55,22 @@ class _Coat:
         return (1 - mi.fresnel(dr.abs(cos), self.ior)[0]) / self.norm
 
 
+class _Veil:
+    """A thin layer of white bodies: single scattering (Chandrasekhar 1960), the half scattered onwards counted as let through."""
+
+    def __init__(self, depth, scale):
+        self.depth, self.scale = depth, scale
+
+    def through(self, si, cos, active):
+        return dr.exp(-0.5 * self.scale * self.depth.eval(si, active) / dr.abs(cos))
+
+    def eval(self, si, a, b, active):
+        """f |cos θo|."""
+        cos_a, cos_b = dr.abs(a.z), dr.abs(b.z)
+        gone = 1 - dr.exp(-self.scale * self.depth.eval(si, active) * (dr.rcp(cos_a) + dr.rcp(cos_b)))
+        return gone * (cos_b / (4 * dr.pi * (cos_a + cos_b)))
+
+
 class _Surface(mi.BSDF):
     """The frame of a point, with its relief; what does not agree about the sides scatters nothing."""
 
@@ -170,7 +186,7 @@ class Soil(_Surface):
 
 
 class Leaf(_Surface):
-    """A sheet that reflects and transmits evenly, each side under a coat."""
+    """A sheet that reflects and transmits evenly, each side under a coat and a veil of hairs and bloom."""
 
     TRANSMITS = True
 
@@ -181,22 +197,29 @@ class Leaf(_Surface):
             coat = None
             if props.has_property(side + "_ior"):
                 coat = _Coat(props[side + "_alpha_u"], props[side + "_alpha_v"], props[side + "_ior"])
-            self.sides.append((coat, _texture(props, side), props[side + "_scale"]))
+            veil = None
+            if props.has_property(side + "_veil"):
+                veil = _Veil(_texture(props, side + "_veil"), props[side + "_veil_scale"])
+            self.sides.append((coat, veil, _texture(props, side), props[side + "_scale"]))
         self.transmittance, self.scale = _texture(props, "through"), props["through_scale"]
 
     def value(self, si, a, b, active):
         let = lambda coat, cos: mi.Float(1) if coat is None else coat.through(cos)
+        seen = lambda veil, cos: mi.Color3f(1) if veil is None else veil.through(si, cos, active)
         lambert = dr.abs(b.z) * dr.inv_pi
         above = a.z > 0
         values = []
-        for (coat, paint, scale), flip in zip(self.sides, (1, -1)):
+        for (coat, veil, paint, scale), flip in zip(self.sides, (1, -1)):
             value = paint.eval(si, active) * (scale * lambert * let(coat, a.z) * let(coat, b.z))
             if coat is not None:
                 value += coat.eval(mi.Vector3f(a.x, a.y, flip * a.z), mi.Vector3f(b.x, b.y, flip * b.z))
+            if veil is not None:
+                value = value * seen(veil, a.z) * seen(veil, b.z) + veil.eval(si, a, b, active)
             values.append(value)
         through = self.transmittance.eval(si, active) * (
             self.scale * lambert * let(self.sides[0][0], dr.select(above, a.z, b.z)) * let(self.sides[1][0], dr.select(above, b.z, a.z))
         )
+        through *= seen(self.sides[0][1], dr.select(above, a.z, b.z)) * seen(self.sides[1][1], dr.select(above, b.z, a.z))
         return dr.select(a.z * b.z > 0, dr.select(above, values[0], values[1]), through)
 
 

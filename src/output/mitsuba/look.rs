@@ -4,8 +4,8 @@
 //! patch is as large as the part's texture lies on the part, and the ray as wide as a texel, so a texture is read on the
 //! level that the camera sees.
 
-use crate::bsdf::Bsdf;
 use crate::bsdf::microfacet::Ggx;
+use crate::bsdf::{Bsdf, Veil};
 use crate::geometry::{Hit, Interaction, Mesh};
 use crate::material::{Material, Varies};
 use crate::math::{Spectrum, Vec2, Vec3, vec2};
@@ -24,6 +24,8 @@ pub(super) enum Kind {
     Sheet {
         /// The coats.
         coats: [Option<Ggx>; 2],
+        /// Hairs and bloom.
+        veils: [Option<Veil>; 2],
     },
 }
 
@@ -71,7 +73,7 @@ impl Look {
                 texels.push(texel);
             }
         }
-        let kind = kind.unwrap_or(Kind::Sheet { coats: [None; 2] });
+        let kind = kind.unwrap_or(Kind::Sheet { coats: [None; 2], veils: [None; 2] });
         Self { kind, width, height, texels }
     }
 
@@ -87,7 +89,9 @@ impl Kind {
     fn and(self, other: Self) -> Self {
         match (self, other) {
             (Self::Soil { shape, film: None }, Self::Soil { film, .. }) => Self::Soil { shape, film },
-            (Self::Sheet { coats: [a, b] }, Self::Sheet { coats: [c, d] }) => Self::Sheet { coats: [a.or(c), b.or(d)] },
+            (Self::Sheet { coats: [a, b], veils: [v, w] }, Self::Sheet { coats: [c, d], veils: [x, y] }) => {
+                Self::Sheet { coats: [a.or(c), b.or(d)], veils: [v.or(x), w.or(y)] }
+            }
             (known, _) => known,
         }
     }
@@ -125,7 +129,8 @@ fn at(material: &Material, patch: &Mesh, uv: Vec2, footprint: f32) -> (Kind, Tex
             let [upper, lower] = b.both_sides();
             let reflect = [upper.diffuse(), lower.diffuse()];
             let texel = Texel { reflect, transmit: b.transmittance(), film: 0.0, normal: frame.z };
-            (Kind::Sheet { coats: [upper.coat(), lower.coat()] }, texel)
+            let kind = Kind::Sheet { coats: [upper.coat(), lower.coat()], veils: [upper.veil(), lower.veil()] };
+            (kind, texel)
         }
     }
 }

@@ -29,6 +29,8 @@ use std::collections::BTreeSet;
 const THROUGH: f32 = 0.4;
 /// Weight of a coat within a side's reflection.
 const COAT: f32 = 0.2;
+/// Optical depth of hairs and bloom over what is written for it: colours above 1 are refused.
+const VEIL: f32 = 16.0;
 /// Weight of a film of water over soil.
 const FILM: f32 = 0.1;
 
@@ -66,7 +68,7 @@ impl Surface {
     pub(super) fn write(look: &Look, stem: &str, mask: Option<String>, files: &mut Files<'_>) -> Result<Self> {
         let (factor, through) = match look.kind {
             Kind::Soil { shape: [a, _], film } => ([a / film.map_or(1.0, |_| 1.0 - FILM); 2], 0.0),
-            Kind::Sheet { coats } => {
+            Kind::Sheet { coats, .. } => {
                 let side = |c: Option<Ggx>| under(c).powi(2) / ((1.0 - THROUGH) * c.map_or(1.0, |_| 1.0 - COAT));
                 (coats.map(side), under(coats[0]) * under(coats[1]) / THROUGH)
             }
@@ -146,7 +148,10 @@ impl Surface {
                     warn("the film of water is about equal");
                 }
             }
-            Kind::Sheet { coats } => {
+            Kind::Sheet { coats, veils } => {
+                if veils.iter().flatten().count() > 0 {
+                    warn("hairs and bloom are left out");
+                }
                 if coats.iter().flatten().count() > 0 {
                     warn("leaf coats are about equal");
                 }
@@ -169,7 +174,7 @@ impl Surface {
             Plugins::BuiltIn => {
                 let inner = match self.kind {
                     Kind::Soil { film, .. } => self.soil(film, band),
-                    Kind::Sheet { coats } => self.sheet(coats, band),
+                    Kind::Sheet { coats, .. } => self.sheet(coats, band),
                 };
                 match &self.normal {
                     Some(normal) => Element::plugin("bsdf", "normalmap")
@@ -232,7 +237,7 @@ impl Surface {
                     _ => soil,
                 }
             }
-            Kind::Sheet { coats } => {
+            Kind::Sheet { coats, veils } => {
                 let mut leaf = Element::plugin("bsdf", "furrow_leaf");
                 for (i, side) in ["upper", "lower"].into_iter().enumerate() {
                     if let Some(coat) = coats[i] {
@@ -240,6 +245,10 @@ impl Surface {
                             .float(&format!("{side}_alpha_u"), coat.alpha[0])
                             .float(&format!("{side}_alpha_v"), coat.alpha[1])
                             .float(&format!("{side}_ior"), coat.ior);
+                    }
+                    if let Some(veil) = veils[i] {
+                        let depth = band.rgb(&format!("{side}_veil"), veil.depth() / VEIL);
+                        leaf = leaf.float(&format!("{side}_veil_scale"), VEIL).inside([depth]);
                     }
                     leaf = leaf.float(&format!("{side}_scale"), 1.0 / self.factor[i]).inside([paint(
                         side,
