@@ -25,10 +25,10 @@ pub use sample::{Emitter, LampHit, LightSample};
 pub use sky::{Dome, Sky};
 pub use sun::{HALF_ANGLE_DEG, Sun};
 
-use crate::Result;
 use crate::math::{Frame, Spectrum, Vec2, Vec3, vec3};
 use crate::sampling::rng::Stream;
 use crate::sampling::vary::{Finite, Fraction, NonNegative, Positive, Vary};
+use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;
@@ -168,6 +168,16 @@ impl Light {
 ///     let desc: LightDesc = ron::from_str(page)?;
 ///     assert_eq!(desc.build(&mut stream)?.len(), count);
 /// }
+/// // A robot that drives by day and under its own two lamps by night: each field is one or the other.
+/// let page = "OneOf([
+///     [Daylight(sun: Angles(elevation_deg: Uniform(20, 65), azimuth_deg: Uniform(0, 360)))],
+///     [
+///         Lamp(shape: Disc(radius_m: 0.05), position_m: (-0.3, 0, 0.8), glow: WhiteLed(irradiance: 1, at_m: 0.9)),
+///         Lamp(shape: Disc(radius_m: 0.05), position_m: (0.3, 0, 0.8), glow: WhiteLed(irradiance: 1, at_m: 0.9)),
+///     ],
+/// ])";
+/// let LightDesc::OneOf(lists) = ron::from_str(page)? else { unreachable!() };
+/// assert_eq!((lists[0].len(), lists[1].len()), (1, 2));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -222,9 +232,25 @@ pub enum LightDesc {
         /// Brightness and colour.
         glow: GlowDesc,
     },
+    /// One of these lists, each as likely as the others, drawn once a field: its lights stand here as if they were written so.
+    /// Only where a page lists its lights; no list is empty or holds a `OneOf`.
+    OneOf(Vec<Vec<LightDesc>>),
 }
 
+/// What is wrong with lists inside lists.
+pub(crate) const ONE_OF_INSIDE: &str = "a OneOf stands among a page's lights, not inside another one\n help: write all lists side by \
+                                        side: OneOf([[…], […], […]])";
+
 impl LightDesc {
+    /// The pictures that it names, those of all its lists.
+    pub fn files(&self) -> Vec<&str> {
+        match self {
+            Self::Environment { file, .. } => vec![file],
+            Self::OneOf(lists) => lists.iter().flatten().flat_map(Self::files).collect(),
+            Self::Daylight { .. } | Self::Overcast { .. } | Self::Constant { .. } | Self::Lamp { .. } => Vec::new(),
+        }
+    }
+
     /// Draws the lights: two for a day with sun and sky, one for the others, none for one that is black. Files are looked for from the
     /// working directory.
     pub fn build(&self, stream: &mut Stream) -> Result<Vec<Light>> {
@@ -232,7 +258,8 @@ impl LightDesc {
         Ok(self.draw(stream, &mut open)?.1)
     }
 
-    /// Draws the lights as [`LightDesc::build`] does, and tells what was drawn. `open` reads a file that the page names.
+    /// Draws the lights as [`LightDesc::build`] does, and tells what was drawn. `open` reads a file that the page names. An
+    /// [`Error::Scene`] for a [`LightDesc::OneOf`], from which the field draws.
     pub fn draw(&self, stream: &mut Stream, open: &mut Open<'_>) -> Result<(LightRecord, Vec<Light>)> {
         let sky = |sky: Option<Sky>| sky.map(|sky| Light::Sky(Box::new(sky)));
         let given = |light: Option<&Light>| light.map_or(Spectrum::ZERO, Light::horizontal_irradiance);
@@ -278,6 +305,7 @@ impl LightDesc {
                 let lamp = Lamp::draw(shape, position_m, look_at_m, glow, stream)?;
                 (LightRecord::lamp(&lamp), vec![Light::Lamp(lamp)])
             }
+            Self::OneOf(_) => return Err(Error::Scene(ONE_OF_INSIDE.into())),
         })
     }
 }

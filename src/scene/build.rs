@@ -4,6 +4,7 @@ mod field;
 mod ground;
 mod growing;
 mod known;
+mod lighting;
 mod models;
 mod season;
 mod wear;
@@ -14,7 +15,7 @@ use super::record::Conditions;
 use super::tag::Tag;
 use super::{Part, PlantRecord, Scene};
 use crate::geometry::Mesh;
-use crate::light::LightRecord;
+use crate::light::{LightDesc, LightRecord};
 use crate::material::{GroundSkin, Material};
 use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3, vec2};
 use crate::optics::soil::LOESS;
@@ -29,6 +30,8 @@ pub use field::Field;
 use ground::{Earth, Skins};
 pub use growing::Growing;
 use growing::Individual;
+pub use lighting::Lighting;
+use lighting::Listed;
 use rayon::prelude::*;
 pub use season::Season;
 use std::path::Path;
@@ -54,6 +57,8 @@ const PLANT_MARGIN: f32 = 0.35;
 const SHADOW: f32 = 2.75;
 /// Address of the season's stream, behind those of any number of lights.
 const SEASON: u64 = 1 << 32;
+/// Address of the first of the streams from which lists of lights are drawn, one for each place among the page's lights.
+const LIGHTING: u64 = 2 << 32;
 /// Most pixels of an image.
 const MOST_PIXELS: u64 = 1 << 28;
 /// Most plants that a field can number.
@@ -159,6 +164,7 @@ struct Builder<'a> {
     season: Season,
     /// The lights as they were drawn.
     lights: Vec<LightRecord>,
+    lighting: Vec<Lighting>,
     scene: Scene,
     warnings: Vec<String>,
 }
@@ -186,10 +192,16 @@ impl<'a> Builder<'a> {
             return Err(page.blame(&[Step::Field("camera"), Step::Field("size")], Error::Scene(words)));
         }
         let (mut lights, mut light_records) = (Vec::new(), Vec::new());
-        for (i, light) in desc.lights.iter().enumerate() {
+        let lists = |place| Stream::of(seed, index, Purpose::Page, LIGHTING + place as u64);
+        let (lighting, listed) = Lighting::draw(page, &desc.lights, lists)?;
+        // Those of all lists, so that all fields are of one scene whatever each of them draws.
+        for file in desc.lights.iter().flat_map(LightDesc::files) {
+            library.surround_file(page, file)?;
+        }
+        for (i, Listed { desc: light, at }) in listed.into_iter().enumerate() {
             let mut open = |file: &str, infrared| library.surround(page, file, infrared);
             let drawn = light.draw(&mut Stream::of(seed, index, Purpose::Page, 1 + i as u64), &mut open);
-            let (record, drawn) = drawn.map_err(|e| page.blame(&[Step::Field("lights"), Step::Item(i)], e))?;
+            let (record, drawn) = drawn.map_err(|e| page.blame(&at, e))?;
             light_records.push(record);
             lights.extend(drawn);
         }
@@ -199,7 +211,7 @@ impl<'a> Builder<'a> {
         }
         let scene = Scene { parts: Vec::new(), materials: Vec::new(), lights, camera, filter: desc.filter.footprint() };
         let season = Season::draw(page, desc, &mut Stream::of(seed, index, Purpose::Page, SEASON))?;
-        Ok(Self { page, desc, library, seed, index, season, lights: light_records, scene, warnings })
+        Ok(Self { page, desc, library, seed, index, season, lights: light_records, lighting, scene, warnings })
     }
 
     fn stream(&self, purpose: Purpose, index: u64) -> Stream {
@@ -292,6 +304,7 @@ impl<'a> Builder<'a> {
             camera: self.scene.camera.record(),
             sensor: self.desc.sensor.build(&mut self.stream(Purpose::Sensor, 0)).record(),
             lights: std::mem::take(&mut self.lights),
+            lighting: std::mem::take(&mut self.lighting),
             soil: known,
             crops: self.crop_records()?,
             weeds: self.weed_records()?,

@@ -181,6 +181,12 @@ impl Library {
         Ok(model)
     }
 
+    /// The file of a light of all directions that `page` names, whether or not a field draws it.
+    pub(super) fn surround_file(&mut self, page: &Page, path: &str) -> Result<()> {
+        let full = page.need_file(path)?;
+        if self.files.contains_key(&full) { Ok(()) } else { self.note(&full) }
+    }
+
     /// The light of all directions that `page` names.
     pub(super) fn surround(&mut self, page: &Page, path: &str, infrared: Infrared) -> Result<Arc<Table>> {
         let full = page.need_file(path)?;
@@ -188,7 +194,7 @@ impl Library {
         if let Some(known) = self.surrounds.get(&key) {
             return Ok(known.clone());
         }
-        self.note(&full)?;
+        self.surround_file(page, path)?;
         let table = Arc::new(Table::load(&full, infrared).map_err(|error| match error {
             Error::Image { what, .. } => {
                 let name = full.file_name().unwrap_or_default().to_string_lossy().into_owned();

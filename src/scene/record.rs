@@ -1,6 +1,6 @@
 //! What a field knows of itself beside its meshes: who may grow in it, and under what conditions.
 
-use super::build::Season;
+use super::build::{Lighting, Season};
 use super::tag::{Class, lowercase};
 use crate::light::LightRecord;
 use crate::scatter::{RowsRecord, WeedsRecord};
@@ -30,6 +30,9 @@ pub struct Conditions {
     pub sensor: Option<SensorRecord>,
     /// What shines, in the order of the page.
     pub lights: Vec<LightRecord>,
+    /// Which of the page's lists of lights are among them; left out where it has none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub lighting: Vec<Lighting>,
     /// The ground; none where the page has none.
     pub soil: Option<SoilRecord>,
     /// What was sown, in the order of the page.
