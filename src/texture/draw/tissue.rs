@@ -114,9 +114,7 @@ impl<'a> Surface<'a> {
         if shape.is_spine(p) {
             c *= 0.12;
         }
-        let wax = look.bloom.f32() * (1.0 + 0.5 * noise(p * 7.0 + far * 19.0, 3));
         let meal = self.meal(p);
-        let meal = meal + wax * (1.0 - meal);
         let hash = unit(mix(
             self.seed ^ (u64::from((p.x * 6000.0 + 9e5) as u32) << 32 | u64::from((p.y * 6000.0 + 9e5) as u32))
         ));
