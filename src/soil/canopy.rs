@@ -103,8 +103,9 @@ mod tests {
     }
 
     /// Rationale: a clod pierces a leaf that is counted too high, and is pressed flat by one that is counted too low. Expected: level,
-    /// steep, upright and thin triangles, some beyond the border, are nowhere above a point of them; over a cell they are not below the lowest of
-    /// many points by more than lies between those; cells that no point comes near are free. Source: points drawn on the triangles.
+    /// steep, upright and small triangles, some beyond the border, are nowhere counted above a point of them, nor below the lowest of
+    /// many points over a cell by more than lies between those; over far fewer cells than their boxes have. Source: points drawn on the
+    /// triangles.
     #[test]
     fn a_triangle_lies_as_low_over_each_cell_as_its_lowest_point_there() {
         let mut s = Stream::of(8, 0, Purpose::Test, 0);
@@ -134,7 +135,7 @@ mod tests {
                 sampled[cell] = sampled[cell].min(p.z);
                 assert!(canopy.lowest[cell] <= p.z + 1e-7, "{k}: {} over {p}", canopy.lowest[cell]);
             }
-            let flat = corners.map(|c| c.truncate());
+            let flat = corners.map(Vec3::truncate);
             let (low, high) = (flat[0].min(flat[1]).min(flat[2]), flat[0].max(flat[1]).max(flat[2]));
             let floor = corners.iter().map(|c| c.z).fold(f32::INFINITY, f32::min);
             for (cell, lowest) in canopy.lowest.iter().enumerate() {
