@@ -102,59 +102,61 @@ impl Mosaic<'_> {
         let which = usize::from(method == Demosaic::MalvarHeCutler);
         let (row, cross, diagonal) = (&ROW[which], &CROSS[which], &DIAGONAL[which]);
         let column = transposed(row);
-        let (left, top) = self.corner;
-        let colored = |i: usize| {
-            let (x, y) = (i as u32 % self.width, i as u32 / self.width);
-            let (own, at) = (self.values[i], (i64::from(x), i64::from(y)));
-            match self.pattern.color(left + x, top + y) {
-                0 => [own, self.weigh(cross, at), self.weigh(diagonal, at)],
-                2 => [self.weigh(diagonal, at), self.weigh(cross, at), own],
-                _ => {
-                    let red_beside = self.pattern.color(left + x + 1, top + y) == 0;
-                    let (beside, above) = (self.weigh(row, at), self.weigh(&column, at));
-                    if red_beside { [beside, own, above] } else { [above, own, beside] }
-                }
-            }
-        };
-        (0..self.values.len()).map(colored).collect()
-    }
-
-    /// A kernel's sum about a pixel.
-    fn weigh(&self, kernel: &Kernel, (x, y): (i64, i64)) -> f32 {
-        let mut sum = 0.0;
-        for (dy, weights) in (0_i64..).zip(kernel) {
-            for (dx, weight) in (0_i64..).zip(weights) {
-                if *weight == 0.0 {
-                    continue;
-                }
-                let mut around = self.at(x + dx, y + dy);
-                if dx > 0 {
-                    around += self.at(x - dx, y + dy);
-                }
-                if dy > 0 {
-                    around += self.at(x + dx, y - dy);
-                }
-                if dx > 0 && dy > 0 {
-                    around += self.at(x - dx, y - dy);
-                }
-                sum += weight * around;
+        let (width, (left, top)) = (self.width as usize, self.corner);
+        let height = self.values.len() / width.max(1);
+        let around_columns: Vec<[usize; 5]> = (0..width).map(|x| around(x, width)).collect();
+        let mut seen = Vec::with_capacity(self.values.len());
+        for y in 0..height {
+            let rows = around(y, height).map(|y| &self.values[y * width..][..width]);
+            for (x, columns) in around_columns.iter().enumerate() {
+                let (own, weigh) = (rows[2][x], |kernel| weigh(kernel, &rows, columns));
+                let at = (left + x as u32, top + y as u32);
+                seen.push(match self.pattern.color(at.0, at.1) {
+                    0 => [own, weigh(cross), weigh(diagonal)],
+                    2 => [weigh(diagonal), weigh(cross), own],
+                    _ => {
+                        let red_beside = self.pattern.color(at.0 + 1, at.1) == 0;
+                        let (beside, above) = (weigh(row), weigh(&column));
+                        if red_beside { [beside, own, above] } else { [above, own, beside] }
+                    }
+                });
             }
         }
-        sum / 8.0
-    }
-
-    fn at(&self, x: i64, y: i64) -> f32 {
-        let height = self.values.len() as i64 / i64::from(self.width);
-        let (x, y) = (mirrored(x, i64::from(self.width)), mirrored(y, height));
-        self.values[(y * i64::from(self.width) + x) as usize]
+        seen
     }
 }
 
-/// An index mirrored about the first and the last of so many; a window of one pixel has only that.
-fn mirrored(i: i64, count: i64) -> i64 {
-    let i = i.abs();
-    let i = if i >= count { 2 * (count - 1) - i } else { i };
-    i.clamp(0, count - 1)
+/// A kernel's sum about a pixel, from the five rows and the five columns around it.
+fn weigh(kernel: &Kernel, rows: &[&[f32]; 5], columns: &[usize; 5]) -> f32 {
+    let mut sum = 0.0;
+    for (dy, weights) in kernel.iter().enumerate() {
+        for (dx, weight) in weights.iter().enumerate() {
+            if *weight == 0.0 {
+                continue;
+            }
+            let mut around = rows[2 + dy][columns[2 + dx]];
+            if dx > 0 {
+                around += rows[2 + dy][columns[2 - dx]];
+            }
+            if dy > 0 {
+                around += rows[2 - dy][columns[2 + dx]];
+            }
+            if dx > 0 && dy > 0 {
+                around += rows[2 - dy][columns[2 - dx]];
+            }
+            sum += weight * around;
+        }
+    }
+    sum / 8.0
+}
+
+/// An index and the two on either side of it, mirrored about the first and the last of `count`; of one there is only that.
+fn around(i: usize, count: usize) -> [usize; 5] {
+    let last = count as i64 - 1;
+    [-2, -1, 0, 1, 2].map(|d| {
+        let i = (i as i64 + d).abs();
+        (if i > last { 2 * last - i } else { i }).clamp(0, last) as usize
+    })
 }
 
 fn transposed(kernel: &Kernel) -> Kernel {
@@ -202,6 +204,63 @@ mod tests {
             assert!(flat.iter().all(|c| *c == [0.25, 0.5, 0.75]), "{pattern:?} {method:?}");
         }
         assert_eq!(through(1, Pattern::Rggb, Demosaic::Bilinear, |_, _| [1.0; 3]), [[1.0; 3]]);
+    }
+
+    /// Rationale: rows and columns are mirrored once, not at each tap. Expected: every bit of a sum that asks for each neighbour by its
+    /// place, in pictures narrower than the kernel too.
+    #[test]
+    fn every_tap_is_the_mirrored_neighbour() {
+        let mut stream = Stream::of(6, 0, Purpose::Test, 0);
+        for (width, height) in [(1, 1), (1, 4), (2, 2), (3, 1), (2, 5), (4, 3), (9, 7)] {
+            let values: Vec<f32> = (0..width * height).map(|_| stream.normal() as f32).collect();
+            for (pattern, method) in PATTERNS.into_iter().flat_map(|p| METHODS.map(|m| (p, m))) {
+                let mosaic = Mosaic { values: &values, width: width as u32, corner: (3, 6), pattern };
+                let seen = mosaic.interpolate(method);
+                let plain = |i: usize| plain(&mosaic, method, (i as i64 % width, i as i64 / width));
+                let plain: Vec<[f32; 3]> = (0..values.len()).map(plain).collect();
+                assert_eq!(seen, plain, "{pattern:?} {method:?} {width} × {height}");
+            }
+        }
+    }
+
+    /// The colours of one pixel, neighbour by neighbour.
+    fn plain(mosaic: &Mosaic<'_>, method: Demosaic, (x, y): (i64, i64)) -> [f32; 3] {
+        let (width, which) = (i64::from(mosaic.width), usize::from(method == Demosaic::MalvarHeCutler));
+        let height = mosaic.values.len() as i64 / width;
+        let mirrored = |i: i64, count: i64| {
+            let i = i.abs();
+            let i = if i >= count { 2 * (count - 1) - i } else { i };
+            i.clamp(0, count - 1)
+        };
+        let at = |x: i64, y: i64| mosaic.values[(mirrored(y, height) * width + mirrored(x, width)) as usize];
+        let sum = |kernel: &Kernel, turned: bool| {
+            let mut sum = 0.0;
+            for (dy, dx) in (0..3).flat_map(|dy| (0..3).map(move |dx| (dy, dx))) {
+                let weight = if turned { kernel[dx][dy] } else { kernel[dy][dx] };
+                let (dx, dy) = (dx as i64, dy as i64);
+                let mut all = at(x + dx, y + dy);
+                if dx > 0 {
+                    all += at(x - dx, y + dy);
+                }
+                if dy > 0 {
+                    all += at(x + dx, y - dy);
+                }
+                if dx > 0 && dy > 0 {
+                    all += at(x - dx, y - dy);
+                }
+                sum += weight * all;
+            }
+            sum / 8.0
+        };
+        let color = |dx: u32| mosaic.pattern.color(mosaic.corner.0 + x as u32 + dx, mosaic.corner.1 + y as u32);
+        let (own, cross, diagonal) = (at(x, y), sum(&CROSS[which], false), sum(&DIAGONAL[which], false));
+        let (beside, above) = (sum(&ROW[which], false), sum(&ROW[which], true));
+        match (color(0), color(1)) {
+            (0, _) => [own, cross, diagonal],
+            (2, _) => [diagonal, cross, own],
+            (_, 0) => [beside, own, above],
+            _ => [above, own, beside],
+        }
     }
 
     /// Expected: on a grey picture with a fine wave the guided interpolation errs less than half as much. Of a single bright pixel

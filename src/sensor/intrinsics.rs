@@ -1,0 +1,93 @@
+//! Focal length, centre and aperture of a camera, as a page writes them.
+
+use super::Aperture;
+use crate::sampling::rng::Stream;
+use crate::sampling::vary::{Finite, Positive, Vary};
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+/// Intrinsics, as they are written.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum IntrinsicsDesc {
+    /// OpenCV's matrix, pixels; with pixel centres at +0.5. A calibration that puts the first pixel's centre at 0 needs 0.5 added
+    /// to cx and cy.
+    Pixels {
+        /// Focal length along x.
+        fx: Vary<Positive>,
+        /// Focal length along y.
+        fy: Vary<Positive>,
+        /// Optical axis, from the left edge.
+        cx: Vary<Finite>,
+        /// Optical axis, from the top edge.
+        cy: Vary<Finite>,
+    },
+    /// From the lens and the sensor; the axis in the image's middle.
+    Millimetres {
+        /// Focal length.
+        focal_mm: Vary<Positive>,
+        /// Side of a square pixel, micrometres.
+        pixel_um: Vary<Positive>,
+    },
+    /// From the angle of view between the left and right edges; square pixels, the axis in the image's middle.
+    FieldOfView {
+        /// Degrees, below 180.
+        horizontal_deg: Vary<Positive>,
+    },
+}
+
+impl IntrinsicsDesc {
+    /// Draws focal lengths and centre, pixels, and the focal length in millimetres where the page has it.
+    pub(super) fn draw(&self, size: (u32, u32), stream: &mut Stream) -> Result<([f64; 2], [f64; 2], Option<f64>)> {
+        let middle = middle(size);
+        Ok(match self {
+            Self::Pixels { fx, fy, cx, cy } => {
+                ([fx.draw(stream), fy.draw(stream)], [cx.draw(stream), cy.draw(stream)], None)
+            }
+            Self::Millimetres { focal_mm, pixel_um } => {
+                let focal = focal_mm.draw(stream);
+                ([focal * 1e3 / pixel_um.draw(stream); 2], middle, Some(focal))
+            }
+            Self::FieldOfView { horizontal_deg } => {
+                let angle = horizontal_deg.draw(stream);
+                if angle >= 180.0 {
+                    return Err(Error::Scene(format!(
+                        "horizontal_deg {angle} is out of range: a pinhole sees less than 180 degrees\n \
+                         help: write an angle of view such as 60"
+                    )));
+                }
+                ([middle[0] / (angle / 2.0).to_radians().tan(); 2], middle, None)
+            }
+        })
+    }
+}
+
+/// A thin lens, as it is written.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ApertureDesc {
+    /// Focal length over the pupil's diameter.
+    pub f_number: Vary<Positive>,
+    /// Distance of the plane in focus.
+    pub focus_m: Vary<Positive>,
+}
+
+impl ApertureDesc {
+    /// Draws the aperture of a lens of a focal length.
+    pub(super) fn draw(&self, focal_mm: Option<f64>, stream: &mut Stream) -> Result<Aperture> {
+        let Some(focal) = focal_mm else {
+            return Err(Error::Scene(
+                "an f_number needs a focal length in millimetres\n help: write intrinsics: Millimetres(focal_mm: …, \
+                 pixel_um: …)"
+                    .into(),
+            ));
+        };
+        let radius = (focal * 1e-3 / (2.0 * self.f_number.draw(stream))) as f32;
+        Ok(Aperture { radius, focus: self.focus_m.draw32(stream) })
+    }
+}
+
+/// The middle of an image of so many pixels.
+pub(super) fn middle((width, height): (u32, u32)) -> [f64; 2] {
+    [f64::from(width) / 2.0, f64::from(height) / 2.0]
+}
