@@ -313,6 +313,8 @@ pub struct LitterDesc {
     pub bit_mm: Vary<Positive>,
     /// Stubs on a stick.
     pub stubs: Vary<Count>,
+    /// How long straw has lain: 0 fresh and pale yellow, 0.5 orange to grey brown, 1 dark and all but soil. Pieces spread around it.
+    pub weathering: Vary<Fraction>,
 }
 
 impl Default for LitterDesc {
@@ -337,6 +339,7 @@ impl Default for LitterDesc {
                 max: 15.0,
             }),
             stubs: Vary::uniform(0.0, 3.0),
+            weathering: Vary::uniform(0.3, 0.8),
         }
     }
 }

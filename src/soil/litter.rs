@@ -5,14 +5,13 @@
 //! and lie where they touch.
 
 use super::record::LitterRecord;
-use super::{Debris, DebrisKind, Ground, LitterDesc, Pile, Rect, cell_stream, cells};
+use super::{Debris, DebrisKind, Ground, LitterDesc, Pile, Rect, cell_stream, cells, residue};
 use crate::geometry::Mesh;
 use crate::math::{Spectrum, Vec2, Vec3, vec2};
 use crate::sampling::{Purpose, Stream};
 use std::f32::consts::{PI, TAU};
 
-/// Reflectance of straw and wood: measured wood shavings and bark; the bits are rotten leaves, redder and darker.
-const STRAW: Spectrum = Spectrum::new(0.42, 0.32, 0.19, 0.585);
+/// Reflectance of wood: measured bark; the bits are rotten leaves, redder and darker.
 const WOOD: Spectrum = Spectrum::new(0.22, 0.16, 0.12, 0.38);
 const ROTTEN: Spectrum = Spectrum::new(0.20, 0.09, 0.05, 0.32);
 
@@ -36,8 +35,8 @@ pub fn litter(desc: &LitterDesc, ground: &Ground, pile: &mut Pile, stream: &Stre
         for (at, mut s) in places(ground.area(), per_m2, &child(k)) {
             all.push(match kind {
                 DebrisKind::Stick => stick(desc, pile, at, &mut s),
-                DebrisKind::Straw => straw(desc, pile, at, &mut s),
-                _ => bit(desc, pile, at, &mut s),
+                DebrisKind::Straw => straw(desc, drawn.weathering, pile, at, &mut s),
+                _ => bit(desc, drawn.weathering, pile, at, &mut s),
             });
         }
     }
@@ -56,6 +55,7 @@ impl LitterRecord {
             straw_cover: desc.straw_cover.draw32(&mut own(stream, 2)),
             sticks_per_m2: desc.sticks_per_m2.draw32(&mut own(stream, 0)),
             bits_per_m2: desc.bits_per_m2.draw32(&mut own(stream, 3)),
+            weathering: desc.weathering.draw32(&mut own(stream, 7)),
         }
     }
 }
@@ -168,7 +168,7 @@ fn debris(kind: DebrisKind, mesh: Mesh, albedo: Spectrum, path: &[Vec3], s: &mut
     Debris { kind, mesh, albedo, tint, hue: s.uniform32(), centre, radius }
 }
 
-fn straw(desc: &LitterDesc, pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
+fn straw(desc: &LitterDesc, weathering: f32, pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
     let length = desc.straw_mm.draw32(s) * 1e-3;
     let width = desc.straw_width_mm.draw32(s) * 1e-3;
     let n = ((length / 0.004) as usize).clamp(6, 24);
@@ -185,7 +185,7 @@ fn straw(desc: &LitterDesc, pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris
         0.5 * s.normal() as f32,
     );
     raise(pile, &path, 0.5 * width);
-    debris(DebrisKind::Straw, mesh, STRAW, &path, s)
+    debris(DebrisKind::Straw, mesh, tone(weathering, s), &path, s)
 }
 
 fn stick(desc: &LitterDesc, pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
@@ -212,7 +212,7 @@ fn stick(desc: &LitterDesc, pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris
     debris(DebrisKind::Stick, mesh, WOOD, &path, s)
 }
 
-fn bit(desc: &LitterDesc, pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
+fn bit(desc: &LitterDesc, weathering: f32, pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
     let length = desc.bit_mm.draw32(s) * 1e-3;
     let half = 0.5 * length * s.range32(0.12, 0.5);
     let points = path(at, length, 0.5, 6, s);
@@ -227,8 +227,13 @@ fn bit(desc: &LitterDesc, pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
     let thick = (0.06 * half).max(6e-5);
     let section: Vec<Vec2> = arc(s.range32(0.3, 1.6), 0.12);
     let mesh = sweep(&path, &section, |t| vec2(half * wide(t), (half * wide(t)).max(thick)), 0.8 * s.normal() as f32);
-    let pale = s.chance(0.3);
-    debris(DebrisKind::Bit, mesh, if pale { STRAW } else { ROTTEN }, &path, s)
+    let stalk = s.chance(0.3);
+    debris(DebrisKind::Bit, mesh, if stalk { tone(weathering, s) } else { ROTTEN }, &path, s)
+}
+
+/// Reflectance of a piece of straw; `s` is the piece's.
+fn tone(weathering: f32, s: &Stream) -> Spectrum {
+    residue::straw(weathering, &mut s.child(Purpose::Debris, 0))
 }
 
 fn raise(pile: &mut Pile, path: &[Vec3], half: f32) {

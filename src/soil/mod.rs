@@ -21,6 +21,7 @@ mod litter;
 mod pile;
 mod record;
 mod relief;
+mod residue;
 mod skin;
 mod stone;
 #[cfg(test)]

@@ -116,4 +116,6 @@ pub struct LitterRecord {
     pub sticks_per_m2: f32,
     /// Bits of dead leaves and roots.
     pub bits_per_m2: f32,
+    /// Mean weathering of straw.
+    pub weathering: f32,
 }

@@ -17,6 +17,11 @@ use std::sync::Arc;
 const YOUNG: f32 = 0.2;
 /// Share of a seed leaf's flea-beetle holes that a true leaf has.
 const BEETLE: f32 = 0.33;
+/// Area of a leaf that meets as many holes of slugs as the page says, of flea beetles on seed leaves, and on true leaves, mm²:
+/// a beet's of four leaves, and its seed leaf. Smaller leaves meet fewer, in proportion; larger ones not more.
+const MEETS_MM2: [f32; 3] = [800.0, 150.0, 400.0];
+/// Most of a blade that holes may take: a leaf that has lost more is shed, or was never the size that it is.
+const MOST_EATEN: f32 = 0.12;
 /// Width of the dead rim of a hole, mm.
 const RIM_MM: f32 = 0.35;
 /// Height over the soil at which splash has fallen to 1/e, and dust to 1/e of what it has more there than at the top, metres.
@@ -145,9 +150,11 @@ impl Marks {
             let n = s.poisson(f64::from(mean * often));
             (0..n).filter_map(|_| patch(bearer, radii, &mut s)).collect::<Vec<Patch>>()
         };
-        let mut holes = on_leaf(&desc.hole_mm, condition.holes, 1);
-        let shots = condition.shot_holes * if bearer.cotyledon { 1.0 / worn } else { BEETLE };
-        holes.extend(on_leaf(&desc.shot_hole_mm, shots, 2));
+        let [slugs, seed_leaf, true_leaf] = MEETS_MM2;
+        let (shots, beetles) = if bearer.cotyledon { (1.0 / worn, seed_leaf) } else { (BEETLE, true_leaf) };
+        let slugged = (on_leaf(&desc.hole_mm, condition.holes, 1), slugs);
+        let shot = (on_leaf(&desc.shot_hole_mm, condition.shot_holes * shots, 2), beetles);
+        let mut holes = met([slugged, shot], bearer, &mut of(9));
         let whole = holes.len();
         let mut s = of(3);
         for _ in 0..s.poisson(f64::from(condition.bites * often)) {
@@ -308,6 +315,38 @@ impl Marks {
     }
 }
 
+/// Area of the blade, mm²: as the mask has it, on a raster of its own.
+fn area(bearer: &Bearer<'_>) -> f32 {
+    const SIDE: usize = 24;
+    let at = |i: usize| (i as f32 + 0.5) / SIDE as f32;
+    let opaque = |k: &usize| bearer.mask.is_none_or(|m| m.opaque_at(vec2(at(k % SIDE), at(k / SIDE))));
+    let share = (0..SIDE * SIDE).filter(opaque).count() as f32 / (SIDE * SIDE) as f32;
+    bearer.image_mm.x * bearer.image_mm.y * share
+}
+
+/// Of holes, each kind with the area that meets all of it, those that a blade of this size meets: no two run together, and the
+/// whole stays below [`MOST_EATEN`]. On a leaf that is large enough they are the same holes whatever its size.
+fn met(kinds: [(Vec<Patch>, f32); 2], bearer: &Bearer<'_>, s: &mut Stream) -> Vec<Patch> {
+    let mut kept: Vec<Patch> = Vec::new();
+    if kinds.iter().all(|(holes, _)| holes.is_empty()) {
+        return kept;
+    }
+    let area = area(bearer);
+    let mut left = MOST_EATEN * area;
+    for (holes, meets) in kinds {
+        let chance = (area / meets).min(1.0);
+        for hole in holes {
+            let eaten = std::f32::consts::PI * hole.radius * hole.radius;
+            let apart = |other: &Patch| other.centre.distance(hole.centre) > 1.3 * (other.radius + hole.radius);
+            if s.uniform32() < chance && eaten <= left && kept.iter().all(apart) {
+                left -= eaten;
+                kept.push(hole);
+            }
+        }
+    }
+    kept
+}
+
 /// Smaller of the leaf's sides, mm.
 fn narrow(bearer: &Bearer<'_>) -> f32 {
     bearer.image_mm.min_element()
@@ -432,6 +471,33 @@ mod tests {
         }
         let area = removed / holes as f32 / (std::f32::consts::PI * 9.0);
         assert!(holes > 50 && (area - 1.0).abs() < 0.15, "{area} of {holes}");
+    }
+
+    /// Rationale: as many holes on a leaf of a centimetre as on one of ten make lace of it. Expected: fewer in proportion to the
+    /// area, and never more than the share that a leaf can lose; outlines stray, so the cut may take a little more than its discs.
+    #[test]
+    fn a_small_leaf_has_few_holes_and_is_never_lace() {
+        let mask = oval();
+        let condition = Condition { holes: 6.0, shot_holes: 10.0, ..Condition::default() };
+        let of = |length_mm: f32, cotyledon: bool| {
+            let bearer = Bearer { image_mm: vec2(0.6, 1.0) * length_mm, cotyledon, ..leaf(&mask) };
+            let (mut holes, mut most) = (0, 0.0_f32);
+            for k in 0..200 {
+                let m = marks(&condition, &bearer, k);
+                holes += m.holes();
+                most = most.max(1.0 - m.cut(Some(&mask)).count() as f32 / mask.count() as f32);
+            }
+            (holes as f32 / 200.0, most)
+        };
+        for (length_mm, cotyledon) in [(5.0, true), (10.0, true), (10.0, false), (20.0, true), (40.0, false)] {
+            let (mean, most) = of(length_mm, cotyledon);
+            assert!(most < 1.35 * MOST_EATEN, "{length_mm} mm: {most}");
+            assert!(length_mm > 10.0 || mean < 2.5, "{length_mm} mm: {mean}");
+        }
+        // 6 of slugs, a third of 10 of beetles; some fall onto others, and the blade of 47 cm² bears the rest.
+        let (mean, most) = of(100.0, false);
+        assert!(mean > 8.0 && most < MOST_EATEN, "{mean} {most}");
+        assert!(of(10.0, true).0 > 0.3, "seed leaves have holes too");
     }
 
     #[test]

@@ -41,11 +41,12 @@ impl Bound for MarkCount {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default, rename = "Condition")]
 pub struct ConditionDesc {
-    /// Holes that slugs and caterpillars eat into a leaf, mean number.
+    /// Holes that slugs and caterpillars eat into a leaf of 8 cm² or more, mean number; smaller ones have fewer in proportion.
     pub holes: Vary<MarkCount>,
     /// Their radius.
     pub hole_mm: Vary<Positive>,
-    /// Small holes that flea beetles eat into seed leaves, mean number; true leaves have a third.
+    /// Small holes that flea beetles eat into seed leaves of 1.5 cm² or more, mean number; true leaves of 4 cm² have a third, smaller ones fewer in
+    /// proportion. All holes together take 12 % of a blade at most.
     pub shot_holes: Vary<MarkCount>,
     /// Their radius.
     pub shot_hole_mm: Vary<Positive>,

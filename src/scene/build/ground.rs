@@ -8,7 +8,7 @@ use crate::sampling::place::Step;
 use crate::sampling::rng::mix;
 use crate::scatter::Rows;
 use crate::scene::library::Layer;
-use crate::soil::{self, Canopy, Clods, Debris, Ground, Pile, Rect, SeedRows, Site, SoilDesc, SoilRecord};
+use crate::soil::{self, Canopy, Clods, Debris, DebrisKind, Ground, Pile, Rect, SeedRows, Site, SoilDesc, SoilRecord};
 use std::sync::Arc;
 
 /// Room around the view with fine ground.
@@ -20,6 +20,9 @@ const STONES: u64 = 0;
 const LITTER: u64 = 1;
 /// Slope angle of the facets of stones, straw and wood, radians.
 const DEBRIS_SIGMA: f32 = 0.3;
+
+/// Largest patches of straw, wood and dead leaves, metres.
+const MOTTLE: f32 = 2e-3;
 
 /// The ground while it is being covered.
 pub(super) struct Earth {
@@ -101,7 +104,10 @@ impl Builder<'_> {
         }
         for (i, thing) in debris.into_iter().enumerate() {
             let solid = Solid::new(thing.albedo * thing.tint, DEBRIS_SIGMA);
-            let solid = solid.with_grain(mix(i as u64) as u32, thing.radius.max(1e-3) * 0.5, 0.35);
+            // A stone is of a piece; dead matter is mottled by what eats it.
+            let patch = 0.5 * thing.radius.max(1e-3);
+            let patch = if thing.kind == DebrisKind::Stone { patch } else { patch.min(MOTTLE) };
+            let solid = solid.with_grain(mix(i as u64) as u32, patch, 0.35);
             let material = self.material(Material::Solid(solid));
             self.part(thing.mesh, material);
         }
