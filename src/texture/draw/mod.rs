@@ -4,6 +4,7 @@
 
 mod canvas;
 mod cells;
+mod crust;
 mod leaf;
 mod shape;
 mod soil;

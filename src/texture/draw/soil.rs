@@ -163,7 +163,8 @@ pub(super) fn draw(recipe: &SoilRecipe) -> Result<Drawn> {
         Ground::Cracked { plate_mm, crack_mm, depth_mm } => {
             tile.crumbs(recipe);
             tile.slake();
-            tile.crack(plate_mm.f32(), crack_mm.f32(), depth_mm.f32());
+            let near = tile.crack(plate_mm.f32(), crack_mm.f32(), depth_mm.f32());
+            tile.fragments(&near);
         }
     }
     tile.litter(&recipe.litter);

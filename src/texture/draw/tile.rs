@@ -1,6 +1,5 @@
 //! The steps by which ground is drawn; each changes heights and colours all over the tile. See [`super::soil`].
 
-use super::cells::Cells;
 use super::soil::{Litter, SoilRecipe};
 use super::stamp::Stamp;
 use super::{Drawn, Grey};
@@ -12,17 +11,17 @@ use crate::texture::srgb::ColorSpace;
 
 /// Ground while it is drawn.
 pub(super) struct Tile {
-    size: usize,
+    pub(super) size: usize,
     /// Pixels in a millimetre.
-    scale: f32,
-    period_mm: f32,
-    stream: Stream,
+    pub(super) scale: f32,
+    pub(super) period_mm: f32,
+    pub(super) stream: Stream,
     noise: Tiling,
-    spread: f32,
+    pub(super) spread: f32,
     /// Heights, mm.
-    height: Vec<f32>,
-    colour: Vec<Vec3>,
-    albedo: Vec3,
+    pub(super) height: Vec<f32>,
+    pub(super) colour: Vec<Vec3>,
+    pub(super) albedo: Vec3,
 }
 
 impl Tile {
@@ -44,14 +43,15 @@ impl Tile {
     }
 
     /// Noise over the tile whose first octave has features of `mm`.
-    fn noise(&self, x: f32, y: f32, mm: f32, octaves: u32, layer: u64) -> f32 {
+    pub(super) fn noise(&self, x: f32, y: f32, mm: f32, octaves: u32, layer: u64) -> f32 {
         let period = (self.period_mm / mm).round().max(1.0);
         let k = period / self.size as f32;
         let noise = Tiling::new(layer * 7919 + u64::from(self.noise.at(0.5, 0.5, 4).to_bits()));
         noise.fbm(x * k, y * k, period as u32, octaves, 0.55)
     }
 
-    fn each(&mut self, mut f: impl FnMut(&Self, f32, f32, usize) -> (f32, Vec3)) {
+    /// Draws every pixel anew: a height and a colour from its place and its number.
+    pub(super) fn each(&mut self, mut f: impl FnMut(&Self, f32, f32, usize) -> (f32, Vec3)) {
         let (mut height, mut colour) = (vec![0.0; self.height.len()], vec![Vec3::ZERO; self.colour.len()]);
         for y in 0..self.size {
             for x in 0..self.size {
@@ -76,7 +76,7 @@ impl Tile {
     }
 
     /// Places a stamp; what lies higher stays.
-    fn stamp(&mut self, stamp: &Stamp, paint: impl Fn(Vec2, f32, Vec3) -> Vec3, rough: f32) {
+    pub(super) fn stamp(&mut self, stamp: &Stamp, paint: impl Fn(Vec2, f32, Vec3) -> Vec3, rough: f32) {
         let reach = stamp.axes.max_element().ceil() as i32 + 1;
         let (cx, cy) = (stamp.centre.x.floor() as i32, stamp.centre.y.floor() as i32);
         let n = self.size as i32;
@@ -99,17 +99,17 @@ impl Tile {
         }
     }
 
-    fn surface(&self, p: Vec2) -> f32 {
+    pub(super) fn surface(&self, p: Vec2) -> f32 {
         let n = self.size;
         self.height[(p.y as usize).min(n - 1) * n + (p.x as usize).min(n - 1)]
     }
 
-    fn somewhere(&self, s: &mut Stream) -> Vec2 {
+    pub(super) fn somewhere(&self, s: &mut Stream) -> Vec2 {
         vec2(s.range32(0.0, self.size as f32), s.range32(0.0, self.size as f32))
     }
 
     /// Sizes of things by the power law, large first, until their areas cover a share of the ground.
-    fn sizes(&self, cover: f32, low: f32, high: f32, power: f32, s: &mut Stream) -> Vec<f32> {
+    pub(super) fn sizes(&self, cover: f32, low: f32, high: f32, power: f32, s: &mut Stream) -> Vec<f32> {
         let mut left = cover * self.period_mm * self.period_mm;
         let cut = (low / high).powf(power);
         let mut sizes = Vec::new();
@@ -160,70 +160,6 @@ impl Tile {
             let fine = t.noise(x, y, 1.4, 2, 5);
             (t.height[i], t.colour[i] * (1.0 + 0.10 * stands + 0.06 * high + 0.06 * fine))
         });
-    }
-
-    /// Rain beats the crumbs down to a smooth, paler crust.
-    pub(super) fn slake(&mut self) {
-        let size = (self.size, self.size);
-        let wrap = crate::texture::Wrap::Repeat;
-        let soften = |t: &Self, mm: f32| {
-            let radius = (mm * t.scale).round().max(1.0) as usize;
-            crate::texture::maps::blur(&crate::texture::maps::blur(&t.height, size, radius, wrap), size, radius, wrap)
-        };
-        let (soft, broad) = (soften(self, 1.0), soften(self, 9.0));
-        let albedo = self.albedo;
-        self.each(|t, x, y, i| {
-            let sieve = smoothstep(-0.2, 0.5, t.noise(x, y, 26.0, 4, 6));
-            // Where the crust is thin, beaten crumbs still show.
-            let shows = lerp(0.18, 0.8, sieve);
-            let grain = t.noise(x, y, 1.6, 3, 7);
-            let pore = smoothstep(0.42, 0.6, t.noise(x, y, 3.2, 2, 8));
-            let h = 4.6 + 0.45 * (broad[i] - 2.6) + 0.5 * shows * (soft[i] - broad[i]) + 0.12 * grain - 0.5 * pore;
-            let veil = albedo * (1.0 + 0.10 * t.noise(x, y, 60.0, 5, 9));
-            let colour = veil.lerp(t.colour[i], 0.25 + 0.4 * shows) * (1.0 + 0.05 * grain - 0.10 * pore);
-            (h, colour)
-        });
-    }
-
-    pub(super) fn crack(&mut self, plate: f32, widest: f32, depth: f32) {
-        let seed = u64::from(self.stream.child(Purpose::Texture, 3).seed32());
-        let layers = [(plate, 1.0, 0.0), (plate / 2.9, 0.3, 0.75)].map(|(mm, width, missing)| {
-            let n = (self.period_mm / mm).round().max(1.0);
-            (Cells::new(seed + mm as u64, (n as u32, n as u32), 0.9), n, width, missing)
-        });
-        self.each(|t, x, y, i| {
-            let bend = |mm: f32, layer: u64| vec2(t.noise(x, y, mm, 5, layer), t.noise(x, y, mm, 5, layer + 1));
-            let warp = bend(plate * 0.5, 20) * plate * 0.16;
-            let ragged = bend(5.0, 24) * 0.9;
-            let mut open = 0.0f32;
-            let (mut curl, mut own) = (0.0f32, 0.5);
-            for (k, (cells, n, width, missing)) in layers.iter().enumerate() {
-                let unit = t.period_mm / n;
-                let p = (vec2(x + 0.5, y + 0.5) / t.scale + warp + ragged) / unit;
-                let cell = cells.at(p);
-                let away = cell.border * unit;
-                if k == 0 {
-                    own = cell.own;
-                }
-                // Only some plates broke again, and not along every line.
-                if k == 1 && (own < 0.35 || cell.shared < missing - 0.6 * own) {
-                    continue;
-                }
-                let vary = lerp(0.35, 1.0, cell.shared) * (1.0 + 0.5 * t.noise(x, y, 18.0, 3, 30));
-                let half = 0.5 * widest * width * vary.max(0.15);
-                let pixel = 0.5 / t.scale;
-                open = open.max(1.0 - smoothstep(half - pixel, half + pixel + 0.3 * half, away));
-                curl = curl.max(width * (-away / (0.09 * plate)).exp());
-            }
-            let wall = open * depth * (0.75 + 0.25 * t.noise(x, y, 4.0, 2, 31));
-            let h = t.height[i] + 0.9 * curl - wall;
-            let tone = 1.0 + 0.12 * (own - 0.5) + 0.05 * curl;
-            // Inside a crack the earth is moister, hence darker; its shadow is the renderer's.
-            (h, t.colour[i] * tone * (1.0 - 0.32 * open))
-        });
-        let lowest = self.height.iter().copied().fold(f32::MAX, f32::min);
-        let lift = (0.2 - lowest).max(0.0);
-        self.height.iter_mut().for_each(|h| *h += lift);
     }
 
     pub(super) fn litter(&mut self, litter: &Litter) {
