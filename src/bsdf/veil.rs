@@ -1,10 +1,10 @@
 //! Hairs and crystals of wax that stand on a leaf: what makes it velvety, mealy or blue.
 //!
 //! A thin layer of bodies that absorb nothing and scatter alike to all sides, of optical depth τ. What it sends back is single
-//! scattering, `f = (1 − e^{−τ(1/μi + 1/μo)}) / 4π(μi + μo)` (Chandrasekhar 1960, *Radiative Transfer*, §47; as a skin on things:
+//! scattering, `f = (1 − e^{−τ(1/μi + 1/μo)}) / 4π(μi + μo)` (Chandrasekhar 1960, *Radiative Transfer*; as a skin on things:
 //! Koenderink & Pont 2003, "The secret of velvety skin"). The half that it scatters onwards still reaches the tissue below, so that
 //! is seen through `e^{−τ/2μ}` on each way. Reciprocal; energy is never gained, and of light that goes to and fro between tissue
-//! and layer 1.1 τ times what the tissue returns are lost within 70° of the normal, 2.5 τ at 86°.
+//! and layer at most 1.1 τ times what the tissue returns is lost within 70° of the normal, 2.5 τ at 86°.
 
 use crate::math::Spectrum;
 use std::f32::consts::PI;
