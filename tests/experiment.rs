@@ -440,6 +440,7 @@ fn mistakes_in_a_page_are_shown_where_they_are() {
         ("name: \"More\"", "name: \"few!\"", "\"few!\"", "there is another `few!`", "of its own"),
         ("name: \"More\"", "name: \"?\"", "\"?\"", "no letter and no digit", "letters"),
         ("steps: 10", "window: (8, 8), steps: 10", "(8, 8)", "networks do not see 8 × 8 pixels", "sides from 32"),
+        ("steps: 10", "rare: 1.5, steps: 10", "1.5", "1.5 is out of range", "from 0 to 1"),
         ("from: [(set: \"frames\", images: \"0..2\")]", "from: []", "[]", "nothing is learnt from", "name a set"),
         (frames, "(set: \"frame\")", "\"frame\"", "there is no set `frame`", "did you mean `frames`?"),
         ("\"0..2\"", "\"2..0\"", "\"2..0\"", "`2..0` picks no images", "0..10"),

@@ -111,7 +111,10 @@ fn a_training_that_is_stopped_or_killed_ends_with_the_same_bytes() {
     let scratch = tempfile::tempdir().unwrap();
     let folder = scratch.path();
     let set = set(folder, 8);
-    for (method, more) in [("adam", " --window 40x32"), ("sgd", " --normalise fixed --loss entropy --balance median")] {
+    for (method, more) in [
+        ("adam", " --window 40x32 --rare 0.5 --balance fading"),
+        ("sgd", " --normalise fixed --loss entropy --balance median"),
+    ] {
         let more = format!(
             "--network unet --steps 40 --optimiser {method} --val {}@0..2 --watch-every 5 --patience 100{more}",
             set.display()
@@ -211,6 +214,8 @@ fn what_cannot_be_gone_on_with_is_told() {
     assert!(error.contains("this is no dataset"), "{error}");
     let error = refuse(&mut fit(&set, &folder.join("e"), &format!("--window {}x{H}", W + 1)), 2);
     assert!(error.contains("--window is larger than the images"), "{error}");
+    let error = refuse(&mut fit(&set, &folder.join("f"), "--window 32x32 --rare 2"), 2);
+    assert!(error.contains("--rare") && error.contains("write a share from 0 to 1"), "{error}");
     for name in ["a", "b", "c", "d", "e"] {
         assert!(!folder.join(name).exists(), "{name} was begun");
     }
@@ -251,14 +256,15 @@ fn batches_do_not_depend_on_threads_or_on_where_a_training_goes_on() {
         let all = Selection { folder: set.clone(), pick: None, repeat: 2 };
         Arc::new(Store::open(&[all], Pick::All, 1, &Classes::default(), &shape, false, memory).unwrap())
     };
-    let (seed, batch, window) = (3, 3, (40, 32));
-    let order = Order { seed, batch, window, augment: Augment::default(), normalisation: Normalisation::Image };
+    let (seed, batch, window) = (3, 3, (32, 24));
+    let order =
+        Order { seed, batch, window, rare: 0.5, augment: Augment::default(), normalisation: Normalisation::Image };
     let batches = |memory, from, threads| -> Vec<_> {
         Loader::start(&store(memory), &order, from, 12, threads).map(|b| b.unwrap()).collect()
     };
     let plain = batches(1 << 30, 0, 1);
     assert_eq!(plain.len(), 12);
-    assert!(plain.iter().all(|b| b.pixels.len() == 3 * 40 * 32 * 3 && b.labels.len() == 3 * 40 * 32));
+    assert!(plain.iter().all(|b| b.pixels.len() == 3 * 32 * 24 * 3 && b.labels.len() == 3 * 32 * 24));
     assert_eq!(plain, batches(0, 0, 4));
     assert_eq!(plain[7..], batches(1 << 30, 7, 3));
     assert_ne!(plain[0], plain[1]);

@@ -69,6 +69,10 @@ pub(crate) struct LearnArgs {
     /// steps cheap and keep small plants as large as they are.
     #[arg(long, value_name = "WxH", value_parser = size)]
     window: Option<(u32, u32)>,
+    /// Share of the windows that are laid about a pixel of a rare class, the rarer the more; small plants are in hardly any
+    /// window else. Of no effect without --window.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = part)]
+    rare: f64,
     /// Most steps.
     #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
     steps: u64,
@@ -90,7 +94,8 @@ pub(crate) struct LearnArgs {
     /// What is made small: the cross-entropy, or with dice that and what classes lack of a full overlap, which serves rare ones.
     #[arg(long, value_name = "NAME", default_value = "dice", value_parser = Objective::parse)]
     loss: Objective,
-    /// What makes up for rare classes: median (frequency), its root, or none.
+    /// What makes up for rare classes: median (frequency), its root, fading (the root, which falls to none until half of the
+    /// steps are done), or none.
     #[arg(long, value_name = "NAME", default_value = "none", value_parser = Balance::parse)]
     balance: Balance,
     /// What is varied: all, none, or some of flip, rotate, scale, crop, colour, blur, noise.
@@ -134,6 +139,10 @@ fn share(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|r: &f64| (0.0..1.0).contains(r)).ok_or_else(|| "write a share from 0 to below 1".into())
 }
 
+fn part(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|r: &f64| (0.0..=1.0).contains(r)).ok_or_else(|| "write a share from 0 to 1".into())
+}
+
 impl Args {
     fn plan(&self, seed: u64, folder: &Path) -> Result<Plan> {
         let learn = &self.learn;
@@ -163,6 +172,7 @@ impl Args {
             steps: learn.steps,
             batch: learn.batch.into(),
             window: learn.window,
+            rare: learn.rare,
             method: learn.optimiser,
             rate: learn.rate.unwrap_or(learn.optimiser.usual_rate()),
             decay: learn.decay,

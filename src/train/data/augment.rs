@@ -6,6 +6,7 @@
 
 use super::example::Example;
 use super::normalise::{self, Normalisation};
+use super::window::{self, Placement, View};
 use crate::sampling::Stream;
 use serde::{Deserialize, Serialize};
 
@@ -66,21 +67,23 @@ impl Augment {
         Ok(augment)
     }
 
-    /// An image of `size` as the network will see it, or the part of it that `window` holds: `bands` values a pixel side by side,
-    /// normalised, and its labels. `colour[b]` says whether band b belongs to the photograph in colour. A window is as large as
-    /// the image, or lies somewhere in it; it is normalised by the whole image, as a network will see whole images later.
+    /// An image as the network will see it, or the window of it: `bands` values a pixel side by side, normalised, and its
+    /// labels. `colour[b]` says whether band b belongs to the photograph in colour. A window is normalised by the whole image,
+    /// as a network will see whole images later.
     pub fn apply(
         &self,
         example: &Example,
-        size: (u32, u32),
-        window: (u32, u32),
+        view: &View,
         colour: &[bool],
         normalisation: &Normalisation,
         stream: &mut Stream,
     ) -> (Vec<f32>, Vec<u8>) {
-        let placement = Placement::draw(*self, size, window, stream);
+        let &View { size, window, rare } = view;
+        let anywhere = window == size || rare == 0.0 || !stream.chance(rare);
+        let about = if anywhere { None } else { window::rare_pixel(&example.labels, size, stream) };
+        let placement = Placement::draw(*self, view, about, stream);
         let (mut pixels, labels) = match &placement {
-            Some(placement) => placement.read(example, size, window),
+            Some(placement) => placement.read(example, view),
             None => (interleave(example, 1), example.labels.clone()),
         };
         let light = self.colour.then(|| Light::draw(colour, stream));
@@ -126,81 +129,6 @@ pub fn interleave(example: &Example, step: usize) -> Vec<f32> {
         }
     }
     pixels
-}
-
-/// Where each pixel of the window lies in the picture: a linear map about the centres, then a shift.
-struct Placement {
-    matrix: [f32; 4],
-    shift: [f32; 2],
-}
-
-impl Placement {
-    fn draw(augment: Augment, size: (u32, u32), window: (u32, u32), stream: &mut Stream) -> Option<Self> {
-        if window == size && !(augment.flip || augment.rotate || augment.scale || augment.crop) {
-            return None;
-        }
-        let mirror = if augment.flip && stream.chance(0.5) { -1.0 } else { 1.0 };
-        let angle = if augment.rotate { stream.range32(0.0, std::f32::consts::TAU) } else { 0.0 };
-        let zoom = if augment.scale { 1.5f32.powf(stream.range32(-1.0, 1.0)) } else { 1.0 };
-        let reach = if augment.crop { 0.1 + (0.5 - 0.5 / zoom).max(0.0) } else { 0.0 };
-        let (sin, cos) = angle.sin_cos();
-        let matrix = [mirror * cos / zoom, -sin / zoom, mirror * sin / zoom, cos / zoom];
-        let shift = [(size.0, window.0), (size.1, window.1)].map(|(n, part)| {
-            let rest = 0.5 * (n - part) as f32;
-            let reach = reach * n as f32 + rest;
-            let shift = stream.range32(-reach, reach);
-            // Neither turned nor scaled, pixels fall on pixels, so that the picture stays as sharp as it is.
-            if augment.rotate || augment.scale { shift } else { (shift + rest).round() - rest }
-        });
-        Some(Self { matrix, shift })
-    }
-
-    /// A point of the window in the picture; both from their centres.
-    fn map(&self, [x, y]: [f32; 2]) -> [f32; 2] {
-        let [a, b, c, d] = self.matrix;
-        [a * x + b * y + self.shift[0], c * x + d * y + self.shift[1]]
-    }
-
-    fn read(&self, example: &Example, (w, h): (u32, u32), window: (u32, u32)) -> (Vec<f32>, Vec<u8>) {
-        let bands = example.planes.len();
-        let (cx, cy) = (w as f32 / 2.0, h as f32 / 2.0);
-        let (wx, wy) = (window.0 as f32 / 2.0, window.1 as f32 / 2.0);
-        let count = window.0 as usize * window.1 as usize;
-        let mut pixels = Vec::with_capacity(count * bands);
-        let mut labels = Vec::with_capacity(count);
-        for y in 0..window.1 {
-            for x in 0..window.0 {
-                let [sx, sy] = self.map([x as f32 + 0.5 - wx, y as f32 + 0.5 - wy]);
-                let (sx, sy) = (mirrored(sx + cx, w), mirrored(sy + cy, h));
-                labels.push(
-                    example.labels[(sy as usize).min(h as usize - 1) * w as usize + (sx as usize).min(w as usize - 1)],
-                );
-                let (x0, x1, fx) = between(sx, w);
-                let (y0, y1, fy) = between(sy, h);
-                for plane in &example.planes {
-                    let at = |x: usize, y: usize| f32::from(plane[y * w as usize + x]);
-                    let top = at(x0, y0) + fx * (at(x1, y0) - at(x0, y0));
-                    let low = at(x0, y1) + fx * (at(x1, y1) - at(x0, y1));
-                    pixels.push((top + fy * (low - top)) / 255.0);
-                }
-            }
-        }
-        (pixels, labels)
-    }
-}
-
-/// A coordinate folded into 0 to n at mirrors on both edges.
-fn mirrored(x: f32, n: u32) -> f32 {
-    let n = n as f32;
-    let folded = x.rem_euclid(2.0 * n);
-    if folded < n { folded } else { 2.0 * n - folded }
-}
-
-/// The pixels on both sides of a coordinate, and how far it is to the second.
-fn between(x: f32, n: u32) -> (usize, usize, f32) {
-    let at = (x - 0.5).clamp(0.0, (n - 1) as f32);
-    let low = (at as usize).min(n as usize - 1);
-    (low, (low + 1).min(n as usize - 1), at - low as f32)
 }
 
 /// Steps of a tone curve: finer than the 8 bits of what it is applied to.
@@ -302,6 +230,10 @@ mod tests {
         Normalisation::Fixed { mean: vec![0.0; 3], sd: vec![1.0; 3] }
     }
 
+    fn view(size: (u32, u32), window: (u32, u32)) -> View {
+        View { size, window, rare: 0.0 }
+    }
+
     fn example(w: u32, h: u32) -> Example {
         let pixel = |i: u32| if i % w > w / 2 { 200 } else { 40 };
         let plane: Vec<u8> = (0..w * h).map(pixel).collect();
@@ -317,7 +249,7 @@ mod tests {
             let mut stream = Stream::of(seed, 0, Purpose::Test, 0);
             for window in [(w, h), (17, 21)] {
                 let (pixels, labels) =
-                    augment.apply(&example(w, h), (w, h), window, &[true; 3], &as_it_is(), &mut stream);
+                    augment.apply(&example(w, h), &view((w, h), window), &[true; 3], &as_it_is(), &mut stream);
                 assert_eq!(labels.len(), (window.0 * window.1) as usize);
                 let wrong =
                     pixels.chunks_exact(3).zip(&labels).filter(|(p, l)| (p[0] > 120.0 / 255.0) != (**l == 1)).count();
@@ -333,7 +265,7 @@ mod tests {
         for seed in 0..50 {
             let mut stream = Stream::of(seed, 0, Purpose::Test, 0);
             let (pixels, labels) =
-                augment.apply(&example(w, h), (w, h), (16, 13), &[true; 3], &as_it_is(), &mut stream);
+                augment.apply(&example(w, h), &view((w, h), (16, 13)), &[true; 3], &as_it_is(), &mut stream);
             let same =
                 |(pixel, label): (&[f32], &u8)| pixel.iter().all(|v| *v == [40.0, 200.0][usize::from(*label)] / 255.0);
             assert!(pixels.chunks_exact(3).zip(&labels).all(same), "{seed}");
@@ -344,7 +276,8 @@ mod tests {
     fn nothing_asked_nothing_changed() {
         let picture = example(8, 6);
         let mut stream = Stream::of(1, 0, Purpose::Test, 0);
-        let (pixels, labels) = Augment::NONE.apply(&picture, (8, 6), (8, 6), &[true; 3], &as_it_is(), &mut stream);
+        let (pixels, labels) =
+            Augment::NONE.apply(&picture, &view((8, 6), (8, 6)), &[true; 3], &as_it_is(), &mut stream);
         assert_eq!(labels, picture.labels);
         assert_eq!(pixels, interleave(&picture, 1));
     }
@@ -359,7 +292,7 @@ mod tests {
         for seed in 0..60 {
             let mut stream = Stream::of(seed, 0, Purpose::Test, 0);
             let (pixels, labels) =
-                Augment::NONE.apply(&picture, (w, h), (8, 8), &[true; 3], &Normalisation::Band, &mut stream);
+                Augment::NONE.apply(&picture, &view((w, h), (8, 8)), &[true; 3], &Normalisation::Band, &mut stream);
             let ones: usize = labels.iter().map(|l| usize::from(*l)).sum();
             for (side, all) in pure.iter_mut().zip([0, labels.len()]) {
                 *side += u32::from(ones == all);

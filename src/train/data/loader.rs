@@ -7,6 +7,7 @@ use super::augment::Augment;
 use super::bands::Band;
 use super::normalise::Normalisation;
 use super::store::Store;
+use super::window::View;
 use crate::Result;
 use crate::sampling::{Purpose, Stream};
 use std::sync::Arc;
@@ -21,6 +22,8 @@ pub struct Order {
     pub batch: usize,
     /// Pixels of each image that are learnt from: width, height.
     pub window: (u32, u32),
+    /// Share of the windows that hold a rare class; see [`View::rare`].
+    pub rare: f64,
     /// What is varied.
     pub augment: Augment,
     /// What is taken out after that.
@@ -107,14 +110,13 @@ impl Epochs {
 fn make(store: &Store, order: &Order, step: u64, epochs: &mut Epochs) -> Result<Batch> {
     let shape = store.shape();
     let colour: Vec<bool> = shape.bands.iter().map(Band::is_color).collect();
+    let view = View { size: (shape.width, shape.height), window: order.window, rare: order.rare };
     let mut batch = Batch { images: order.batch, pixels: Vec::new(), labels: Vec::new() };
     for slot in 0..order.batch as u64 {
         let place = step * order.batch as u64 + slot;
         let example = store.get(epochs.at(place, store.len()))?;
         let mut stream = Stream::of(order.seed, place, Purpose::Training, 2);
-        let size = (shape.width, shape.height);
-        let (pixels, labels) =
-            order.augment.apply(&example, size, order.window, &colour, &order.normalisation, &mut stream);
+        let (pixels, labels) = order.augment.apply(&example, &view, &colour, &order.normalisation, &mut stream);
         batch.pixels.extend(pixels);
         batch.labels.extend(labels);
     }

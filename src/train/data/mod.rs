@@ -7,6 +7,7 @@
 //! | `example` | one image at the network's size, with its labels |
 //! | `store` | all that were selected, decoded once as far as memory goes |
 //! | `augment` | chance between the image and the network |
+//! | `window` | which part of the image is seen: anywhere, or about a rare class |
 //! | `normalise` | exposure taken out |
 //! | `loader` | threads that are ahead of the network, in an order that the seed alone decides |
 
@@ -17,6 +18,7 @@ pub mod loader;
 pub mod normalise;
 pub mod select;
 pub mod store;
+pub mod window;
 
 pub use augment::Augment;
 pub use bands::Band;
@@ -25,3 +27,4 @@ pub use loader::{Batch, Loader, Order};
 pub use normalise::Normalisation;
 pub use select::{Pick, Selection};
 pub use store::Store;
+pub use window::View;

@@ -13,54 +13,63 @@ pub enum Balance {
     Median,
     /// The root of that: a compromise between rare classes and few false alarms.
     Root,
+    /// That root at first, falling to none until half of the steps are done. Classes of a few pixels must be heard early: once a
+    /// network never answers them, overlaps have no slope that leads back. Later, weights would only widen their outlines.
+    Fading,
     /// All pixels weigh the same.
     None,
 }
 
 impl Balance {
-    /// Reads `median`, `root` or `none`.
+    /// Reads `median`, `root`, `fading` or `none`.
     pub fn parse(text: &str) -> Result<Self, String> {
         match text {
             "median" => Ok(Self::Median),
             "root" => Ok(Self::Root),
+            "fading" => Ok(Self::Fading),
             "none" => Ok(Self::None),
-            _ => Err(format!("classes are not weighed by `{text}`: write median, root or none")),
+            _ => Err(format!("classes are not weighed by `{text}`: write median, root, fading or none")),
         }
     }
 
-    /// The weights of the classes; 0 for a class that no image holds.
-    pub fn weights(self, store: &Store, classes: usize) -> Result<Vec<f32>> {
-        let mut images = Vec::new();
-        for place in 0..store.len() {
-            images.push(store.get(place)?.counts(classes));
-        }
-        Ok(self.of(&images, classes))
+    /// The weights of classes of these rarities when a training is `done`, in 0 to 1; 0 for a class that no image holds.
+    pub fn weights(self, rarities: &[Option<f64>], done: f64) -> Vec<f32> {
+        let power = match self {
+            Self::Median => 1.0,
+            Self::Root => 0.5,
+            Self::Fading => (0.5 - done).max(0.0),
+            Self::None => 0.0,
+        };
+        rarities.iter().map(|rarity| rarity.map_or(0.0, |r| r.powf(power) as f32)).collect()
     }
+}
 
-    /// The same from the pixels of each class in each image.
-    pub fn of(self, images: &[Vec<u64>], classes: usize) -> Vec<f32> {
-        let frequency = |class: usize| {
-            let holding = images.iter().filter(|counts| counts[class] > 0);
-            let (own, all) = holding.fold((0, 0), |(own, all), c| (own + c[class], all + c.iter().sum::<u64>()));
-            (own > 0).then(|| own as f64 / all as f64)
-        };
-        let frequencies: Vec<Option<f64>> = (0..classes).map(frequency).collect();
-        let mut there: Vec<f64> = frequencies.iter().copied().flatten().collect();
-        there.sort_by(f64::total_cmp);
-        let middle = there.len() / 2;
-        let median = match there.len() {
-            0 => return vec![1.0; classes],
-            n if n % 2 == 1 => there[middle],
-            _ => f64::midpoint(there[middle - 1], there[middle]),
-        };
-        let weight = |f: Option<f64>| match (self, f) {
-            (_, None) => 0.0,
-            (Self::Median, Some(f)) => median / f,
-            (Self::Root, Some(f)) => (median / f).sqrt(),
-            (Self::None, Some(_)) => 1.0,
-        };
-        frequencies.into_iter().map(|f| weight(f) as f32).collect()
+/// The classes' rarities: the median of their frequencies over that of each; none of a class that no image holds.
+pub fn rarities(store: &Store, classes: usize) -> Result<Vec<Option<f64>>> {
+    let mut images = Vec::new();
+    for place in 0..store.len() {
+        images.push(store.get(place)?.counts(classes));
     }
+    Ok(rarities_of(&images, classes))
+}
+
+/// The same from the pixels of each class in each image.
+fn rarities_of(images: &[Vec<u64>], classes: usize) -> Vec<Option<f64>> {
+    let frequency = |class: usize| {
+        let holding = images.iter().filter(|counts| counts[class] > 0);
+        let (own, all) = holding.fold((0, 0), |(own, all), c| (own + c[class], all + c.iter().sum::<u64>()));
+        (own > 0).then(|| own as f64 / all as f64)
+    };
+    let frequencies: Vec<Option<f64>> = (0..classes).map(frequency).collect();
+    let mut there: Vec<f64> = frequencies.iter().copied().flatten().collect();
+    there.sort_by(f64::total_cmp);
+    let middle = there.len() / 2;
+    let median = match there.len() {
+        0 => 0.0,
+        n if n % 2 == 1 => there[middle],
+        _ => f64::midpoint(there[middle - 1], there[middle]),
+    };
+    frequencies.into_iter().map(|f| f.map(|f| median / f)).collect()
 }
 
 #[cfg(test)]
@@ -71,12 +80,24 @@ mod tests {
     fn median_frequency_is_that_of_the_images_that_hold_the_class() {
         // Class 2 is only in the first image: 10 of 100 pixels there. Class 1: 30 of 200. Class 0: 160 of 200.
         let images = vec![vec![70, 20, 10], vec![90, 10, 0]];
-        let weights = Balance::Median.of(&images, 3);
+        let rarities = rarities_of(&images, 3);
+        let weights = Balance::Median.weights(&rarities, 0.7);
         let expected = [0.15 / 0.8, 1.0, 1.5];
         assert!(weights.iter().zip(expected).all(|(w, e)| (w - e).abs() < 1e-6), "{weights:?}");
-        let roots = Balance::Root.of(&images, 3);
+        let roots = Balance::Root.weights(&rarities, 0.7);
         assert!(roots.iter().zip(expected).all(|(w, e)| (w * w - e).abs() < 1e-6));
-        assert_eq!(Balance::Median.of(&[vec![50, 50, 0]], 3), [1.0, 1.0, 0.0]);
-        assert_eq!(Balance::None.of(&images, 3), [1.0; 3]);
+        assert_eq!(Balance::Median.weights(&rarities_of(&[vec![50, 50, 0]], 3), 0.0), [1.0, 1.0, 0.0]);
+        assert_eq!(Balance::None.weights(&rarities, 0.0), [1.0; 3]);
+        assert_eq!(Balance::None.weights(&rarities_of(&[vec![50, 50, 0]], 3), 0.0), [1.0, 1.0, 0.0]);
+    }
+
+    #[test]
+    fn weights_fade_from_the_root_to_none_within_half_of_the_steps() {
+        let rarities = [Some(0.04), Some(1.0), None, Some(81.0)];
+        let fading = |done| Balance::Fading.weights(&rarities, done);
+        assert_eq!(fading(0.0), Balance::Root.weights(&rarities, 0.0));
+        assert!((fading(0.25)[3] - 3.0).abs() < 1e-5 && (fading(0.25)[0] - 0.04f32.sqrt().sqrt()).abs() < 1e-5);
+        assert_eq!(fading(0.5), [1.0, 1.0, 0.0, 1.0]);
+        assert_eq!(fading(1.0), fading(0.5));
     }
 }

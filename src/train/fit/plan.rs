@@ -104,6 +104,9 @@ pub struct Plan {
     /// Width and height of the part of each image that a step learns from, somewhere in it; all of it with none. Small windows
     /// make a step as cheap as small images would, and what is seen stays sharp.
     pub window: Option<(u32, u32)>,
+    /// Share of the windows that are laid about a pixel of a rare class, 0 to 1; see [`crate::train::data::View::rare`].
+    #[serde(default)]
+    pub rare: f64,
     /// How gradients become steps.
     pub method: Method,
     /// First learning rate.
@@ -164,6 +167,7 @@ impl Default for Plan {
             steps: 2000,
             batch: 4,
             window: None,
+            rare: 0.0,
             method,
             rate: method.usual_rate(),
             decay: 5e-4,

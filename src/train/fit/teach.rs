@@ -1,5 +1,6 @@
 //! The steps of a training: a batch, its loss, its gradients, a step; now and then a look at the validation images.
 
+use super::balance;
 use super::checkpoint::{Checkpoint, History, Look, Loss};
 use super::objective;
 use super::optimiser::Optimiser;
@@ -80,11 +81,12 @@ pub fn teach(
         model.load(begin)?;
     }
     let mut optimiser = Optimiser::new(plan.method, plan.decay, at.step, &at.memory, &model);
-    let weights = Tensor::from_slice(&plan.balance.weights(&data.train, classes)?).to_device(place.device);
+    let rarities = balance::rarities(&data.train, classes)?;
     let order = Order {
         seed: plan.seed,
         batch: plan.batch,
         window: plan.window(),
+        rare: plan.rare,
         augment: plan.augment,
         normalisation: normalisation.clone(),
     };
@@ -109,7 +111,9 @@ pub fn teach(
         }
         let batch = loader.next().unwrap_or_else(|| Err(Error::Training("the loading threads have ended".into())))?;
         let in_time = plan.seconds.map_or(0.0, |most| at.seconds / most as f64);
-        let rate = plan.rate * plan.schedule.share(in_time.max(at.step as f64 / plan.steps as f64));
+        let done = in_time.max(at.step as f64 / plan.steps as f64);
+        let rate = plan.rate * plan.schedule.share(done);
+        let weights = Tensor::from_slice(&plan.balance.weights(&rarities, done)).to_device(place.device);
         let loss = step(&model, &mut optimiser, &batch, plan, &weights, rate)?;
         if !loss.is_finite() {
             return Err(Error::Training(format!(

@@ -75,6 +75,9 @@ pub struct LearnDesc {
     /// Width and height of the part of each image that a step learns from; all of it unless given. Not larger than `size`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub window: Option<(u32, u32)>,
+    /// Share of the windows that are laid about a pixel of a rare class, 0 to 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rare: Option<f64>,
     /// Most steps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub steps: Option<u64>,
@@ -96,7 +99,7 @@ pub struct LearnDesc {
     /// What is made small: `entropy` or `dice`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss: Option<String>,
-    /// What makes up for rare classes: `median`, `root` or `none`.
+    /// What makes up for rare classes: `median`, `root`, `fading` or `none`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub balance: Option<String>,
     /// What is varied: `all`, `none`, or some of `flip,rotate,scale,crop,colour,blur,noise`.

@@ -523,6 +523,7 @@ fn set(desc: &LearnDesc, plan: &mut Plan) -> Words {
     number("steps", desc.steps, &mut plan.steps, |n| (1..=100_000_000).contains(&n), whole, |n| n)?;
     number("batch", desc.batch, &mut plan.batch, |n| (1..=1024).contains(&n), "write a number from 1 to 1024", |n| n)?;
     number("rate", desc.rate, &mut plan.rate, |r| r > 0.0 && r < 100.0, "write a number above 0 such as 0.001", |r| r)?;
+    number("rare", desc.rare, &mut plan.rare, |r| (0.0..=1.0).contains(&r), "write a share from 0 to 1", |r| r)?;
     let help = "write a share from 0 to below 1";
     number("decay", desc.decay, &mut plan.decay, |r| (0.0..1.0).contains(&r), help, |r| r)?;
     number("watch_every", desc.watch_every, &mut plan.watch_every, |n| n > 0, whole, |n| n)?;
