@@ -216,7 +216,7 @@ fn what_cannot_be_gone_on_with_is_told() {
     assert!(error.contains("--window is larger than the images"), "{error}");
     let error = refuse(&mut fit(&set, &folder.join("f"), "--window 32x32 --rare 2"), 2);
     assert!(error.contains("--rare") && error.contains("write a share from 0 to 1"), "{error}");
-    for name in ["a", "b", "c", "d", "e"] {
+    for name in ["a", "b", "c", "d", "e", "f"] {
         assert!(!folder.join(name).exists(), "{name} was begun");
     }
 }
