@@ -275,6 +275,8 @@ pub struct StonesDesc {
     pub albedo: Spectrum,
     /// Standard deviation of the logarithm of their brightness.
     pub tint_sigma: Num<NonNegative>,
+    /// How many lie together, within about a length of each other: more than 1 for what has fallen to pieces, such as grains of fertiliser.
+    pub together: Vary<PositiveCount>,
 }
 
 impl Default for StonesDesc {
@@ -287,6 +289,7 @@ impl Default for StonesDesc {
             max_mm: Num::new(60.0),
             albedo: Spectrum::new(0.30, 0.27, 0.23, 0.36),
             tint_sigma: Num::new(0.28),
+            together: Vary::fixed(1.0),
         }
     }
 }
