@@ -48,6 +48,8 @@ fn median(mut values: Vec<f64>) -> f64 {
 }
 
 fn main() {
+    // As the program does.
+    furrow::train::memory::keep();
     let asked = asked();
     let precision = Precision::named(&asked.precision, Device::Cpu).expect("a precision");
     let threads = std::thread::available_parallelism().map_or(1, usize::from);

@@ -15,6 +15,7 @@ pub mod engine;
 pub mod figure;
 pub mod fit;
 pub mod measure;
+pub mod memory;
 pub mod net;
 pub mod run;
 #[cfg(feature = "train")]
