@@ -447,6 +447,7 @@ fn mistakes_in_a_page_are_shown_where_they_are() {
         ("\"0..2\"", "\"most\"", "\"most\"", "`most` picks no images", "train"),
         (frames, "(set: \"small\", images: \"0..7\")", "\"0..7\"", "`small` has 6 images", "fewer"),
         ("repeat: 2", "repeat: 0", "0", "0 times", "1 or more"),
+        ("repeat: 2", "margin_px: -17", "-17", "not moved by -17 pixels", "from -16 to 16"),
         (
             "set: \"frames\", images: \"6..8\"",
             "set: \"jai\"",

@@ -24,3 +24,14 @@ pub fn direction(zenith: f32, azimuth: f32) -> Vec3 {
     let (sa, ca) = azimuth.sin_cos();
     vec3(sz * sa, sz * ca, cz)
 }
+
+/// Steps along x and y to all pixels whose centres lie within `reach` pixels, the nearest first, of equally near ones by rows; not the
+/// pixel itself.
+pub fn disc(reach: f32) -> Vec<(i64, i64)> {
+    let most = reach.ceil() as i64;
+    let square = |(x, y): &(i64, i64)| x * x + y * y;
+    let mut all: Vec<(i64, i64)> = (-most..=most).flat_map(|y| (-most..=most).map(move |x| (x, y))).collect();
+    all.retain(|step| square(step) > 0 && square(step) as f32 <= reach * reach);
+    all.sort_by_key(square);
+    all
+}

@@ -2,6 +2,7 @@
 
 use super::data::{Pick, Selection, Store, augment};
 use super::engine::{Model, Precision, Where, device};
+use super::fit::calibrate::calibrate;
 use super::fit::checkpoint::Checkpoint;
 use super::fit::{self, Data, Plan, Watch};
 use super::measure::{Answer, Evaluation, Report};
@@ -66,7 +67,11 @@ pub fn fit(plan: &Plan, begin: Option<&Path>, machine: &Machine, folder: &Path, 
     }
     let hash = identity.hash()?;
     let data = Data { train: Arc::new(train), val, loaders: machine.loaders };
-    let outcome = fit::teach(&plan, &hash, &data, &begin, place, folder, watch)?;
+    let mut outcome = fit::teach(&plan, &hash, &data, &begin, place, folder, watch)?;
+    if plan.calibrate > 0 {
+        let model = Model::with(plan.network, plan.shape.bands.len(), plan.classes.len(), &outcome.values, place)?;
+        outcome.values = calibrate(&model, &data.train, &outcome.normalisation, plan.calibrate)?;
+    }
     let learnt = parameters(plan.network, plan.shape.bands.len(), plan.classes.len());
     let card = Card {
         furrow: env!("CARGO_PKG_VERSION").into(),
@@ -91,6 +96,25 @@ pub fn fit(plan: &Plan, begin: Option<&Path>, machine: &Machine, folder: &Path, 
     run::write_json(&folder.join(run::RESULT), &results)?;
     Checkpoint::remove(folder)?;
     Ok(results)
+}
+
+/// What was learnt, each class answered as readily as overlaps best with the labels of `images` images of the selections.
+pub fn calibrated(
+    learnt: &Learnt,
+    on: &[Selection],
+    images: u64,
+    precision: &str,
+    threads: usize,
+    machine: &Machine,
+) -> Result<Learnt> {
+    let card = &learnt.card;
+    let place = machine.place(precision)?;
+    device::set_threads(threads);
+    let model = Model::with(card.network, card.input.bands.len(), card.classes.len(), &learnt.values, place)?;
+    let store = Store::open(on, Pick::Split(Split::Train), 0, &card.classes, &card.input, false, 0)?;
+    let values = calibrate(&model, &store, &card.normalisation, images)?;
+    let card = Card { weights_sha256: weights::hash(&values), ..card.clone() };
+    Ok(Learnt { card, values })
 }
 
 /// Which class each pixel of an image is, as [`evaluate`] shows it to whoever wants to keep it.

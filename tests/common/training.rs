@@ -37,7 +37,7 @@ pub fn set(name: &str) -> PathBuf {
 
 /// Trains a network for six steps on a set.
 pub fn learn(network: Network, bands: &str, exposure: Exposure, set: &Path, out: &Path) -> Learnt {
-    let selection = Selection { folder: set.into(), pick: Some(Pick::All), repeat: 1 };
+    let selection = Selection { pick: Some(Pick::All), ..Selection::of(set) };
     let shape = Shape { bands: Band::list(bands).expect("bands"), width: SIZE.0, height: SIZE.1 };
     let plan = Plan {
         network,

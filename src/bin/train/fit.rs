@@ -98,6 +98,10 @@ pub(crate) struct LearnArgs {
     /// steps are done), or none.
     #[arg(long, value_name = "NAME", default_value = "none", value_parser = Balance::parse)]
     balance: Balance,
+    /// Images to learn from on which, in the end, it is set how readily each class is answered, for the best overlap: losses that serve
+    /// small plants make a network draw them too wide. 0 for none.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    calibrate: u64,
     /// What is varied: all, none, or some of flip, rotate, scale, crop, colour, blur, noise.
     #[arg(long, value_name = "NAMES", default_value = "all", value_parser = Augment::parse)]
     augment: Augment,
@@ -179,6 +183,7 @@ impl Args {
             schedule: learn.schedule,
             loss: learn.loss,
             balance: learn.balance,
+            calibrate: learn.calibrate,
             augment: learn.augment,
             exposure: learn.normalise,
             watch_every: learn.watch_every,

@@ -1,6 +1,7 @@
 //! `train`: learns to tell crop from weed from datasets, and says how well.
 
 mod baseline;
+mod calibrate;
 mod eval;
 mod export;
 mod fit;
@@ -18,7 +19,8 @@ use std::process::ExitCode;
 /// Trains networks on datasets, rendered or real, and judges them on real images.
 ///
 /// A set is a folder that `trace dataset` made or imported. DIR@PICK chooses images of it: DIR@train, DIR@val, DIR@test, DIR@all,
-/// DIR@0..10, DIR@1/2 (every second from number 1 on), DIR@random:100; DIR@0..10*4 has them four times.
+/// DIR@0..10, DIR@1/2 (every second from number 1 on), DIR@random:100; DIR@0..10*4 has them four times. DIR@all+1.4px takes
+/// outlines 1.4 pixels outside of the leaves, as people draw them (DIR@all-1px inside): rendered labels end where the leaf ends.
 #[derive(Parser)]
 #[command(name = "train", version, arg_required_else_help = true, after_help = EXAMPLES)]
 struct Cli {
@@ -32,6 +34,7 @@ Examples:
   train fit --set data/d --set data/real@0..10*4 --network unet --size 240x180 --out runs/augmented
   train eval runs/d --set data/real@12..20                how well it does on real images
   train predict runs/d photos/ --out answers              masks of photographs, and masks over them
+  train calibrate runs/d --set data/d --out runs/d2   plants as wide as there
   train export runs/d --format onnx                       the network for a robot
   train baseline exg-size --from data/real@0..10 --set data/real@12..20
   train table scenes/experiments/paper.ron --real jai=DIR the paper's tables, from scenes and real folders
@@ -48,6 +51,8 @@ enum Verb {
     Eval(eval::Args),
     /// Answer on pictures without labels: masks, and masks over the pictures.
     Predict(predict::Args),
+    /// Set how readily a trained network answers each class, by images with labels.
+    Calibrate(calibrate::Args),
     /// Write a trained network for other programs.
     Export(export::Args),
     /// Judge what colour alone can do: what a network must beat.
@@ -57,11 +62,14 @@ enum Verb {
 }
 
 fn main() -> ExitCode {
+    let verb = Cli::parse().verb;
+    furrow::train::memory::keep();
     let signals = signal::Signals::watch();
-    let done = match Cli::parse().verb {
+    let done = match verb {
         Verb::Fit(args) => fit::run(&args, &signals),
         Verb::Eval(args) => eval::run(&args, &signals),
         Verb::Predict(args) => predict::run(&args, &signals),
+        Verb::Calibrate(args) => calibrate::run(&args),
         Verb::Export(args) => export::run(&args),
         Verb::Baseline(args) => baseline::run(&args, &signals),
         Verb::Table(args) => table::run(&args, &signals),

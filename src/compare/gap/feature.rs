@@ -32,6 +32,8 @@ pub enum Feature {
     Lightness(Region),
     /// How far in a* and b* from the soil around, for each picture.
     Chroma(Region),
+    /// How far outside of the edges that light sees the outlines of plants lie, for each picture.
+    Outline,
 }
 
 impl Feature {
@@ -48,6 +50,7 @@ impl Feature {
         for of in [Self::BlobSize, Self::BlobCount, Self::Lightness, Self::Chroma] {
             all.extend(plants.map(of));
         }
+        all.push(Self::Outline);
         all
     }
 
@@ -65,6 +68,7 @@ impl Feature {
             Self::BlobCount(of) => ("blob_count", "blobs", Some(of), "/Mpx"),
             Self::Lightness(of) => ("contrast_lightness", "contrast in L*", Some(of), "L*"),
             Self::Chroma(of) => ("contrast_chroma", "contrast in a*b*", Some(of), "ΔE"),
+            Self::Outline => ("outline", "outlines of plants", None, "px"),
         }
     }
 
@@ -107,6 +111,9 @@ impl Feature {
             Self::BlobCount(_) => "connected parts in a million pixels, of each picture",
             Self::Lightness(_) | Self::Chroma(_) => {
                 "mean of the class less that of the soil around it, of each picture"
+            }
+            Self::Outline => {
+                "pixels from where the colour is half way between soil and plants out to the labels' outline"
             }
         }
     }

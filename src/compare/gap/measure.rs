@@ -2,7 +2,7 @@
 
 use super::feature::{Feature, Sample, Samples};
 use super::histogram::Histogram;
-use super::{frequency, noise, regions};
+use super::{frequency, noise, outline, regions};
 use crate::compare::color::{lab, linear};
 use crate::compare::{Picture, Region};
 
@@ -108,6 +108,9 @@ fn plants(samples: &mut Samples, region: Region, colors: &[[f32; 3]], labels: &[
     let pixels = mask.iter().filter(|inside| **inside).count();
     samples.insert(Feature::Cover(region), Sample::Value(100.0 * pixels as f64 / mask.len().max(1) as f64));
     if region == Region::Vegetation {
+        if let Some(margin) = outline::margin(colors, &mask, width) {
+            samples.insert(Feature::Outline, Sample::Value(margin));
+        }
         return;
     }
     let areas: Vec<u64> = regions::blobs(&mask, width).into_iter().filter(|area| *area >= SPECK).collect();
@@ -178,6 +181,7 @@ mod tests {
         close(Feature::Ndvi(Region::Crop), 0.5, 0.005);
         close(Feature::Ndvi(Region::Soil), 0.0, 0.005);
         close(Feature::Noise, 0.0, 0.0);
+        close(Feature::Outline, 0.0, 1e-6);
         let ([l, a, b], [m, c, d]) = (lab([60, 120, 40]), lab([100, 80, 60]));
         close(Feature::Lightness(Region::Crop), f64::from(l - m), 1e-3);
         close(Feature::Chroma(Region::Crop), f64::from((a - c).hypot(b - d)), 1e-3);

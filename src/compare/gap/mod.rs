@@ -14,6 +14,7 @@
 //! | noise | deviation in flat ground, 8-bit levels | W₁ |
 //! | cover, blobs and their sizes | labels | W₁ |
 //! | contrast | a class and the soil around it, L* and a*b* | W₁ |
+//! | outlines | how far outside of the leaves labels end, pixels | W₁ |
 //!
 //! W₁ is the Wasserstein distance of `histogram`. Classes are compared where both sets have labels, NDVI where both have near infrared.
 //!
@@ -22,7 +23,7 @@
 //! | `source` | which pictures there are |
 //! | `feature` | what is measured, and how sets differ in it |
 //! | `measure` | one picture, measured |
-//! | `histogram`, `frequency`, `noise`, `regions` | how |
+//! | `histogram`, `frequency`, `noise`, `regions`, `outline` | how |
 //! | `sets` | all of it, from two folders to distances |
 //! | `window` | what the page shows of a picture |
 //! | `table`, `chart`, `page` | how it is written: JSON, CSV, text; curves; one HTML page |
@@ -33,6 +34,7 @@ mod frequency;
 mod histogram;
 mod measure;
 mod noise;
+mod outline;
 mod page;
 mod regions;
 mod sets;

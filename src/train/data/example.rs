@@ -1,6 +1,7 @@
 //! One image at the network's size.
 
 use super::bands::{self, Band};
+use super::margin;
 use crate::dataset::sample::IGNORE;
 use crate::dataset::{Set, native};
 use crate::output;
@@ -42,8 +43,8 @@ pub struct Example {
 }
 
 impl Example {
-    /// Reads an image of a set.
-    pub fn read(set: &Set, number: u64, map: &Map, shape: &Shape, with_plants: bool) -> Result<Self> {
+    /// Reads an image of a set; `margin` pixels of it lie between leaves and their outlines, see [`margin`].
+    pub fn read(set: &Set, number: u64, map: &Map, margin: f32, shape: &Shape, with_plants: bool) -> Result<Self> {
         let name = Set::name(number);
         let folder = set.folder.join(native::folder(&name));
         if !folder.is_dir() {
@@ -74,11 +75,15 @@ impl Example {
             same(&path, (lw, lh))?;
             plants = nearest((w, h), &numbers, (shape.width, shape.height));
         }
+        let mut labels = map.labels(&semantics, &species);
+        if margin != 0.0 {
+            labels = margin::moved(&labels, (w, h), margin);
+        }
         let to = (shape.width, shape.height);
         Ok(Self {
             name,
             planes: planes.iter().map(|plane| output::resize_gray(w, h, plane, to)).collect(),
-            labels: nearest((w, h), &map.labels(&semantics, &species), to),
+            labels: nearest((w, h), &labels, to),
             plants,
         })
     }

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `bands` | what a pixel holds: red, green, blue, nir, or any grey picture by name |
 //! | `select` | which images of which set, as a command line writes them |
+//! | `margin` | outlines as people draw them, outside of the leaf or inside |
 //! | `example` | one image at the network's size, with its labels |
 //! | `store` | all that were selected, decoded once as far as memory goes |
 //! | `augment` | chance between the image and the network |
@@ -15,6 +16,7 @@ pub mod augment;
 pub mod bands;
 pub mod example;
 pub mod loader;
+pub mod margin;
 pub mod normalise;
 pub mod select;
 pub mod store;

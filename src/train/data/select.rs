@@ -1,5 +1,7 @@
-//! Which images of which set: `DIR`, `DIR@val`, `DIR@0..10`, `DIR@1/2`, `DIR@random:100`, each with `*4` to have them four times.
+//! Which images of which set: `DIR`, `DIR@val`, `DIR@0..10`, `DIR@1/2`, `DIR@random:100`; `DIR@0..10+1.4px` has outlines so far outside
+//! of the leaves, and all may end with `*4` to have images four times.
 
+use super::margin;
 use crate::dataset::Set;
 use crate::dataset::split::Split;
 use crate::sampling::{Purpose, Stream};
@@ -24,28 +26,45 @@ pub enum Pick {
 }
 
 /// Images of a set.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Selection {
     /// The set's folder.
     pub folder: PathBuf,
     /// Which of its images; the verb's own choice unless given.
     pub pick: Option<Pick>,
+    /// How far outside of the leaves their outlines are taken to lie, pixels of the set's images, negative for inside; see
+    /// [`super::margin`].
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub margin: f32,
     /// How often each stands in the list; ≥ 1.
     pub repeat: u32,
 }
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
+fn is_none(margin: &f32) -> bool {
+    *margin == 0.0
+}
+
 impl Selection {
-    /// Reads `DIR[@PICK][*N]`.
+    /// All images of a folder that a verb takes unless told otherwise.
+    pub fn of(folder: impl Into<PathBuf>) -> Self {
+        Self { folder: folder.into(), pick: None, margin: 0.0, repeat: 1 }
+    }
+
+    /// Reads `DIR[@PICK[+MARGINpx]][*N]`; the margin may be `-2px`.
     pub fn parse(text: &str) -> Result<Self, String> {
         let (text, repeat) = match text.rsplit_once('*') {
             Some((left, n)) => (left, n.parse().ok().filter(|n| *n >= 1).ok_or("write `*` and how often, such as *4")?),
             None => (text, 1),
         };
-        let (folder, pick) = match text.rsplit_once('@') {
-            Some((folder, pick)) => (folder, Some(Pick::parse(pick)?)),
-            None => (text, None),
+        let Some((folder, text)) = text.rsplit_once('@') else { return Ok(Self { repeat, ..Self::of(text) }) };
+        let (pick, margin) = match text.strip_suffix("px").and_then(|rest| Some(rest.split_at(rest.rfind(['+', '-'])?)))
+        {
+            Some((pick, margin)) => (pick, margin::parse(margin)?),
+            None => (text, 0.0),
         };
-        Ok(Self { folder: folder.into(), pick, repeat })
+        let pick = Some(Pick::parse(pick)?);
+        Ok(Self { folder: folder.into(), pick, margin, repeat })
     }
 
     /// The set and the numbers of its images; `otherwise` where no pick was written.
@@ -68,6 +87,13 @@ impl Selection {
         let all = numbers.iter().copied().cycle().take(numbers.len() * self.repeat as usize).collect();
         Ok((set, all))
     }
+
+    /// What decides what is seen: fingerprint of the set and margin of its outlines, and the numbers of its images.
+    pub fn identity(&self, otherwise: Pick, seed: u64) -> Result<(String, Vec<u64>)> {
+        let (set, numbers) = self.open(otherwise, seed)?;
+        let margin = if self.margin == 0.0 { String::new() } else { format!("{:+}px", self.margin) };
+        Ok((set.recipe.fingerprint()? + &margin, numbers))
+    }
 }
 
 impl fmt::Display for Selection {
@@ -80,6 +106,9 @@ impl fmt::Display for Selection {
             Some(Pick::Range(from, to)) => write!(f, "@{from}..{to}")?,
             Some(Pick::Every(first, of)) => write!(f, "@{first}/{of}")?,
             Some(Pick::Random(n)) => write!(f, "@random:{n}")?,
+        }
+        if self.margin != 0.0 {
+            write!(f, "{:+}px", self.margin)?;
         }
         if self.repeat == 1 { Ok(()) } else { write!(f, "*{}", self.repeat) }
     }
@@ -126,17 +155,19 @@ mod tests {
     #[test]
     fn selections_are_read_as_written() {
         let read = |text: &str| Selection::parse(text).unwrap();
-        assert_eq!(read("data/d"), Selection { folder: "data/d".into(), pick: None, repeat: 1 });
-        assert_eq!(
-            read("a@b/c@0..10*4"),
-            Selection { folder: "a@b/c".into(), pick: Some(Pick::Range(0, 10)), repeat: 4 }
-        );
+        assert_eq!(read("data/d"), Selection::of("data/d"));
+        let ten = Selection { pick: Some(Pick::Range(0, 10)), ..Selection::of("a@b/c") };
+        assert_eq!(read("a@b/c@0..10*4"), Selection { repeat: 4, ..ten.clone() });
+        assert_eq!(read("a@b/c@0..10+1.4px*4"), Selection { margin: 1.4, repeat: 4, ..ten });
+        assert_eq!(read("field-2px"), Selection::of("field-2px"));
         assert_eq!(read("d@random:7").pick, Some(Pick::Random(7)));
         assert_eq!(read("d@val").pick, Some(Pick::Split(Split::Val)));
-        for text in ["data/d", "a@b/c@0..10*4", "d@random:7", "d@val", "d@all*2", "d@1/2"] {
+        for text in
+            ["data/d", "a@b/c@0..10*4", "d@random:7", "d@val", "d@all*2", "d@1/2", "d@all+1.5px", "d@0..4-2px*3"]
+        {
             assert_eq!(read(text).to_string(), text);
         }
-        for bad in ["d@", "d@5..5", "d@2/2", "d@random:0", "d*0", "d*x", "d@most"] {
+        for bad in ["d@", "d@5..5", "d@2/2", "d@random:0", "d*0", "d*x", "d@most", "d@all+17px", "d@all+px", "d@+2px"] {
             assert!(Selection::parse(bad).is_err(), "{bad}");
         }
     }

@@ -11,7 +11,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Images of one or several sets, by place.
 pub struct Store {
-    sets: Vec<(Set, Map)>,
+    /// With their outlines' margins.
+    sets: Vec<(Set, Map, f32)>,
     /// Set and number of each image.
     images: Vec<(usize, u64)>,
     shape: Shape,
@@ -38,7 +39,7 @@ impl Store {
             let (set, numbers) = selection.open(otherwise, seed)?;
             let map = classes.of(&set.recipe).map_err(|e| Error::Dataset(format!("{}: {e}", set.folder.display())))?;
             images.extend(numbers.into_iter().map(|n| (sets.len(), n)));
-            sets.push((set, map));
+            sets.push((set, map, selection.margin));
         }
         let mut first = std::collections::BTreeMap::new();
         let same = images.iter().enumerate().map(|(i, image)| *first.entry(*image).or_insert(i)).collect();
@@ -68,8 +69,8 @@ impl Store {
             return Ok(Cow::Borrowed(example));
         }
         let (set, number) = self.images[place];
-        let (set, map) = &self.sets[set];
-        let example = Example::read(set, number, map, &self.shape, self.with_plants)?;
+        let (set, map, margin) = &self.sets[set];
+        let example = Example::read(set, number, map, *margin, &self.shape, self.with_plants)?;
         let bytes = example.bytes();
         let takes = |free: u64| free.checked_sub(bytes);
         if self.free.fetch_update(Ordering::Relaxed, Ordering::Relaxed, takes).is_ok() {
@@ -80,7 +81,7 @@ impl Store {
 
     /// What decides the images of a place: the set's fingerprint and the image's number.
     pub fn fingerprints(&self) -> Result<Vec<(String, Vec<u64>)>> {
-        let of = |(i, (set, _)): (usize, &(Set, Map))| {
+        let of = |(i, (set, ..)): (usize, &(Set, Map, f32))| {
             let numbers = self.images.iter().filter(|(s, _)| *s == i).map(|(_, n)| *n).collect();
             Ok((set.recipe.fingerprint()?, numbers))
         };
@@ -89,7 +90,7 @@ impl Store {
 
     /// What its first set's images are, for people: folders with the number of images of each.
     pub fn told(&self) -> Vec<(String, usize)> {
-        let of = |(i, (set, _)): (usize, &(Set, Map))| {
+        let of = |(i, (set, ..)): (usize, &(Set, Map, f32))| {
             (set.folder.display().to_string(), self.images.iter().filter(|(s, _)| *s == i).count())
         };
         self.sets.iter().enumerate().map(of).collect()

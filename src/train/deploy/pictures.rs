@@ -138,9 +138,8 @@ pub fn find(inputs: &[PathBuf], shape: &Shape, elsewhere: &[(Band, PathBuf)]) ->
 
 /// A set's images, where the input is a set or picks images of one.
 fn selection(input: &Path) -> Result<Option<Selection>> {
-    let whole = |folder: &Path| Selection { folder: folder.into(), pick: None, repeat: 1 };
     if input.is_dir() {
-        return Ok(input.join(crate::dataset::recipe::FILE).is_file().then(|| whole(input)));
+        return Ok(input.join(crate::dataset::recipe::FILE).is_file().then(|| Selection::of(input)));
     }
     match input.to_str() {
         Some(text) if !input.exists() && text.contains('@') => Selection::parse(text).map(Some).map_err(Error::Dataset),

@@ -9,11 +9,14 @@
 //! | `optimiser` | gradients to steps, with a memory that can be saved |
 //! | `checkpoint` | a training on disk, between two steps |
 //! | `teach` | the steps themselves |
+//! | `calibrate` | in the end, how readily each class is answered |
 //!
-//! Only `objective`, `optimiser` and `teach` need libtorch. On a CPU the same plan on the same number of threads gives the same bits, stopped
+//! Only `objective`, `optimiser`, `teach` and `calibrate` need libtorch. On a CPU the same plan on the same number of threads gives the same bits, stopped
 //! and gone on with or not.
 
 pub mod balance;
+#[cfg(feature = "train")]
+pub mod calibrate;
 pub mod checkpoint;
 #[cfg(feature = "train")]
 mod objective;

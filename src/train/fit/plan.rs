@@ -82,6 +82,11 @@ impl Exposure {
     }
 }
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
+fn is_none(images: &u64) -> bool {
+    *images == 0
+}
+
 /// A training.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
@@ -119,6 +124,9 @@ pub struct Plan {
     pub loss: Objective,
     /// What a pixel of each class weighs.
     pub balance: Balance,
+    /// Images to learn from on which, when all steps are done, it is set how readily each class is answered; 0 for none. See `calibrate`.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub calibrate: u64,
     /// What is varied.
     pub augment: Augment,
     /// What is taken out.
@@ -174,6 +182,7 @@ impl Default for Plan {
             schedule: Schedule::Poly,
             loss: Objective::Dice,
             balance: Balance::None,
+            calibrate: 0,
             augment: Augment::default(),
             exposure: Exposure::Band,
             watch_every: 100,

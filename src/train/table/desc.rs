@@ -102,6 +102,9 @@ pub struct LearnDesc {
     /// What makes up for rare classes: `median`, `root`, `fading` or `none`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub balance: Option<String>,
+    /// Images to learn from on which, in the end, it is set how readily each class is answered; 0 for none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calibrate: Option<u64>,
     /// What is varied: `all`, `none`, or some of `flip,rotate,scale,crop,colour,blur,noise`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub augment: Option<String>,
@@ -191,6 +194,10 @@ pub struct PartDesc {
     /// number 1 on), or by chance as `random:100`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub images: Option<String>,
+    /// How far outside of the leaves their outlines are taken to lie, pixels of the set's images, negative for inside, at most 16: people
+    /// draw so, and rendered labels end where the leaf ends.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub margin_px: Option<f32>,
     /// How often each is there, 1 or more: few real images beside many rendered ones must be repeated to be heard.
     #[serde(default = "once")]
     pub repeat: u32,

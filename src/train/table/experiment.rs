@@ -9,6 +9,7 @@ use crate::sampling::place::Step;
 use crate::sampling::{Sampler, fault};
 use crate::train::baseline::Kind;
 use crate::train::classes::Classes;
+use crate::train::data::margin::MOST;
 use crate::train::data::{Augment, Band, Pick};
 use crate::train::fit::Plan;
 use crate::train::fit::balance::Balance;
@@ -74,18 +75,20 @@ pub enum Source {
 }
 
 /// Images of a set.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Part {
     /// The set's place in [`Experiment::sets`].
     pub set: usize,
     /// Which of its images.
     pub pick: Pick,
+    /// How far outside of the leaves their outlines lie, pixels of the set's images.
+    pub margin: f32,
     /// How often each.
     pub repeat: u32,
 }
 
 /// What is learnt from.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct TrainSet {
     /// Name in the tables.
     pub name: String,
@@ -98,7 +101,7 @@ pub struct TrainSet {
 }
 
 /// What is judged on.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct TestSet {
     /// Name in the tables.
     pub name: String,
@@ -352,8 +355,13 @@ impl Checker<'_> {
         if desc.repeat == 0 {
             return Err(self.fault(&step("repeat"), "images that are there 0 times teach nothing", "write 1 or more"));
         }
+        let margin = desc.margin_px.unwrap_or(0.0);
+        if margin.is_nan() || margin.abs() > MOST {
+            let what = format!("outlines are not moved by {margin} pixels");
+            return Err(self.fault(&step("margin_px"), what, format!("write a number from -{MOST} to {MOST}")));
+        }
         let (set, pick) = self.images(&desc.set, desc.images.as_deref(), otherwise, at, sets)?;
-        Ok(Part { set, pick, repeat: desc.repeat })
+        Ok(Part { set, pick, margin, repeat: desc.repeat })
     }
 
     /// A set and which of its images.
@@ -423,7 +431,7 @@ impl Checker<'_> {
             let step = |field| [at[0], at[1], Step::Field(field)];
             let slug = self.title(&desc.name, all.iter().map(|t| t.slug.as_str()), &step("name"))?;
             let (set, pick) = self.images(&desc.set, desc.images.as_deref(), Pick::All, &at, sets)?;
-            all.push(TestSet { name: desc.name.clone(), slug, part: Part { set, pick, repeat: 1 } });
+            all.push(TestSet { name: desc.name.clone(), slug, part: Part { set, pick, margin: 0.0, repeat: 1 } });
         }
         if all.is_empty() {
             let help = "name one at least: [(name: \"Test\", set: \"NAME\")]";
@@ -524,6 +532,7 @@ fn set(desc: &LearnDesc, plan: &mut Plan) -> Words {
     number("batch", desc.batch, &mut plan.batch, |n| (1..=1024).contains(&n), "write a number from 1 to 1024", |n| n)?;
     number("rate", desc.rate, &mut plan.rate, |r| r > 0.0 && r < 100.0, "write a number above 0 such as 0.001", |r| r)?;
     number("rare", desc.rare, &mut plan.rare, |r| (0.0..=1.0).contains(&r), "write a share from 0 to 1", |r| r)?;
+    number("calibrate", desc.calibrate, &mut plan.calibrate, |_| true, "write a number of images", |n| n)?;
     let help = "write a share from 0 to below 1";
     number("decay", desc.decay, &mut plan.decay, |r| (0.0..1.0).contains(&r), help, |r| r)?;
     number("watch_every", desc.watch_every, &mut plan.watch_every, |n| n > 0, whole, |n| n)?;

@@ -1,6 +1,6 @@
 //! How well a row does on a test set, kept in a file that tells what it is of.
 
-use crate::train::data::{Pick, Selection};
+use crate::train::data::Pick;
 use crate::train::measure::Report;
 use crate::train::measure::report::Seconds;
 use crate::train::run::{self, Card};
@@ -56,12 +56,6 @@ pub(super) fn who(folder: &Path) -> Result<Option<Judged>> {
         return Ok(Some(Judged::Baseline(run::read_json(&baseline)?)));
     }
     Ok(None)
-}
-
-/// A test set's images: fingerprint and numbers.
-pub(super) fn images(on: &Selection) -> Result<(String, Vec<u64>)> {
-    let (set, numbers) = on.open(Pick::All, 0)?;
-    Ok((set.recipe.fingerprint()?, numbers))
 }
 
 /// The file of a row's evaluation on a test set.

@@ -4,6 +4,7 @@ use super::experiment::{Experiment, Part, Source};
 use super::names::unknown;
 use crate::dataset::recipe;
 use crate::train::data::Selection;
+use crate::train::memory;
 use crate::{Error, Result};
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
@@ -107,7 +108,8 @@ impl Bound {
 
     /// Images of a set as a training or an evaluation opens them.
     pub fn selection(&self, part: &Part) -> Selection {
-        Selection { folder: self.folder(part.set).into(), pick: Some(part.pick), repeat: part.repeat }
+        let Part { set, pick, margin, repeat } = *part;
+        Selection { folder: self.folder(set).into(), pick: Some(pick), margin, repeat }
     }
 
     /// Sets that are used by what is left, by place.
@@ -179,7 +181,7 @@ impl Bound {
         // The lock goes with the open file, which the child holds as well: where this process is killed, the set stays locked until
         // its orphan is done.
         command.stdin(lock.map_or_else(Stdio::null, Stdio::from)).stdout(Stdio::null());
-        let child = command.spawn().map_err(|e| Error::Io { path: trace.into(), source: e })?;
+        let child = memory::as_usual(&mut command).spawn().map_err(|e| Error::Io { path: trace.into(), source: e })?;
         let status = wait(child, trace, stop)?;
         match status.code() {
             Some(0) => Ok(()),

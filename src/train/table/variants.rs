@@ -14,6 +14,8 @@ const STEPS: u64 = 600;
 const BATCH: u64 = 4;
 /// Part of an image that a step learns from.
 const WINDOW: (u32, u32) = (240, 180);
+/// Share of these windows that are laid about rare classes: seedlings of some pixels are in hardly any other.
+const RARE: f64 = 0.25;
 /// Windows of that size that two cores of 2 GHz learn in a second, in bf16 (`cargo bench --bench learn`).
 const RATE: f64 = 17.0;
 /// Smallest side that networks see.
@@ -46,11 +48,11 @@ Experiment(
     networks: [\"unet\"],
     baselines: [],
     seeds: {SEEDS:?},
-    learn: (size: {size:?}, {}steps: {STEPS}, batch: {BATCH}),
+    learn: (size: {size:?}, {}balance: \"fading\", steps: {STEPS}, batch: {BATCH}),
     sets: {{
 ",
         reals.iter().fold(String::new(), |words, real| words + " --real " + real + "=DIR"),
-        window.map(|window| format!("window: {window:?}, ")).unwrap_or_default(),
+        window.map(|window| format!("window: {window:?}, rare: {RARE:?}, ")).unwrap_or_default(),
     );
     for (set, about) in sets {
         let _ = writeln!(text, "        // {about}\n        {0:?}: Dataset(path: {0:?}),", name(set));

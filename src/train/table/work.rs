@@ -277,13 +277,9 @@ impl Work<'_> {
     fn fit_baseline(&self, kind: Kind) -> Result<bool> {
         let like = &self.order.bound.experiment.learn.shape;
         let (from, _) = self.selections();
-        let prints = |selection: &Selection| {
-            let (set, numbers) = selection.open(Pick::All, self.seed())?;
-            Ok((set.recipe.fingerprint()?, numbers))
-        };
         let path = self.folder.join(BASELINE);
         let size = (like.width, like.height);
-        let prints = from.iter().map(prints).collect::<Result<Vec<_>>>()?;
+        let prints = from.iter().map(|s| s.identity(Pick::All, self.seed())).collect::<Result<Vec<_>>>()?;
         if path.exists() {
             match run::read_json::<Fitted>(&path) {
                 Ok(there) if there.from == prints && there.size == size && there.baseline.kind == kind => {
@@ -308,7 +304,7 @@ impl Work<'_> {
         let mut made = false;
         for test in &bound.experiment.test {
             let selection = bound.selection(&test.part);
-            let on = judgement::images(&selection)?;
+            let on = selection.identity(Pick::All, 0)?;
             match Judgement::find(&judgement::path(&self.folder, &test.slug), &of, test.part.pick, Some(&on)) {
                 Known::Here(_) => continue,
                 Known::Wrong(why) => self.again(&why),
