@@ -48,7 +48,9 @@ pub fn calibrate(model: &Model, store: &Store, normalisation: &Normalisation, im
 fn offsets(values: &[f32], labels: &[u8], classes: usize) -> Vec<f32> {
     let mut offsets = vec![0.0f32; classes];
     let mut counts = vec![0; classes];
-    labels.iter().for_each(|label| counts[usize::from(*label)] += 1);
+    for label in labels {
+        counts[usize::from(*label)] += 1;
+    }
     for _ in 0..ROUNDS {
         for class in (1..classes).filter(|class| counts[*class] > 0) {
             let mut overlap = Overlap { there: &counts, answered: vec![0; classes], right: vec![0; classes] };
