@@ -301,8 +301,8 @@ fn calibrated_a_network_overlaps_better() {
 }
 
 /// Rationale: outlines that people drew keep a distance from the leaf; a network that is judged by them learns it from rendered
-/// labels that are moved as far. Expected: the labels of the whole image are those of the closed form: a disc of 11 pixels and a
-/// margin of 2 is one of 13, and photographs stay. A set with a margin is another one to learn from. Source: the areas of discs.
+/// labels that are moved as far. Expected: with a margin of 2 pixels, soil whose outline is no farther is plant, all else and the
+/// photographs stay. A set with a margin is another one to learn from. Source: distances to all plants' pixels.
 #[test]
 fn outlines_are_learnt_where_people_draw_them() {
     let scratch = tempfile::tempdir().unwrap();

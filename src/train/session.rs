@@ -112,6 +112,11 @@ pub fn calibrated(
     device::set_threads(threads);
     let model = Model::with(card.network, card.input.bands.len(), card.classes.len(), &learnt.values, place)?;
     let store = Store::open(on, Pick::Split(Split::Train), 0, &card.classes, &card.input, false, 0)?;
+    if store.is_empty() {
+        return Err(Error::Training(
+            "there is no image to calibrate on\n help: name others of the set, such as DIR@all".into(),
+        ));
+    }
     let values = calibrate(&model, &store, &card.normalisation, images)?;
     let card = Card { weights_sha256: weights::hash(&values), ..card.clone() };
     Ok(Learnt { card, values })

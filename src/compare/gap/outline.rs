@@ -88,7 +88,8 @@ mod tests {
     }
 
     /// Rationale: networks that are judged by outlines which people drew must know where these lie. Expected: a mask drawn 1.4 pixels too
-    /// wide has a margin of 1.4, one that is too narrow a negative one, an exact one none, within three tenths of a pixel, for distances are those of whole pixels. Source: the radii.
+    /// wide has a margin of 1.4, one that is too narrow a negative one, an exact one none, within three tenths of a pixel,
+    /// for distances are those of whole pixels. Source: the radii.
     #[test]
     fn a_margin_is_found_where_it_was_drawn() {
         for margin_drawn in [-2.5f32, 0.0, 0.7, 1.4, 3.0] {
