@@ -57,6 +57,35 @@ fn a_list_of_growths_moves_nothing_else() {
     assert_ne!(of(&plain, "GALAP"), of(&other, "GALAP"));
 }
 
+/// Lengths of blades, base to tip, metres.
+fn lengths(plant: &PlantRecord) -> Vec<f32> {
+    plant.leaf_axes.iter().map(|a| a.base.distance(a.tip)).collect()
+}
+
+#[test]
+fn vigour_scales_the_plants_of_its_entry_and_moves_nothing_else() {
+    let (plain, small) = (meadow("AgeDays(20)", "AgeDays(9)", 1), meadow("AgeDays(20), vigour: 0.5", "AgeDays(9)", 1));
+    let (beets, dwarfs) = (of(&plain, "BEAVX"), of(&small, "BEAVX"));
+    assert_eq!(beets.len(), dwarfs.len());
+    let mut compared = 0;
+    for (beet, dwarf) in beets.iter().zip(&dwarfs) {
+        assert_eq!((beet.position, beet.axis, beet.age_days), (dwarf.position, dwarf.axis, dwarf.age_days));
+        // The youngest leaf, halved, may still be hidden in the bud.
+        for (whole, half) in lengths(beet).iter().zip(lengths(dwarf)) {
+            assert!((half / whole - 0.5).abs() < 0.02, "{whole} m, {half} m");
+            compared += 1;
+        }
+    }
+    assert!(compared > 10);
+    assert_eq!(of(&plain, "GALAP"), of(&small, "GALAP"));
+    let drawn: Vec<f32> = of(&meadow("AgeDays(20), vigour: Uniform(0.4, 1)", "AgeDays(9)", 1), "BEAVX")
+        .iter()
+        .zip(&beets)
+        .map(|(a, b)| lengths(a)[0] / lengths(b)[0])
+        .collect();
+    assert!(drawn.iter().all(|r| (0.38..1.02).contains(r)) && drawn.windows(2).any(|w| w[0] != w[1]), "{drawn:?}");
+}
+
 /// An empty field without ground, by what its camera and its lights are.
 fn studio(camera: &str, lights: &str, options: &Options) -> Field {
     field(&format!("Field(seed: 9, camera: {camera}, lights: [{lights}])"), options)

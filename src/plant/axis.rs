@@ -84,13 +84,10 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
     }
     let skin = |own: &str| if own.is_empty() { "stalk".to_owned() } else { own.to_owned() };
     let foot = -ROOT / nodes[0].1.z.max(0.3);
-    let mut rings: Vec<Ring> = [foot, 0.0, growth.hypocotyl * 0.5, growth.hypocotyl]
+    let rings: Vec<Ring> = [foot, 0.0, growth.hypocotyl * 0.5, growth.hypocotyl]
         .into_iter()
         .map(|h| ring(nodes[0].1 * h, nodes[0].1, radius, Profile::Channelled(1.0)))
         .collect();
-    if stemless {
-        dome(&mut rings, nodes[0].1, radius, crown);
-    }
     let mesh = tube::rigid(&rings, 10);
     organs.push(Organ {
         kind: OrganKind::Hypocotyl,
@@ -99,8 +96,14 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
         mesh,
         midrib: None,
     });
-    if !stemless {
-        let mut rings: Vec<Ring> = Vec::with_capacity(2 * nodes.len() + 4);
+    let mut rings: Vec<Ring> = Vec::with_capacity(2 * nodes.len() + 4);
+    if stemless {
+        // Leaf bases close round a crown: it is green like them, however red the hypocotyl below.
+        let (base, along) = nodes[0];
+        rings.push(ring(base - along * (0.5 * radius), along, radius, Profile::Channelled(1.0)));
+        rings.push(ring(base, along, 1.04 * radius, Profile::Channelled(1.0)));
+        dome(&mut rings, along, 1.04 * radius, crown);
+    } else {
         for (i, ((p, d), r)) in nodes.iter().zip(&radii).enumerate() {
             if i > 0 && p.distance(nodes[i - 1].0) < 1e-5 {
                 continue;
@@ -113,9 +116,9 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
         if let (Some((_, d)), Some(r)) = (nodes.last(), radii.last()) {
             dome(&mut rings, *d, *r, 1.0);
         }
-        let mesh = tube::rigid(&rings, 12);
-        organs.push(Organ { kind: OrganKind::Stem, leaf: 0, skin: skin(&growth.desc.stem_skin), mesh, midrib: None });
     }
+    let mesh = tube::rigid(&rings, if stemless { 10 } else { 12 });
+    organs.push(Organ { kind: OrganKind::Stem, leaf: 0, skin: skin(&growth.desc.stem_skin), mesh, midrib: None });
     Axis { nodes, radii, section, crown }
 }
 

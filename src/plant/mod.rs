@@ -299,17 +299,17 @@ pub fn turn(stream: &Stream) -> f32 {
 
 /// Grows one plant.
 pub fn grow(desc: &PlantDesc, stage: Stage, stream: &Stream) -> Plant {
-    grow_in(desc, stage, stream, None)
+    grow_in(desc, stage, stream, (1.0, None))
 }
 
-/// Grows one plant that holds its leaves as its condition has them.
+/// Grows one plant of a vigour, the factor on its sizes, that holds its leaves as its condition has them.
 pub fn grow_in(
     desc: &PlantDesc,
     stage: Stage,
     stream: &Stream,
-    condition: Option<(&ConditionDesc, &Condition)>,
+    (vigour, condition): (f32, Option<(&ConditionDesc, &Condition)>),
 ) -> Plant {
-    let Some(mut growth) = stage::growth(desc, stage, stream) else {
+    let Some(mut growth) = stage::growth(desc, stage, stream, vigour) else {
         return Plant { organs: Vec::new(), bbch: 0, age_days: 0.0, height: 0.0, radius: 0.0 };
     };
     if let Some((desc, condition)) = condition {

@@ -175,17 +175,17 @@ pub(super) fn turn(stream: &Stream) -> f32 {
     stream.child(Purpose::Plant, 0).child(Purpose::Plant, 1).range32(0.0, 2.0 * PI)
 }
 
-/// What the plant of `stream` looks like at `stage`; `None` without stages.
-pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream) -> Option<Growth<'a>> {
+/// What the plant of `stream` looks like at `stage`, all its sizes but its height over the soil times `vigour`; `None` without stages.
+pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, vigour: f32) -> Option<Growth<'a>> {
     const MM: f32 = 1e-3;
     let between = Between::find(&desc.stages, stage)?;
     let Between { from, to, u } = between;
     let whole = (Some(from), to);
     let own = stream.child(Purpose::Plant, 0);
-    let vigour = desc.vigour.draw32(&mut own.child(Purpose::Plant, 0));
+    let stem = between.draw(whole, None, &own, 3, |s| &s.stem_mm) * MM * vigour;
+    let vigour = vigour * desc.vigour.draw32(&mut own.child(Purpose::Plant, 0));
     let spin = turn(stream);
     let hypocotyl = between.draw(whole, None, &own, 2, |s| &s.hypocotyl_mm) * MM;
-    let stem = between.draw(whole, None, &own, 3, |s| &s.stem_mm) * MM;
     let tillers = between.draw(whole, None, &own, 4, |s| &s.tillers).round() as usize;
     let (mut leaves, mut rise, mut height, mut number) = (Vec::new(), Vec::new(), 0.0, 0);
     for (k, layer) in to.layers.iter().enumerate() {

@@ -22,6 +22,7 @@ use crate::optics::soil::LOESS;
 use crate::page::Page;
 use crate::plant::{self, ConditionDesc, LeafAxis, OrganKind};
 use crate::sampling::place::Step;
+use crate::sampling::vary::{Positive, Vary};
 use crate::sampling::{Purpose, Stream};
 use crate::scatter::{self, Disc, Spot};
 use crate::soil::{Ground, Rect};
@@ -127,16 +128,16 @@ struct Seedling {
     stream: Stream,
     /// Whose shape and age it has, where all of its species are alike.
     individual: Option<Individual>,
+    /// Factor on its sizes.
+    vigour: Vary<Positive>,
     condition: Option<ConditionDesc>,
 }
 
 impl Seedling {
-    /// The same in the condition that its entry on the page has, if any.
-    fn conditioned(self, condition: Option<&ConditionDesc>) -> Self {
-        match condition {
-            Some(own) => Self { condition: Some(own.clone()), ..self },
-            None => self,
-        }
+    /// The same as vigorous as its entry on the page says, and in the entry's condition, if it has one.
+    fn tended(self, vigour: &Vary<Positive>, condition: Option<&ConditionDesc>) -> Self {
+        let condition = condition.cloned().or(self.condition);
+        Self { vigour: vigour.clone(), condition, ..self }
     }
 }
 
@@ -349,7 +350,7 @@ impl<'a> Builder<'a> {
             self.check_number(places, all.len(), ["crops", "rows"], k)?;
             for spot in scatter::rows(&crop.rows, area, stones, &self.stream(Purpose::Scatter, k as u64)) {
                 let seedling = self.seedling(&species, &crop.growth, spot, 1 + k as u64);
-                all.push(seedling.conditioned(crop.condition.as_ref()));
+                all.push(seedling.tended(&crop.vigour, crop.condition.as_ref()));
             }
         }
         for (k, weed) in desc.weeds.iter().enumerate() {
@@ -358,7 +359,7 @@ impl<'a> Builder<'a> {
             self.check_number(places, all.len(), ["weeds", "spread"], k)?;
             for spot in scatter::weeds(&weed.spread, area, stones, &self.stream(Purpose::Scatter, 1000 + k as u64)) {
                 let seedling = self.seedling(&species, &weed.growth, spot, 1001 + k as u64);
-                all.push(seedling.conditioned(weed.condition.as_ref()));
+                all.push(seedling.tended(&weed.vigour, weed.condition.as_ref()));
             }
         }
         for (k, placed) in desc.plants.iter().enumerate() {
@@ -374,9 +375,10 @@ impl<'a> Builder<'a> {
                 only_leaf: placed.only_leaf.map(|l| l.get() as u16),
                 stream: stream.child(Purpose::Plant, 0),
                 individual: self.individual(&species.desc),
+                vigour: placed.vigour.clone(),
                 condition: species.desc.condition.clone(),
             };
-            all.push(seedling.conditioned(placed.condition.as_ref()));
+            all.push(seedling.tended(&placed.vigour, placed.condition.as_ref()));
         }
         self.check_number(0.0, all.len(), ["plants", ""], 0)?;
         Ok(all)
@@ -407,6 +409,7 @@ impl<'a> Builder<'a> {
             only_leaf: None,
             stream: self.stream(Purpose::Plant, population).child(Purpose::Plant, spot.key),
             individual: self.individual(&species.desc),
+            vigour: Vary::fixed(1.0),
             condition: species.desc.condition.clone(),
         }
     }
@@ -497,9 +500,10 @@ fn grow(s: &Seedling, number: u16, floor: Option<Floor<'_>>, dust: Spectrum) -> 
     let shape = s.individual.as_ref().map_or(&stream, Individual::shape);
     let ailing = s.condition.as_ref().map(|condition| Ailing::new(condition, shape, dust));
     let posture = ailing.as_ref().map(Ailing::posture);
+    let vigour = s.vigour.draw32(&mut shape.child(Purpose::Plant, VIGOUR));
     let plant = match &s.individual {
-        Some(individual) => individual.plant(desc, (&s.growth, s.season), &stream, posture),
-        None => plant::grow_in(&desc.plant, stage, &stream, posture),
+        Some(individual) => individual.plant(desc, (&s.growth, s.season), &stream, (vigour, posture)),
+        None => plant::grow_in(&desc.plant, stage, &stream, (vigour, posture)),
     };
     let foot = Vec3::new(x, y, z);
     // Plant coordinates: y to the north before the turn, z along the axis. Growing has given it a turn of its own.
@@ -559,6 +563,9 @@ fn grow(s: &Seedling, number: u16, floor: Option<Floor<'_>>, dust: Spectrum) -> 
     };
     (record, organs)
 }
+
+/// Which of a plant's streams its vigour in the field is drawn from.
+const VIGOUR: u64 = 1 << 21;
 
 /// Radius over which the ground's slope decides how a plant stands, metres.
 const STANCE: f32 = 0.02;

@@ -106,6 +106,9 @@ pub struct CropDesc {
     pub species: String,
     /// How far each plant has grown.
     pub growth: Growth,
+    /// Factor on its sizes, beyond that of the species' page: below 1 where cold or drought kept plants small for their leaves.
+    #[serde(default = "as_it_is", skip_serializing_if = "is_as_it_is")]
+    pub vigour: Vary<Positive>,
     /// Where they stand.
     pub rows: RowsDesc,
     /// Age, health and damage of its plants; as the species' page has it unless given.
@@ -121,6 +124,9 @@ pub struct WeedDesc {
     pub species: String,
     /// How far each plant has grown.
     pub growth: Growth,
+    /// Factor on its sizes, beyond that of the species' page: below 1 where cold or drought kept plants small for their leaves.
+    #[serde(default = "as_it_is", skip_serializing_if = "is_as_it_is")]
+    pub vigour: Vary<Positive>,
     /// How many and how they gather.
     #[serde(default)]
     pub spread: WeedsDesc,
@@ -137,6 +143,9 @@ pub struct PlacedDesc {
     pub species: String,
     /// How far it has grown.
     pub growth: Growth,
+    /// Factor on its sizes, beyond that of the species' page: below 1 where cold or drought kept plants small for their leaves.
+    #[serde(default = "as_it_is", skip_serializing_if = "is_as_it_is")]
+    pub vigour: Vary<Positive>,
     /// Where its stem meets the ground, metres east and north.
     #[serde(default = "origin")]
     pub position_m: (Vary<Finite>, Vary<Finite>),
@@ -198,6 +207,10 @@ pub type Shares = (Num<Fraction>, Num<Fraction>, Num<Fraction>, Num<Fraction>);
 
 fn as_it_is() -> Vary<Positive> {
     Vary::fixed(1.0)
+}
+
+fn is_as_it_is(factor: &Vary<Positive>) -> bool {
+    *factor == as_it_is()
 }
 
 fn origin() -> (Vary<Finite>, Vary<Finite>) {

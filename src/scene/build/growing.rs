@@ -41,16 +41,16 @@ impl Individual {
         &self.shape
     }
 
-    /// Grows it to the age that the field draws, turned as the plant of `own` would be.
+    /// Grows it to the age that the field draws, of this vigour and in this condition, turned as the plant of `own` would be.
     pub(super) fn plant(
         &self,
         desc: &SpeciesDesc,
         (growth, season): (&Growth, usize),
         own: &Stream,
-        condition: Option<(&ConditionDesc, &Condition)>,
+        raised: (f32, Option<(&ConditionDesc, &Condition)>),
     ) -> Plant {
         let stage = growth.draw(season, &mut self.age.clone());
-        let mut plant = plant::grow_in(&desc.plant, stage, &self.shape, condition);
+        let mut plant = plant::grow_in(&desc.plant, stage, &self.shape, raised);
         // Azimuths run clockwise seen from above.
         let turn = Mat3::from_rotation_z(plant::turn(&self.shape) - plant::turn(own));
         for organ in &mut plant.organs {
