@@ -88,7 +88,7 @@ impl GroundSkin {
 #[derive(Clone, Debug)]
 pub struct Ground {
     skin: Arc<GroundSkin>,
-    tint: f32,
+    tint: Spectrum,
     relief: bool,
     /// Slope angle of the facets, radians; `None` for Lambert's soil, which no film of water makes glossy.
     facets: Option<f32>,
@@ -97,11 +97,11 @@ pub struct Ground {
 impl Ground {
     /// The ground: its fine relief tilts the shading normal.
     pub fn new(skin: Arc<GroundSkin>) -> Self {
-        Self { skin, tint: 1.0, relief: true, facets: Some(SIGMA) }
+        Self { skin, tint: Spectrum::ONE, relief: true, facets: Some(SIGMA) }
     }
 
-    /// Clods of it, brighter by `tint`: they have relief of their own.
-    pub fn clods(skin: Arc<GroundSkin>, tint: f32) -> Self {
+    /// Clods of it, of a reflectance `tint` times as high: they have relief of their own.
+    pub fn clods(skin: Arc<GroundSkin>, tint: Spectrum) -> Self {
         Self { skin, tint, relief: false, facets: Some(SIGMA) }
     }
 
@@ -130,7 +130,7 @@ impl Ground {
             vec2(east, -north) / Skin::SLOPE_STEPS
         };
         Swatch::pictured(key, size, texel, mean, 1.0)
-            .tinted(Vec3::splat(self.tint), Vec3::ONE)
+            .tinted(self.tint.0.truncate(), Vec3::ONE)
             .raised(slope, f32::from(u8::from(self.relief)))
             .grained(move |x, y| {
                 let film = skin.texels[y as usize * skin.width + x as usize].film;

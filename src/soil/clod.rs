@@ -7,7 +7,7 @@
 use super::body::{self, Cut, LEVELS, Pose, Shape};
 use super::{Canopy, Ground, Pile};
 use crate::geometry::Mesh;
-use crate::math::{Vec2, vec2, vec3};
+use crate::math::{Spectrum, Vec2, vec2, vec3};
 use crate::sampling::{Purpose, Stream};
 
 /// How aggregates break.
@@ -18,7 +18,10 @@ pub(super) const CUT: Cut =
 const SHAPES: usize = 24;
 
 /// Brightness groups.
-const GROUPS: usize = 7;
+const TONES: usize = 7;
+
+/// Hues of the matter that the clods of one ground broke from.
+const HUES: usize = 6;
 
 /// The middle and the short axis over the long one. Source: Aubertot et al. 1999.
 const AXES: (f32, f32) = (0.77, 0.55);
@@ -48,14 +51,14 @@ struct Candidate {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Clods {
     /// Factor on the reflectance of the ground's matter.
-    pub tint: f32,
+    pub tint: Spectrum,
     /// Whether they are as wet as the ground, or as dry as the law says.
     pub damp: bool,
     /// Their bodies, with texture coordinates of [`Ground::fabric`].
     pub mesh: Mesh,
 }
 
-/// The clods of a ground in groups of like brightness and moisture.
+/// The clods of a ground in groups of like brightness, hue and moisture.
 ///
 /// None of them pierces the `canopy`. About 1.2 million triangles and 0.5 s of one core for a third
 /// of a square metre with clods from 2.5 mm.
@@ -64,7 +67,7 @@ pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy) -> Vec<Clods> {
     let own = stream.child(Purpose::Page, 0);
     let scale = (FINE_M / ground.step()).min(1.0);
     let mut shapes: Vec<Vec<Option<Shape>>> = vec![vec![None; SHAPES]; LEVELS];
-    let mut groups: Vec<Mesh> = vec![Mesh::default(); 2 * GROUPS];
+    let mut groups: Vec<Mesh> = vec![Mesh::default(); 2 * HUES * TONES];
     for clod in candidates(ground, &stream) {
         let mut s = own.child(Purpose::Debris, u64::from(clod.key));
         let level = FROM_MM.iter().rposition(|from| clod.mm * scale >= *from).unwrap_or(0);
@@ -81,6 +84,7 @@ pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy) -> Vec<Clods> {
         let stays = s.uniform32();
         let damp = s.uniform32() < ground.law.damp;
         let from = vec2(s.uniform32(), s.uniform32());
+        let hue = if ground.law.hue_sigma > 0.0 { s.index(HUES) } else { 0 };
 
         let radius = 0.5 * (axes.x + axes.y);
         let at = if clod.mm < 15.0 { pile.settle(clod.at, radius, 0.75) } else { Some(clod.at) };
@@ -96,7 +100,7 @@ pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy) -> Vec<Clods> {
         }
         // What grows pushes down what lies under its leaves.
         let centre = at.extend(support - (sink * height).max(height - free) - pose.low);
-        let mesh = &mut groups[group(tint, ground.law.tint_sigma) + GROUPS * usize::from(damp)];
+        let mesh = &mut groups[(usize::from(damp) * HUES + hue) * TONES + tone(tint, ground.law.tint_sigma)];
         let slack = 0.06 * height;
         body::emit(
             mesh,
@@ -114,11 +118,27 @@ pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy) -> Vec<Clods> {
         );
         pile.heap(at, pose.turn, 0.92 * axes.x, 0.92 * axes.y, support, centre.z + 0.95 * pose.high);
     }
-    let sigma = ground.law.tint_sigma;
-    let known = |g: usize| (group_tint(g % GROUPS, sigma), g >= GROUPS);
+    let hues = hues(ground.law.hue_sigma, &mut stream.child(Purpose::Page, 1));
+    let brightness = |g: usize| tone_tint(g % TONES, ground.law.tint_sigma);
     (groups.into_iter().enumerate().filter(|(_, mesh)| !mesh.triangles.is_empty()))
-        .map(|(g, mesh)| Clods { tint: known(g).0, damp: known(g).1, mesh })
+        .map(|(g, mesh)| Clods { tint: hues[g / TONES % HUES] * brightness(g), damp: g >= HUES * TONES, mesh })
         .collect()
+}
+
+/// Factors on the reflectance in R, G, B; near infrared knows no hue.
+///
+/// Most matter is of one hue and a little of it far greener or yellower: green over red and blue under green lie at the middles of
+/// equal parts of an exponential law, in orders of their own.
+fn hues(sigma: f32, stream: &mut Stream) -> [Spectrum; HUES] {
+    let beyond_mean = |k: usize| -(1.0 - (k as f32 + 0.5) / HUES as f32).ln() - 1.0;
+    let mut order: [usize; HUES] = std::array::from_fn(|k| k);
+    for k in (1..HUES).rev() {
+        order.swap(k, stream.index(k + 1));
+    }
+    std::array::from_fn(|k| {
+        let (green, blue) = (sigma * beyond_mean(k), -sigma * beyond_mean(order[k]));
+        Spectrum::new((-0.5 * green).exp(), (0.5 * green).exp(), (0.5 * green + blue).exp(), 1.0)
+    })
 }
 
 /// All clods, largest first.
@@ -145,14 +165,14 @@ fn sink(mm: f32, u: f32) -> f32 {
     0.2 + 0.1 * (mm / 15.0).min(1.0) + 0.2 * u
 }
 
-/// The group of a logarithm of brightness beside the mean clod's: even steps over ±2.2 of its standard deviations.
-fn group(tint: f32, sigma: f32) -> usize {
+/// The tone of a logarithm of brightness beside the mean clod's: even steps over ±2.2 of its standard deviations.
+fn tone(tint: f32, sigma: f32) -> usize {
     let reach = 2.2 * (sigma * sigma + LOOSE_GAIN * LOOSE_GAIN * 0.25).sqrt();
     let t = (tint / reach.max(1e-6)).clamp(-1.0, 1.0) * 0.5 + 0.5;
-    ((t * GROUPS as f32) as usize).min(GROUPS - 1)
+    ((t * TONES as f32) as usize).min(TONES - 1)
 }
 
-fn group_tint(group: usize, sigma: f32) -> f32 {
+fn tone_tint(tone: usize, sigma: f32) -> f32 {
     let reach = 2.2 * (sigma * sigma + LOOSE_GAIN * LOOSE_GAIN * 0.25).sqrt();
-    (((group as f32 + 0.5) / GROUPS as f32 * 2.0 - 1.0) * reach).exp()
+    (((tone as f32 + 0.5) / TONES as f32 * 2.0 - 1.0) * reach).exp()
 }

@@ -33,6 +33,8 @@ pub(super) struct Law {
     noise: Perlin,
     /// Standard deviation of the logarithm of brightness.
     pub(super) tint_sigma: f32,
+    /// Standard deviation of the logarithms of the ratios of colours.
+    pub(super) hue_sigma: f32,
     /// Share of the ground's moisture that aggregates have lost.
     pub(super) dryness: f32,
     /// Share of them that have lost none.
@@ -74,6 +76,7 @@ impl Law {
             sorting: desc.sorting.f32(),
             noise: Perlin::new(child(4).seed32()),
             tint_sigma: desc.tint_sigma.f32(),
+            hue_sigma: desc.hue_sigma.f32(),
             dryness: desc.dryness.draw32(&mut child(5)),
             damp: desc.damp.draw32(&mut child(6)),
             loose: desc.loose.draw32(&mut child(7)),

@@ -230,6 +230,9 @@ pub struct ClodsDesc {
     pub sorting: Num<Fraction>,
     /// Standard deviation of the logarithm of their brightness.
     pub tint_sigma: Num<NonNegative>,
+    /// Standard deviation, from clod to clod, of the logarithms of green over red and of blue over green: iron, humus and algae lie
+    /// unevenly, so that some clods are all but green.
+    pub hue_sigma: Num<NonNegative>,
     /// How much of the ground's moisture clods and crumbs have lost: 0 as wet as the ground, 1 air-dry. On damp ground dry clods
     /// are what is seen first.
     pub dryness: Vary<Fraction>,
@@ -250,6 +253,7 @@ impl Default for ClodsDesc {
             cluster_m: Vary::fixed(0.12),
             sorting: Num::new(0.1),
             tint_sigma: Num::new(0.1),
+            hue_sigma: Num::new(0.03),
             dryness: Vary::uniform(0.3, 0.9),
             damp: Vary::uniform(0.05, 0.25),
             loose: Vary::uniform(0.0, 0.5),
