@@ -230,8 +230,10 @@ pub struct ClodsDesc {
     pub sorting: Num<Fraction>,
     /// Standard deviation of the logarithm of their brightness.
     pub tint_sigma: Num<NonNegative>,
-    /// Standard deviation, from clod to clod, of the logarithms of green over red and of blue over green: iron, humus and algae lie
-    /// unevenly, so that some clods are all but green.
+    /// How much the logarithms of green over red and of blue over green vary from clod to clod: iron, humus and algae lie unevenly,
+    /// so that some clods are yellow or all but green. The scale of an exponential law; the standard deviation is 0.8 of it. Source:
+    /// patches of 2 mm on 20 frames of SugarBeets2016, 0.042 and 0.044, less in quadrature what rendered ones had without, 0.026 and
+    /// 0.029.
     pub hue_sigma: Num<NonNegative>,
     /// How much of the ground's moisture clods and crumbs have lost: 0 as wet as the ground, 1 air-dry. On damp ground dry clods
     /// are what is seen first.
