@@ -33,7 +33,7 @@ pub(super) struct Law {
     noise: Perlin,
     /// Standard deviation of the logarithm of brightness.
     pub(super) tint_sigma: f32,
-    /// Standard deviation of the logarithms of the ratios of colours.
+    /// Scale of the logarithms of the ratios of colours.
     pub(super) hue_sigma: f32,
     /// Share of the ground's moisture that aggregates have lost.
     pub(super) dryness: f32,
