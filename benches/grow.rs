@@ -6,7 +6,7 @@ use furrow::page::Page;
 use furrow::plant::{self, Stage};
 use furrow::render;
 use furrow::sampling::{Purpose, Stream};
-use furrow::scene::build;
+use furrow::scene::assemble;
 use furrow::scene::desc::SpeciesDesc;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -43,9 +43,9 @@ fn main() {
     group.finish();
 
     let mut group = criterion.benchmark_group("scene");
-    let options = build::Options { width: Some(324), ..build::Options::default() };
+    let options = assemble::Options { width: Some(324), ..assemble::Options::default() };
     let pool = render::pool(0).expect("a pool");
-    let field = || pool.install(|| build::field(Path::new("scenes/field.ron"), &options)).expect("the main scene");
+    let field = || pool.install(|| assemble::field(Path::new("scenes/field.ron"), &options)).expect("the main scene");
     group.bench_function("field", |b| b.iter(field));
     let grown = field();
     let surfaces = grown.scene.surfaces();

@@ -7,7 +7,7 @@ use furrow::accel::{EmbreeAccel, Surface, prepare_thread};
 use furrow::geometry::{Interaction, Intersect, Ray};
 use furrow::math::{Frame, Vec3};
 use furrow::sampling::{Purpose, Stream, warp};
-use furrow::scene::{Field, Part, build};
+use furrow::scene::{Field, Part, assemble};
 use std::hint::black_box;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -19,8 +19,8 @@ const STRIDE: u32 = 13;
 const LIGHT: Vec3 = Vec3::new(0.0, -std::f32::consts::FRAC_1_SQRT_2, std::f32::consts::FRAC_1_SQRT_2);
 
 fn field() -> Field {
-    let options = build::Options { width: Some(WIDTH), ..build::Options::default() };
-    build::field(Path::new("scenes/field.ron"), &options).expect("the main scene")
+    let options = assemble::Options { width: Some(WIDTH), ..assemble::Options::default() };
+    assemble::field(Path::new("scenes/field.ron"), &options).expect("the main scene")
 }
 
 /// What a path asks of the geometry.

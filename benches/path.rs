@@ -11,7 +11,7 @@ use furrow::geometry::{Hit, Intersect, PACKET, Ray, Window};
 use furrow::integrator::{Path as PathTracer, World};
 use furrow::render::{self, Settings, Watch};
 use furrow::sampling::Points;
-use furrow::scene::build;
+use furrow::scene::assemble;
 use std::hint::black_box;
 use std::path::Path;
 use std::sync::Mutex;
@@ -118,8 +118,8 @@ fn main() {
     );
     println!("|---|---|---|---|---|---|---|---|---|---|");
     for (name, page, width) in SCENES {
-        let options = build::Options { width, ..build::Options::default() };
-        let field = || pool.install(|| build::field(Path::new(page), &options)).expect(page);
+        let options = assemble::Options { width, ..assemble::Options::default() };
+        let field = || pool.install(|| assemble::field(Path::new(page), &options)).expect(page);
         let grow = median((0..RUNS).map(|_| seconds(|| drop(black_box(field())))).collect());
         let field = field();
         let scene = &field.scene;

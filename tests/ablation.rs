@@ -19,7 +19,7 @@ use furrow::material::Material;
 use furrow::math::Vec3;
 use furrow::render::{self, LabelMap, Settings, Watch};
 use furrow::sampling::Points;
-use furrow::scene::build::Options;
+use furrow::scene::assemble::Options;
 use furrow::scene::{Field, Part, PlantRecord};
 use furrow::sensor::Photograph;
 use std::collections::{BTreeMap, BTreeSet};

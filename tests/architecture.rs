@@ -75,7 +75,7 @@ const DOORS: &[(&str, &str)] = &[
     ("rand_pcg", "sampling/rng.rs"),
     // Parallel at the top only.
     // Images, plants, and the soil's skin: loops over what is many.
-    ("rayon", "render/ dataset/ compare/ scene/build.rs soil/skin.rs material/ground.rs raster/sheets.rs"),
+    ("rayon", "render/ dataset/ compare/ scene/assemble/mod.rs soil/skin.rs material/ground.rs raster/sheets.rs"),
     // One reader for all pages; faults inside a value are found where they lie.
     ("ron", "page.rs sampling/fault.rs"),
     ("serde", "*"),
@@ -469,7 +469,7 @@ fn made_up_violations_are_found() {
     for (path, code) in [
         ("plant/leaf.rs", "use crate::material::Leaf;"),
         ("render/label.rs", "use crate::film::Film;"),
-        ("scene/build.rs", "crate::cli::fail(&e);"),
+        ("scene/assemble/mod.rs", "crate::cli::fail(&e);"),
     ] {
         assert_eq!(never_faults(&[Source::new(path, code)]).len(), 1, "{code}");
     }

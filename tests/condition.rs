@@ -13,7 +13,7 @@ use furrow::geometry::{Interaction, Intersect, Ray, Window};
 use furrow::plant::ConditionDesc;
 use furrow::render::label;
 use furrow::render::label::NONE;
-use furrow::scene::build::Options;
+use furrow::scene::assemble::Options;
 use furrow::scene::{Field, Part};
 
 /// Everything that can be eaten, eaten.

@@ -18,7 +18,7 @@ use furrow::math::{Mat3, Vec3, vec3};
 use furrow::render::{self, Settings, coverage};
 use furrow::sampling::Points;
 use furrow::scene::Scene;
-use furrow::scene::build::Options;
+use furrow::scene::assemble::Options;
 use furrow::scene::tag::{Class, Tag};
 
 /// The share of the pixel at (x, y) that lies in a convex polygon, pixels.

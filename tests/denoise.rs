@@ -19,7 +19,7 @@ use furrow::math::Spectrum;
 use furrow::output::Denoiser;
 use furrow::render::{self, Settings};
 use furrow::sampling::Points;
-use furrow::scene::build::{self, Options};
+use furrow::scene::assemble::{self, Options};
 use std::path::Path;
 use std::process::Output;
 
@@ -125,7 +125,7 @@ fn psnr(film: &Film, reference: &Film) -> f64 {
 #[ignore = "needs Open Image Denoise, and minutes"]
 fn sixteen_samples_denoised_beat_thirty_two() {
     let denoiser = Denoiser::find().unwrap_or_else(|e| panic!("{e}"));
-    let field = build::field(Path::new("scenes/field.ron"), &Options::default()).unwrap();
+    let field = assemble::field(Path::new("scenes/field.ron"), &Options::default()).unwrap();
     let window = Window { x0: 500, y0: 360, x1: 820, y1: 600 };
     let films = with_world(&field.scene, 2, |world, watch| {
         [(16, 1), (32, 2), (128, 3), (1024, 4)].map(|(spp, seed)| {

@@ -14,7 +14,7 @@ use common::pictures;
 use common::program::{self, FILES, SMALL, bits, field, hash, names, run, scratch, shoot, small_text, trace};
 use furrow::output::{read_gray16, read_indexed};
 use furrow::render::{self, LabelMap};
-use furrow::scene::build::Options;
+use furrow::scene::assemble::Options;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Command, Stdio};

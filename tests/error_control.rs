@@ -16,7 +16,7 @@ use furrow::math::Spectrum;
 use furrow::render::{self, Progressive, Settings};
 use furrow::sampling::Points;
 use furrow::scene::Field;
-use furrow::scene::build::Options;
+use furrow::scene::assemble::Options;
 use std::io::{BufRead, BufReader};
 use std::process::Stdio;
 use std::time::{Duration, Instant};

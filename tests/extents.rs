@@ -16,7 +16,7 @@ use furrow::film::Filter;
 use furrow::geometry::{Intersect, Mesh, Ray, Window};
 use furrow::math::{Vec3, vec3};
 use furrow::render::{self, Extent, LabelMap, extents, label};
-use furrow::scene::build::{self, Options};
+use furrow::scene::assemble::{self, Options};
 use furrow::scene::tag::{Class, Tag};
 use furrow::scene::{Part, Scene};
 use furrow::sensor::{Camera, Distortion};
@@ -125,7 +125,7 @@ fn extents_are_those_of_each_plant_and_leaf_alone() {
 fn extents_hold_in_a_canopy_and_for_models() {
     for page in ["benches/canopy.ron", "scenes/07-model.ron"] {
         let options = Options { width: Some(64), ..Options::default() };
-        let scene = build::field(Path::new(page), &options).unwrap_or_else(|e| panic!("{e}")).scene;
+        let scene = assemble::field(Path::new(page), &options).unwrap_or_else(|e| panic!("{e}")).scene;
         assert!(!check(&scene, full(&scene)).is_empty());
     }
 }
@@ -259,7 +259,7 @@ fn keypoints_stand_in_the_world_where_the_leaves_do() {
     let mut ends = 0;
     for page in ["tests/ref/small.ron", "scenes/01-one-leaf.ron"] {
         let options = Options { width: Some(32), ..Options::default() };
-        let grown = build::field(Path::new(page), &options).unwrap_or_else(|e| panic!("{e}"));
+        let grown = assemble::field(Path::new(page), &options).unwrap_or_else(|e| panic!("{e}"));
         for plant in &grown.plants {
             let parts = || grown.scene.parts.iter().filter(|p| p.tag.plant == plant.number && p.tag.leaf > 0);
             let leaves: BTreeSet<u16> = parts().map(|p| p.tag.leaf).collect();

@@ -8,7 +8,7 @@ mod common;
 use common::program::{SMALL, field, shoot, small_text};
 use furrow::light::LightRecord;
 use furrow::math::{Spectrum, vec3};
-use furrow::scene::build::{self, Options};
+use furrow::scene::assemble::{self, Options};
 use furrow::scene::tag::Class;
 use furrow::scene::{Field, PlantRecord};
 use std::path::Path;
@@ -244,7 +244,7 @@ fn the_grounds_record_holds_what_the_page_asked_for() {
 
 #[test]
 fn a_field_names_every_file_that_it_was_made_of() {
-    let field = build::field(Path::new(SMALL), &Options::default()).unwrap();
+    let field = assemble::field(Path::new(SMALL), &Options::default()).unwrap();
     assert_eq!(field.text, std::fs::read_to_string(SMALL).unwrap());
     assert!(field.files.iter().all(|f| f.is_file()), "{:?}", field.files);
     for ending in ["small.ron", "sugar_beet.ron", "dirt.png"] {
@@ -254,7 +254,7 @@ fn a_field_names_every_file_that_it_was_made_of() {
 
 #[test]
 fn conditions_are_written_with_their_units() {
-    let field = build::field(Path::new(SMALL), &Options::default()).unwrap();
+    let field = assemble::field(Path::new(SMALL), &Options::default()).unwrap();
     let json = serde_json::to_value(&field.conditions).unwrap();
     assert_eq!(json["lights"][0]["kind"], "daylight");
     assert_eq!(json["lights"][0]["sky_irradiance_w_m2_nm"].as_array().unwrap().len(), 4);

@@ -22,9 +22,9 @@ use furrow::output::{self, Provenance, Spp};
 use furrow::render::label::NONE;
 use furrow::render::{LabelMap, label};
 use furrow::sampling::{Purpose, Stream};
-use furrow::scene::build::Options;
+use furrow::scene::assemble::Options;
 use furrow::scene::tag::{Class, Tag};
-use furrow::scene::{Field, Part, Scene, build};
+use furrow::scene::{Field, Part, Scene, assemble};
 use furrow::sensor::{Camera, Distortion, Pose};
 use std::path::Path;
 use std::sync::Arc;
@@ -288,7 +288,7 @@ fn check_every_pixel(name: &str, scene: &Scene) {
 }
 
 fn open(page: &Path, options: &Options) -> Field {
-    build::field(page, options).unwrap_or_else(|e| panic!("{}: {e}", page.display()))
+    assemble::field(page, options).unwrap_or_else(|e| panic!("{}: {e}", page.display()))
 }
 
 #[test]

@@ -13,7 +13,7 @@ use furrow::geometry::Window;
 use furrow::math::Vec3;
 use furrow::output::encode_layers;
 use furrow::render::LabelMap;
-use furrow::scene::build::Options;
+use furrow::scene::assemble::Options;
 use furrow::scene::tag::{Class, Tag};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;

@@ -425,7 +425,7 @@ fn a_page_may_name_a_picture_of_all_directions() {
     let field = |light: &str| {
         let camera = "Pinhole(size: (8, 8), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 1))";
         std::fs::write(&page, format!("Field(\n  camera: {camera},\n  lights: [{light}],\n)")).unwrap();
-        furrow::scene::build::field(&page, &furrow::scene::build::Options::default()).map_err(|e| e.to_string())
+        furrow::scene::assemble::field(&page, &furrow::scene::assemble::Options::default()).map_err(|e| e.to_string())
     };
     let lit =
         field(r#"Environment(file: "even.hdr", scale: 3, rotate_deg: Uniform(0, 360), nir: OfRed(0.8))"#).unwrap();

@@ -23,7 +23,7 @@ use furrow::material::Material;
 use furrow::math::{Frame, Mat3, Spectrum, Vec3, vec2, vec3};
 use furrow::output;
 use furrow::render;
-use furrow::scene::build::{self, Options};
+use furrow::scene::assemble::{self, Options};
 use furrow::scene::tag::{Class, Tag};
 use furrow::scene::{Part, Scene};
 use furrow::sensor::{Camera, Distortion, Pose};
@@ -134,7 +134,7 @@ fn prepare(name: &str, scene: &Scene, spp: u32) -> PathBuf {
 /// One field of a page, its camera's point spread left out.
 fn field(page: &str, width: u32) -> Scene {
     let options = Options { width: Some(width), ..Options::default() };
-    let mut field = build::field(Path::new(page), &options).unwrap_or_else(|e| panic!("{e}"));
+    let mut field = assemble::field(Path::new(page), &options).unwrap_or_else(|e| panic!("{e}"));
     field.scene.filter = Filter::Box.footprint();
     field.scene
 }

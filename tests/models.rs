@@ -17,7 +17,7 @@ use furrow::math::{Spectrum, Vec2, Vec3, vec2, vec3};
 use furrow::model::{Model, Up, glb};
 use furrow::output;
 use furrow::render::LabelMap;
-use furrow::scene::build::{self, Options};
+use furrow::scene::assemble::{self, Options};
 use furrow::scene::tag::Class;
 use furrow::scene::{Field, Part};
 use proptest::prelude::*;
@@ -43,7 +43,7 @@ fn placed(folder: &Path, models: &str) -> furrow::Result<Field> {
     let text =
         format!("Field(seed: 3, camera: {CAMERA}, lights: [Constant(radiance: (1, 1, 1, 1))], models: [{models}])");
     std::fs::write(&page, text).unwrap();
-    build::field(&page, &Options::default())
+    assemble::field(&page, &Options::default())
 }
 
 fn bits(mesh: &Mesh) -> Vec<u32> {
@@ -353,7 +353,7 @@ fn a_model_stands_on_the_ground_and_counts_after_the_plants() {
         + "models: [(file: \"square.obj\", up: Z, class: Weed, position_m: (0.05, -0.03), scale: 0.01)])";
     let page = write(&folder, "page.ron", text);
     let field =
-        build::field(&page, &Options { width: Some(32), ..Options::default() }).unwrap_or_else(|e| panic!("{e}"));
+        assemble::field(&page, &Options { width: Some(32), ..Options::default() }).unwrap_or_else(|e| panic!("{e}"));
     let bare = program::field(&small_text(), &Options { width: Some(32), ..Options::default() });
     assert_eq!(field.plants[..bare.plants.len()], bare.plants[..], "a model moves no plant");
     let model = field.plants.last().unwrap();

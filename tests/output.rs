@@ -13,7 +13,7 @@ use furrow::film::Film;
 use furrow::math::Spectrum;
 use furrow::output::{self, Provenance, Spp};
 use furrow::render::{LabelMap, label::NONE};
-use furrow::scene::build::Options;
+use furrow::scene::assemble::Options;
 use std::collections::BTreeMap;
 use std::path::Path as File;
 

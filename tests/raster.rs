@@ -19,7 +19,7 @@ use furrow::material::Material;
 use furrow::math::{Spectrum, Vec2, Vec3, vec2, vec3};
 use furrow::raster::{Drawn, Effect, Rasterizer, Settings};
 use furrow::render::{LabelMap, label};
-use furrow::scene::build::{self, Options};
+use furrow::scene::assemble::{self, Options};
 use furrow::scene::tag::{Class, Tag};
 use furrow::scene::{Part, Scene};
 use furrow::sensor::{Camera, Distortion, Pose};
@@ -73,7 +73,7 @@ fn labels_are_those_of_the_rays_on_every_scene() {
     assert!(pages.len() >= 12, "{pages:?}");
     for page in pages {
         let options = Options { width: Some(400), ..Options::default() };
-        let field = build::field(&page, &options).expect("a field");
+        let field = assemble::field(&page, &options).expect("a field");
         let geometry = EmbreeAccel::build(&field.scene.surfaces(), 2).expect("an accelerator");
         let (expected, found) = (rays(&field.scene), draw(&field.scene, &[]).labels);
         let (width, count) = (expected.window.width() as usize, expected.tags.len());
@@ -168,7 +168,7 @@ fn a_lamp_falls_off_with_the_square_of_the_distance() {
 
 #[test]
 fn each_effect_changes_the_picture_and_no_label() {
-    let field = build::field(SMALL.as_ref(), &Options::default()).expect("a field");
+    let field = assemble::field(SMALL.as_ref(), &Options::default()).expect("a field");
     let whole = draw(&field.scene, &[]);
     let again = draw(&field.scene, &[]);
     assert!(whole.film == again.film && whole.labels == again.labels, "equal input makes equal bits");
@@ -182,7 +182,7 @@ fn each_effect_changes_the_picture_and_no_label() {
 
 #[test]
 fn it_is_about_as_bright_as_the_path_tracer() {
-    let field = build::field(SMALL.as_ref(), &Options::default()).expect("a field");
+    let field = assemble::field(SMALL.as_ref(), &Options::default()).expect("a field");
     let (film, _) = program::shoot(&field, 16, 2);
     let mean = |film: &furrow::film::Film| {
         film.pixels.iter().map(|p| p.mean.0).sum::<furrow::math::Vec4>() / film.pixels.len() as f32

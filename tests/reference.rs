@@ -23,7 +23,7 @@ use furrow::math::{Frame, Mat3, Spectrum, Vec3, vec3};
 use furrow::output::{Picture, write_png};
 use furrow::sampling::Points;
 use furrow::scene::Scene;
-use furrow::scene::build::{self, Options};
+use furrow::scene::assemble::{self, Options};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -37,7 +37,7 @@ const SPP: u32 = 256;
 
 fn page(path: &str) -> Scene {
     let options = Options { width: Some(SIZE.0), height: Some(SIZE.1), ..Options::default() };
-    build::field(Path::new(path), &options).unwrap_or_else(|e| panic!("{e}")).scene
+    assemble::field(Path::new(path), &options).unwrap_or_else(|e| panic!("{e}")).scene
 }
 
 /// A box without a gap, a lamp in it, a ball and a leaf: all light bounces many times.

@@ -8,7 +8,7 @@
 use furrow::page::Page;
 use furrow::plant::{Stage, grow};
 use furrow::sampling::{Purpose, Stream};
-use furrow::scene::build::{self, Options};
+use furrow::scene::assemble::{self, Options};
 use furrow::scene::desc::{FieldDesc, SpeciesDesc};
 use furrow::texture::draw::Recipe;
 use furrow::train::table::{Experiment, ExperimentDesc};
@@ -61,7 +61,7 @@ fn every_field_page_builds() {
     for path in fields() {
         // Few pixels: the ground is grown as fine as a pixel sees it.
         let options = Options { width: Some(48), ..Options::default() };
-        let field = build::field(&path, &options).unwrap_or_else(|e| panic!("{e}"));
+        let field = assemble::field(&path, &options).unwrap_or_else(|e| panic!("{e}"));
         assert!(!field.scene.parts.is_empty() && !field.scene.lights.is_empty(), "{}: nothing to see", path.display());
         assert!(field.warnings.is_empty(), "{}: {:?}", path.display(), field.warnings);
         for part in &field.scene.parts {
@@ -146,7 +146,7 @@ fn the_papers_four_sets_differ_in_their_weeds_and_seeds_alone() {
 
 /// What a bad page is told, as the program prints it.
 fn told(path: &Path) -> String {
-    match build::field(path, &Options { width: Some(16), ..Options::default() }) {
+    match assemble::field(path, &Options { width: Some(16), ..Options::default() }) {
         Ok(_) => panic!("{}: it builds", path.display()),
         Err(e) => format!("error: {e}\n").replace('\\', "/"),
     }

@@ -16,12 +16,12 @@ use furrow::geometry::Window;
 use furrow::integrator::Path as PathTracer;
 use furrow::render::{self, Settings};
 use furrow::sampling::Points;
-use furrow::scene::build::{self, Options};
+use furrow::scene::assemble::{self, Options};
 use std::path::Path;
 
 /// Mean squared error of 64 stratified samples over that of 64 independent ones, in squares of this side over the image.
 fn ratio(side: u32, reference_spp: u32, seeds: u64) -> f64 {
-    let field = build::field(Path::new("scenes/field.ron"), &Options::default()).unwrap();
+    let field = assemble::field(Path::new("scenes/field.ron"), &Options::default()).unwrap();
     let scene = &field.scene;
     let (mut stratified, mut independent) = (0.0, 0.0);
     with_world(scene, 2, |world, watch| {

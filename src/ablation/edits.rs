@@ -2,7 +2,7 @@
 
 use super::{Change, Drawing, Edit, growth, labels, light, picture};
 use crate::material::Feature;
-use crate::scene::build::Growing;
+use crate::scene::assemble::Growing;
 
 /// No edit: what all others are compared with.
 pub static FULL: Edit =

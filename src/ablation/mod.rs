@@ -25,7 +25,7 @@ use crate::material::Feature;
 use crate::render::LabelMap;
 use crate::sampling::fault::choose;
 use crate::scene::Field;
-use crate::scene::build::{Growing, Options, Source};
+use crate::scene::assemble::{Growing, Options, Source};
 use crate::scene::tag::Tag;
 use crate::sensor::{Camera, Photograph, SensorDesc};
 use crate::{Error, Result};

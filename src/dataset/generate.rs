@@ -10,7 +10,7 @@ use super::set::Set;
 use super::shoot::{Engine, Times, shoot, source};
 use super::{File, format, native};
 use crate::render::{self, Watch};
-use crate::scene::build::Source;
+use crate::scene::assemble::Source;
 use crate::{Error, Result};
 use rayon::ThreadPool;
 use rayon::prelude::*;

@@ -6,7 +6,7 @@ use super::split::Shares;
 use super::{File, format, seal};
 use crate::ablation::{Drawing, Edit};
 use crate::output::is_unfinished;
-use crate::scene::build::Options;
+use crate::scene::assemble::Options;
 use crate::{Error, Result};
 use std::path::{Component, Path, PathBuf};
 

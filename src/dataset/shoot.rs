@@ -11,7 +11,7 @@ use crate::film::Film;
 use crate::geometry::Window;
 use crate::output::{Provenance, half};
 use crate::render::{self, LabelMap, Watch};
-use crate::scene::build::{Options, Source};
+use crate::scene::assemble::{Options, Source};
 use crate::scene::{Field, PlantRecord};
 use crate::{Error, Result};
 use std::collections::BTreeMap;

@@ -9,7 +9,7 @@ use super::split::Split;
 use super::{File, format, generate, invariants, ledger, native};
 use crate::render::Watch;
 use crate::sampling::rng::mix;
-use crate::scene::build::Source;
+use crate::scene::assemble::Source;
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};

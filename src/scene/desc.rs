@@ -88,7 +88,7 @@ impl Growth {
     /// Draws one plant's stage; `place` is the one that the field has drawn for every list.
     ///
     /// # Panics
-    /// Where a list is not that long, which [`super::build`] refuses before anything grows.
+    /// Where a list is not that long, which [`super::assemble`] refuses before anything grows.
     pub fn draw(&self, place: usize, stream: &mut Stream) -> Stage {
         match self {
             Self::AgeDays(days) => Stage::Age(days.draw32(stream)),

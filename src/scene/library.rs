@@ -1,6 +1,6 @@
 //! Everything that pages name, read once: species, pictures, soil layers.
 
-use super::build::Growing;
+use super::assemble::Growing;
 use super::desc::SpeciesDesc;
 use crate::geometry::{AlphaMask, Margin};
 use crate::light::{Infrared, Table};

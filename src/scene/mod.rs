@@ -1,6 +1,6 @@
 //! What is out there: parts, materials, lights, a camera.
 
-pub mod build;
+pub mod assemble;
 pub mod desc;
 mod library;
 pub mod record;
@@ -17,7 +17,7 @@ use crate::sensor::Camera;
 use std::sync::Arc;
 use tag::{Class, Tag};
 
-pub use build::Field;
+pub use assemble::Field;
 
 /// One organ of one plant, one stone, the ground: a mesh with a material and a name.
 #[derive(Clone, Debug)]

@@ -1,6 +1,6 @@
 //! What a field knows of itself beside its meshes: who may grow in it, and under what conditions.
 
-use super::build::{Lighting, Season};
+use super::assemble::{Lighting, Season};
 use super::tag::{Class, lowercase};
 use crate::light::LightRecord;
 use crate::scatter::{RowsRecord, WeedsRecord};

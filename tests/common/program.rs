@@ -7,7 +7,7 @@ use furrow::integrator::{Path as PathTracer, World};
 use furrow::render::{self, LabelMap, Settings, Watch};
 use furrow::sampling::Points;
 use furrow::scene::Field;
-use furrow::scene::build::{self, Options};
+use furrow::scene::assemble::{self, Options};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::atomic::AtomicBool;
@@ -60,7 +60,7 @@ pub fn scratch() -> (tempfile::TempDir, PathBuf) {
 
 /// A field from a page's text, without the program.
 pub fn field(text: &str, options: &Options) -> Field {
-    build::field_of(text, options).unwrap_or_else(|e| panic!("{e}"))
+    assemble::field_of(text, options).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// Film and labels of a whole field at this many threads.

@@ -2,7 +2,7 @@
 
 use furrow::ablation::Edit;
 use furrow::scene::Field;
-use furrow::scene::build::Options;
+use furrow::scene::assemble::Options;
 use furrow::{Result, cli};
 use std::path::{Path, PathBuf};
 

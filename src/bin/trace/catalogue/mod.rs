@@ -19,7 +19,7 @@ use furrow::page::Page;
 use furrow::render::{self, Settings, Watch};
 use furrow::sampling::Points;
 use furrow::scene::desc::SpeciesDesc;
-use furrow::scene::{Field, PlantRecord, build};
+use furrow::scene::{Field, PlantRecord, assemble};
 use furrow::{Error, Result};
 use page::Entry;
 use sheet::{Column, View};
@@ -154,7 +154,7 @@ impl Args {
             )",
             text(page)
         );
-        build::field_of(&scene, &build::Options { seed: Some(self.seed), ..Default::default() })
+        assemble::field_of(&scene, &assemble::Options { seed: Some(self.seed), ..Default::default() })
     }
 
     /// One picture, and how many of its pixels are a millimetre at the plant's foot.

@@ -76,7 +76,7 @@ mod tests {
     use crate::math::Spectrum;
     use crate::sampling::{Purpose, Stream};
     use crate::scene::Field;
-    use crate::scene::build::{self, Options};
+    use crate::scene::assemble::{self, Options};
 
     const LAMPS: &str = "Constant(radiance: (Uniform(1, 2), 1, 1, 1)), Constant(radiance: (Uniform(3, 4), 1, 1, 1))";
     const DAY: &str = "Overcast(illuminance_klx: Uniform(5, 25))";
@@ -88,7 +88,7 @@ mod tests {
     }
 
     fn field(lights: &str, index: u64) -> Result<Field> {
-        build::field_of(&text(lights), &Options { index, ..Options::default() })
+        assemble::field_of(&text(lights), &Options { index, ..Options::default() })
     }
 
     /// Expected: each list as often as the others, two places of a page independent of each other, the record as drawn. Source: the
@@ -168,7 +168,7 @@ mod tests {
         let pictures = r#"OneOf([[Environment(file: "day.hdr")], [Environment(file: "dusk.hdr")]])"#;
         std::fs::write(&page, text(pictures)).unwrap();
         let fields: Vec<Field> =
-            (0..8).map(|index| build::field(&page, &Options { index, ..Options::default() }).unwrap()).collect();
+            (0..8).map(|index| assemble::field(&page, &Options { index, ..Options::default() }).unwrap()).collect();
         for field in &fields {
             assert_eq!(field.hash, fields[0].hash);
             assert_eq!(field.files.len(), 3, "{:?}", field.files);
@@ -176,7 +176,7 @@ mod tests {
         assert!(fields.iter().any(|f| f.conditions.lights != fields[0].conditions.lights));
         std::fs::write(&page, text(&pictures.replace("dusk", "night"))).unwrap();
         for index in 0..4 {
-            let message = build::field(&page, &Options { index, ..Options::default() }).err().unwrap().to_string();
+            let message = assemble::field(&page, &Options { index, ..Options::default() }).err().unwrap().to_string();
             assert!(message.contains("there is no file `night.hdr`"), "{message}");
         }
     }
