@@ -6,16 +6,17 @@
 //!
 //! | floor | rooms |
 //! |---|---|
-//! | 12 | [`train`] |
-//! | 11 | [`dataset`], [`compare`] |
-//! | 10 | [`ablation`], [`output`], [`raster`] |
-//! | 9 | [`render`] |
-//! | 8 | [`integrator`] |
-//! | 7 | [`scene`] |
-//! | 6 | [`material`], [`scatter`] |
-//! | 5 | [`bsdf`], [`light`], [`sensor`], [`plant`], [`soil`], [`accel`], [`model`] |
-//! | 4 | [`texture`] |
-//! | 3 | [`optics`], [`film`], [`page`], [`html`], [`cli`] |
+//! | 13 | [`train`] |
+//! | 12 | [`dataset`], [`compare`] |
+//! | 11 | [`ablation`], [`output`], [`raster`] |
+//! | 10 | [`render`] |
+//! | 9 | [`integrator`] |
+//! | 8 | [`scene`] |
+//! | 7 | [`material`], [`scatter`] |
+//! | 6 | [`bsdf`], [`light`], [`sensor`], [`plant`], [`soil`], [`accel`], [`model`] |
+//! | 5 | [`texture`] |
+//! | 4 | [`optics`], [`film`], [`html`], [`cli`] |
+//! | 3 | [`ron_file`] |
 //! | 2 | [`sampling`], [`geometry`] |
 //! | 1 | [`math`], [`error`] |
 //!
@@ -40,11 +41,11 @@ pub mod math;
 pub mod model;
 pub mod optics;
 pub mod output;
-pub mod page;
 pub mod plant;
 #[cfg(feature = "raster")]
 pub mod raster;
 pub mod render;
+pub mod ron_file;
 pub mod sampling;
 pub mod scatter;
 pub mod scene;

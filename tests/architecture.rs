@@ -76,8 +76,8 @@ const DOORS: &[(&str, &str)] = &[
     // Parallel at the top only.
     // Images, plants, and the soil's skin: loops over what is many.
     ("rayon", "render/ dataset/ compare/ scene/assemble/mod.rs soil/skin.rs material/ground.rs raster/sheets.rs"),
-    // One reader for all pages; faults inside a value are found where they lie.
-    ("ron", "page.rs sampling/fault.rs"),
+    // One reader for all RON files; faults inside a value are found where they lie.
+    ("ron", "ron_file/"),
     ("serde", "*"),
     // glTF documents, read and written; records and formats of datasets.
     (
@@ -92,6 +92,8 @@ const DOORS: &[(&str, &str)] = &[
     ("smallvec", "film/tally.rs output/exr/cryptomatte.rs"),
     ("sobol_burley", "sampling/sampler.rs"),
     ("solar_positioning", "light/position.rs"),
+    // How far a misspelt name is from those that are known.
+    ("strsim", "ron_file/suggest.rs"),
     // libtorch: networks and how they learn.
     ("tch", "train/engine/ train/fit/objective.rs train/fit/optimiser.rs train/fit/teach.rs train/deploy/"),
     // Files appear whole or not at all: images of fields, and drawn textures below them. The denoiser's go through a folder.

@@ -2,7 +2,7 @@
 //!
 //! Rationale: a README is the first program that a newcomer runs. Expected: nothing in it is stale. Source: the README.
 
-use furrow::page::Page;
+use furrow::ron_file::RonFile;
 use furrow::scene::desc::FieldDesc;
 use std::path::Path;
 
@@ -26,7 +26,7 @@ fn the_page_in_the_readme_is_a_page() {
     let pages = blocks(&read("README.md"), "ron");
     assert!(!pages.is_empty());
     for page in pages {
-        let page = Page { path: "scenes/readme.ron".into(), text: page };
+        let page = RonFile { path: "scenes/readme.ron".into(), text: page };
         let desc: FieldDesc = page.parse().unwrap_or_else(|e| panic!("{e}"));
         let species = desc.crops.iter().map(|c| &c.species).chain(desc.weeds.iter().map(|w| &w.species));
         for file in species {

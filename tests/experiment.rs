@@ -9,7 +9,7 @@ mod common;
 
 use common::dataset::{make, same, succeed, tree};
 use furrow::dataset::generate::Shard;
-use furrow::page::Page;
+use furrow::ron_file::RonFile;
 use furrow::train::baseline::files;
 use furrow::train::classes::Classes;
 use furrow::train::data::{Normalisation, Pick, Selection, Shape, Store};
@@ -54,9 +54,9 @@ const PAGE: &str = r#"Experiment(
     scales: {"less": (learn: (steps: 5), seeds: [7])},
 )"#;
 
-fn page(text: &str) -> Page {
+fn page(text: &str) -> RonFile {
     // Paths count from the page's folder: the repository's, where tests run.
-    Page { path: "experiment.ron".into(), text: text.into() }
+    RonFile { path: "experiment.ron".into(), text: text.into() }
 }
 
 /// Who plays the networks: a run with an odd seed answers soil everywhere, one with an even seed the truth.
@@ -144,7 +144,7 @@ impl Players {
         self.run_page(&page(text), out, shard, only)
     }
 
-    fn run_page(&self, page: &Page, out: &Path, shard: Shard, only: Option<Only>) -> Result<Vec<PathBuf>> {
+    fn run_page(&self, page: &RonFile, out: &Path, shard: Shard, only: Option<Only>) -> Result<Vec<PathBuf>> {
         let experiment = Experiment::of(page, None)?;
         let real = [Real { name: "frames".into(), folder: frames().into() }];
         let bound = Bound::new(experiment, &real, &[], out)?;
@@ -530,8 +530,8 @@ fn variants() -> &'static Path {
 }
 
 /// The page that was written beside them, small.
-fn written() -> Page {
-    let mut page = Page::read(&variants().join("ablation.ron")).unwrap();
+fn written() -> RonFile {
+    let mut page = RonFile::read(&variants().join("ablation.ron")).unwrap();
     page.text = page.text.replace("\"unet\"", "\"basic-segnet\"").replace("[1, 2, 3]", "[1, 2]");
     page
 }
@@ -545,7 +545,7 @@ fn what_ablate_writes_is_an_experiment_on_its_datasets() {
     assert_eq!(experiment.against.as_deref(), Some("full"));
     assert_eq!(experiment.test.iter().map(|t| t.name.as_str()).collect::<Vec<_>>(), ["Rendered", "real"]);
     let fault = |from: &str, to: &str| {
-        let page = Page { path: page.path.clone(), text: page.text.replace(from, to) };
+        let page = RonFile { path: page.path.clone(), text: page.text.replace(from, to) };
         Experiment::of(&page, None).unwrap_err().to_string()
     };
     let said = fault("path: \"no-sky\"", "path: \"no-skye\"");
@@ -558,7 +558,7 @@ fn what_ablate_writes_is_an_experiment_on_its_datasets() {
 fn changes_are_told_seed_by_seed_with_their_spread() {
     let (_keep, out) = common::program::scratch();
     let page = written();
-    let page = Page { path: page.path.clone(), text: page.text.replace("\"real\"", "\"frames\"") };
+    let page = RonFile { path: page.path.clone(), text: page.text.replace("\"real\"", "\"frames\"") };
     Players::default().run_page(&page, &out, Shard::ALL, None).unwrap();
     let table = |column: &str| number(&out, "against", &["basic-segnet", "no-sky"], column);
     assert_eq!((table("Rendered vegetation"), table("Rendered vegetation ±"), table("seeds")), (0.0, 0.0, 2.0));

@@ -5,8 +5,8 @@
 //! error shows file, line, column, the characters at fault and a way out. Source: none; the words are ours. After a change of
 //! words: `FURROW_BLESS=1 cargo test --test scene_files` writes them anew; read the difference before committing it.
 
-use furrow::page::Page;
 use furrow::plant::{Stage, grow};
+use furrow::ron_file::RonFile;
 use furrow::sampling::{Purpose, Stream};
 use furrow::scene::assemble::{self, Options};
 use furrow::scene::desc::{FieldDesc, SpeciesDesc};
@@ -74,7 +74,7 @@ fn every_field_page_builds() {
 fn every_species_page_grows_at_every_stage() {
     assert!(species().len() >= 16, "species pages are missing");
     for path in species() {
-        let desc: SpeciesDesc = Page::read(&path).unwrap().parse().unwrap_or_else(|e| panic!("{e}"));
+        let desc: SpeciesDesc = RonFile::read(&path).unwrap().parse().unwrap_or_else(|e| panic!("{e}"));
         for stage in &desc.plant.stages {
             let plant = grow(&desc.plant, Stage::Bbch(stage.bbch), &Stream::of(1, 0, Purpose::Test, 0));
             assert!(!plant.organs.is_empty(), "{} BBCH {}", path.display(), stage.bbch);
@@ -93,7 +93,7 @@ fn every_species_page_grows_at_every_stage() {
 fn every_experiment_page_reads_at_each_of_its_scales() {
     assert!(!experiments().is_empty(), "experiment pages are missing");
     for path in experiments() {
-        let page = Page::read(&path).unwrap();
+        let page = RonFile::read(&path).unwrap();
         let desc: ExperimentDesc = page.parse().unwrap_or_else(|e| panic!("{e}"));
         for scale in [None].into_iter().chain(desc.scales.names().into_iter().map(Some)) {
             Experiment::of(&page, scale).unwrap_or_else(|e| panic!("{e}"));
@@ -102,11 +102,12 @@ fn every_experiment_page_reads_at_each_of_its_scales() {
 }
 
 fn survives_printing<T: Debug + PartialEq + Serialize + DeserializeOwned>(path: &Path) {
-    let first: T = Page::read(path).unwrap().parse().unwrap_or_else(|e| panic!("{e}"));
-    let printed = Page::print(&first).unwrap();
-    let second: T = Page::of(&printed).parse().unwrap_or_else(|e| panic!("{} printed: {e}\n{printed}", path.display()));
+    let first: T = RonFile::read(path).unwrap().parse().unwrap_or_else(|e| panic!("{e}"));
+    let printed = RonFile::print(&first).unwrap();
+    let second: T =
+        RonFile::of(&printed).parse().unwrap_or_else(|e| panic!("{} printed: {e}\n{printed}", path.display()));
     assert_eq!(first, second, "{}", path.display());
-    assert_eq!(printed, Page::print(&second).unwrap(), "{}", path.display());
+    assert_eq!(printed, RonFile::print(&second).unwrap(), "{}", path.display());
 }
 
 #[test]
@@ -128,7 +129,10 @@ fn a_printed_page_reads_the_same() {
 #[test]
 fn the_papers_four_sets_differ_in_their_weeds_and_seeds_alone() {
     let read = |set: char| -> FieldDesc {
-        Page::read(Path::new(&format!("scenes/synthetic-{set}.ron"))).unwrap().parse().unwrap_or_else(|e| panic!("{e}"))
+        RonFile::read(Path::new(&format!("scenes/synthetic-{set}.ron")))
+            .unwrap()
+            .parse()
+            .unwrap_or_else(|e| panic!("{e}"))
     };
     let all = ['a', 'b', 'c', 'd'].map(read);
     for (i, page) in all.iter().enumerate() {
@@ -252,7 +256,7 @@ fn tidy<T>(read: Result<T>) -> Result<(), TestCaseError> {
 }
 
 fn read_as_any(text: &str) -> Result<(), TestCaseError> {
-    let page = Page::of(text);
+    let page = RonFile::of(text);
     tidy(page.parse::<FieldDesc>())?;
     tidy(page.parse::<SpeciesDesc>())?;
     tidy(page.parse::<Recipe>())
@@ -294,6 +298,6 @@ proptest! {
     ) {
         let page = std::fs::read_to_string("scenes/field.ron").unwrap();
         let text = edits.iter().fold(page, |text, edit| edited(&text, edit));
-        tidy(Page::of(&text).parse::<FieldDesc>())?;
+        tidy(RonFile::of(&text).parse::<FieldDesc>())?;
     }
 }

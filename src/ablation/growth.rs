@@ -1,7 +1,7 @@
 //! Edits of what grows: the ground's shape, the blades', and whether plants differ.
 
 use crate::plant::PlantDesc;
-use crate::sampling::vary::Num;
+use crate::ron_file::Num;
 use crate::scene::desc::{FieldDesc, SpeciesDesc};
 
 /// Cells of a blade of few triangles, along and across: 16 triangles.

@@ -23,7 +23,7 @@ use crate::film::{Film, Footprint};
 use crate::light::Light;
 use crate::material::Feature;
 use crate::render::LabelMap;
-use crate::sampling::fault::choose;
+use crate::ron_file::choose;
 use crate::scene::Field;
 use crate::scene::assemble::{Growing, Options, Source};
 use crate::scene::tag::Tag;

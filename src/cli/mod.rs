@@ -3,7 +3,7 @@
 pub mod signal;
 
 use crate::geometry::Window;
-use crate::sampling::fault::nearest;
+use crate::ron_file::nearest;
 use crate::{Error, Result};
 use std::path::Path;
 use std::process::ExitCode;

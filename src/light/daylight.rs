@@ -11,8 +11,8 @@ use super::position::{SunPosition, Utc, sun_position};
 use super::sky::{Dome, Sky};
 use super::sun::Sun;
 use crate::math::{Spectrum, Vec3, direction};
+use crate::ron_file::{Bound, Finite, Pick, Positive, Vary};
 use crate::sampling::rng::Stream;
-use crate::sampling::vary::{Bound, Finite, Pick, Positive, Vary};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 

@@ -9,8 +9,8 @@
 
 use super::sample::{Emitter, LampHit, LightSample};
 use crate::math::{Frame, Spectrum, Vec2, Vec3, vec3};
+use crate::ron_file::{Finite, NonNegative, Positive, Vary};
 use crate::sampling::rng::Stream;
-use crate::sampling::vary::{Finite, NonNegative, Positive, Vary};
 use crate::sampling::warp;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};

@@ -26,8 +26,8 @@ pub use sky::{Dome, Sky};
 pub use sun::{HALF_ANGLE_DEG, Sun};
 
 use crate::math::{Frame, Spectrum, Vec2, Vec3, vec3};
+use crate::ron_file::{Finite, Fraction, NonNegative, Positive, Vary};
 use crate::sampling::rng::Stream;
-use crate::sampling::vary::{Finite, Fraction, NonNegative, Positive, Vary};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::Path;

@@ -10,9 +10,9 @@
 
 use super::sample::{Emitter, LampHit, LightSample};
 use crate::math::{Spectrum, Vec3, vec3};
+use crate::ron_file::{Finite, NonNegative, Positive, Vary};
 use crate::sampling::distribution::Distribution2D;
 use crate::sampling::rng::Stream;
-use crate::sampling::vary::{Finite, NonNegative, Positive, Vary};
 use crate::texture::panorama::Panorama;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};

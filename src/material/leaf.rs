@@ -8,7 +8,7 @@ use crate::bsdf::{self, Bsdf, Side, Veil};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec2, Vec3};
 use crate::optics::{Leaf, LeafOptics, Pigments};
-use crate::sampling::vary::{Bound, Fraction, NonNegative, Num, Pick};
+use crate::ron_file::{Bound, Fraction, NonNegative, Num, Pick};
 use crate::texture::{Maps, Texture};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -26,10 +26,10 @@ impl Bound for Index {
 /// A leaf as a species page writes it.
 ///
 /// ```
-/// use furrow::{material::LeafDesc, page::Page};
-/// let page = Page::of(r#"Leaf(texture: "leaf.png", roughness: 0.3, pigments: (chlorophyll: 38))"#);
+/// use furrow::{material::LeafDesc, ron_file::RonFile};
+/// let page = RonFile::of(r#"Leaf(texture: "leaf.png", roughness: 0.3, pigments: (chlorophyll: 38))"#);
 /// let leaf: LeafDesc = page.parse().unwrap();
-/// assert!(Page::of("Leaf(roughnes: 0.3)").parse::<LeafDesc>().is_err());
+/// assert!(RonFile::of("Leaf(roughnes: 0.3)").parse::<LeafDesc>().is_err());
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default, rename = "Leaf")]

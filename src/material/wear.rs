@@ -15,7 +15,7 @@
 use crate::math::{Spectrum, Vec2, Vec3, Vec4, smoothstep};
 use crate::optics::{Leaf, LeafBands, LeafOptics, Pigments};
 use crate::plant::condition::Marks;
-use crate::sampling::vary::Num;
+use crate::ron_file::Num;
 use crate::texture::Texture;
 use crate::texture::noise::Perlin;
 use std::sync::Arc;

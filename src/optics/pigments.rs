@@ -3,7 +3,7 @@
 use super::bands;
 use super::prospect::{self, Inputs};
 use crate::math::Spectrum;
-use crate::sampling::vary::{Bound, NonNegative, Num};
+use crate::ron_file::{Bound, NonNegative, Num};
 use serde::{Deserialize, Serialize};
 
 /// The structure parameter N of the leaf model: 1 and above; above 4 no leaf was ever measured.

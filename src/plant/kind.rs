@@ -2,7 +2,7 @@
 
 use super::organ::OrganKind;
 use crate::geometry::outline::Outline;
-use crate::sampling::vary::{Finite, Fraction, NonNegative, Num, Positive, PositiveCount, Vary};
+use crate::ron_file::{Finite, Fraction, NonNegative, Num, Positive, PositiveCount, Vary};
 use serde::{Deserialize, Serialize};
 
 /// How a blade is made.
@@ -138,16 +138,16 @@ fn stalk() -> String {
     "stalk".into()
 }
 
-fn num<B: crate::sampling::vary::Bound, const N: i32>() -> Num<B> {
+fn num<B: crate::ron_file::Bound, const N: i32>() -> Num<B> {
     Num::new(f64::from(N))
 }
 
-fn vary<B: crate::sampling::vary::Bound, const N: i32>() -> Vary<B> {
+fn vary<B: crate::ron_file::Bound, const N: i32>() -> Vary<B> {
     Vary::fixed(f64::from(N))
 }
 
-fn normal<B: crate::sampling::vary::Bound>(sd: f64) -> Vary<B> {
-    use crate::sampling::vary::Distribution;
+fn normal<B: crate::ron_file::Bound>(sd: f64) -> Vary<B> {
+    use crate::ron_file::Distribution;
     Vary::Drawn(Distribution::Normal { mean: 0.0, sd, min: -3.0 * sd, max: 3.0 * sd })
 }
 

@@ -43,8 +43,8 @@ pub use kind::{LeafKind, Shape};
 pub use organ::{LeafAxis, Organ, OrganKind};
 pub use stage::{BUD, LayerDesc, StageDesc};
 
+use crate::ron_file::{self, Finite, Positive, Step, Vary};
 use crate::sampling::Stream;
-use crate::sampling::vary::{self, Finite, Positive, Step, Vary};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 
@@ -162,8 +162,8 @@ fn lean() -> Vary<Finite> {
 
 impl<'de> Deserialize<'de> for PlantDesc {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        vary::from_raw(deserializer, |raw| {
-            let w: Written = vary::parse_in(raw)?;
+        ron_file::from_raw(deserializer, |raw| {
+            let w: Written = ron_file::parse_in(raw)?;
             let desc = Self {
                 form: w.form,
                 kinds: w.kinds,
@@ -175,7 +175,7 @@ impl<'de> Deserialize<'de> for PlantDesc {
                 hypocotyl_skin: w.hypocotyl_skin,
                 stem_skin: w.stem_skin,
             };
-            desc.check_at().map_err(|(at, message, help)| vary::inside(raw, &at, message, help))?;
+            desc.check_at().map_err(|(at, message, help)| ron_file::inside(raw, &at, message, help))?;
             Ok(desc)
         })
     }
@@ -206,7 +206,7 @@ impl PlantDesc {
                 let kind = &stage.layers[k].kind;
                 let known: Vec<&str> = self.kinds.keys().map(String::as_str).collect();
                 let message = format!("no kind of leaf is called \"{kind}\"");
-                return Err((at, message, vary::choose("kinds", &known, kind)));
+                return Err((at, message, ron_file::choose("kinds", &known, kind)));
             }
         }
         for (i, pair) in self.stages.windows(2).enumerate() {

@@ -12,7 +12,7 @@
 use super::kind::LeafKind;
 use super::{PlantDesc, Stage};
 use crate::math::lerp;
-use crate::sampling::vary::{Bound, Finite, NonNegative, Num, PositiveCount, Vary};
+use crate::ron_file::{Bound, Finite, NonNegative, Num, PositiveCount, Vary};
 use crate::sampling::{Purpose, Stream};
 use serde::{Deserialize, Serialize};
 use std::f32::consts::PI;

@@ -2,7 +2,7 @@
 
 use super::{Area, Disc, Spot, outside, within};
 use crate::math::{Vec2, vec2};
-use crate::sampling::vary::{Finite, Fraction, NonNegative, Positive, Vary};
+use crate::ron_file::{Finite, Fraction, NonNegative, Positive, Vary};
 use crate::sampling::{Purpose, Stream};
 use serde::{Deserialize, Serialize};
 

@@ -8,7 +8,7 @@ use super::field::Field;
 use super::record::WeedsRecord;
 use super::{Area, Disc, Spot, outside, within};
 use crate::math::{Vec2, vec2};
-use crate::sampling::vary::{Fraction, NonNegative, Positive, Vary};
+use crate::ron_file::{Fraction, NonNegative, Positive, Vary};
 use crate::sampling::{Purpose, Stream};
 use serde::{Deserialize, Serialize};
 

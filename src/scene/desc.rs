@@ -5,8 +5,8 @@ use crate::light::LightDesc;
 use crate::material::LeafDesc;
 use crate::model::Up;
 use crate::plant::{ConditionDesc, PlantDesc, Stage};
+use crate::ron_file::{Finite, Fraction, NonNegative, Num, Pick, Positive, PositiveCount, Vary};
 use crate::sampling::Stream;
-use crate::sampling::vary::{Finite, Fraction, NonNegative, Num, Pick, Positive, PositiveCount, Vary};
 use crate::scatter::{RowsDesc, WeedsDesc};
 use crate::scene::tag::Class;
 use crate::sensor::{CameraDesc, SensorDesc};
@@ -163,10 +163,10 @@ pub struct PlacedDesc {
 /// A model from disk in its place: a scanned plant, a stone, a tool. Each is one plant, or one thing, in the labels.
 ///
 /// ```
-/// use furrow::{page::Page, scene::desc::ModelDesc};
-/// let page = Page::of(r#"Model(file: "thistle.glb", class: Weed, position_m: (0.1, Uniform(-0.1, 0.1)), scale: 0.01)"#);
+/// use furrow::{ron_file::RonFile, scene::desc::ModelDesc};
+/// let page = RonFile::of(r#"Model(file: "thistle.glb", class: Weed, position_m: (0.1, Uniform(-0.1, 0.1)), scale: 0.01)"#);
 /// let model: ModelDesc = page.parse().unwrap();
-/// assert!(Page::of(r#"Model(file: "thistle.glb", clas: Weed)"#).parse::<ModelDesc>().is_err());
+/// assert!(RonFile::of(r#"Model(file: "thistle.glb", clas: Weed)"#).parse::<ModelDesc>().is_err());
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename = "Model")]

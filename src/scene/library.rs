@@ -8,9 +8,7 @@ use crate::material::{LeafMaterial, Picture, Tones};
 use crate::math::{Spectrum, Vec2};
 use crate::model::{Model, Up};
 use crate::optics::{Pigments, soil};
-use crate::page::Page;
-use crate::sampling::fault::choose;
-use crate::sampling::place::Step;
+use crate::ron_file::{RonFile, Step, choose};
 use crate::soil::{LayerDesc, LayerMaps};
 use crate::texture::{ColorSpace, Height, Maps, Relief, Texture, Wrap};
 use crate::{Error, Result};
@@ -69,8 +67,8 @@ pub(super) struct Library {
 
 impl Library {
     /// The page itself.
-    pub(super) fn page(&mut self, path: &Path) -> Result<Page> {
-        let page = Page::read(path)?;
+    pub(super) fn page(&mut self, path: &Path) -> Result<RonFile> {
+        let page = RonFile::read(path)?;
         self.files.insert(path.into(), Sha256::digest(page.text.as_bytes()).into());
         Ok(page)
     }
@@ -94,7 +92,7 @@ impl Library {
     }
 
     /// The species page that `page` names.
-    pub(super) fn species(&mut self, page: &Page, path: &str) -> Result<Arc<Species>> {
+    pub(super) fn species(&mut self, page: &RonFile, path: &str) -> Result<Arc<Species>> {
         let full = page.need_file(path)?;
         if let Some(known) = self.species.get(&full) {
             return Ok(known.clone());
@@ -144,7 +142,7 @@ impl Library {
         Ok(species)
     }
 
-    fn picture(&mut self, page: &Page, path: &str, relief_range: f32) -> Result<Cut> {
+    fn picture(&mut self, page: &RonFile, path: &str, relief_range: f32) -> Result<Cut> {
         let full = page.need_file(path)?;
         if let Some(known) = self.pictures.get(&full) {
             return Ok(known.clone());
@@ -167,7 +165,7 @@ impl Library {
     }
 
     /// The model that `page` names, with the files that it needs.
-    pub(super) fn model(&mut self, page: &Page, path: &str, up: Up) -> Result<Arc<Model>> {
+    pub(super) fn model(&mut self, page: &RonFile, path: &str, up: Up) -> Result<Arc<Model>> {
         let full = page.need_file(path)?;
         let key = (full.clone(), up == Up::Z);
         if let Some(known) = self.models.get(&key) {
@@ -182,13 +180,13 @@ impl Library {
     }
 
     /// The file of a light of all directions that `page` names, whether or not a field draws it.
-    pub(super) fn surround_file(&mut self, page: &Page, path: &str) -> Result<()> {
+    pub(super) fn surround_file(&mut self, page: &RonFile, path: &str) -> Result<()> {
         let full = page.need_file(path)?;
         if self.files.contains_key(&full) { Ok(()) } else { self.note(&full) }
     }
 
     /// The light of all directions that `page` names.
-    pub(super) fn surround(&mut self, page: &Page, path: &str, infrared: Infrared) -> Result<Arc<Table>> {
+    pub(super) fn surround(&mut self, page: &RonFile, path: &str, infrared: Infrared) -> Result<Arc<Table>> {
         let full = page.need_file(path)?;
         let key = (full.clone(), infrared);
         if let Some(known) = self.surrounds.get(&key) {
@@ -208,7 +206,7 @@ impl Library {
     }
 
     /// A soil layer's textures.
-    pub(super) fn layer(&mut self, page: &Page, desc: &LayerDesc) -> Result<Arc<Layer>> {
+    pub(super) fn layer(&mut self, page: &RonFile, desc: &LayerDesc) -> Result<Arc<Layer>> {
         let key = (desc.albedo.clone(), desc.height.clone());
         if let Some(known) = self.layers.get(&key) {
             return Ok(known.clone());
@@ -249,7 +247,7 @@ fn read_off(albedo: &Texture) -> Height {
 }
 
 /// A file that cannot be read as an image or a model is the page's fault: shown where the page names it.
-fn at_its_place(page: &Page, literal: &str, error: Error) -> Error {
+fn at_its_place(page: &RonFile, literal: &str, error: Error) -> Error {
     match error {
         Error::Image { path, what } => {
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();

@@ -3,7 +3,7 @@
 //! Of the numbers' range the black level takes a share; white, 90 % of the full well, lies at 87 % of it: the JAI AD-130 puts them at
 //! 33 and 890 of 1023, or at 8 and 222 of 255 (manual of its sister AD-131GE).
 
-use crate::sampling::vary::{Bound, Num};
+use crate::ron_file::{Bound, Num};
 use serde::{Deserialize, Serialize};
 
 /// Bits of a number.

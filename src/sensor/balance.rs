@@ -2,8 +2,8 @@
 
 use super::response::RESPONSE;
 use crate::math::Spectrum;
+use crate::ron_file::{Fraction, Positive, Vary};
 use crate::sampling::rng::Stream;
-use crate::sampling::vary::{Fraction, Positive, Vary};
 use serde::{Deserialize, Serialize};
 
 /// ASTM G173 global irradiance: what "daylight" balances for.

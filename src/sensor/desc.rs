@@ -6,8 +6,8 @@ use super::motion::MotionDesc;
 use super::pose::{PoseDesc, nadir, origin, zero};
 use super::{Aperture, Camera};
 use crate::Result;
+use crate::ron_file::{Finite, Num, Positive, PositiveCount, Vary};
 use crate::sampling::rng::Stream;
-use crate::sampling::vary::{Finite, Num, Positive, PositiveCount, Vary};
 use serde::{Deserialize, Serialize};
 
 /// Writes [`CameraDesc`]. Cameras with a name all look down and are written alike, each with defaults, pixels and a shutter of its own; a
@@ -263,7 +263,7 @@ impl Named<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::page::Page;
+    use crate::ron_file::RonFile;
 
     /// Expected: a camera by its name has its own pixels, lens and height, and what is wrong in it is told by that name.
     #[test]
@@ -274,11 +274,11 @@ mod tests {
             ("Phone", (4032, 3024), 4.25, 1.4, 0.6),
             ("MachineVision", (2448, 2048), 12.0, 3.45, 0.85),
         ] {
-            let desc: CameraDesc = Page::of(&format!("{name}()")).parse().unwrap();
+            let desc: CameraDesc = RonFile::of(&format!("{name}()")).parse().unwrap();
             let camera = desc.build(&mut stream).unwrap();
             assert_eq!((camera.width(), camera.height(), camera.pose().height()), (size.0, size.1, height_m));
             assert!((camera.focal[0] - focal_mm * 1e3 / pixel_um).abs() < 1e-9);
-            let wrong = Page::of(&format!("{name}(hight_m: 1)")).parse::<CameraDesc>().unwrap_err().to_string();
+            let wrong = RonFile::of(&format!("{name}(hight_m: 1)")).parse::<CameraDesc>().unwrap_err().to_string();
             assert!(
                 wrong.contains(&format!("unknown field `hight_m` in {name}")) && wrong.contains("height_m"),
                 "{wrong}"

@@ -1,7 +1,7 @@
 //! How much light: metering the picture or the light that falls on it.
 
+use crate::ron_file::{Bound, Positive, Vary};
 use crate::sampling::rng::Stream;
-use crate::sampling::vary::{Bound, Positive, Vary};
 use serde::{Deserialize, Serialize};
 
 /// Between 0 and 100.

@@ -1,8 +1,8 @@
 //! Focal length, centre and aperture of a camera, as a page writes them.
 
 use super::Aperture;
+use crate::ron_file::{Finite, Positive, Vary};
 use crate::sampling::rng::Stream;
-use crate::sampling::vary::{Finite, Positive, Vary};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 

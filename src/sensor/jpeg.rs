@@ -4,8 +4,8 @@
 //! pictures' files stay PNG. Source: ITU-T T.81 (1992), annexes A and K; tables are scaled by quality as the Independent JPEG Group does,
 //! colours are those of JFIF 1.02. Blocks begin at the window's first pixel.
 
+use crate::ron_file::{Bound, Vary};
 use crate::sampling::rng::Stream;
-use crate::sampling::vary::{Bound, Vary};
 use serde::{Deserialize, Serialize};
 use std::f32::consts::{FRAC_1_SQRT_2, PI};
 

@@ -5,8 +5,8 @@
 //! y′ = y (1 + k1 r² + k2 r⁴ + k3 r⁶) + p1 (r² + 2y²) + 2 p2 x y.
 //! Source: Brown 1971, "Close-range camera calibration"; OpenCV, module calib3d.
 
+use crate::ron_file::{Finite, Vary};
 use crate::sampling::rng::Stream;
-use crate::sampling::vary::{Finite, Vary};
 use serde::{Deserialize, Serialize};
 
 /// The five coefficients; all zero is a pinhole.

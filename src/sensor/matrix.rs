@@ -2,8 +2,8 @@
 //!
 //! It stands behind the white balance and before the tone curve, so white is (1, 1, 1) and stays so where every row adds up to 1.
 
+use crate::ron_file::{Finite, NonNegative, Vary};
 use crate::sampling::rng::Stream;
-use crate::sampling::vary::{Finite, NonNegative, Vary};
 use serde::{Deserialize, Serialize};
 
 /// A colour matrix, as it is written.

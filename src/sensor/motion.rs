@@ -7,8 +7,8 @@
 
 use super::Camera;
 use crate::math::{Vec3, vec3};
+use crate::ron_file::{Finite, NonNegative, Vary};
 use crate::sampling::rng::{Purpose, Stream};
-use crate::sampling::vary::{Finite, NonNegative, Vary};
 use serde::{Deserialize, Serialize};
 
 /// Motion and shutter of a camera, as they are written; at rest by default.

@@ -7,8 +7,8 @@
 use super::given::{Given, layered};
 use super::tone::CLIP;
 use crate::math::Spectrum;
+use crate::ron_file::{Count, Fraction, NonNegative, Num, Positive};
 use crate::sampling::rng::{Purpose, Stream};
-use crate::sampling::vary::{Count, Fraction, NonNegative, Num, Positive};
 use serde::Serialize;
 use std::f32::consts::TAU;
 

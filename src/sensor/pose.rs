@@ -6,8 +6,8 @@
 //! roll towards the image's right; yaw is applied to the camera already pitched, pitch to the camera already rolled.
 
 use crate::math::{Mat3, Vec3, vec3};
+use crate::ron_file::{Finite, Positive, Vary};
 use crate::sampling::rng::Stream;
-use crate::sampling::vary::{Finite, Positive, Vary};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 

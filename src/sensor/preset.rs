@@ -10,7 +10,7 @@ use super::psf::PsfDesc;
 use super::settings::SensorDesc;
 use super::sharpen::SharpenDesc;
 use super::tone::Tone;
-use crate::sampling::vary::{Num, Vary};
+use crate::ron_file::{Num, Vary};
 
 /// What [`sensor`] knows.
 pub(super) const NAMES: [&str; 3] = ["JaiAd130", "Phone", "MachineVision"];

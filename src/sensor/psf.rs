@@ -5,8 +5,8 @@
 
 use super::given::{Given, layered};
 use crate::math::Spectrum;
+use crate::ron_file::{Finite, NonNegative, Vary};
 use crate::sampling::rng::Stream;
-use crate::sampling::vary::{Finite, NonNegative, Vary};
 use serde::Serialize;
 
 layered! {

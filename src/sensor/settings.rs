@@ -13,8 +13,8 @@ use super::psf::{PsfDesc, PsfWritten};
 use super::response::Sensor;
 use super::sharpen::{SharpenDesc, SharpenWritten};
 use super::tone::Tone;
+use crate::ron_file::{self, Fraction, Num, Vary};
 use crate::sampling::rng::{Purpose, Stream};
-use crate::sampling::vary::{self, Fraction, Num, Vary};
 use serde::{Deserialize, Deserializer, Serialize};
 
 layered! {
@@ -91,23 +91,23 @@ layered! {
 
 impl<'de> Deserialize<'de> for SensorDesc {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        vary::from_raw(deserializer, |raw| {
+        ron_file::from_raw(deserializer, |raw| {
             let start = raw.len() - raw.trim_start().len();
             let len = raw[start..].find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(raw.len() - start);
             let name = &raw[start..start + len];
             if name.is_empty() || name == "SensorDesc" {
-                return vary::parse_in(raw).map(|written: Written| written.over(Self::default()));
+                return ron_file::parse_in(raw).map(|written: Written| written.over(Self::default()));
             }
             let Some(preset) = preset::sensor(name) else {
-                let help = vary::choose("sensors", &preset::NAMES, name);
-                return Err(vary::Fault {
+                let help = ron_file::choose("sensors", &preset::NAMES, name);
+                return Err(ron_file::Fault {
                     end: start + len,
-                    ..vary::whole(raw, format!("unknown sensor `{name}`"), help)
+                    ..ron_file::whole(raw, format!("unknown sensor `{name}`"), help)
                 });
             };
             // Spaces for the name keep the places of what follows.
             let fields = [" ".repeat(start + len).as_str(), &raw[start + len..]].concat();
-            let written = if fields.trim().is_empty() { Written::default() } else { vary::parse_in(&fields)? };
+            let written = if fields.trim().is_empty() { Written::default() } else { ron_file::parse_in(&fields)? };
             Ok(written.over(preset))
         })
     }
@@ -163,7 +163,7 @@ mod tests {
 
     fn read(page: &str) -> Result<SensorDesc, String> {
         ron::from_str(page)
-            .map_err(|e| vary::Fault::parse(&e.code.to_string()).map_or_else(|| e.to_string(), |f| f.message))
+            .map_err(|e| ron_file::Fault::parse(&e.code.to_string()).map_or_else(|| e.to_string(), |f| f.message))
     }
 
     /// Expected: a name alone, with nothing or with something in brackets; what is given replaces that value and no other, also

@@ -3,8 +3,8 @@
 use super::given::{Given, layered};
 use super::psf::Psf;
 use crate::math::Spectrum;
+use crate::ron_file::{NonNegative, Vary};
 use crate::sampling::rng::Stream;
-use crate::sampling::vary::{NonNegative, Vary};
 use serde::Serialize;
 
 layered! {

@@ -1,6 +1,6 @@
 //! From linear values to stored ones: a soft shoulder for the highlights, then the curve that screens expect.
 
-use crate::sampling::vary::{Num, Positive};
+use crate::ron_file::{Num, Positive};
 use serde::{Deserialize, Serialize};
 
 /// The curve from linear sensor values (1 is white) to what is stored.

@@ -223,7 +223,7 @@ impl Crumbs {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampling::vary::{Num, Vary};
+    use crate::ron_file::{Num, Vary};
 
     fn law(clustering: f64) -> Law {
         let desc = ClodsDesc {

@@ -2,7 +2,7 @@
 
 use super::{SoilColor, WheelDesc};
 use crate::math::Spectrum;
-use crate::sampling::vary::{Count, Finite, Fraction, NonNegative, Num, Positive, PositiveCount, Vary};
+use crate::ron_file::{Count, Finite, Fraction, NonNegative, Num, Positive, PositiveCount, Vary};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -330,7 +330,7 @@ impl Default for LitterDesc {
     fn default() -> Self {
         Self {
             straw_cover: Vary::uniform(0.0, 0.01),
-            straw_mm: Vary::Drawn(crate::sampling::vary::Distribution::LogNormal {
+            straw_mm: Vary::Drawn(crate::ron_file::Distribution::LogNormal {
                 median: 30.0,
                 sigma: 0.6,
                 min: 6.0,
@@ -341,7 +341,7 @@ impl Default for LitterDesc {
             stick_mm: Vary::uniform(30.0, 120.0),
             stick_width_mm: Vary::uniform(1.5, 5.0),
             bits_per_m2: Vary::uniform(60.0, 350.0),
-            bit_mm: Vary::Drawn(crate::sampling::vary::Distribution::LogNormal {
+            bit_mm: Vary::Drawn(crate::ron_file::Distribution::LogNormal {
                 median: 4.0,
                 sigma: 0.5,
                 min: 1.5,

@@ -138,7 +138,7 @@ impl Relief {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampling::vary::Vary;
+    use crate::ron_file::Vary;
     use crate::soil::RowReliefDesc;
 
     fn desc(rms_mm: f64) -> ReliefDesc {

@@ -137,7 +137,7 @@ fn stone(desc: &StonesDesc, ground: &Ground, pile: &mut Pile, at: Vec2, mm: f32,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampling::vary::Vary;
+    use crate::ron_file::Vary;
 
     #[test]
     fn stones_cover_what_they_were_asked_to() {

@@ -1,7 +1,7 @@
 //! The ground as a whole: what the pieces must keep together.
 
 use super::*;
-use crate::sampling::vary::{Num, Vary};
+use crate::ron_file::{Num, Vary};
 use std::collections::BTreeMap;
 
 /// Waves and steps, so that layers differ in height and colour.

@@ -2,8 +2,8 @@
 
 use super::record::WheelRecord;
 use crate::math::{Vec2, smoothstep, vec2};
+use crate::ron_file::{Finite, NonNegative, Positive, Vary};
 use crate::sampling::Stream;
-use crate::sampling::vary::{Finite, NonNegative, Positive, Vary};
 use serde::{Deserialize, Serialize};
 
 /// One wheel's track. A tractor's are 20–50 mm deep and 300–500 mm wide; a light robot's or a seeder's press less.

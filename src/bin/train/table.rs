@@ -6,7 +6,7 @@ use crate::report::Shots;
 use furrow::cli::signal::Signals;
 use furrow::dataset::generate::Shard;
 use furrow::output::write_atomically;
-use furrow::page::Page;
+use furrow::ron_file::RonFile;
 use furrow::train::baseline::files;
 use furrow::train::classes::Classes;
 use furrow::train::data::{Band, Pick, Selection};
@@ -79,7 +79,7 @@ enum Part {
 
 /// Does what is missing.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
-    let page = Page::read(&args.page)?;
+    let page = RonFile::read(&args.page)?;
     let experiment = Experiment::of(&page, args.scale.as_deref())?;
     let out = args.out.clone().unwrap_or_else(|| usual_folder(&args.page, args.scale.as_deref()));
     cli::check_folder(&out)?;

@@ -78,7 +78,7 @@ pub fn all(recipe: &Recipe) -> Result<Vec<(&str, &'static dyn Format)>> {
     for name in &recipe.formats {
         let format = named(name).ok_or_else(|| {
             let known: Vec<&str> = NAMES.iter().map(|(name, _)| *name).collect();
-            let help = crate::sampling::fault::choose("formats", &known, name);
+            let help = crate::ron_file::choose("formats", &known, name);
             Error::Dataset(format!("there is no format `{name}`\n help: {help}"))
         })?;
         all.push((name.as_str(), format));

@@ -11,7 +11,7 @@ mod posture;
 pub use marks::{Bearer, Marks, Tissue};
 pub(super) use posture::Posture;
 
-use crate::sampling::vary::{Bound, Fraction, NonNegative, Num, Positive, Vary};
+use crate::ron_file::{Bound, Fraction, NonNegative, Num, Positive, Vary};
 use crate::sampling::{Purpose, Stream};
 use serde::{Deserialize, Serialize};
 
@@ -33,10 +33,10 @@ impl Bound for MarkCount {
 /// seed leaf, leaf spots of 0.5–3 mm; estimates from field scoring.
 ///
 /// ```
-/// use furrow::{page::Page, plant::ConditionDesc};
-/// let page = Page::of("Condition(holes: Uniform(0, 6), chlorosis: 0.4, dust: Uniform(0.05, 0.2), wilt: 0.3)");
+/// use furrow::{ron_file::RonFile, plant::ConditionDesc};
+/// let page = RonFile::of("Condition(holes: Uniform(0, 6), chlorosis: 0.4, dust: Uniform(0.05, 0.2), wilt: 0.3)");
 /// let tired: ConditionDesc = page.parse().unwrap();
-/// assert!(Page::of("Condition(hole: 3)").parse::<ConditionDesc>().is_err());
+/// assert!(RonFile::of("Condition(hole: 3)").parse::<ConditionDesc>().is_err());
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default, rename = "Condition")]
@@ -137,7 +137,7 @@ impl ConditionDesc {
             blotches: none(),
             blotch_mm: Vary::uniform(3.0, 15.0),
             spots: none(),
-            spot_mm: Vary::Drawn(crate::sampling::vary::Distribution::LogNormal {
+            spot_mm: Vary::Drawn(crate::ron_file::Distribution::LogNormal {
                 median: 0.9,
                 sigma: 0.45,
                 min: 0.4,

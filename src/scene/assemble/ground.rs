@@ -3,8 +3,8 @@
 use super::{Builder, Floor};
 use crate::Result;
 use crate::material::{Ground as GroundMaterial, GroundSkin, Material, Solid};
+use crate::ron_file::Step;
 use crate::sampling::Purpose;
-use crate::sampling::place::Step;
 use crate::sampling::rng::mix;
 use crate::scatter::Rows;
 use crate::scene::library::Layer;

@@ -1,9 +1,9 @@
 //! The lights of a field: those that its page lists, and where it has lists side by side, those of the list that the field draws.
 
 use crate::light::{LightDesc, ONE_OF_INSIDE};
-use crate::page::Page;
+use crate::ron_file::RonFile;
+use crate::ron_file::Step;
 use crate::sampling::Stream;
-use crate::sampling::place::Step;
 use crate::{Error, Result};
 use serde::Serialize;
 
@@ -28,7 +28,7 @@ impl Lighting {
     /// Draws one list of each `OneOf`, from the stream of its place, and puts its lights in its stead; refuses what nothing can be
     /// drawn from, where it stands in the page.
     pub(super) fn draw<'a>(
-        page: &Page,
+        page: &RonFile,
         lights: &'a [LightDesc],
         stream: impl Fn(usize) -> Stream,
     ) -> Result<(Vec<Self>, Vec<Listed<'a>>)> {
@@ -51,7 +51,7 @@ impl Lighting {
 }
 
 /// Refuses lists without lights and lists inside lists.
-fn check(page: &Page, lists: &[Vec<LightDesc>], at: &[Step<'_>]) -> Result<()> {
+fn check(page: &RonFile, lists: &[Vec<LightDesc>], at: &[Step<'_>]) -> Result<()> {
     let fault = |to: &[Step<'_>], words: &str| Err(page.blame(&[at, to].concat(), Error::Scene(words.into())));
     if lists.is_empty() {
         let words = "an empty list: there is nothing to draw\n help: OneOf([[Daylight(…)], [Lamp(…), Lamp(…)]])";

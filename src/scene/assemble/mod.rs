@@ -19,10 +19,9 @@ use crate::light::{LightDesc, LightRecord};
 use crate::material::{GroundSkin, Material};
 use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3, vec2};
 use crate::optics::soil::LOESS;
-use crate::page::Page;
 use crate::plant::{self, ConditionDesc, LeafAxis, OrganKind};
-use crate::sampling::place::Step;
-use crate::sampling::vary::{Positive, Vary};
+use crate::ron_file::RonFile;
+use crate::ron_file::{Positive, Step, Vary};
 use crate::sampling::{Purpose, Stream};
 use crate::scatter::{self, Disc, Spot};
 use crate::soil::{Ground, Rect};
@@ -72,12 +71,12 @@ pub fn field(path: &Path, options: &Options) -> Result<Field> {
 
 /// Builds a field from a page's text; paths are relative to the working directory.
 pub fn field_of(text: &str, options: &Options) -> Result<Field> {
-    Source::of(Page::of(text), Library::default())?.field(options)
+    Source::of(RonFile::of(text), Library::default())?.field(options)
 }
 
 /// A page and what its fields have read so far, so that the next field need not read it again. Several may be built at once.
 pub struct Source {
-    page: Page,
+    page: RonFile,
     desc: FieldDesc,
     library: Mutex<Library>,
 }
@@ -90,7 +89,7 @@ impl Source {
         Self::of(page, library)
     }
 
-    fn of(page: Page, library: Library) -> Result<Self> {
+    fn of(page: RonFile, library: Library) -> Result<Self> {
         let desc: FieldDesc = page.parse()?;
         Ok(Self { page, desc, library: Mutex::new(library) })
     }
@@ -157,7 +156,7 @@ impl Floor<'_> {
 }
 
 struct Builder<'a> {
-    page: &'a Page,
+    page: &'a RonFile,
     desc: &'a FieldDesc,
     library: Library,
     seed: u64,
@@ -171,7 +170,7 @@ struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    fn new(page: &'a Page, desc: &'a FieldDesc, options: &Options, mut library: Library) -> Result<Self> {
+    fn new(page: &'a RonFile, desc: &'a FieldDesc, options: &Options, mut library: Library) -> Result<Self> {
         let (seed, index) = (options.seed.unwrap_or(desc.seed), options.index);
         let mut stream = Stream::of(seed, index, Purpose::Page, 0);
         let camera = desc.camera.build(&mut stream).map_err(|e| page.blame(&[Step::Field("camera")], e))?;

@@ -1,8 +1,8 @@
 //! The season of a field: which of the growths that a page lists side by side all its plants have.
 
-use crate::page::Page;
+use crate::ron_file::RonFile;
+use crate::ron_file::Step;
 use crate::sampling::Stream;
-use crate::sampling::place::Step;
 use crate::scene::desc::{FieldDesc, Growth};
 use crate::{Error, Result};
 use serde::Serialize;
@@ -18,7 +18,7 @@ pub struct Season {
 
 impl Season {
     /// Draws the place; refuses lists that do not fit together, where they stand in the page.
-    pub(super) fn draw(page: &Page, desc: &FieldDesc, stream: &mut Stream) -> Result<Self> {
+    pub(super) fn draw(page: &RonFile, desc: &FieldDesc, stream: &mut Stream) -> Result<Self> {
         let mut of = 0;
         for (room, k, growth) in growths(desc) {
             let Growth::Either(list) = growth else { continue };

@@ -21,7 +21,7 @@ pub use veins::Veins;
 pub use write::{encode, encode_height, write};
 
 use crate::error::Result;
-use crate::page::Page;
+use crate::ron_file::RonFile;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -72,7 +72,7 @@ impl Grey {
 
 /// Reads a recipe.
 pub fn read(path: &Path) -> Result<Recipe> {
-    Page::read(path)?.parse()
+    RonFile::read(path)?.parse()
 }
 
 /// Draws a recipe.

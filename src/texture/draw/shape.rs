@@ -5,8 +5,8 @@
 use super::cells::unit;
 use crate::geometry::outline::Outline;
 use crate::math::{Vec2, lerp, smoothstep, vec2};
+use crate::ron_file::{Count, Fraction, Num, Positive, PositiveCount};
 use crate::sampling::rng::mix;
-use crate::sampling::vary::{Count, Fraction, Num, Positive, PositiveCount};
 use serde::{Deserialize, Serialize};
 
 /// How the margin departs from the outline; always inward, so that the mesh's outline bounds the leaf.

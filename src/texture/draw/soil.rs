@@ -8,7 +8,7 @@ use super::Drawn;
 use super::tile::Tile;
 use crate::error::{Error, Result};
 use crate::math::Vec3;
-use crate::sampling::vary::{Count, Fraction, NonNegative, Num, Positive, PositiveCount};
+use crate::ron_file::{Count, Fraction, NonNegative, Num, Positive, PositiveCount};
 use serde::{Deserialize, Serialize};
 
 /// Ground to draw.

@@ -4,8 +4,8 @@ use super::soil::{Litter, SoilRecipe};
 use super::stamp::Stamp;
 use super::{Drawn, Grey};
 use crate::math::{Vec2, Vec3, lerp, smoothstep, vec2, vec3};
+use crate::ron_file::Num;
 use crate::sampling::rng::{Purpose, Stream};
-use crate::sampling::vary::Num;
 use crate::texture::noise::Tiling;
 use crate::texture::srgb::ColorSpace;
 

@@ -6,8 +6,8 @@
 
 use super::shape::Shape;
 use crate::math::{Vec2, lerp, smoothstep, vec2};
+use crate::ron_file::{Count, Fraction, NonNegative, Num, PositiveCount};
 use crate::sampling::rng::{Purpose, Stream};
-use crate::sampling::vary::{Count, Fraction, NonNegative, Num, PositiveCount};
 use serde::{Deserialize, Serialize};
 
 /// The plan of a leaf's veins.

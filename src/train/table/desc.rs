@@ -9,7 +9,7 @@ use std::marker::PhantomData;
 ///
 /// ```
 /// use furrow::train::table::ExperimentDesc;
-/// let page = furrow::page::Page::of(r#"Experiment(
+/// let page = furrow::ron_file::RonFile::of(r#"Experiment(
 ///     networks: ["basic-segnet", "unet"],
 ///     seeds: [1, 2],
 ///     learn: (size: (240, 180), steps: 400, batch: 4),

@@ -4,9 +4,8 @@ use super::desc::{ExperimentDesc, LearnDesc, Named, PartDesc, ScaleDesc, SetDesc
 use super::names::{slug, unknown};
 use crate::dataset::recipe::{self, Recipe};
 use crate::dataset::split::Shares;
-use crate::page::Page;
-use crate::sampling::place::Step;
-use crate::sampling::{Sampler, fault};
+use crate::ron_file::{RonFile, Step, choose};
+use crate::sampling::Sampler;
 use crate::train::baseline::Kind;
 use crate::train::classes::Classes;
 use crate::train::data::margin::MOST;
@@ -114,11 +113,11 @@ pub struct TestSet {
 impl Experiment {
     /// Reads a page, at one of its scales.
     pub fn read(path: &Path, scale: Option<&str>) -> Result<Self> {
-        Self::of(&Page::read(path)?, scale)
+        Self::of(&RonFile::read(path)?, scale)
     }
 
     /// The same of a page that was read before.
-    pub fn of(page: &Page, scale: Option<&str>) -> Result<Self> {
+    pub fn of(page: &RonFile, scale: Option<&str>) -> Result<Self> {
         let desc: ExperimentDesc = page.parse()?;
         Checker { page, desc: &desc }.experiment(scale)
     }
@@ -135,7 +134,7 @@ impl Experiment {
 type Words = Result<(), (&'static str, String, String)>;
 
 struct Checker<'a> {
-    page: &'a Page,
+    page: &'a RonFile,
     desc: &'a ExperimentDesc,
 }
 
@@ -200,7 +199,7 @@ impl Checker<'_> {
             None => Err(Error::Training(format!(
                 "{}: the page has no scale `{name}`\n help: {}",
                 self.page.path.display(),
-                fault::choose("its scales", &scales.names(), name)
+                choose("its scales", &scales.names(), name)
             ))),
         }
     }

@@ -1,6 +1,6 @@
 //! Names: of folders, and of what was probably meant.
 
-use crate::sampling::fault::choose;
+use crate::ron_file::choose;
 
 /// A name for folders and files: lower case, with `-` for all that is neither letter nor digit.
 ///

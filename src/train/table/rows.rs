@@ -73,11 +73,11 @@ pub(super) fn of_shard(experiment: &Experiment, shard: Shard) -> Vec<(usize, Row
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::page::Page;
+    use crate::ron_file::RonFile;
 
     #[test]
     fn every_row_is_in_one_shard_and_has_a_folder_of_its_own() {
-        let page = Page::of(
+        let page = RonFile::of(
             r#"Experiment(networks: ["unet", "segnet"], seeds: [3, 4], sets: {"a": Real(), "b": Real()},
                 train: [(name: "One", from: [(set: "a")]), (name: "Two", from: [(set: "b")])],
                 test: [(name: "T", set: "a", images: "5..6")])"#,

@@ -15,8 +15,8 @@ use furrow::geometry::Window;
 use furrow::integrator::{Path as PathTracer, World};
 use furrow::math::vec3;
 use furrow::output::{self, Picture};
-use furrow::page::Page;
 use furrow::render::{self, Settings, Watch};
+use furrow::ron_file::RonFile;
 use furrow::sampling::Points;
 use furrow::scene::desc::SpeciesDesc;
 use furrow::scene::{Field, PlantRecord, assemble};
@@ -99,7 +99,7 @@ impl Args {
 
     /// One species: its sheet's path, and its entry in the page.
     fn species(&self, page: &Path, signals: &Signals) -> Result<(PathBuf, Entry)> {
-        let desc: SpeciesDesc = Page::read(page)?.parse()?;
+        let desc: SpeciesDesc = RonFile::read(page)?.parse()?;
         let mut stages = Vec::new();
         for stage in &desc.plant.stages {
             let bare = self.field(page, stage.bbch, None)?;

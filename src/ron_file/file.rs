@@ -1,8 +1,9 @@
-//! Pages: RON files, read with errors that show their place.
+//! A RON file: its text, and the way from it to a value or to an error that shows its place.
 
+use super::fault::{Fault, locate, offset_of};
+use super::place::{Step, place};
+use super::suggest::nearest;
 use crate::error::PageError;
-use crate::sampling::fault::{Fault, locate, nearest, offset_of};
-use crate::sampling::place::{Step, place};
 use crate::{Error, Result};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -14,16 +15,16 @@ const LARGEST: u64 = 4 << 20;
 /// Bytes of a value that are underlined as a whole.
 const MOST_UNDERLINED: usize = 48;
 
-/// A page's text and where it lies.
+/// A RON file's text and where it lies.
 #[derive(Clone, Debug)]
-pub struct Page {
+pub struct RonFile {
     /// The file.
     pub path: PathBuf,
     /// Its text.
     pub text: String,
 }
 
-impl Page {
+impl RonFile {
     /// Reads a file.
     pub fn read(path: &Path) -> Result<Self> {
         let refuse = |what: &str| Err(Error::Scene(format!("{}: {what}", path.display())));
@@ -200,8 +201,8 @@ fn options() -> ron::Options {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{bound::Positive, vary::Vary};
     use super::*;
-    use crate::sampling::vary::{Positive, Vary};
     use serde::Deserialize;
 
     #[derive(Debug, Deserialize)]
@@ -213,7 +214,7 @@ mod tests {
     }
 
     fn message(text: &str) -> String {
-        Page::of(text).parse::<Sun>().unwrap_err().to_string()
+        RonFile::of(text).parse::<Sun>().unwrap_err().to_string()
     }
 
     #[test]

@@ -1,158 +1,23 @@
-//! What a page may say where a number stands: the number itself, or a distribution that every field draws afresh.
+//! What a file may say where a number stands: the number itself, or a distribution that every field draws afresh.
 //!
 //! ```
-//! use furrow::sampling::vary::{Positive, Vary};
+//! use furrow::ron_file::{Positive, Vary};
 //! let spacing: Vary<Positive> = ron::from_str("Normal(mean: 0.20, sd: 0.02, min: 0.1, max: 0.3)").unwrap();
 //! let age: Vary<Positive> = ron::from_str("24").unwrap();
 //! assert!(ron::from_str::<Vary<Positive>>("Uniform(-3, 2)").is_err());
 //! ```
-//!
-//! The bound is part of the type, so an impossible value is an error at its place in the file.
 
-pub use super::fault::{Fault, choose, from_raw, inside, parse_in, whole};
-pub use super::place::Step;
-use super::rng::Stream;
+use super::bound::{Bound, Finite, NonNegative, Positive};
+use super::fault::{Fault, from_raw, inside, parse_in, whole};
+use super::num::{DISTRIBUTIONS, Num, name_of, number};
+use super::place::Step;
+use super::suggest::choose;
+use crate::sampling::Stream;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de, ser};
-use std::fmt;
-use std::marker::PhantomData;
-
-/// What a number must be.
-pub trait Bound: Copy + Clone + fmt::Debug + PartialEq {
-    /// Smallest value.
-    const MIN: f64 = f64::NEG_INFINITY;
-    /// Largest value.
-    const MAX: f64 = f64::INFINITY;
-    /// True where the smallest value itself is not allowed.
-    const ABOVE_MIN: bool = false;
-    /// True where only whole numbers make sense.
-    const WHOLE: bool = false;
-    /// In words, after "must be".
-    const WORDS: &'static str;
-
-    /// Whether `x` will do.
-    fn holds(x: f64) -> bool {
-        x.abs() <= LARGEST
-            && (x == 0.0 || x.abs() >= SMALLEST)
-            && x <= Self::MAX
-            && (x > Self::MIN || (x == Self::MIN && !Self::ABOVE_MIN))
-            && (!Self::WHOLE || x.fract() == 0.0)
-    }
-
-    /// Why `x` will not do.
-    fn refuse(x: f64) -> String {
-        if !x.is_finite() {
-            format!("{x} cannot be used: it must be {}", Self::WORDS)
-        } else if x.abs() > LARGEST {
-            format!("{x:e} is out of range: numbers here go up to {LARGEST:e}")
-        } else if x != 0.0 && x.abs() < SMALLEST {
-            format!("{x:e} is too close to 0 to be told from it")
-        } else {
-            format!("{x} is out of range: it must be {}", Self::WORDS)
-        }
-    }
-}
-
-/// Largest number in a page: beyond any metre, count or watt, and its square is still a single-precision number.
-const LARGEST: f64 = 1e12;
-/// Smallest number above zero in a page.
-const SMALLEST: f64 = 1e-12;
-
-macro_rules! bounds {
-    ($($(#[$doc:meta])* $name:ident { $($body:tt)* })*) => {$(
-        $(#[$doc])*
-        #[derive(Clone, Copy, Debug, Default, PartialEq)]
-        pub struct $name;
-        impl Bound for $name { $($body)* }
-    )*};
-}
-
-bounds! {
-    /// Any finite number.
-    Finite { const WORDS: &'static str = "a finite number"; }
-    /// Above zero.
-    Positive { const MIN: f64 = 0.0; const ABOVE_MIN: bool = true; const WORDS: &'static str = "above 0"; }
-    /// Zero or above.
-    NonNegative { const MIN: f64 = 0.0; const WORDS: &'static str = "0 or above"; }
-    /// Between 0 and 1.
-    Fraction { const MIN: f64 = 0.0; const MAX: f64 = 1.0; const WORDS: &'static str = "between 0 and 1"; }
-    /// A whole number, 0 or above.
-    Count { const MIN: f64 = 0.0; const MAX: f64 = 1e6; const WHOLE: bool = true; const WORDS: &'static str = "a whole number from 0 to 1000000"; }
-    /// A whole number, 1 or above.
-    PositiveCount { const MIN: f64 = 1.0; const MAX: f64 = 1e6; const WHOLE: bool = true; const WORDS: &'static str = "a whole number from 1 to 1000000"; }
-    /// Degrees of elevation above the horizon.
-    Elevation { const MIN: f64 = -90.0; const MAX: f64 = 90.0; const WORDS: &'static str = "between -90 and 90 degrees"; }
-}
-
-/// The name that a value starts with; `None` for a number, `inf` and `NaN` among them.
-fn name_of(raw: &str) -> Option<&str> {
-    let t = raw.trim_start();
-    let name = &t[..t.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(t.len())];
-    (name.starts_with(|c: char| c.is_alphabetic() || c == '_') && !["inf", "NaN"].contains(&name)).then_some(name)
-}
-
-/// One number within its bound.
-fn number<B: Bound>(raw: &str, help: &str) -> Result<f64, Fault> {
-    let x: f64 = parse_in(raw)?;
-    if B::holds(x) { Ok(x) } else { Err(whole(raw, B::refuse(x), help)) }
-}
 
 /// How a number is drawn.
 const DRAWN: &str =
     "write one number, or draw it for every field: Uniform(a, b), Normal(mean: a, sd: b), Choice([a, b])";
-
-/// The distributions' names.
-const NAMES: [&str; 5] = ["Uniform", "Normal", "LogNormal", "Choice", "Weighted"];
-
-/// A fixed number within its bound.
-///
-/// ```
-/// use furrow::sampling::vary::{Num, Positive};
-/// assert_eq!(ron::from_str::<Num<Positive>>("2.5").unwrap().get(), 2.5);
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Num<B: Bound = Finite>(f64, PhantomData<B>);
-
-impl<B: Bound> Num<B> {
-    /// For defaults and tests; `x` must be within the bound.
-    pub const fn new(x: f64) -> Self {
-        Self(x, PhantomData)
-    }
-
-    /// The number.
-    pub const fn get(self) -> f64 {
-        self.0
-    }
-
-    /// Whether it is nothing: what a page need not write where that is the default.
-    pub fn is_zero(&self) -> bool {
-        self.0 == 0.0
-    }
-
-    /// The number, single precision.
-    pub const fn f32(self) -> f32 {
-        self.0 as f32
-    }
-}
-
-impl<'de, B: Bound> Deserialize<'de> for Num<B> {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        from_raw(deserializer, |raw| match name_of(raw) {
-            Some(name) if NAMES.contains(&name) => Err(whole(
-                raw,
-                format!("{name} cannot stand here: this number is the same in every field"),
-                "write one number",
-            )),
-            Some(name) => Err(whole(raw, format!("`{name}` is not a number"), "write one number, such as 2 or 0.5")),
-            None => number::<B>(raw, "write one number; it is the same in every field").map(Self::new),
-        })
-    }
-}
-
-impl<B: Bound> Serialize for Num<B> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_f64(self.0)
-    }
-}
 
 /// The distributions, as they are written.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -370,9 +235,10 @@ impl<'de, B: Bound> Deserialize<'de> for Vary<B> {
             let Some(name) = name_of(raw) else {
                 return number::<B>(raw, DRAWN).map(Self::fixed);
             };
-            if !NAMES.contains(&name) {
+            if !DISTRIBUTIONS.contains(&name) {
                 let start = raw.len() - raw.trim_start().len();
-                let help = format!("write a number or a distribution; {}", choose("distributions", &NAMES, name));
+                let help =
+                    format!("write a number or a distribution; {}", choose("distributions", &DISTRIBUTIONS, name));
                 let unknown = whole(raw, format!("`{name}` is neither a number nor a distribution"), help);
                 return Err(Fault { end: start + name.len(), ..unknown });
             }
@@ -472,8 +338,9 @@ impl<T: Serialize> Serialize for Pick<T> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::rng::Purpose;
+    use super::super::bound::Count;
     use super::*;
+    use crate::sampling::Purpose;
 
     fn stream() -> Stream {
         Stream::of(3, 0, Purpose::Test, 0)

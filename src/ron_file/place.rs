@@ -19,7 +19,7 @@ pub enum Step<'a> {
 /// before it.
 ///
 /// ```
-/// use furrow::sampling::place::{Step, place};
+/// use furrow::ron_file::{Step, place};
 /// let text = "Field(seed: 3, lights: [Sun(), Sky(haze: /* much */ 7)])";
 /// assert_eq!(&text[place(text, &[Step::Field("lights"), Step::Item(1), Step::Field("haze")])], "7");
 /// ```
@@ -66,7 +66,7 @@ fn find(text: &str, whole: &Range<usize>, step: Step<'_>) -> Option<Range<usize>
 }
 
 /// A bracket that does not fit: where it stands or the text ends, and the one that is still open there, if any.
-pub fn mismatch(text: &str) -> Option<(usize, Option<usize>)> {
+pub(super) fn mismatch(text: &str) -> Option<(usize, Option<usize>)> {
     let mut open: Vec<(usize, char)> = Vec::new();
     let mut at = skip(text, 0);
     while let Some(c) = text[at..].chars().next() {
@@ -86,7 +86,7 @@ pub fn mismatch(text: &str) -> Option<(usize, Option<usize>)> {
 }
 
 /// The token at or behind `at`: a name, a number, a quoted text or one character; empty at the text's end.
-pub fn token(text: &str, at: usize) -> Range<usize> {
+pub(super) fn token(text: &str, at: usize) -> Range<usize> {
     let start = skip(text, at);
     let end = match text[start..].chars().next() {
         None => start,

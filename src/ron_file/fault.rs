@@ -5,6 +5,7 @@
 //! page's text can bring in by itself.
 
 use super::place::{Step, mismatch, place, token};
+use super::suggest::choose;
 use ron::error::{Error as Ron, SpannedError};
 use serde::{Deserialize, Deserializer, de};
 use std::fmt;
@@ -71,7 +72,7 @@ pub fn parse_in<T: de::DeserializeOwned>(raw: &str) -> Result<T, Fault> {
 }
 
 /// The place of a parser's error within `text`, and words for it.
-pub fn locate(text: &str, error: &SpannedError) -> Fault {
+pub(super) fn locate(text: &str, error: &SpannedError) -> Fault {
     let start = offset_of(text, error.span.start.line, error.span.start.col);
     let end = offset_of(text, error.span.end.line, error.span.end.col).max(start);
     if let Ron::Message(message) = &error.code
@@ -134,7 +135,7 @@ pub fn locate(text: &str, error: &SpannedError) -> Fault {
 }
 
 /// The byte offset of a line and column (both from 1, columns in characters); the text's end when it lies beyond.
-pub fn offset_of(text: &str, line: usize, column: usize) -> usize {
+pub(super) fn offset_of(text: &str, line: usize, column: usize) -> usize {
     let start = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum::<usize>();
     let rest = &text[start.min(text.len())..];
     start + rest.char_indices().nth(column.saturating_sub(1)).map_or(rest.len(), |(i, _)| i)
@@ -209,51 +210,9 @@ fn explain(code: &Ron) -> (String, String) {
     (message.to_owned(), help.to_owned())
 }
 
-/// Words for a list of what could stand there: "fields are a, b, c", with the likely one first when the name was nearly right.
-pub fn choose(what: &str, expected: &[&str], found: &str) -> String {
-    let near = nearest(expected, found);
-    if expected.is_empty() {
-        return format!("there are no {what}");
-    }
-    let all = expected.join(", ");
-    match near {
-        Some(e) => format!("did you mean `{e}`? {what} are {all}"),
-        None => format!("{what} are {all}"),
-    }
-}
-
-/// The name that was probably meant; `None` where none is like it.
-pub fn nearest<'a, S: AsRef<str>>(known: &'a [S], found: &str) -> Option<&'a str> {
-    let near = known.iter().map(|k| (distance(k.as_ref(), found), k.as_ref())).min();
-    near.filter(|(d, k)| *d <= 1 + k.len() / 4).map(|(_, k)| k)
-}
-
-/// Edit distance. Source: Wagner & Fischer 1974.
-fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, ca) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, cb) in b.iter().enumerate() {
-            let substitute = diagonal + usize::from(ca != *cb);
-            diagonal = row[j + 1];
-            row[j + 1] = substitute.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[b.len()]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn edit_distance_counts_single_edits() {
-        assert_eq!(distance("azimuth_deg", "azimut_deg"), 1);
-        assert_eq!(distance("kitten", "sitting"), 3);
-        assert_eq!(distance("", "abc"), 3);
-    }
 
     #[test]
     fn a_fault_survives_the_way_through_a_string() {

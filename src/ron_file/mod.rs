@@ -1,0 +1,23 @@
+//! RON files: scene, species, experiment and texture files, read with errors that show their place.
+//!
+//! [`RonFile`] is the text of one file: `read` takes it from the disk, `parse` makes a value of it, `print` makes text of a
+//! value, `blame` puts an error at the place that a path of fields and items ([`Step`]) leads to. [`Num`] and [`Vary`] are
+//! the numbers of such files: fixed, or drawn for every field from a distribution, within the [`Bound`] that their type says.
+//!
+//! Types that read themselves from raw text use [`from_raw`]; what they refuse is a [`Fault`], which keeps its place.
+
+mod bound;
+mod fault;
+mod file;
+mod num;
+mod place;
+mod suggest;
+mod vary;
+
+pub use bound::{Bound, Count, Elevation, Finite, Fraction, NonNegative, Positive, PositiveCount};
+pub use fault::{Fault, from_raw, inside, parse_in, whole};
+pub use file::RonFile;
+pub use num::Num;
+pub use place::{Step, place};
+pub use suggest::{choose, nearest};
+pub use vary::{Distribution, Pick, Vary};

@@ -1,0 +1,33 @@
+//! Which of the known names was probably meant, and which there are: the second half of many errors.
+
+/// Words for a list of what could stand there: "fields are a, b, c", with the likely one first when the name was nearly right.
+pub fn choose(what: &str, expected: &[&str], found: &str) -> String {
+    let near = nearest(expected, found);
+    if expected.is_empty() {
+        return format!("there are no {what}");
+    }
+    let all = expected.join(", ");
+    match near {
+        Some(e) => format!("did you mean `{e}`? {what} are {all}"),
+        None => format!("{what} are {all}"),
+    }
+}
+
+/// The name that was probably meant; `None` where none is like it.
+pub fn nearest<'a, S: AsRef<str>>(known: &'a [S], found: &str) -> Option<&'a str> {
+    let near = known.iter().map(|k| (strsim::levenshtein(k.as_ref(), found), k.as_ref())).min();
+    near.filter(|(d, k)| *d <= 1 + k.len() / 4).map(|(_, k)| k)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_that_is_nearly_right_is_found_and_no_other() {
+        assert_eq!(nearest(&["elevation_deg", "azimuth_deg"], "azimut_deg"), Some("azimuth_deg"));
+        assert_eq!(nearest(&["kitten"], "sitting"), None);
+        assert_eq!(choose("sizes", &["small", "large"], "smal"), "did you mean `small`? sizes are small, large");
+        assert_eq!(choose("sizes", &[], "smal"), "there are no sizes");
+    }
+}
