@@ -8,7 +8,7 @@ mod common;
 
 use common::dataset::{fail, made, path, same, succeed, tree, verb};
 use common::program::{SMALL, bits, scratch, trace};
-use furrow::ablation::{Change, Drawing, EDITS, Edit, FULL};
+use furrow::ablation::{Change, EDITS, Edit, FULL};
 use furrow::accel::EmbreeAccel;
 use furrow::dataset::{Set, native};
 use furrow::film::Film;
@@ -22,15 +22,16 @@ use furrow::sampling::Points;
 use furrow::scene::assemble::Options;
 use furrow::scene::{Field, Part, PlantRecord};
 use furrow::sensor::Photograph;
+use furrow::settings::{Engine, Quality, RenderOptions};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::Stdio;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-/// How the small field is drawn without an edit.
-fn drawing() -> Drawing {
-    Drawing { engine: "trace".into(), spp: 2, denoise: false, max_depth: None }
+/// How the small field is rendered without an edit.
+fn options() -> RenderOptions {
+    RenderOptions::path_traced(Quality::spp(2))
 }
 
 /// A field in which there is something to take away for every edit.
@@ -51,7 +52,8 @@ struct Shot {
 
 fn shoot(edit: &Edit, field: &Field, threads: usize) -> Shot {
     let scene = &field.scene;
-    let Drawing { spp, max_depth, .. } = edit.drawing(drawing());
+    let RenderOptions { quality, techniques, .. } = edit.options(options());
+    let (spp, max_depth) = (quality.spp, techniques.max_depth);
     let tracer =
         PathTracer { max_depth: max_depth.unwrap_or(PathTracer::default().max_depth), ..PathTracer::default() };
     render::pool(threads).unwrap().install(|| {
@@ -132,7 +134,7 @@ fn every_edit_changes_one_thing_and_nothing_else() {
                 field.scene.camera != full.scene.camera || field.scene.filter.filter() != full.scene.filter.filter(),
             ),
             ("sensor", field.sensor != full.sensor),
-            ("drawing", edit.drawing(drawing()) != drawing()),
+            ("options", edit.options(options()) != options()),
         ];
         let found: Vec<&str> = differs.into_iter().filter(|(_, differs)| *differs).map(|(what, _)| what).collect();
         let expected: &[&str] = match edit.change {
@@ -140,7 +142,7 @@ fn every_edit_changes_one_thing_and_nothing_else() {
             Change::Lights(_) => &["lights"],
             Change::Lens(_) => &["lens"],
             Change::Sensor(_) => &["sensor"],
-            Change::Drawing(_) => &["drawing"],
+            Change::Rendering(_) => &["options"],
             Change::Nothing | Change::Materials(_) | Change::Photograph(_) | Change::Labels(_) => &[],
         };
         assert_eq!(found, expected, "{name}");
@@ -170,14 +172,14 @@ fn every_edit_changes_one_thing_and_nothing_else() {
 fn every_edit_shows_and_keeps_labels_where_it_says_so() {
     let full = shoot(&FULL, &grow(&FULL), 2);
     // What another engine draws is `raster.rs`'s matter, where that is built.
-    for edit in EDITS.iter().filter(|edit| edit.drawing(drawing()).engine == "trace") {
+    for edit in EDITS.iter().filter(|edit| edit.options(options()).engine == Engine::Trace) {
         let shot = shoot(edit, &grow(edit), 2);
         let same_labels = shot.labels.tags == full.labels.tags;
         assert_eq!(same_labels, edit.keeps_labels, "{}", edit.name);
         let same_film = bits(&shot.film) == bits(&full.film);
         let behind = matches!(edit.change, Change::Sensor(_) | Change::Photograph(_) | Change::Labels(_));
         // The denoiser works on the film's photograph; it is not everywhere.
-        let denoised = edit.drawing(drawing()).denoise;
+        let denoised = edit.options(options()).quality.denoise;
         assert_eq!(same_film, behind || denoised, "{}", edit.name);
         let same_picture = shot.photograph == full.photograph;
         assert_eq!(same_picture, matches!(edit.change, Change::Labels(_)) || denoised, "{}", edit.name);

@@ -33,6 +33,10 @@ const NEVER: &[(&str, &str)] = &[
     ("film", "scene sampling"),
     // The other way of drawing shares the scene, not the rays.
     ("raster", "integrator accel bsdf sampling output"),
+    // The pipeline knows no dataset, and what it writes is output's.
+    ("job", "dataset train compare"),
+    // Data alone.
+    ("settings", "integrator render output raster"),
     // It says what is otherwise; who grows, draws and writes is theirs.
     ("ablation", "integrator accel bsdf output dataset"),
     // It asks `render` for an image and a label map.

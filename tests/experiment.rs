@@ -22,6 +22,7 @@ use furrow::train::weights::{self, Array};
 use furrow::{Error, Result};
 use std::cell::{Cell, RefCell};
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 use tempfile::TempDir;
@@ -65,7 +66,7 @@ struct Players {
     /// Calls so far, in words.
     calls: RefCell<Vec<String>>,
     /// What was warned of.
-    warned: RefCell<Vec<String>>,
+    warned: Mutex<Vec<String>>,
     /// After so many calls the next is interrupted.
     patience: Cell<Option<usize>>,
 }
@@ -148,19 +149,9 @@ impl Players {
         let experiment = Experiment::of(page, None)?;
         let real = [Real { name: "frames".into(), folder: frames().into() }];
         let bound = Bound::new(experiment, &real, &[], out)?;
-        let trace = Path::new(env!("CARGO_BIN_EXE_trace"));
-        let order = Order {
-            bound: &bound,
-            out,
-            page: &page.text,
-            shard,
-            only,
-            seconds: None,
-            threads: 1,
-            precision: "f32",
-            trace,
-            quiet: true,
-        };
+        let order =
+            Order { bound: &bound, out, page: &page.text, shard, only, seconds: None, threads: 1, precision: "f32" };
+        let warned = &self.warned;
         table::run(
             &order,
             &Hands {
@@ -169,7 +160,7 @@ impl Players {
                 judge: &|answerer, on, _| self.judge(answerer, on),
                 training: &|_, _| (),
                 tell: &|_| (),
-                warn: &|words| self.warned.borrow_mut().push(words.into()),
+                warn: &|words| warned.lock().expect("no panic").push(words.into()),
                 stop: &AtomicBool::new(false),
             },
         )
@@ -324,7 +315,7 @@ fn evaluations_that_cannot_be_believed_are_told_and_made_again() {
     for (spoil, words, judged) in spoils {
         spoil();
         players.run(PAGE, &out, Shard::ALL, None).unwrap();
-        let warned = players.warned.take().join("\n");
+        let warned = std::mem::take(&mut *players.warned.lock().expect("no panic")).join("\n");
         assert!(warned.contains(words) && warned.contains("made again"), "{warned}");
         assert_eq!(players.took().len(), judged);
         same(&files(&out), &before);
@@ -332,7 +323,7 @@ fn evaluations_that_cannot_be_believed_are_told_and_made_again() {
     // Tables alone make nothing again: they leave it out.
     std::fs::write(&file, "").unwrap();
     players.run(PAGE, &out, Shard::ALL, Some(Only::Tables)).unwrap();
-    assert!(players.warned.take().join("\n").contains("leave it out"));
+    assert!(std::mem::take(&mut *players.warned.lock().expect("no panic")).join("\n").contains("leave it out"));
     assert_eq!(number(&out, "table-1", &["unet", "Few"], "runs"), 1.0);
     // That of the other seed alone, which is wrong.
     assert!(
@@ -341,7 +332,13 @@ fn evaluations_that_cannot_be_believed_are_told_and_made_again() {
     // Other test images: what is there is of others.
     let other = PAGE.replace("4..6", "5..6");
     players.run(&other, &out, Shard::ALL, None).unwrap();
-    assert!(players.warned.take().iter().filter(|w| w.contains("other images")).count() >= 8);
+    assert!(
+        std::mem::take(&mut *players.warned.lock().expect("no panic"))
+            .iter()
+            .filter(|w| w.contains("other images"))
+            .count()
+            >= 8
+    );
     assert_eq!(players.took().len(), 8);
 }
 

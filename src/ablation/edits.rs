@@ -1,23 +1,31 @@
 //! The table of edits. The tests find what is new here unasked.
 
-use super::{Change, Drawing, Edit, growth, labels, light, picture};
+use super::{Change, Edit, growth, labels, light, picture};
 use crate::material::Feature;
 use crate::scene::assemble::Growing;
+use crate::settings::{Engine, Quality, RenderOptions};
 
 /// No edit: what all others are compared with.
 pub static FULL: Edit =
     Edit { name: "full", about: "the field as its page says", keeps_labels: true, change: Change::Nothing };
 
-/// An edit of how the field is drawn.
-macro_rules! drawn {
-    ($name:literal, $about:literal, $field:ident = $value:expr) => {
+/// An edit of how the field is rendered.
+macro_rules! rendered {
+    ($name:literal, $about:literal, $($field:ident).+ = $value:expr) => {
         Edit {
             name: $name,
             about: $about,
             keeps_labels: true,
-            change: Change::Drawing(|drawing| drawing.$field = $value),
+            change: Change::Rendering(|options| options.$($field).+ = $value),
         }
     };
+}
+
+/// By the rasterizer: each pixel once, without noise, without paths. What is left out of it stays left out.
+fn rasterized(options: &mut RenderOptions) {
+    options.engine = Engine::Raster;
+    options.quality = Quality::spp(1);
+    options.techniques.max_depth = None;
 }
 
 /// An edit of what parts are made of.
@@ -46,11 +54,11 @@ pub static EDITS: &[Edit] = &[
         about: "drawn as a game engine of 2017 does: shadow maps, no bounces; labels of its own target of ids",
         // But for a few pixels in a million, whose centre lies on an edge.
         keeps_labels: false,
-        change: Change::Drawing(|drawing| *drawing = Drawing::raster()),
+        change: Change::Rendering(rasterized),
     },
     // Light transport.
-    drawn!("direct-light", "no light that came by another surface", max_depth = Some(1)),
-    drawn!("one-bounce", "light that came by one other surface at most", max_depth = Some(2)),
+    rendered!("direct-light", "no light that came by another surface", techniques.max_depth = Some(1)),
+    rendered!("one-bounce", "light that came by one other surface at most", techniques.max_depth = Some(2)),
     // Light.
     Edit {
         name: "no-sky",
@@ -135,9 +143,13 @@ pub static EDITS: &[Edit] = &[
         change: Change::Labels(labels::smooth),
     },
     // Samples.
-    drawn!("spp-4", "4 samples a pixel", spp = 4),
-    drawn!("spp-16", "16 samples a pixel", spp = 16),
-    drawn!("spp-64", "64 samples a pixel", spp = 64),
-    drawn!("spp-256", "256 samples a pixel", spp = 256),
-    drawn!("denoised", "photographs without the noise of few samples; needs Open Image Denoise", denoise = true),
+    rendered!("spp-4", "4 samples a pixel", quality.spp = 4),
+    rendered!("spp-16", "16 samples a pixel", quality.spp = 16),
+    rendered!("spp-64", "64 samples a pixel", quality.spp = 64),
+    rendered!("spp-256", "256 samples a pixel", quality.spp = 256),
+    rendered!(
+        "denoised",
+        "photographs without the noise of few samples; needs Open Image Denoise",
+        quality.denoise = true
+    ),
 ];

@@ -7,12 +7,10 @@
 //! | file | idea |
 //! |---|---|
 //! | `edits` | the table: a new edit is a row, with a function where it needs one |
-//! | `drawing` | how a field is drawn |
 //! | `growth`, `light`, `picture`, `labels` | what edits do to plants and soil, light, camera and photographs, labels |
 //!
 //! What a record tells of plants, light and soil is what was drawn for the field, before an edit of light or materials.
 
-mod drawing;
 mod edits;
 mod growth;
 mod labels;
@@ -28,10 +26,10 @@ use crate::scene::Field;
 use crate::scene::assemble::{Growing, Options, Source};
 use crate::scene::tag::Tag;
 use crate::sensor::{Camera, Photograph, SensorDesc};
+use crate::settings::RenderOptions;
 use crate::{Error, Result};
 use std::path::Path;
 
-pub use drawing::Drawing;
 pub use edits::{EDITS, FULL};
 
 /// One edit.
@@ -62,8 +60,8 @@ pub enum Change {
     Lens(fn(&mut Camera, &mut Footprint)),
     /// On the sensor.
     Sensor(fn(&mut SensorDesc)),
-    /// On how the field is drawn.
-    Drawing(fn(&mut Drawing)),
+    /// On how the field is rendered.
+    Rendering(fn(&mut RenderOptions)),
     /// On the photographs.
     Photograph(fn(&mut Photograph)),
     /// On the labels; they are told what the pixels' samples met, and who each part is.
@@ -100,18 +98,18 @@ impl Edit {
             Change::Materials(feature) => scene.materials.iter_mut().for_each(|m| m.leave_out(feature)),
             Change::Lens(change) => change(&mut scene.camera, &mut scene.filter),
             Change::Sensor(change) => change(&mut field.sensor),
-            Change::Nothing | Change::Growth(_) | Change::Drawing(_) | Change::Photograph(_) | Change::Labels(_) => {}
+            Change::Nothing | Change::Growth(_) | Change::Rendering(_) | Change::Photograph(_) | Change::Labels(_) => {}
         }
         Ok(field)
     }
 
-    /// How a field is drawn that would be drawn like this.
+    /// How a field is rendered that would be rendered like this.
     #[must_use]
-    pub fn drawing(&self, mut drawing: Drawing) -> Drawing {
-        if let Change::Drawing(change) = self.change {
-            change(&mut drawing);
+    pub fn options(&self, mut options: RenderOptions) -> RenderOptions {
+        if let Change::Rendering(change) = self.change {
+            change(&mut options);
         }
-        drawing
+        options
     }
 
     /// Takes the photograph of a film of a field.

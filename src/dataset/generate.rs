@@ -5,14 +5,13 @@
 //! a part of another, and may take up all of it.) Memory grows with the images at once, not with the dataset.
 
 use super::ledger::{Ledger, Row};
+use super::render::{Times, render, renderer, scene_file};
 use super::seal::{Seal, write_files};
 use super::set::Set;
-use super::shoot::{Engine, Times, shoot, source};
 use super::{File, format, native};
-use crate::render::{self, Watch};
-use crate::scene::assemble::Source;
+use crate::job::{Renderer, SceneFile, Threads};
+use crate::render::Watch;
 use crate::{Error, Result};
-use rayon::ThreadPool;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -52,10 +51,19 @@ pub struct Work {
     pub at_once: usize,
 }
 
-/// How a run is watched.
-pub struct Overseer<'a> {
+impl Default for Work {
+    /// All images, on all cores.
+    fn default() -> Self {
+        Self { shard: Shard::ALL, threads: 0, at_once: 0 }
+    }
+}
+
+/// How a run is watched and stopped.
+pub struct Callbacks<'a> {
     /// Told how many images are to be made, before the first.
     pub begin: &'a (dyn Fn(usize) + Sync),
+    /// Told what the user should know before hours are spent.
+    pub warn: &'a (dyn Fn(&str) + Sync),
     /// Told of every image that is done, from any thread.
     pub done: &'a (dyn Fn(u64) + Sync),
     /// Set it to stop when the images under way are done.
@@ -84,25 +92,27 @@ fn share(threads: usize, lanes: usize, lane: usize) -> usize {
 }
 
 /// Makes what is missing of a shard. Stopped, it returns [`Error::Interrupted`], and the same call goes on later.
-pub fn generate(set: &Set, work: &Work, engine: Option<&dyn Engine>, overseer: &Overseer<'_>) -> Result<()> {
-    let pool = render::pool(work.threads)?;
-    let threads = pool.current_num_threads();
+pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()> {
+    let renderer = renderer(set)?;
+    let all = Threads::new(work.threads)?;
+    let threads = all.count();
     let shard = work.shard;
     let wanted: Vec<u64> = (0..set.recipe.count).filter(|k| k % shard.of == shard.number).collect();
     let tasks: Vec<(u64, Task)> =
-        pool.install(|| wanted.into_par_iter().map(|k| task(set, k).map(|t| (k, t))).collect::<Result<Vec<_>>>())?;
+        all.install(|| wanted.into_par_iter().map(|k| task(set, k).map(|t| (k, t))).collect::<Result<Vec<_>>>())?;
     let tasks: Vec<(u64, Task)> = tasks.into_iter().filter(|(_, t)| *t != Task::Done).collect();
-    (overseer.begin)(tasks.len());
+    (callbacks.begin)(tasks.len());
     let at_once = if work.at_once == 0 { threads.min(MOST_AT_ONCE) } else { work.at_once }.min(tasks.len()).max(1);
-    let pools: Vec<ThreadPool> =
-        (0..at_once).map(|lane| render::pool(share(threads, at_once, lane))).collect::<Result<_>>()?;
+    let lanes: Vec<Threads> =
+        (0..at_once).map(|lane| Threads::new(share(threads, at_once, lane))).collect::<Result<_>>()?;
     let run = Run {
         set,
-        studio: engine
+        source: renderer
+            .as_ref()
             .filter(|_| tasks.iter().any(|(_, t)| *t == Task::All))
-            .map(|e| source(set).map(|s| (s, e)))
+            .map(|renderer| scene_file(set).map(|scene| (scene, renderer)))
             .transpose()?,
-        overseer,
+        callbacks,
         threads,
         at_once,
         ledger: Ledger::new(&set.folder, &format!("{}-of-{}", shard.number, shard.of)),
@@ -116,14 +126,14 @@ pub fn generate(set: &Set, work: &Work, engine: Option<&dyn Engine>, overseer: &
         failed.fetch_or(!own, Ordering::Relaxed);
         failures.lock().unwrap_or_else(PoisonError::into_inner).insert(index, error);
     };
-    let stopped = || overseer.soon.load(Ordering::Relaxed) || overseer.now.load(Ordering::Relaxed);
+    let stopped = || callbacks.soon.load(Ordering::Relaxed) || callbacks.now.load(Ordering::Relaxed);
     std::thread::scope(|scope| {
-        for pool in &pools {
+        for lane in &lanes {
             scope.spawn(|| {
                 while !stopped() && !failed.load(Ordering::Relaxed) {
                     let Some((index, task)) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
-                    match pool.install(|| run.image(*index, *task)) {
-                        Ok(()) => (overseer.done)(*index),
+                    match lane.install(|| run.image(*index, *task, lane)) {
+                        Ok(()) => (callbacks.done)(*index),
                         Err(e) => fail(*index, e),
                     }
                 }
@@ -201,9 +211,9 @@ fn in_format(path: &str, format: &str) -> bool {
 /// A run of a shard.
 struct Run<'a> {
     set: &'a Set,
-    /// What images are made of, and by whom.
-    studio: Option<(Source, &'a dyn Engine)>,
-    overseer: &'a Overseer<'a>,
+    /// What images are rendered from, and by what.
+    source: Option<(SceneFile, &'a Renderer)>,
+    callbacks: &'a Callbacks<'a>,
     threads: usize,
     at_once: usize,
     ledger: Ledger,
@@ -211,21 +221,21 @@ struct Run<'a> {
 
 impl Run<'_> {
     /// Makes one image and seals it.
-    fn image(&self, index: u64, task: Task) -> Result<()> {
+    fn image(&self, index: u64, task: Task, threads: &Threads) -> Result<()> {
         let begin = Instant::now();
         let Set { folder, recipe } = self.set;
         let (files, times) = if task == Task::Formats {
             (derived(self.set, index)?, Times::default())
         } else {
-            let (source, engine) = self.studio.as_ref().ok_or_else(|| lost(self.set, index))?;
-            let watch = Watch { done: &|_| (), stop: self.overseer.now };
-            let shot = shoot(self.set, source, index, *engine, &watch)?;
-            super::invariants::check(recipe, &shot.sample)?;
-            let mut files = native::files(&shot.sample, &shot.text)?;
-            files.extend(formatted(self.set, &shot.sample)?);
-            (files, shot.times)
+            let (scene, renderer) = self.source.as_ref().ok_or_else(|| lost(self.set, index))?;
+            let watch = Watch { done: &|_| (), stop: self.callbacks.now };
+            let made = render(self.set, &scene.clone().threads(threads), index, renderer, watch)?;
+            super::invariants::check(recipe, &made.sample)?;
+            let mut files = native::files(&made.sample, &made.text)?;
+            files.extend(formatted(self.set, &made.sample)?);
+            (files, made.times)
         };
-        if self.overseer.now.load(Ordering::Relaxed) {
+        if self.callbacks.now.load(Ordering::Relaxed) {
             return Err(Error::Interrupted);
         }
         write_files(folder, &files)?;

@@ -3,7 +3,7 @@
 //! The only place of a dataset with clock times: everything else is the same however often, where and in how many pieces it was
 //! made. Runs never share a file, for lines that two machines append to one file over a network get lost.
 
-use super::shoot::Times;
+use super::render::Times;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions};

@@ -18,10 +18,12 @@
 //! | file | idea |
 //! |---|---|
 //! | `recipe`, `split` | what makes a dataset; which image is for what |
+//! | `render` | an image from its field, by [`crate::job`] |
 //! | `sample`, `record`, `annotate`, `rle` | one image and all that is known of it |
 //! | `native`, `format` | as files, ours and other people's |
 //! | `seal`, `set` | which files make an image; the dataset on disk |
-//! | `plan`, `generate`, `ledger`, `finish` | from a page to files; what remains to be done is found by looking at the disk |
+//! | `make` | all of it in one call |
+//! | `plan`, `generate`, `ledger`, `finish` | from a scene file to files; what remains to be done is found by looking at the disk |
 //! | `cluster` | the same on many machines: job files for schedulers |
 //! | `invariants`, `verify` | what must hold of every image, and whether it does |
 //! | `import` | other people's images and labels |
@@ -35,19 +37,22 @@ pub mod generate;
 pub mod import;
 pub mod invariants;
 pub mod ledger;
+mod make;
 pub mod native;
 pub mod plan;
 pub mod recipe;
 pub mod record;
+pub mod render;
 pub mod report;
 pub mod rle;
 pub mod sample;
 pub mod seal;
 pub mod set;
-pub mod shoot;
 pub mod split;
 pub mod verify;
 
+pub use make::{begin, make, make_watched};
+pub use plan::Order;
 pub use recipe::Recipe;
 pub use record::Record;
 pub use sample::Sample;

@@ -4,13 +4,14 @@ use super::recipe::{FILE, Made, Recipe, Rendering};
 use super::set::Set;
 use super::split::Shares;
 use super::{File, format, seal};
-use crate::ablation::{Drawing, Edit};
+use crate::ablation::{Edit, FULL};
+use crate::job::{Renderer, SceneFile};
 use crate::output::is_unfinished;
-use crate::scene::assemble::Options;
+use crate::settings::RenderOptions;
 use crate::{Error, Result};
 use std::path::{Component, Path, PathBuf};
 
-/// What the user asks for.
+/// A dataset that is asked for.
 #[derive(Clone, Debug)]
 pub struct Order {
     /// The page.
@@ -29,16 +30,31 @@ pub struct Order {
     pub split: Shares,
     /// What others may do with them.
     pub licence: String,
-    /// How the images are drawn, before the edit.
-    pub drawing: Drawing,
-    /// What the last bits may depend on: ray tracing kernels, a graphics card.
-    pub kernels: String,
+    /// How the images are rendered, before the edit; a fixed number of samples.
+    pub options: RenderOptions,
     /// What is changed; [`crate::ablation::FULL`] for nothing.
     pub edit: &'static Edit,
-    /// Techniques left out.
-    pub without: Vec<String>,
-    /// Most radiance of a path.
-    pub clamp: Option<f32>,
+}
+
+impl Order {
+    /// Images 0 to `count` − 1 of a scene file, as the file says, path traced with the usual quality, in the native format.
+    pub fn new(scene: impl Into<PathBuf>, count: u64) -> Self {
+        Self {
+            scene: scene.into(),
+            seed: None,
+            count,
+            width: None,
+            height: None,
+            formats: Vec::new(),
+            split: Shares::default(),
+            licence: Self::NO_LICENCE.into(),
+            options: RenderOptions::default(),
+            edit: &FULL,
+        }
+    }
+
+    /// What the manifest says where nobody has said what others may do.
+    pub const NO_LICENCE: &'static str = "not stated";
 }
 
 /// Most species that `species.png` numbers.
@@ -48,8 +64,17 @@ const MOST_SPECIES: usize = u8::MAX as usize;
 /// should know.
 pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
     // Names are checked before anything is written.
-    let options = Options { seed: order.seed, index: 0, width: order.width, height: order.height };
-    let field = order.edit.field(&order.edit.open(&order.scene)?, &options)?;
+    let options = order.edit.options(order.options.clone());
+    if !options.quality.is_fixed() {
+        return Err(Error::Dataset(
+            "the images of a dataset have a fixed number of samples\n help: give --spp instead of --target-error or --time".into(),
+        ));
+    }
+    // Before anything grows: what could not be rendered here.
+    let kernels = Renderer::open(&options)?.kernels().to_owned();
+    let scene_file = SceneFile::edited(&order.scene, order.edit)?;
+    let first = scene_file.seed(order.seed).width(order.width).height(order.height).field(0)?;
+    let field = first.grown();
     if field.species.len() > MOST_SPECIES {
         return Err(Error::Dataset(format!(
             "{}: {} species, more than the {MOST_SPECIES} that species.png numbers\n help: make two pages of it",
@@ -59,7 +84,6 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
     }
     let (files, scene) = gather(&field.files, &order.scene)?;
     let camera = &field.scene.camera;
-    let Drawing { engine, spp, denoise, max_depth } = order.edit.drawing(order.drawing.clone());
     let mut recipe = Recipe {
         furrow: env!("CARGO_PKG_VERSION").into(),
         made: Made::Rendered(Rendering {
@@ -68,13 +92,13 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
             seed: field.seed,
             width: camera.width(),
             height: camera.height(),
-            engine,
-            spp,
-            denoise,
-            without: order.without.clone(),
-            max_depth,
-            clamp: order.clamp,
-            kernels: order.kernels.clone(),
+            engine: options.engine,
+            spp: options.quality.spp,
+            denoise: options.quality.denoise,
+            without: options.techniques.left_out().to_vec(),
+            max_depth: options.techniques.max_depth,
+            clamp: options.techniques.clamp,
+            kernels,
             edit: order.edit.label(),
         }),
         count: order.count,

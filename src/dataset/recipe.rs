@@ -6,6 +6,7 @@
 use super::split::Shares;
 use crate::ablation::{self, Edit};
 use crate::scene::record::SpeciesRecord;
+use crate::settings::{Engine, Quality, RenderOptions, Technique, Techniques};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -58,14 +59,14 @@ pub struct Rendering {
     pub width: u32,
     /// Pixels down.
     pub height: u32,
-    /// What draws: `trace` for the path tracer, `raster` for the rasterized engine.
-    pub engine: String,
+    /// What renders.
+    pub engine: Engine,
     /// Samples a pixel.
     pub spp: u32,
     /// Whether `rgb.png` and `nir.png` are without the noise of few samples.
     pub denoise: bool,
     /// Techniques left out.
-    pub without: Vec<String>,
+    pub without: Vec<Technique>,
     /// Most surfaces on a path, where it is not the default.
     pub max_depth: Option<u32>,
     /// Most radiance of a path, where there is a limit.
@@ -81,6 +82,16 @@ impl Rendering {
     /// The edit; [`ablation::FULL`] where nothing was changed.
     pub fn edit(&self) -> Result<&'static Edit> {
         self.edit.as_deref().map_or(Ok(&ablation::FULL), Edit::named)
+    }
+
+    /// Engine, quality and techniques, the edit's change of them included.
+    pub fn options(&self) -> RenderOptions {
+        let techniques = Techniques::new(&self.without, self.max_depth, self.clamp);
+        RenderOptions {
+            engine: self.engine,
+            quality: Quality { denoise: self.denoise, ..Quality::spp(self.spp) },
+            techniques,
+        }
     }
 }
 

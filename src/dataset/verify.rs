@@ -2,14 +2,14 @@
 
 use super::finish::{MANIFEST, lacks, ranges};
 use super::generate::Task;
+use super::render::{render, scene_file};
 use super::seal::{Print, Seal};
 use super::set::Set;
-use super::shoot::{Engine, shoot, source};
 use super::split::Split;
 use super::{File, format, generate, invariants, ledger, native};
+use crate::job::{Renderer, SceneFile, Threads};
 use crate::render::Watch;
 use crate::sampling::rng::mix;
-use crate::scene::assemble::Source;
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -43,26 +43,25 @@ impl Findings {
     }
 }
 
-/// Checks every file and every invariant, and renders `again` images anew. Call it inside a pool.
+/// Checks every file and every invariant, and renders `again` images anew.
 pub fn verify(
     set: &Set,
     again: u64,
-    engine: Option<&dyn Engine>,
+    renderer: Option<&Renderer>,
+    threads: &Threads,
     done: &(dyn Fn(u64) + Sync),
     stop: &AtomicBool,
 ) -> Result<Findings> {
     let count = set.recipe.count;
-    let looked: Vec<Looked> = (0..count)
-        .into_par_iter()
-        .map(|index| {
-            if stop.load(std::sync::atomic::Ordering::Relaxed) {
-                return Err(Error::Interrupted);
-            }
-            let looked = look(set, index)?;
-            done(index);
-            Ok(looked)
-        })
-        .collect::<Result<_>>()?;
+    let look_at = |index: u64| {
+        if stop.load(std::sync::atomic::Ordering::Relaxed) {
+            return Err(Error::Interrupted);
+        }
+        let looked = look(set, index)?;
+        done(index);
+        Ok(looked)
+    };
+    let looked: Vec<Looked> = threads.install(|| (0..count).into_par_iter().map(look_at).collect::<Result<_>>())?;
     let mut found = Findings::default();
     for (index, looked) in (0..count).zip(&looked) {
         if looked.missing {
@@ -80,13 +79,13 @@ pub fn verify(
     if again == 0 {
         return Ok(found);
     }
-    let source = source(set)?;
+    let scene = scene_file(set)?.threads(threads);
     for index in drawn(count, again) {
         if found.missing.contains(&index) {
             continue;
         }
-        let Some(engine) = engine else { continue };
-        match rerender(set, &source, index, engine, stop)? {
+        let Some(renderer) = renderer else { continue };
+        match rerender(set, &scene, index, renderer, stop)? {
             Some(fault) => found.faults.push(fault),
             None => found.rendered += 1,
         }
@@ -202,12 +201,18 @@ fn drawn(count: u64, again: u64) -> Vec<u64> {
     all
 }
 
-fn rerender(set: &Set, source: &Source, index: u64, engine: &dyn Engine, stop: &AtomicBool) -> Result<Option<String>> {
+fn rerender(
+    set: &Set,
+    scene: &SceneFile,
+    index: u64,
+    renderer: &Renderer,
+    stop: &AtomicBool,
+) -> Result<Option<String>> {
     let watch = Watch { done: &|_| (), stop };
-    let shot = shoot(set, source, index, engine, &watch)?;
-    let mut files = native::files(&shot.sample, &shot.text)?;
+    let made = render(set, scene, index, renderer, watch)?;
+    let mut files = native::files(&made.sample, &made.text)?;
     for (_, format) in format::all(&set.recipe)? {
-        files.extend(format.image(&set.recipe, &shot.sample)?);
+        files.extend(format.image(&set.recipe, &made.sample)?);
     }
     let differs = |file: &&File| !Print::of(&file.bytes).holds(&set.folder.join(&file.path));
     let wrong: Vec<&str> = files.iter().filter(differs).map(|f| f.path.as_str()).collect();

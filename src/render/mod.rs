@@ -47,6 +47,14 @@ pub struct Watch<'a> {
     pub stop: &'a AtomicBool,
 }
 
+impl Default for Watch<'_> {
+    /// Nobody watches, nobody stops it.
+    fn default() -> Self {
+        static NEVER: AtomicBool = AtomicBool::new(false);
+        Self { done: &|_| (), stop: &NEVER }
+    }
+}
+
 impl Watch<'_> {
     /// Whether to stop.
     fn stopped(&self) -> bool {

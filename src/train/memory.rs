@@ -22,11 +22,3 @@ pub fn keep() {
         let _ = Command::new(program).args(std::env::args_os().skip(1)).envs(KEPT).exec();
     }
 }
-
-/// Starts another program without that.
-pub fn as_usual(command: &mut Command) -> &mut Command {
-    KEPT.iter().fold(command, |command, (name, value)| match std::env::var(name) {
-        Ok(there) if there == *value => command.env_remove(name),
-        _ => command,
-    })
-}

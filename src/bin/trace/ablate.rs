@@ -1,15 +1,14 @@
 //! `trace ablate`: one dataset, and the same fields again with one thing changed at a time.
 
-use crate::dataset::order::ImageArgs;
+use crate::dataset::order::{self, ImageArgs};
 use crate::dataset::render::{WorkArgs, generate};
-use crate::engine::Engine;
-use crate::raster::Card;
-use crate::technique::TechniqueArgs;
-use furrow::ablation::{Change, Drawing, EDITS, Edit, FULL};
+use furrow::ablation::{Change, EDITS, Edit, FULL};
 use furrow::cli::signal::Signals;
 use furrow::dataset::generate::Shard;
 use furrow::dataset::{Set, finish};
-use furrow::output::{Denoiser, write_atomically};
+use furrow::job::Renderer;
+use furrow::output::write_atomically;
+use furrow::settings::{RenderOptions, Techniques};
 use furrow::train::table::variants;
 use furrow::{Error, Result, cli};
 use std::io::Write;
@@ -71,8 +70,8 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         return Ok(Vec::new());
     }
     let edits = chosen(args)?;
-    let out = args.images.out.clone().unwrap_or_default();
-    cli::check_folder(&out)?;
+    let out = args.images.folder();
+    cli::check_folder(out)?;
     let say = |text: String| {
         if !args.work.quiet {
             eprintln!("{text}");
@@ -81,9 +80,13 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let mut sets: Vec<Set> = Vec::new();
     for edit in &edits {
         let folder = out.join(edit.name);
-        sets.push(if args.shard.is_some() { begun(&folder)? } else { args.images.begin(&folder, edit)? });
+        sets.push(if args.shard.is_some() {
+            begun(&folder)?
+        } else {
+            order::begin(&folder, &args.images.order(edit)?)?
+        });
     }
-    let mut paths = vec![page(&out, &args.real)?];
+    let mut paths = vec![page(out, &args.real)?];
     for (i, (edit, set)) in edits.iter().zip(&sets).enumerate() {
         if args.plan {
             paths.push(set.folder.join(furrow::dataset::recipe::FILE));
@@ -115,14 +118,14 @@ fn chosen(args: &Args) -> Result<Vec<&'static Edit>> {
         Edit::named(name)?;
     }
     let mut all = vec![&FULL];
-    let drawing = args.images.drawing();
+    let full = args.images.options();
     for edit in EDITS {
         let named = args.only.iter().any(|name| name == edit.name);
         if args.except.iter().any(|name| name == edit.name) || !(named || args.only.is_empty()) {
             continue;
         }
-        let drawn = edit.drawing(drawing.clone());
-        if matches!(edit.change, Change::Drawing(_)) && drawn == drawing {
+        let options = edit.options(full.clone());
+        if matches!(edit.change, Change::Rendering(_)) && options == full {
             if named {
                 return Err(Error::Dataset(format!(
                     "--only {}: the full dataset is drawn like that already\n help: leave it out, or give other arguments",
@@ -132,7 +135,7 @@ fn chosen(args: &Args) -> Result<Vec<&'static Edit>> {
             if !args.work.quiet {
                 eprintln!("{} is left out: the full dataset is drawn like that", edit.name);
             }
-        } else if let (false, Err(e)) = (named, possible(&drawn, &drawing)) {
+        } else if let (false, Err(e)) = (named, possible(&options, &full)) {
             eprintln!("warning: {} is left out: {e}", edit.name);
         } else {
             all.push(edit);
@@ -141,15 +144,13 @@ fn chosen(args: &Args) -> Result<Vec<&'static Edit>> {
     Ok(all)
 }
 
-/// Whether this machine has what a drawing needs beyond that of the full dataset.
-fn possible(drawn: &Drawing, full: &Drawing) -> Result<()> {
-    if drawn.denoise && !full.denoise {
-        Denoiser::find()?;
+/// Whether this machine has what these options need beyond those of the full dataset.
+fn possible(options: &RenderOptions, full: &RenderOptions) -> Result<()> {
+    let more = options.quality.denoise && !full.quality.denoise || options.engine != full.engine;
+    if !more {
+        return Ok(());
     }
-    if drawn.engine != full.engine && Engine::named(&drawn.engine) == Engine::Raster {
-        Card::open(&TechniqueArgs::default())?;
-    }
-    Ok(())
+    Renderer::open(&RenderOptions { techniques: Techniques::default(), ..options.clone() }).map(drop)
 }
 
 /// Writes the page of an experiment on all datasets that lie in the folder. Networks learn from red, green and blue: where only near

@@ -1,7 +1,7 @@
 //! `trace compare`: how far pictures are from others of the same things; with `--real` and `--synthetic`, how far one set is from another.
 
 use crate::dataset::progress::Progress;
-use crate::render::threads;
+use crate::quality::threads;
 use furrow::compare::{Comparison, Options, PIXELS_PER_DEGREE, Pairs, gap};
 use furrow::{Error, Result, cli, render};
 use std::path::{Path, PathBuf};

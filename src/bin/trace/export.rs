@@ -3,9 +3,10 @@
 use crate::field::FieldArgs;
 use clap::ValueEnum;
 use furrow::ablation::FULL;
+use furrow::job::Threads;
 use furrow::output::{self, Export};
 use furrow::scene::Field;
-use furrow::{Result, cli, render};
+use furrow::{Result, cli};
 use std::path::{Path, PathBuf};
 
 /// What to write, and how.
@@ -51,17 +52,13 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     args.field.check()?;
     let out = args.out.clone().unwrap_or_else(|| args.field.default_folder().join(args.format.name()));
     cli::check_folder(&out)?;
-    let pool = render::pool(0)?;
-    let (field, export) = pool.install(|| {
-        let field = args.field.grow(&FULL)?;
-        let export = args.format.write(&out, &field)?;
-        Ok::<_, furrow::Error>((field, export))
-    })?;
+    let field = args.field.grow(&FULL, &Threads::all()?)?;
+    let export = field.threads().install(|| args.format.write(&out, field.grown()))?;
     if !args.quiet {
-        for warning in field.warnings.iter().chain(&export.warnings) {
+        for warning in field.grown().warnings.iter().chain(&export.warnings) {
             eprintln!("warning: {warning}");
         }
-        eprintln!("{}: {} files in {}", args.field.page().display(), export.paths.len(), out.display());
+        eprintln!("{}: {} files in {}", args.field.path().display(), export.paths.len(), out.display());
     }
     Ok(export.paths)
 }

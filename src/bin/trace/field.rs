@@ -1,18 +1,17 @@
-//! Which field: the flags that every verb with a scene shares.
+//! Which field: the flags that every verb with a scene file shares.
 
 use furrow::ablation::Edit;
-use furrow::scene::Field;
-use furrow::scene::assemble::Options;
+use furrow::job::{Field, SceneFile, Threads};
 use furrow::{Result, cli};
 use std::path::{Path, PathBuf};
 
 /// A scene's distribution over fields, at one size.
 #[derive(clap::Args)]
-pub(crate) struct PageArgs {
-    /// Scene page (RON): what grows, what shines, who looks.
-    #[arg(long, value_name = "PAGE", required = true)]
+pub(crate) struct SceneArgs {
+    /// Scene file (RON): what grows, what shines, who looks.
+    #[arg(long, value_name = "FILE", required = true)]
     scene: Option<PathBuf>,
-    /// Seed, instead of the page's.
+    /// Seed, instead of the scene file's.
     #[arg(long, allow_negative_numbers = true)]
     pub(crate) seed: Option<u64>,
     /// Image width in pixels; the field of view stays, the height follows unless given.
@@ -23,47 +22,47 @@ pub(crate) struct PageArgs {
     pub(crate) height: Option<u32>,
 }
 
-impl PageArgs {
-    /// The page.
+impl SceneArgs {
+    /// The scene file.
     pub(crate) fn path(&self) -> &Path {
         self.scene.as_deref().unwrap_or(Path::new(""))
     }
 
-    /// Checks, before anything grows, that the page is there.
+    /// Checks, before anything grows, that the scene file is there.
     pub(crate) fn check(&self) -> Result<()> {
         cli::check_scene(self.path())
     }
 }
 
-/// One field of a page.
+/// One field of a scene file.
 #[derive(clap::Args)]
 pub(crate) struct FieldArgs {
     #[command(flatten)]
-    page: PageArgs,
+    scene: SceneArgs,
     /// Which field of the distribution.
     #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
     index: u64,
 }
 
 impl FieldArgs {
-    /// The page.
-    pub(crate) fn page(&self) -> &Path {
-        self.page.path()
+    /// The scene file.
+    pub(crate) fn path(&self) -> &Path {
+        self.scene.path()
     }
 
-    /// Checks, before anything grows, that the page is there.
+    /// Checks, before anything grows, that the scene file is there.
     pub(crate) fn check(&self) -> Result<()> {
-        self.page.check()
+        self.scene.check()
     }
 
-    /// Grows the field as an edit has it. Call it inside a pool.
-    pub(crate) fn grow(&self, edit: &Edit) -> Result<Field> {
-        let PageArgs { seed, width, height, .. } = self.page;
-        edit.field(&edit.open(self.page())?, &Options { seed, index: self.index, width, height })
+    /// Grows the field as an edit has it.
+    pub(crate) fn grow(&self, edit: &'static Edit, threads: &Threads) -> Result<Field> {
+        let SceneArgs { seed, width, height, .. } = self.scene;
+        SceneFile::edited(self.path(), edit)?.seed(seed).width(width).height(height).threads(threads).field(self.index)
     }
 
-    /// `out/<name of the page>`.
+    /// `out/<name of the scene file>`.
     pub(crate) fn default_folder(&self) -> PathBuf {
-        Path::new("out").join(self.page().file_stem().unwrap_or_default())
+        Path::new("out").join(self.path().file_stem().unwrap_or_default())
     }
 }

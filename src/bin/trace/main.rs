@@ -4,13 +4,10 @@ mod ablate;
 mod catalogue;
 mod compare;
 mod dataset;
-mod engine;
 mod export;
 mod field;
 mod quality;
-mod raster;
 mod render;
-mod technique;
 mod texture;
 
 use clap::{Parser, Subcommand};

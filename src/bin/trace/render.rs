@@ -1,26 +1,21 @@
-//! `trace`: grows a field, path traces it, labels it, writes it.
+//! `trace --scene …`: one field, rendered, labelled and written; or one pixel of it, explained.
 
-use crate::engine::Engine;
 use crate::field::FieldArgs;
-use crate::quality::QualityArgs;
-use crate::raster::{Card, left_out};
-use crate::technique::TechniqueArgs;
-use clap::ValueEnum;
-use furrow::ablation::{Drawing, Edit, FULL};
-use furrow::accel::{self, EmbreeAccel};
+use crate::quality::{QualityArgs, TechniqueArgs, threads};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use furrow::ablation::{Edit, FULL};
 use furrow::cli::signal::Signals;
 use furrow::film::Film;
 use furrow::geometry::Window;
-use furrow::integrator::{FalseColor, Integrator, World};
-use furrow::output::{self, Denoiser, Provenance, Spp};
-use furrow::render::{self, Settings, Watch};
-use furrow::scene::Field;
+use furrow::job::{Field, Image, Renderer, Request, Threads, View};
+use furrow::render::Watch;
+use furrow::settings::{Engine, Quality};
 use furrow::{Error, Result, cli};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// What to render, and how.
 #[derive(clap::Args)]
@@ -29,24 +24,21 @@ pub(crate) struct Args {
     field: FieldArgs,
     #[command(flatten)]
     quality: QualityArgs,
-    /// Folder for the files; `out/` and the page's name unless given.
+    /// Folder for the files; `out/` and the scene file's name unless given.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Threads; 0 for one on each core. The files do not depend on it.
     #[arg(long, default_value_t = 0, value_parser = threads)]
     threads: usize,
-    /// What draws.
-    #[arg(long, value_enum, default_value_t = Engine::Trace)]
-    engine: Engine,
-    /// What to draw.
-    #[arg(long, value_enum, default_value_t = Draw::Path)]
-    integrator: Draw,
     #[command(flatten)]
     technique: TechniqueArgs,
+    /// What the image shows.
+    #[arg(long, default_value = View::Path.name(), value_parser = views())]
+    integrator: View,
     /// Change one thing of the field, by its name; `trace ablate --list` tells them.
     #[arg(long, value_name = "NAME", conflicts_with = "enough")]
     edit: Option<String>,
-    /// Also write the picture without its noise, beside the noisy one; needs Open Image Denoise, for `--integrator path`.
+    /// Also write the image without its noise, beside the noisy one; needs Open Image Denoise, for `--integrator path`.
     #[arg(long)]
     denoise: bool,
     /// Render only this part of the image: x,y,width,height in pixels.
@@ -60,238 +52,139 @@ pub(crate) struct Args {
     quiet: bool,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum Draw {
-    /// Light, by path tracing.
-    Path,
-    /// Shading normals.
-    Normals,
-    /// A colour for each part.
-    Ids,
-    /// Texture coordinates.
-    Uv,
-    /// Reflectance.
-    Albedo,
-    /// Distance.
-    Depth,
-}
-
-impl Draw {
-    fn integrator(self, technique: &TechniqueArgs) -> Box<dyn Integrator> {
-        match self {
-            Self::Path => Box::new(technique.path()),
-            Self::Normals => Box::new(FalseColor::Normals),
-            Self::Ids => Box::new(FalseColor::Ids),
-            Self::Uv => Box::new(FalseColor::Uv),
-            Self::Albedo => Box::new(FalseColor::Albedo),
-            Self::Depth => Box::new(FalseColor::Depth),
-        }
-    }
-
-    fn name(self) -> String {
-        self.to_possible_value().map(|v| v.get_name().to_owned()).unwrap_or_default()
-    }
+fn views() -> impl TypedValueParser<Value = View> {
+    let values = View::ALL.map(|(name, _, help)| PossibleValue::new(name).help(help));
+    PossibleValuesParser::new(values).map(|name| View::named(&name).unwrap_or_default())
 }
 
 /// Renders one field, or explains one pixel of it; returns the paths of the files.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let begin = Instant::now();
-    let say = |text: String| {
-        if !args.quiet {
-            eprintln!("{text}");
-        }
-    };
     args.field.check()?;
     let edit = args.edit.as_deref().map_or(Ok(&FULL), Edit::named)?;
-    let drawing = edit.drawing(Drawing {
-        engine: args.engine.name().into(),
-        spp: args.quality.most(),
-        denoise: args.denoise,
-        max_depth: args.technique.limits().0,
-    });
-    let engine = Engine::named(&drawing.engine);
-    let (quality, technique) = (args.quality.with_spp(drawing.spp), args.technique.with_max_depth(drawing.max_depth));
-    technique.check(engine)?;
-    if engine == Engine::Raster {
-        args.check_raster()?;
+    let options = edit.options(args.technique.options(args.quality.quality(args.denoise)));
+    if args.pixel.is_some() && options.engine == Engine::Raster {
+        return Err(Error::Scene(
+            "--pixel says nothing with --engine raster, which has no rays\n help: use --engine trace, or leave it out"
+                .into(),
+        ));
     }
-    if !matches!(args.integrator, Draw::Path) {
-        technique.check_unused(drawing.denoise)?;
-    }
-    // Before hours are spent on what could not be denoised then.
-    let denoiser = drawing.denoise.then(Denoiser::find).transpose()?;
+    // Before hours are spent on what could not be rendered or written then.
+    args.integrator.check(&options)?;
     let out = args.out.clone().unwrap_or_else(|| args.field.default_folder());
     if args.pixel.is_none() {
         cli::check_folder(&out)?;
     }
-    // Likewise.
-    let card = (engine == Engine::Raster).then(|| Card::open(&technique)).transpose()?;
-    let pool = render::pool(args.threads)?;
-    let field: Field = pool.install(|| args.field.grow(edit))?;
-    for warning in &field.warnings {
-        say(format!("warning: {warning}"));
+    let renderer = Renderer::open(&options)?;
+    let threads = Threads::new(args.threads)?;
+    let field = args.field.grow(edit, &threads)?;
+    let warning = renderer.warning(&field).map(String::from);
+    for warning in field.grown().warnings.iter().chain(&warning) {
+        args.say(&format!("warning: {warning}"));
     }
-    let scene = &field.scene;
-    let (width, height) = (scene.camera.width(), scene.camera.height());
+    let camera = &field.grown().scene.camera;
+    let (width, height) = (camera.width(), camera.height());
     let window = args.crop.unwrap_or(Window::full(width, height));
     cli::check_crop(window, width, height)?;
     if let Some(pixel) = args.pixel {
         cli::check_pixel(pixel, width, height)?;
-    }
-    let built = begin.elapsed();
-    if let Some(card) = card {
-        return pool.install(|| rasterize(args, edit, &field, window, &card, &out, begin));
-    }
-    let geometry = pool.install(|| EmbreeAccel::build(&scene.surfaces(), pool.current_num_threads() as u32))?;
-    say(format!(
-        "{}: {} plants, {} parts, {:.2} M triangles; grown in {:.2} s, built in {:.2} s",
-        args.field.page().display(),
-        field.plants.len(),
-        scene.parts.len(),
-        scene.triangles() as f64 / 1e6,
-        built.as_secs_f64(),
-        begin.elapsed().as_secs_f64() - built.as_secs_f64()
-    ));
-
-    let world = World { scene, geometry: &geometry };
-    let integrator = args.integrator.integrator(&technique);
-    let settings = Settings { spp: quality.most(), seed: field.sample_seed(), window, points: technique.points() };
-    if let Some((x, y)) = args.pixel {
-        let words = pool.install(|| render::explain(&world, &field.plants, integrator.as_ref(), &settings, x, y));
-        let told = edit.label().map(|name| format!("\n  edit: {name}, {}", edit.about)).unwrap_or_default();
         // The words are the result; a closed pipe is no failure.
-        let _ = writeln!(std::io::stdout(), "{words}{told}");
+        let _ = writeln!(std::io::stdout(), "{}", renderer.explain(&field, args.integrator, pixel)?);
         return Ok(Vec::new());
     }
-
-    // First, so that the clock of `--time` need not guess how long they take.
-    let labels = pool.install(|| render::label(&geometry, &scene.parts, &scene.camera, window));
-    let traced = AtomicU64::new(0);
-    let bar = progress(quality.samples(window), args.quiet);
-    let done = |n| {
-        traced.fetch_add(n, Ordering::Relaxed);
-        bar.inc(n);
+    if options.engine == Engine::Trace {
+        field.geometry()?;
+        args.say(&grown(args.field.path(), &field));
+    }
+    let sampled = AtomicU64::new(0);
+    let bar = progress(&options.quality, window, args.quiet);
+    let done = |samples| {
+        sampled.fetch_add(samples, Ordering::Relaxed);
+        bar.inc(samples);
     };
     let watch = Watch { done: &done, stop: signals.heed() };
-    let start = Instant::now();
-    let deadline = quality.deadline(begin, window, drawing.denoise);
-    let film: Film = pool.install(|| quality.render(&world, integrator.as_ref(), &settings, deadline, &watch))?;
-    let rendered = start.elapsed();
+    let request = Request { window: args.crop, view: args.integrator, begin: Some(begin), watch };
+    let image = renderer.render(&field, &request)?;
     bar.finish_and_clear();
-    let photograph = edit.photograph(&field, &film);
-    let labels = edit.labels(labels, &film, &scene.tags());
-    let provenance = Provenance {
-        scene_hash: field.hash.clone(),
-        seed: field.seed,
-        index: field.index,
-        spp: quality.spp(&film),
-        integrator: args.integrator.name(),
-        deviations: deviations(&technique, edit),
-        kernels: accel::version()?,
-    };
-    let mut paths = pool.install(|| output::write_image(&out, &film, &labels, &photograph, &provenance))?;
-    if let Some(denoiser) = denoiser {
-        let clean = denoiser.denoise(&film, args.threads)?;
-        paths.extend(output::write_denoised(&out, &clean, &edit.photograph(&field, &clean), &provenance)?);
+    let paths = image.write(&out)?;
+    let taken = begin.elapsed();
+    if options.engine == Engine::Raster {
+        args.say(&format!("{}, drawn on {}", grown(args.field.path(), &field), renderer.kernels()));
     }
-    // One sample has no spread to tell an error by.
-    let (_, mean, most) = film.samples();
-    let error = if most > 1 { format!("{:.1} %", 100.0 * film.median_relative_error()) } else { "unknown".into() };
-    let samples = traced.into_inner() as f64 / 1e6;
-    say(format!(
-        "{samples:.0} Msamples in {:.1} s: {:.2} Msamples/s; {}median relative error {error}; {:.1} s in all; files in {}",
-        rendered.as_secs_f64(),
-        samples / rendered.as_secs_f64(),
-        if quality.is_open() { format!("{mean:.0} samples a pixel; ") } else { String::new() },
-        begin.elapsed().as_secs_f64(),
-        out.display()
-    ));
-    for warning in quality.missed(&film, begin.elapsed()) {
-        say(format!("warning: {warning}"));
+    args.say(&summary(&image, &options.quality, sampled.into_inner(), taken, &out));
+    for warning in missed(&options.quality, &image.film, taken) {
+        args.say(&format!("warning: {warning}"));
     }
     Ok(paths)
 }
 
 impl Args {
-    /// Refuses what the rasterized engine cannot do.
-    fn check_raster(&self) -> Result<()> {
-        let useless = [
-            (!matches!(self.integrator, Draw::Path), "--integrator"),
-            (self.pixel.is_some(), "--pixel"),
-            (self.denoise, "--denoise"),
-            (self.quality.is_open(), "--time and --target-error"),
-        ];
-        match useless.into_iter().find(|(given, _)| *given) {
-            Some((_, flags)) => Err(Error::Scene(format!(
-                "{flags} say nothing with --engine raster, which has no rays and no noise\n help: use --engine trace, or leave them out"
-            ))),
-            None => Ok(()),
+    fn say(&self, text: &str) {
+        if !self.quiet {
+            eprintln!("{text}");
         }
     }
 }
 
-/// Whatever differs from the page and the defaults, for the files.
-pub(crate) fn deviations(technique: &TechniqueArgs, edit: &Edit) -> Vec<String> {
-    technique.deviations().into_iter().chain(edit.label().map(|name| format!("edit: {name}"))).collect()
+/// What was grown, and how long that took.
+fn grown(path: &Path, field: &Field) -> String {
+    let (grow, build) = field.times();
+    let scene = &field.grown().scene;
+    format!(
+        "{}: {} plants, {} parts, {:.2} M triangles; grown in {:.2} s, built in {:.2} s",
+        path.display(),
+        field.grown().plants.len(),
+        scene.parts.len(),
+        scene.triangles() as f64 / 1e6,
+        grow.as_secs_f64(),
+        build.as_secs_f64()
+    )
 }
 
-/// Draws a field as a game engine does; returns the paths of the files.
-fn rasterize(
-    args: &Args,
-    edit: &Edit,
-    field: &Field,
-    window: Window,
-    card: &Card,
-    out: &Path,
-    begin: Instant,
-) -> Result<Vec<PathBuf>> {
-    let start = Instant::now();
-    let (film, labels) = card.draw(&field.scene)?;
-    let drawn = start.elapsed();
-    let left_out = left_out(&field.scene);
-    if let Some(words) = left_out.filter(|_| !args.quiet) {
-        eprintln!("warning: {words}");
+/// How good the image is, how long it took, and where it lies.
+fn summary(image: &Image<'_>, quality: &Quality, samples: u64, taken: Duration, out: &Path) -> String {
+    let drawn = image.times.sample.as_secs_f64();
+    let taken = taken.as_secs_f64();
+    if samples == 0 {
+        return format!("drawn in {drawn:.2} s; {taken:.1} s in all; files in {}", out.display());
     }
-    let (film, labels) = (film.cut(window), labels.cut(window));
-    let labels = edit.labels(labels, &film, &field.scene.tags());
-    let provenance = Provenance {
-        scene_hash: field.hash.clone(),
-        seed: field.seed,
-        index: field.index,
-        spp: Spp::Uniform(1),
-        integrator: Engine::Raster.name().into(),
-        deviations: deviations(&args.technique, edit).into_iter().chain(left_out.map(String::from)).collect(),
-        kernels: card.name().into(),
-    };
-    let paths = output::write_image(out, &film, &labels, &edit.photograph(field, &film), &provenance)?;
-    if !args.quiet {
-        eprintln!(
-            "{}: {} plants, {:.2} M triangles; drawn on {} in {:.2} s; {:.1} s in all; files in {}",
-            args.field.page().display(),
-            field.plants.len(),
-            field.scene.triangles() as f64 / 1e6,
-            card.name(),
-            drawn.as_secs_f64(),
-            begin.elapsed().as_secs_f64(),
-            out.display()
-        );
-    }
-    Ok(paths)
+    // One sample has no spread to tell an error by.
+    let (_, mean, most) = image.film.samples();
+    let error =
+        if most > 1 { format!("{:.1} %", 100.0 * image.film.median_relative_error()) } else { "unknown".into() };
+    let samples = samples as f64 / 1e6;
+    format!(
+        "{samples:.0} Msamples in {drawn:.1} s: {:.2} Msamples/s; {}median relative error {error}; {taken:.1} s in all; files in {}",
+        samples / drawn,
+        if quality.is_fixed() { String::new() } else { format!("{mean:.0} samples a pixel; ") },
+        out.display()
+    )
 }
 
-/// A number of threads that a machine may have.
-pub(crate) fn threads(text: &str) -> Result<usize, String> {
-    text.parse().ok().filter(|n| *n <= 1024).ok_or_else(|| "write a number from 0 (one for each core) to 1024".into())
+/// What was asked for and not reached.
+fn missed(quality: &Quality, film: &Film, taken: Duration) -> Vec<String> {
+    let mut all = Vec::new();
+    let error = film.median_relative_error();
+    if quality.target_error.is_some_and(|target| error > target) {
+        let help = if quality.time.is_some() { "a longer --time or a larger --max-spp" } else { "a larger --max-spp" };
+        all.push(format!("the error is {:.2} %: {help} gets nearer", 100.0 * error));
+    }
+    if let Some(time) = quality.time.filter(|time| taken > *time) {
+        all.push(format!("this took {:.1} s, longer than the {} s of --time", taken.as_secs_f64(), time.as_secs_f64()));
+    }
+    all
 }
 
 /// A bar where the number of samples is known, else a count of them.
-fn progress(samples: Option<u64>, quiet: bool) -> ProgressBar {
+fn progress(quality: &Quality, window: Window, quiet: bool) -> ProgressBar {
     if quiet || !std::io::stderr().is_terminal() {
         return ProgressBar::hidden();
     }
-    let (bar, template) = match samples {
-        Some(samples) => (ProgressBar::new(samples), "{bar:40} {percent:>3} %  {elapsed} gone, {eta} left"),
-        None => (ProgressBar::new_spinner(), "{spinner} {human_pos} samples  {elapsed} gone"),
+    let samples = u64::from(window.width()) * u64::from(window.height()) * u64::from(quality.spp);
+    let (bar, template) = if quality.is_fixed() {
+        (ProgressBar::new(samples), "{bar:40} {percent:>3} %  {elapsed} gone, {eta} left")
+    } else {
+        (ProgressBar::new_spinner(), "{spinner} {human_pos} samples  {elapsed} gone")
     };
     bar.with_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()))
 }

@@ -52,8 +52,8 @@ pub(crate) struct Args {
     /// Most time of a training, such as 30m; its end is then where the clock says, and the tables are not the same twice.
     #[arg(long, value_name = "DURATION", value_parser = humantime::parse_duration)]
     time: Option<Duration>,
-    /// The program that makes sets; `trace` beside this one unless given.
-    #[arg(long, value_name = "PATH")]
+    /// Nothing: this program makes the sets itself. Kept for one version.
+    #[arg(long, value_name = "PATH", hide = true)]
     trace: Option<PathBuf>,
     #[command(flatten)]
     machine: MachineArgs,
@@ -91,10 +91,9 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         eprint!("{}", table::listing(&bound, &out)?.markdown());
         return Ok(Vec::new());
     }
-    let trace = match &args.trace {
-        Some(trace) => trace.clone(),
-        None => beside()?,
-    };
+    if args.trace.is_some() {
+        eprintln!("warning: --trace says nothing any more: this program renders the sets itself");
+    }
     let machine = args.machine.machine();
     // First of all: for a GPU the program replaces itself.
     let precision = Precision::named(&args.machine.precision, device::find(&machine.device)?);
@@ -112,8 +111,6 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         seconds: args.time.map(|t| t.as_secs()),
         threads: args.machine.threads(),
         precision,
-        trace: &trace,
-        quiet: args.quiet,
     };
     let stop = signals.heed();
     let paths = table::run(
@@ -186,17 +183,4 @@ fn left(seconds: Option<f64>) -> String {
 fn usual_folder(page: &Path, scale: Option<&str>) -> PathBuf {
     let name = page.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     Path::new("out").join(scale.map(|s| format!("{name}-{s}")).unwrap_or(name))
-}
-
-/// The program `trace` beside this one.
-fn beside() -> Result<PathBuf> {
-    let own = std::env::current_exe().map_err(Error::io("train".as_ref()))?;
-    let trace = own.with_file_name(format!("trace{}", std::env::consts::EXE_SUFFIX));
-    if trace.is_file() {
-        return Ok(trace);
-    }
-    Err(Error::Training(format!(
-        "{}: the program that makes sets is not there\n help: build it beside this one (`cargo build --release`), or name it with --trace PATH",
-        trace.display()
-    )))
 }

@@ -35,7 +35,7 @@ impl Meaning {
 }
 
 /// Meanings by name: of numbers, or of categories.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Names(pub BTreeMap<String, Meaning>);
 
 impl Names {

@@ -40,6 +40,31 @@ pub struct Folders {
     pub ignore_others: bool,
 }
 
+/// What masks mean unless one says otherwise: the numbers of `semantics.png`.
+const NUMBERS: &str = "0=soil,1=crop,2=weed,255=ignore";
+
+impl Default for Coding {
+    fn default() -> Self {
+        Self::Numbers(Names::parse(NUMBERS).unwrap_or_default())
+    }
+}
+
+impl Folders {
+    /// Images and masks of the same names, whose numbers are those of `semantics.png`; anything else is an error.
+    pub fn new(images: PathBuf, masks: PathBuf) -> Self {
+        Self {
+            images,
+            masks,
+            nir: None,
+            image_suffix: String::new(),
+            mask_suffix: String::new(),
+            nir_suffix: String::new(),
+            coding: Coding::default(),
+            ignore_others: false,
+        }
+    }
+}
+
 /// The files of an image.
 struct Files {
     image: PathBuf,

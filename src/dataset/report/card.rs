@@ -6,6 +6,7 @@ use crate::dataset::recipe::{Made, Recipe, Rendering};
 use crate::dataset::split::Split;
 use crate::html::{count, escape, keyed, pairs, percent, whole};
 use crate::scene::tag::Class;
+use crate::settings::Engine;
 use std::fmt::Write;
 
 /// The page's name without folder and ending, or where the images come from.
@@ -28,7 +29,7 @@ pub(super) fn lead(recipe: &Recipe, found: &Statistics) -> String {
     };
     match &recipe.made {
         Made::Rendered(Rendering { engine, spp, .. }) => {
-            let how = if engine == "trace" { "path traced" } else { "drawn" };
+            let how = if *engine == Engine::Trace { "path traced" } else { "drawn" };
             format!(
                 "Procedurally grown crop fields, {how} with {} a pixel in colour and near infrared at {size}, every pixel labelled \
                  exactly by the geometry that was drawn.",
@@ -49,11 +50,11 @@ pub(super) fn provenance(recipe: &Recipe) -> String {
             rows.push(("scene SHA-256", code(&made.scene_sha256)));
             rows.push(("seed", made.seed.to_string()));
             rows.push(("image size", format!("{} × {} pixels", made.width, made.height)));
-            let engine = if made.engine == "trace" { "path tracer".into() } else { escape(&made.engine) };
-            rows.push(("engine", engine));
+            let engine = if made.engine == Engine::Trace { "path tracer" } else { made.engine.name() };
+            rows.push(("engine", engine.into()));
             rows.push(("samples a pixel", made.spp.to_string()));
             rows.push(("denoised", if made.denoise { "yes, Open Image Denoise".into() } else { "no".into() }));
-            let mut deviations: Vec<String> = made.without.iter().map(|t| format!("without {}", escape(t))).collect();
+            let mut deviations: Vec<String> = made.without.iter().map(|t| format!("without {}", t.name())).collect();
             deviations.extend(made.max_depth.map(|n| format!("at most {n} surfaces on a path")));
             deviations.extend(made.clamp.map(|x| format!("radiance of a path cut at {x}")));
             deviations.extend(made.edit.as_ref().map(|name| format!("edit {}", escape(name))));

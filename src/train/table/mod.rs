@@ -32,7 +32,7 @@
 //! | `desc`, `experiment` | what a page says; the same, checked |
 //! | `names` | names of folders |
 //! | `rows` | what is to be done, in which order, in which folder |
-//! | `sets` | images made by the program `trace` |
+//! | `sets` | images, rendered and imported |
 //! | `judgement` | how well a row does on a test set, kept |
 //! | `work` | all of it, as far as it is missing |
 //! | `print` | tables |

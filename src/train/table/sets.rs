@@ -1,15 +1,20 @@
-//! The images of an experiment: bound to folders, and made by the program `trace` where they are missing.
+//! The images of an experiment: bound to folders, rendered or imported where they are missing.
 
 use super::experiment::{Experiment, Part, Source};
 use super::names::unknown;
-use crate::dataset::recipe;
+use crate::dataset::generate::{Callbacks, Work};
+use crate::dataset::import::masks::{Folders, Masks};
+use crate::dataset::import::{self, Source as _};
+use crate::dataset::split::Shares;
+use crate::dataset::{self, recipe};
+use crate::job::Threads;
+use crate::settings::{Quality, RenderOptions};
 use crate::train::data::Selection;
-use crate::train::memory;
 use crate::{Error, Result};
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Where a real set lies: `NAME=DIR` on the command line.
@@ -36,9 +41,9 @@ impl Real {
 /// How a set comes to its folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Origin {
-    /// `trace dataset` renders it.
+    /// It is rendered.
     Rendered,
-    /// `trace dataset import` brings it in from here.
+    /// It is imported from here.
     Imported(PathBuf),
     /// It is a dataset already, and stays as it is.
     There,
@@ -136,62 +141,102 @@ impl Bound {
         )))
     }
 
-    /// What makes a set, or makes what is missing of it; none where that is not for us to do.
-    fn command(&self, set: usize, trace: &Path) -> Option<Command> {
-        let (folder, origin) = &self.sets[set];
-        let mut command = Command::new(trace);
-        command.arg("dataset");
-        match (&self.experiment.sets[set].1, origin) {
-            (Source::Scene { page, count, size, spp, seed, split }, Origin::Rendered) => {
-                command.arg("--scene").arg(page).args(["--count", &count.to_string(), "--spp", &spp.to_string()]);
-                command.args(["--width", &size.0.to_string(), "--height", &size.1.to_string()]);
-                command.args(["--split", &split.0.map(|n| n.to_string()).join(",")]);
-                if let Some(seed) = seed {
-                    command.args(["--seed", &seed.to_string()]);
-                }
-            }
-            (_, Origin::Imported(from)) => {
-                command.args(["import", "--format", "masks"]);
-                command.arg("--images").arg(from.join("images")).arg("--masks").arg(from.join("labels"));
-            }
-            _ => return None,
-        }
-        command.arg("--out").arg(folder);
-        Some(command)
-    }
-
-    /// Makes what is missing of a set, by the program `trace`; waits where another process is at it.
+    /// Makes what is missing of a set: renders or imports it. Waits where another process is at it.
     pub(super) fn make(
         &self,
         set: usize,
-        trace: &Path,
-        quiet: bool,
-        tell: &dyn Fn(&str),
+        tell: &(dyn Fn(&str) + Sync),
+        warn: &(dyn Fn(&str) + Sync),
         stop: &AtomicBool,
     ) -> Result<()> {
-        let name = &self.experiment.sets[set].0;
-        let Some(mut command) = self.command(set, trace) else { return Ok(()) };
-        if quiet {
-            command.arg("--quiet");
+        let (folder, origin) = &self.sets[set];
+        let (name, source) = &self.experiment.sets[set];
+        if !matches!(origin, Origin::Rendered | Origin::Imported(_)) {
+            return Ok(());
         }
-        let lock = lock(self.folder(set), name, tell, stop)?;
-        if !self.folder(set).join(crate::dataset::finish::MANIFEST).exists() {
+        let _lock = lock(folder, name, tell, stop)?;
+        if !folder.join(dataset::finish::MANIFEST).exists() {
             tell(&format!("making the set `{name}`"));
         }
-        // The lock goes with the open file, which the child holds as well: where this process is killed, the set stays locked until
-        // its orphan is done.
-        command.stdin(lock.map_or_else(Stdio::null, Stdio::from)).stdout(Stdio::null());
-        let child = memory::as_usual(&mut command).spawn().map_err(|e| Error::Io { path: trace.into(), source: e })?;
-        let status = wait(child, trace, stop)?;
-        match status.code() {
-            Some(0) => Ok(()),
-            Some(75) => Err(Error::Interrupted),
-            Some(2) => Err(Error::Training(format!(
-                "the set `{name}` cannot be made: `trace dataset` has refused, for the reason above\n help: set right what it names; what is done is kept"
-            ))),
-            _ => Err(Error::Damaged(format!(
-                "the set `{name}` was not made: `trace dataset` ended with {status}\n help: the same command goes on with it"
-            ))),
+        let progress = Progress::new(name, tell);
+        let made = match (source, origin) {
+            (Source::Scene { page, count, size, spp, seed, split }, _) => {
+                let order = dataset::Order {
+                    seed: *seed,
+                    width: Some(size.0),
+                    height: Some(size.1),
+                    split: *split,
+                    options: RenderOptions::path_traced(Quality::spp(*spp)),
+                    ..dataset::Order::new(page, *count)
+                };
+                let callbacks = Callbacks {
+                    begin: &|total| progress.expect(total),
+                    warn,
+                    done: &|_| progress.add(),
+                    soon: stop,
+                    now: stop,
+                };
+                dataset::make_watched(folder, &order, &Work::default(), &callbacks)
+            }
+            (_, Origin::Imported(from)) => import(from, folder, &progress, warn, stop),
+            _ => Ok(Vec::new()),
+        };
+        made.map(drop).map_err(|error| match error {
+            Error::Interrupted => error,
+            error if error.exit_code() == 2 => Error::Training(format!("the set `{name}` cannot be made: {error}")),
+            error => Error::Damaged(format!(
+                "the set `{name}` was not made: {error}\n help: the same command goes on with it"
+            )),
+        })
+    }
+}
+
+/// Brings masks of a real set in.
+fn import(
+    from: &Path,
+    folder: &Path,
+    progress: &Progress<'_>,
+    warn: &(dyn Fn(&str) + Sync),
+    stop: &AtomicBool,
+) -> Result<Vec<PathBuf>> {
+    let source = Masks::open(Folders::new(from.join("images"), from.join("labels")))?;
+    for warning in source.warnings() {
+        warn(warning);
+    }
+    progress.expect(source.images().len());
+    let order = import::Order { split: Shares::default(), licence: dataset::Order::NO_LICENCE.into() };
+    let done = |_| progress.add();
+    let set = Threads::all()?.install(|| import::import(folder, &source, &order, &done, stop))?;
+    dataset::finish::finish(&set, None)
+}
+
+/// How far a set is, told now and then.
+struct Progress<'a> {
+    name: &'a str,
+    tell: &'a (dyn Fn(&str) + Sync),
+    total: AtomicUsize,
+    done: AtomicUsize,
+    last: Mutex<Instant>,
+}
+
+impl<'a> Progress<'a> {
+    /// Between two words on it.
+    const EVERY: Duration = Duration::from_secs(30);
+
+    fn new(name: &'a str, tell: &'a (dyn Fn(&str) + Sync)) -> Self {
+        Self { name, tell, total: AtomicUsize::new(0), done: AtomicUsize::new(0), last: Mutex::new(Instant::now()) }
+    }
+
+    fn expect(&self, total: usize) {
+        self.total.store(total, Ordering::Relaxed);
+    }
+
+    fn add(&self) {
+        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        if last.elapsed() >= Self::EVERY {
+            *last = Instant::now();
+            (self.tell)(&format!("set `{}`: {done} of {} images", self.name, self.total.load(Ordering::Relaxed)));
         }
     }
 }
@@ -226,28 +271,9 @@ fn real_set(real: &Real, own: PathBuf) -> Result<(PathBuf, Origin)> {
 
 /// Between two looks at what is waited for.
 const LOOK: Duration = Duration::from_millis(50);
-/// How long a child may take to end by itself: a terminal's Ctrl-C reaches it as well.
-const GRACE: Duration = Duration::from_secs(2);
 
-/// Waits for `trace`; told to stop, ends it. It can be killed at any moment, and goes on where it was.
-fn wait(mut child: Child, trace: &Path, stop: &AtomicBool) -> Result<ExitStatus> {
-    let failed = |e| Error::Io { path: trace.into(), source: e };
-    let mut asked: Option<Instant> = None;
-    loop {
-        if let Some(status) = child.try_wait().map_err(failed)? {
-            return if asked.is_some() { Err(Error::Interrupted) } else { Ok(status) };
-        }
-        if stop.load(Ordering::Relaxed) && asked.get_or_insert_with(Instant::now).elapsed() > GRACE {
-            child.kill().map_err(failed)?;
-            child.wait().map_err(failed)?;
-            return Err(Error::Interrupted);
-        }
-        std::thread::sleep(LOOK);
-    }
-}
-
-/// Takes a set for this process; none where the file system knows no locks, on which `trace` alone keeps its files whole.
-fn lock(folder: &Path, name: &str, tell: &dyn Fn(&str), stop: &AtomicBool) -> Result<Option<File>> {
+/// Takes a set for this process; none where the file system knows no locks, on which files are whole all the same.
+fn lock(folder: &Path, name: &str, tell: &(dyn Fn(&str) + Sync), stop: &AtomicBool) -> Result<Option<File>> {
     let path = folder.with_file_name(format!("{name}.lock"));
     let sets = folder.parent().unwrap_or(Path::new("."));
     std::fs::create_dir_all(sets).map_err(Error::io(sets))?;

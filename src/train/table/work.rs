@@ -52,10 +52,6 @@ pub struct Order<'a> {
     pub threads: usize,
     /// Precision, for the same.
     pub precision: &'a str,
-    /// The program that makes sets.
-    pub trace: &'a Path,
-    /// Whether that shall be quiet.
-    pub quiet: bool,
 }
 
 /// Who does what needs libtorch, and who is told.
@@ -69,9 +65,9 @@ pub struct Hands<'a> {
     /// Told before each training what it is, and how far the experiment is.
     pub training: &'a dyn Fn(&str, &State),
     /// Told what is done else, in words.
-    pub tell: &'a dyn Fn(&str),
+    pub tell: &'a (dyn Fn(&str) + Sync),
     /// Told what was not as it should be, in words.
-    pub warn: &'a dyn Fn(&str),
+    pub warn: &'a (dyn Fn(&str) + Sync),
     /// Raised by whoever wants it to stop.
     pub stop: &'a AtomicBool,
 }
@@ -104,7 +100,7 @@ pub fn run(order: &Order<'_>, hands: &Hands<'_>) -> Result<Vec<PathBuf>> {
     bound.check()?;
     alone(out, || write_atomically(&out.join("experiment.ron"), order.page.as_bytes()))?;
     for set in bound.used() {
-        bound.make(set, order.trace, order.quiet, hands.tell, hands.stop)?;
+        bound.make(set, hands.tell, hands.warn, hands.stop)?;
     }
     if order.only == Some(Only::Sets) {
         return Ok(bound.used().into_iter().map(|set| bound.folder(set).join(crate::dataset::recipe::FILE)).collect());

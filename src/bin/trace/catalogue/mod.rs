@@ -8,7 +8,7 @@ mod letters;
 mod page;
 mod sheet;
 
-use crate::render::threads;
+use crate::quality::threads;
 use furrow::accel::EmbreeAccel;
 use furrow::cli::{self, signal::Signals};
 use furrow::geometry::Window;

@@ -1,7 +1,7 @@
 //! Other people's data: `trace dataset import`.
 
 use super::progress::Progress;
-use crate::render::threads;
+use crate::quality::threads;
 use clap::ValueEnum;
 use furrow::cli::signal::Signals;
 use furrow::dataset::import::classes::{Colors, Names};
@@ -88,9 +88,6 @@ enum Others {
     Ignore,
 }
 
-/// What masks mean unless one says otherwise: the numbers of `semantics.png`.
-const NUMBERS: &str = "0=soil,1=crop,2=weed,255=ignore";
-
 /// Brings it in and writes what belongs to all.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     cli::check_folder(&args.out)?;
@@ -129,11 +126,10 @@ fn source(args: &Args) -> Result<Box<dyn Source>> {
     }
     Ok(match args.format {
         Format::Masks => {
-            let numbers = || Names::parse(NUMBERS).map_err(Error::Dataset);
             let coding = match (&args.colors, &args.classes) {
                 (Some(colors), _) => Coding::Colors(colors.clone()),
                 (None, Some(names)) => Coding::Numbers(names.clone()),
-                (None, None) => Coding::Numbers(numbers()?),
+                (None, None) => Coding::default(),
             };
             Box::new(Masks::open(Folders {
                 images: needed(&args.images, "--images")?,

@@ -1,7 +1,6 @@
 //! `trace dataset`: many fields, with all their labels, in the formats of other tools.
 
 mod emit;
-mod engine;
 mod finish;
 mod import;
 pub(crate) mod order;

@@ -1,12 +1,11 @@
 //! Making the images: `trace dataset render`.
 
-use super::engine;
 use super::progress::Progress;
-use crate::render::threads;
+use crate::quality::threads;
 use furrow::Result;
 use furrow::cli::signal::Signals;
 use furrow::dataset::Set;
-use furrow::dataset::generate::{self, Overseer, Shard, Work};
+use furrow::dataset::generate::{self, Callbacks, Shard, Work};
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -46,14 +45,14 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
 /// Makes the images of a dataset that are missing.
 pub(crate) fn generate(set: &Set, args: &WorkArgs, shard: Shard, signals: &Signals) -> Result<()> {
     let begin = Instant::now();
-    let engine = engine::of(set)?;
     let (soon, now) = signals.heed_patiently();
     let progress = Progress::new(begin, args.quiet);
     let total = |n: usize| progress.expect(n as u64);
     let done = |_| progress.add();
-    let overseer = Overseer { begin: &total, done: &done, soon, now };
+    let warn = |words: &str| eprintln!("warning: {words}");
+    let callbacks = Callbacks { begin: &total, warn: &warn, done: &done, soon, now };
     let work = Work { shard, threads: args.threads, at_once: args.at_once };
-    let made = generate::generate(set, &work, engine.as_deref(), &overseer);
+    let made = generate::generate(set, &work, &callbacks);
     let (images, rate) = progress.finish();
     if !args.quiet {
         let rate = if images > 0 { format!(": {rate:.0} images an hour") } else { String::new() };

@@ -1,11 +1,11 @@
 //! Whether a dataset is whole: `trace dataset verify`.
 
-use super::engine;
 use super::progress::Progress;
-use crate::render::threads;
+use crate::quality::threads;
+use furrow::Result;
 use furrow::cli::signal::Signals;
-use furrow::dataset::{Set, verify};
-use furrow::{Result, render};
+use furrow::dataset::{Set, render, verify};
+use furrow::job::Threads;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -31,13 +31,12 @@ pub(crate) struct Args {
 /// Checks; says what was found.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let set = Set::open(&args.dir)?;
-    let engine = if args.rerender > 0 { engine::of(&set)? } else { None };
+    let renderer = if args.rerender > 0 { render::renderer(&set)? } else { None };
     let progress = Progress::new(Instant::now(), args.quiet);
     progress.expect(set.recipe.count);
     let done = |_| progress.add();
-    let engine = engine.as_deref();
-    let pool = render::pool(args.threads)?;
-    let found = pool.install(|| verify::verify(&set, args.rerender, engine, &done, signals.heed()))?;
+    let threads = Threads::new(args.threads)?;
+    let found = verify::verify(&set, args.rerender, renderer.as_ref(), &threads, &done, signals.heed())?;
     progress.finish();
     if !args.quiet {
         eprintln!(

@@ -1,40 +1,18 @@
-//! Grows field k, has it drawn, labels it: a [`Sample`].
+//! Renders field k: a [`Sample`].
 
 use super::annotate::{self, keypoint, of_255};
 use super::recipe::Recipe;
 use super::record::{Exposure, Grown, Leaf, Plant, Record, Seen};
 use super::sample::{Rendered, Sample};
 use super::set::Set;
-use crate::ablation::Edit;
-use crate::accel::EmbreeAccel;
-use crate::film::Film;
-use crate::geometry::Window;
-use crate::output::{Provenance, half};
+use crate::job::{Image, Renderer, Request, SceneFile};
+use crate::output::half;
 use crate::render::{self, LabelMap, Watch};
-use crate::scene::assemble::{Options, Source};
 use crate::scene::{Field, PlantRecord};
+use crate::settings::Engine;
 use crate::{Error, Result};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
-
-/// Draws fields: a path tracer, a rasterizer.
-pub trait Engine: Sync {
-    /// Draws a whole field. Called inside a pool of so many threads.
-    fn draw(&self, field: &Field, geometry: &EmbreeAccel, threads: usize, watch: &Watch<'_>) -> Result<Drawn>;
-
-    /// What the files say of where they came from.
-    fn provenance(&self, field: &Field) -> Provenance;
-}
-
-/// What an engine drew.
-pub struct Drawn {
-    /// The film.
-    pub film: Film,
-    /// The film that the photographs are made of, where it is another: one without noise.
-    pub clean: Option<Film>,
-    /// What lies at each pixel's centre, where the engine knows it by itself.
-    pub labels: Option<LabelMap>,
-}
 
 /// Where an image's time went.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -47,8 +25,8 @@ pub struct Times {
     pub label: Duration,
 }
 
-/// A new image.
-pub struct Shot {
+/// A new image of a dataset.
+pub struct RenderedSample {
     /// The image.
     pub sample: Sample,
     /// What its pictures say of where they came from.
@@ -57,22 +35,49 @@ pub struct Shot {
     pub times: Times,
 }
 
-/// The page that a dataset is rendered from.
-pub fn source(set: &Set) -> Result<Source> {
+/// The scene file that a dataset is rendered from.
+pub fn scene_file(set: &Set) -> Result<SceneFile> {
     let rendering = set.recipe.rendering()?;
-    rendering.edit()?.open(&set.folder.join(&rendering.scene))
+    let scene = SceneFile::edited(set.folder.join(&rendering.scene), rendering.edit()?)?;
+    Ok(scene.seed(rendering.seed).width(rendering.width).height(rendering.height))
 }
 
-/// Makes image `index` of a dataset from its [`source`]. Call it inside a pool.
-pub fn shoot(set: &Set, source: &Source, index: u64, engine: &dyn Engine, watch: &Watch<'_>) -> Result<Shot> {
+/// What renders the images of a dataset; `None` for images that were imported. An error where this machine would make other bits than
+/// the one that began the dataset.
+pub fn renderer(set: &Set) -> Result<Option<Renderer>> {
+    let Ok(rendering) = set.recipe.rendering() else { return Ok(None) };
+    let same = |what: &str, there: &str, here: &str| {
+        if there == here {
+            return Ok(());
+        }
+        Err(Error::Dataset(format!(
+            "{}: the dataset was begun with {what} {there}, this is {here}: its images would differ\n help: go on with {there}, \
+             or begin another dataset",
+            set.folder.display()
+        )))
+    };
+    same("furrow", &set.recipe.furrow, env!("CARGO_PKG_VERSION"))?;
+    let renderer = Renderer::open(&rendering.options())?;
+    let kernels = match rendering.engine {
+        Engine::Trace => "the ray tracing kernels",
+        Engine::Raster => "the graphics card",
+    };
+    same(kernels, &rendering.kernels, renderer.kernels())?;
+    Ok(Some(renderer))
+}
+
+/// Makes image `index` of a dataset from its [`scene_file`], whose threads do the work.
+pub fn render(
+    set: &Set,
+    scene_file: &SceneFile,
+    index: u64,
+    renderer: &Renderer,
+    watch: Watch<'_>,
+) -> Result<RenderedSample> {
     let Set { folder, recipe } = set;
     let rendering = recipe.rendering()?;
-    let begin = Instant::now();
-    let options =
-        Options { seed: Some(rendering.seed), index, width: Some(rendering.width), height: Some(rendering.height) };
-    let edit = rendering.edit()?;
-    let field = edit.field(source, &options)?;
-    if field.hash != rendering.scene_sha256 {
+    let field = scene_file.field(index)?;
+    if field.grown().hash != rendering.scene_sha256 {
         return Err(Error::Dataset(format!(
             "{}: the page or something that it names was changed since the dataset was begun\n help: restore {}/scene/, or begin \
              another dataset",
@@ -80,28 +85,22 @@ pub fn shoot(set: &Set, source: &Source, index: u64, engine: &dyn Engine, watch:
             folder.display()
         )));
     }
-    let threads = rayon::current_num_threads();
-    let geometry = EmbreeAccel::build(&field.scene.surfaces(), threads as u32)?;
-    let grow = begin.elapsed();
+    field.geometry()?;
+    let (grow, build) = field.times();
+    let image = renderer.render(&field, &Request { watch, ..Request::default() })?;
     let begin = Instant::now();
-    let mut drawn = engine.draw(&field, &geometry, threads, watch)?;
-    let draw = begin.elapsed();
-    let begin = Instant::now();
-    let window = Window::full(field.scene.camera.width(), field.scene.camera.height());
-    let Field { scene, .. } = &field;
-    let labels = drawn.labels.take().unwrap_or_else(|| render::label(&geometry, &scene.parts, &scene.camera, window));
-    let provenance = engine.provenance(&field);
-    let text = provenance.photograph_text(drawn.clean.is_some());
-    let sample = expose(recipe, edit, &field, drawn, labels)?;
-    Ok(Shot { sample, text, times: Times { grow, draw, label: begin.elapsed() } })
+    let (draw, label) = (image.times.draw, image.times.label);
+    let text = image.provenance.photograph_text(image.denoised.is_some());
+    let sample = field.threads().install(|| describe(recipe, image))?;
+    Ok(RenderedSample { sample, text, times: Times { grow: grow + build, draw, label: label + begin.elapsed() } })
 }
 
-/// The sample of a field that was drawn and labelled.
-fn expose(recipe: &Recipe, edit: &Edit, field: &Field, drawn: Drawn, labels: LabelMap) -> Result<Sample> {
-    let Drawn { film, clean, .. } = drawn;
-    let photograph = edit.photograph(field, clean.as_ref().unwrap_or(&film));
+/// The sample of an image.
+fn describe(recipe: &Recipe, image: Image<'_>) -> Result<Sample> {
+    let photograph = image.photograph();
+    let field = image.field().grown();
     let tags = field.scene.tags();
-    let labels = edit.labels(labels, &film, &tags);
+    let Image { film, labels, .. } = image;
     let kinds: BTreeMap<u16, u16> = field.plants.iter().map(|p| (p.number, p.kind)).collect();
     let kind = |plant: u16| kinds.get(&plant).copied().unwrap_or(0);
     let mut sample = Sample {

@@ -1,0 +1,32 @@
+//! A whole dataset in one call: plan, render, finish.
+
+use super::generate::{Callbacks, Shard, Work, generate};
+use super::plan::{Order, plan};
+use super::{Set, finish};
+use crate::Result;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+/// Makes what is missing of a dataset in `folder` with all threads, and returns the paths of the files that belong to all images.
+/// Killed, stopped or damaged, the same call makes what is missing and ends with the same files.
+pub fn make(folder: impl AsRef<Path>, order: &Order) -> Result<Vec<PathBuf>> {
+    let never = AtomicBool::new(false);
+    let callbacks = Callbacks { begin: &|_| (), warn: &|_| (), done: &|_| (), soon: &never, now: &never };
+    make_watched(folder.as_ref(), order, &Work::default(), &callbacks)
+}
+
+/// The same with a choice of threads, told of warnings and progress, and stopped when the callbacks say so. All shards are made.
+pub fn make_watched(folder: &Path, order: &Order, work: &Work, callbacks: &Callbacks<'_>) -> Result<Vec<PathBuf>> {
+    let set = begin(folder, order, callbacks)?;
+    generate(&set, &Work { shard: Shard::ALL, ..*work }, callbacks)?;
+    finish::finish(&set, None)
+}
+
+/// Begins a dataset, or finds it begun, and tells the warnings.
+pub fn begin(folder: &Path, order: &Order, callbacks: &Callbacks<'_>) -> Result<Set> {
+    let (set, warnings) = plan(folder, order)?;
+    for warning in &warnings {
+        (callbacks.warn)(warning);
+    }
+    Ok(set)
+}

@@ -1,0 +1,71 @@
+//! One grown field, ready to be rendered.
+
+use super::image::Image;
+use super::renderer::{Renderer, Request};
+use super::threads::Threads;
+use crate::ablation::Edit;
+use crate::accel::EmbreeAccel;
+use crate::integrator::World;
+use crate::scene;
+use crate::settings::{Quality, RenderOptions};
+use crate::{Error, Result};
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
+
+/// A grown field: everything that a camera can see, and what is known of every plant.
+pub struct Field {
+    grown: scene::Field,
+    edit: &'static Edit,
+    threads: Threads,
+    grow: Duration,
+    geometry: OnceLock<(EmbreeAccel, Duration)>,
+}
+
+impl Field {
+    pub(super) fn new(grown: scene::Field, edit: &'static Edit, threads: Threads, grow: Duration) -> Self {
+        Self { grown, edit, threads, grow, geometry: OnceLock::new() }
+    }
+
+    /// Path traces what the camera sees, and labels it. [`Renderer`] offers the rasterizer, crops, progress and a stop as well, and
+    /// serves any number of fields.
+    pub fn render(&self, quality: &Quality) -> Result<Image<'_>> {
+        let options = self.edit.options(RenderOptions::path_traced(*quality));
+        Renderer::open(&options)?.render(self, &Request::default())
+    }
+
+    /// Scene, plants and sensor; seed, index and hash of what was read; conditions and warnings.
+    pub fn grown(&self) -> &scene::Field {
+        &self.grown
+    }
+
+    /// What was changed of it.
+    pub fn edit(&self) -> &'static Edit {
+        self.edit
+    }
+
+    /// The threads that work on it.
+    pub fn threads(&self) -> &Threads {
+        &self.threads
+    }
+
+    /// How long it took to grow, and to build its BVH as far as that is done.
+    pub fn times(&self) -> (Duration, Duration) {
+        (self.grow, self.geometry.get().map_or(Duration::ZERO, |(_, build)| *build))
+    }
+
+    /// What rays hit; built at the first call.
+    pub fn geometry(&self) -> Result<&EmbreeAccel> {
+        if self.geometry.get().is_none() {
+            let begin = Instant::now();
+            let surfaces = self.grown.scene.surfaces();
+            let built = self.threads.install(|| EmbreeAccel::build(&surfaces, self.threads.count() as u32))?;
+            let _ = self.geometry.set((built, begin.elapsed()));
+        }
+        self.geometry.get().map(|(built, _)| built).ok_or_else(|| Error::Embree("the scene was not built".into()))
+    }
+
+    /// Scene and geometry, as integrators take them.
+    pub fn world(&self) -> Result<World<'_>> {
+        Ok(World { scene: &self.grown.scene, geometry: self.geometry()? })
+    }
+}

@@ -1,0 +1,80 @@
+//! What was rendered of a field, and how it is written.
+
+use super::field::Field;
+use crate::Result;
+use crate::film::Film;
+use crate::output::{self, Provenance};
+use crate::render::LabelMap;
+use crate::sensor::Photograph;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Where an image's time went.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Times {
+    /// Sampling alone.
+    pub sample: Duration,
+    /// Sampling and denoising.
+    pub draw: Duration,
+    /// Labels.
+    pub label: Duration,
+}
+
+/// A rendered and labelled image of a field.
+pub struct Image<'f> {
+    field: &'f Field,
+    /// Radiance, its variance, and attributes of the first surface, by pixel.
+    pub film: Film,
+    /// The same without noise, where that was asked for.
+    pub denoised: Option<Film>,
+    /// Class, plant and leaf at each pixel's centre.
+    pub labels: LabelMap,
+    /// What its files say of where they came from.
+    pub provenance: Provenance,
+    /// Where the time went.
+    pub times: Times,
+}
+
+impl<'f> Image<'f> {
+    pub(super) fn new(
+        field: &'f Field,
+        film: Film,
+        denoised: Option<Film>,
+        labels: LabelMap,
+        provenance: Provenance,
+        times: Times,
+    ) -> Self {
+        let labels = field.edit().labels(labels, &film, &field.grown().scene.tags());
+        Self { field, film, denoised, labels, provenance, times }
+    }
+
+    /// The field.
+    pub fn field(&self) -> &'f Field {
+        self.field
+    }
+
+    /// The photograph that the field's sensor takes; of the denoised film where there is one.
+    pub fn photograph(&self) -> Photograph {
+        self.expose(self.denoised.as_ref().unwrap_or(&self.film))
+    }
+
+    /// Writes all files into a folder, which is made where it is missing, and returns their paths. Each appears whole or not at all.
+    ///
+    /// `rgb.png`, `nir.png` (and `rgb16.png`, `nir16.png` of a sensor with more than 8 bits), `radiance.exr`, `semantics.png`,
+    /// `plants.png`, `leaves.png`, `overlay.png`; with denoising `rgb_denoised.png`, `nir_denoised.png` and `denoised.exr` beside them.
+    pub fn write(&self, folder: impl AsRef<Path>) -> Result<Vec<PathBuf>> {
+        let Self { film, labels, provenance, .. } = self;
+        let folder = folder.as_ref();
+        self.field.threads().install(|| {
+            let mut paths = output::write_image(folder, film, labels, &self.expose(film), provenance)?;
+            if let Some(clean) = &self.denoised {
+                paths.extend(output::write_denoised(folder, clean, &self.expose(clean), provenance)?);
+            }
+            Ok(paths)
+        })
+    }
+
+    fn expose(&self, film: &Film) -> Photograph {
+        self.field.threads().install(|| self.field.edit().photograph(self.field.grown(), film))
+    }
+}

@@ -1,0 +1,69 @@
+//! A scene file, read once for any number of its fields.
+
+use super::field::Field;
+use super::threads::Threads;
+use crate::Result;
+use crate::ablation::{Edit, FULL};
+use crate::scene::assemble::{Options, Source};
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// A scene file: a distribution over fields. What its fields have read (species, textures, tables) is kept for the next.
+#[derive(Clone)]
+pub struct SceneFile {
+    source: Arc<Source>,
+    edit: &'static Edit,
+    options: Options,
+    threads: Threads,
+}
+
+impl SceneFile {
+    /// Opens a scene file. An error names the line, the column and a way out.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        Self::edited(path, &FULL)
+    }
+
+    /// Opens a scene file with one thing changed, for an ablation.
+    pub fn edited(path: impl AsRef<Path>, edit: &'static Edit) -> Result<Self> {
+        let source = Arc::new(edit.open(path.as_ref())?);
+        Ok(Self { source, edit, options: Options::default(), threads: Threads::all()? })
+    }
+
+    /// With this seed instead of the file's; `None` keeps it.
+    #[must_use]
+    pub fn seed(mut self, seed: impl Into<Option<u64>>) -> Self {
+        self.options.seed = seed.into();
+        self
+    }
+
+    /// With images this many pixels wide; the field of view stays, the height follows unless [`SceneFile::height`] says it. `None`: as
+    /// the file says.
+    #[must_use]
+    pub fn width(mut self, width: impl Into<Option<u32>>) -> Self {
+        self.options.width = width.into();
+        self
+    }
+
+    /// With images this many pixels high.
+    #[must_use]
+    pub fn height(mut self, height: impl Into<Option<u32>>) -> Self {
+        self.options.height = height.into();
+        self
+    }
+
+    /// With its work done by these threads. It shares what it has read with the scene file that it was made from.
+    #[must_use]
+    pub fn threads(mut self, threads: &Threads) -> Self {
+        self.threads = threads.clone();
+        self
+    }
+
+    /// Grows field `index`: always the same for the same file, seed and index, and without growing those before it.
+    pub fn field(&self, index: u64) -> Result<Field> {
+        let begin = Instant::now();
+        let options = Options { index, ..self.options };
+        let grown = self.threads.install(|| self.edit.field(&self.source, &options))?;
+        Ok(Field::new(grown, self.edit, self.threads.clone(), begin.elapsed()))
+    }
+}
