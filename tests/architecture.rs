@@ -102,14 +102,13 @@ const DOORS: &[(&str, &str)] = &[
     ("tch", "train/engine/ train/fit/objective.rs train/fit/optimiser.rs train/fit/teach.rs train/deploy/"),
     // Files appear whole or not at all: images of fields, and drawn textures below them. The denoiser's go through a folder.
     ("tempfile", "output/mod.rs output/denoise.rs texture/draw/write.rs"),
-    ("thiserror", "error.rs"),
     ("tobj", "model/obj.rs"),
     // Graphics cards.
     ("wgpu", "raster/"),
 ];
 
 /// Dependencies that no source names: libtorch's place is told to the build script of whoever depends on it directly.
-const UNNAMED: &[&str] = &["torch_sys"];
+const UNNAMED: &[&str] = &["thiserror", "torch_sys"];
 
 /// A source file without its comments, strings and tests.
 struct Source {
@@ -443,6 +442,42 @@ fn every_dependency_is_in_the_table_of_doors() {
     for krate in UNNAMED {
         let faults: Vec<String> = sources().iter().filter(|s| names(s, krate)).map(|s| s.path.clone()).collect();
         assert!(faults.is_empty(), "{krate} is named in {faults:?}: give it a door");
+    }
+}
+
+/// Help that is hidden in a message, in a literal of the source: after a line break, be it on the next line of the literal.
+fn hidden_help(code: &str) -> bool {
+    code.match_indices("\\n").any(|(at, _)| {
+        let rest = code[at + 2..].trim_start().trim_start_matches("\\\n");
+        rest.trim_start().starts_with("help: ")
+    })
+}
+
+/// Rationale: an error's help is a field of its own, for programs to use and for one place to print. Expected: no message holds it.
+#[test]
+fn no_message_hides_its_help() {
+    fn walk(dir: &Path, faults: &mut Vec<String>) {
+        for entry in fs::read_dir(dir).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                walk(&path, faults);
+            } else if path.extension().is_some_and(|e| e == "rs") && !path.ends_with("src/error.rs") {
+                let code = fs::read_to_string(&path).unwrap();
+                let code = code.split("#[cfg(test)]").next().unwrap();
+                if hidden_help(code) {
+                    faults.push(path.display().to_string());
+                }
+            }
+        }
+    }
+    let mut faults = Vec::new();
+    walk(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut faults);
+    assert!(faults.is_empty(), "give the help to Error::help: {faults:?}");
+    for hidden in ["\"a\\n help: b\"", "\"a\\n \\\n        help: b\"", "\"a\\n \\\n help: b\""] {
+        assert!(hidden_help(hidden), "{hidden}");
+    }
+    for plain in ["\"help: b\"", "\"a\\n b help: c\""] {
+        assert!(!hidden_help(plain), "{plain}");
     }
 }
 

@@ -9,6 +9,7 @@ mod common;
 
 use common::dataset::{make, same, succeed, tree};
 use furrow::dataset::generate::Shard;
+use furrow::error::Kind;
 use furrow::ron_file::RonFile;
 use furrow::train::baseline::files;
 use furrow::train::classes::Classes;
@@ -76,7 +77,7 @@ impl Players {
         if let Some(left) = self.patience.get() {
             self.patience.set(left.checked_sub(1));
             if left == 0 {
-                return Err(Error::Interrupted);
+                return Err(Error::interrupted());
             }
         }
         self.calls.borrow_mut().push(words);
@@ -228,7 +229,7 @@ fn interrupted_before_every_step_it_ends_with_the_same_files() {
     loop {
         players.patience.set(Some(1));
         match players.run(PAGE, &out, Shard::ALL, None) {
-            Err(Error::Interrupted) => sittings += 1,
+            Err(e) if e.kind() == Kind::Interrupted => sittings += 1,
             other => {
                 other.unwrap();
                 break;
@@ -459,13 +460,15 @@ fn mistakes_in_a_page_are_shown_where_they_are() {
     for (from, to, underlined, what, help) in faults {
         let at = PAGE.find(from).unwrap_or_else(|| panic!("{from}"));
         let error = Experiment::of(&page(&PAGE.replacen(from, to, 1)), None).expect_err(to);
-        let Error::Page(place) = &error else { panic!("{to}: without a place: {error}") };
+        let place = error.place().and_then(|place| place.span.as_ref());
+        let place = place.unwrap_or_else(|| panic!("{to}: without a place: {error}"));
         let under: String = place.text.chars().skip(place.column - 1).take(place.width).collect();
         assert_eq!(under, underlined, "{error}");
         if underlined != "[\"exg\"]" {
             assert_eq!(place.line, PAGE[..at].matches('\n').count() + 1, "{error}");
         }
-        assert!(place.message.contains(what) && place.help.contains(help), "{to}: {what} | {help}\n{error}");
+        let advice = error.advice().unwrap_or_default();
+        assert!(error.message().contains(what) && advice.contains(help), "{to}: {what} | {help}\n{error}");
         assert_eq!(error.exit_code(), 2);
     }
     for list in ["train", "test"] {

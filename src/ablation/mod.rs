@@ -74,7 +74,7 @@ impl Edit {
         EDITS.iter().find(|edit| edit.name == name).ok_or_else(|| {
             let known: Vec<&str> = EDITS.iter().map(|edit| edit.name).collect();
             let help = choose("edits", &known, name);
-            Error::Scene(format!("there is no edit `{name}`\n help: {help}"))
+            Error::misuse(format!("there is no edit `{name}`")).help(help)
         })
     }
 

@@ -60,7 +60,7 @@ fn device(threads: u32) -> Result<rtc::Device> {
 }
 
 fn refused(error: rtc::Error) -> Error {
-    Error::Embree(format!("{error:?}"))
+    Error::failed(format!("{error:?}"))
 }
 
 impl EmbreeAccel {

@@ -37,10 +37,9 @@ pub fn crop(text: &str) -> Result<Window, String> {
 /// Checks that files can be written into `folder`, before hours are spent on what would go there.
 pub fn check_folder(folder: &Path) -> Result<()> {
     match folder.ancestors().find(|f| f.exists()) {
-        Some(there) if !there.is_dir() => Err(Error::Scene(format!(
-            "{}: this is a file, so no files can be written into it\n help: give --out a folder; it is made where it is missing",
-            there.display()
-        ))),
+        Some(there) if !there.is_dir() => Err(Error::misuse("this is a file, so no files can be written into it")
+            .in_file(there)
+            .help("give --out a folder; it is made where it is missing")),
         _ => Ok(()),
     }
 }
@@ -62,7 +61,7 @@ pub fn check_scene(page: &Path) -> Result<()> {
         (None, false) => format!("pages in {} are {}", folder.display(), pages.join(", ")),
         (None, true) => "the main scene is scenes/field.ron in the project's folder".to_owned(),
     };
-    Err(Error::Scene(format!("{}: there is no such page\n help: {help}", page.display())))
+    Err(Error::input("there is no such page").in_file(page).help(help))
 }
 
 /// Checks that a crop lies in the image.
@@ -71,10 +70,8 @@ pub fn check_crop(crop: Window, width: u32, height: u32) -> Result<()> {
         return Ok(());
     }
     let Window { x0, y0, x1, y1 } = crop;
-    Err(Error::Scene(format!(
-        "the crop reaches to pixel {x1},{y1}, past the image of {width} × {height} pixels\n \
-         help: x + width may be {width} at most, y + height {height}; the crop begins at {x0},{y0}"
-    )))
+    Err(Error::misuse(format!("the crop reaches to pixel {x1},{y1}, past the image of {width} × {height} pixels"))
+        .help(format!("x + width may be {width} at most, y + height {height}; the crop begins at {x0},{y0}")))
 }
 
 /// Checks that a pixel lies in the image.
@@ -82,9 +79,8 @@ pub fn check_pixel((x, y): (u32, u32), width: u32, height: u32) -> Result<()> {
     if x < width && y < height {
         return Ok(());
     }
-    Err(Error::Scene(format!(
-        "pixel {x},{y} lies outside the image of {width} × {height} pixels\n \
-         help: pixels count from 0,0 at the top left to {},{}",
+    Err(Error::misuse(format!("pixel {x},{y} lies outside the image of {width} × {height} pixels")).help(format!(
+        "pixels count from 0,0 at the top left to {},{}",
         width - 1,
         height - 1
     )))

@@ -114,10 +114,11 @@ fn check(pair: &Pair, found: &Pairs) -> Result<()> {
     if a == b {
         return Ok(());
     }
-    Err(Error::Compare(format!(
-        "{} has {} × {} pixels in {}, {} × {} in {}\n help: pixels stand for each other; render both at one --width, or resize one",
+    Err(Error::input(format!(
+        "{} has {} × {} pixels in {}, {} × {} in {}",
         pair.name, a.0, a.1, found.a, b.0, b.1, found.b
-    )))
+    ))
+    .help("pixels stand for each other; render both at one --width, or resize one"))
 }
 
 /// Measures a pair; with a picture of it for pages that show so many.

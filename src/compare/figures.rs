@@ -149,10 +149,11 @@ pub fn pair(a: &Picture, b: &Picture, labels: Option<&[u8]>, pixels_per_degree: 
 /// The error of each pixel of `b`, seen by an eye with so many pixels to a degree. An error where sizes differ or no pixel is there.
 pub fn maps(a: &Picture, b: &Picture, pixels_per_degree: f32) -> Result<Maps> {
     if a.size() != b.size() || a.rgb.is_empty() {
-        return Err(Error::Compare(format!(
-            "pictures of {} × {} and {} × {} pixels cannot be compared\n help: pixels stand for each other, so sizes must be equal",
+        return Err(Error::input(format!(
+            "pictures of {} × {} and {} × {} pixels cannot be compared",
             a.width, a.height, b.width, b.height
-        )));
+        ))
+        .help("pixels stand for each other, so sizes must be equal"));
     }
     let (flip, (ssim, ciede2000)) = rayon::join(
         || flip::map(a, b, pixels_per_degree),
@@ -167,7 +168,7 @@ pub fn maps(a: &Picture, b: &Picture, pixels_per_degree: f32) -> Result<Maps> {
 /// Means of the maps, and what else is measured.
 pub(super) fn figures(a: &Picture, b: &Picture, labels: Option<&[u8]>, maps: &Maps) -> Result<Figures> {
     if labels.is_some_and(|labels| labels.len() != a.rgb.len()) {
-        return Err(Error::Compare("there must be a label for each pixel".into()));
+        return Err(Error::misuse("there must be a label for each pixel"));
     }
     let width = a.width as usize;
     let regions = if labels.is_some() { &Region::ALL[..] } else { &Region::ALL[..1] };

@@ -84,11 +84,12 @@ impl Pairs {
             }
             (one, _) => {
                 let (one, many) = if matches!(one, Source::One(_)) { (a, b) } else { (b, a) };
-                return Err(Error::Compare(format!(
-                    "{} is one picture, {} a folder of many\n help: give two pictures or two folders",
+                return Err(Error::misuse(format!(
+                    "{} is one picture, {} a folder of many",
                     one.display(),
                     many.display()
-                )));
+                ))
+                .help("give two pictures or two folders"));
             }
         }
         found.check(labels)?;
@@ -97,21 +98,19 @@ impl Pairs {
 
     fn check(&self, labels: Option<&Path>) -> Result<()> {
         if self.pairs.is_empty() {
-            return Err(Error::Compare(format!(
-                "no picture of {} has a partner in {}\n help: pictures are paired by their names below the folder, without the extension; \
+            return Err(Error::input(format!("no picture of {} has a partner in {}", self.a, self.b)).help(format!(
+                "pictures are paired by their names below the folder, without the extension; \
                  the first has {}, the second {}",
-                self.a,
-                self.b,
                 told(&self.only_a),
                 told(&self.only_b)
             )));
         }
         match labels {
-            Some(labels) if self.pairs.iter().all(|pair| pair.labels.is_none()) => Err(Error::Compare(format!(
-                "{}: there are no labels of {} in it\n help: they are PNG files with the pictures' names, or semantics.png in folders with these",
-                labels.display(),
-                self.pairs[0].name
-            ))),
+            Some(labels) if self.pairs.iter().all(|pair| pair.labels.is_none()) => {
+                Err(Error::input(format!("there are no labels of {} in it", self.pairs[0].name))
+                    .in_file(labels)
+                    .help("they are PNG files with the pictures' names, or semantics.png in folders with these"))
+            }
             _ => Ok(()),
         }
     }
@@ -147,10 +146,9 @@ pub(super) fn there(path: &Path) -> Result<()> {
     if path.exists() {
         return Ok(());
     }
-    Err(Error::Compare(format!(
-        "{}: there is no such file or folder\n help: give a PNG or JPEG, a folder of such, a rendered image or a dataset",
-        path.display()
-    )))
+    Err(Error::input("there is no such file or folder")
+        .in_file(path)
+        .help("give a PNG or JPEG, a folder of such, a rendered image or a dataset"))
 }
 
 fn source(path: &Path) -> Result<Source> {
@@ -166,10 +164,9 @@ fn source(path: &Path) -> Result<Source> {
     let mut found = BTreeMap::new();
     walk(if images.is_dir() { &images } else { path }, "", &mut found)?;
     if found.is_empty() {
-        return Err(Error::Compare(format!(
-            "{}: there is no PNG or JPEG in this folder\n help: give a picture, a folder of such, a rendered image or a dataset",
-            path.display()
-        )));
+        return Err(Error::input("there is no PNG or JPEG in this folder")
+            .in_file(path)
+            .help("give a picture, a folder of such, a rendered image or a dataset"));
     }
     Ok(Source::Many(found))
 }
@@ -177,7 +174,7 @@ fn source(path: &Path) -> Result<Source> {
 /// Every picture below a folder, by its name there.
 pub(super) fn walk(folder: &Path, prefix: &str, found: &mut BTreeMap<String, PathBuf>) -> Result<()> {
     let entries = std::fs::read_dir(folder).and_then(Iterator::collect::<std::io::Result<Vec<_>>>);
-    for entry in entries.map_err(Error::io(folder))? {
+    for entry in entries.map_err(Error::reading(folder))? {
         let path = entry.path();
         let name = entry.file_name().to_string_lossy().into_owned();
         if name.starts_with('.') {
@@ -196,11 +193,8 @@ pub(super) fn walk(folder: &Path, prefix: &str, found: &mut BTreeMap<String, Pat
         };
         let name = format!("{prefix}{name}");
         if let Some(other) = found.insert(name.clone(), picture.clone()) {
-            return Err(Error::Compare(format!(
-                "{} and {} are both called {name}\n help: pictures are paired by their names without the extension; move one away",
-                other.display(),
-                picture.display()
-            )));
+            return Err(Error::input(format!("{} and {} are both called {name}", other.display(), picture.display()))
+                .help("pictures are paired by their names without the extension; move one away"));
         }
     }
     Ok(())

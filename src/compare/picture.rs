@@ -46,9 +46,10 @@ impl Picture {
 pub fn read_labels(path: &Path, size: (u32, u32)) -> Result<Vec<u8>> {
     let (w, h, map) = output::read_map(path)?;
     same_size(path, (w, h), size)?;
-    let wrong = |what: String| Error::Image {
-        path: path.into(),
-        what: format!("{what}\n help: labels are numbers: 0 soil, 1 crop, 2 weed, 255 none; --labels names others"),
+    let wrong = |what: String| {
+        Error::input(what)
+            .help("labels are numbers: 0 soil, 1 crop, 2 weed, 255 none; --labels names others")
+            .in_file(path)
     };
     let numbers = match map {
         Map::Numbers(numbers) | Map::Indexed(numbers, _) => numbers,
@@ -65,5 +66,5 @@ fn same_size(path: &Path, (w, h): (u32, u32), (width, height): (u32, u32)) -> Re
     if (w, h) == (width, height) {
         return Ok(());
     }
-    Err(Error::Image { path: path.into(), what: format!("it has {w} × {h} pixels, its picture {width} × {height}") })
+    Err(Error::input(format!("it has {w} × {h} pixels, its picture {width} × {height}")).in_file(path))
 }

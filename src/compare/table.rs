@@ -102,7 +102,7 @@ pub(super) fn json(of: &Comparison) -> Result<String> {
         pairs: pairs.collect(),
     };
     let text = serde_json::to_string_pretty(&document);
-    text.map(|text| text + "\n").map_err(|e| Error::Compare(format!("cannot write figures as JSON: {e}")))
+    text.map(|text| text + "\n").map_err(|e| Error::failed(format!("cannot write figures as JSON: {e}")))
 }
 
 /// A row for each pair, band and region.

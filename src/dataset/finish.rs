@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// The manifest's file.
 pub const MANIFEST: &str = "manifest.json";
 
-/// Writes everything that belongs to all images. An [`Error::Damaged`] names the images that are missing, and, of a dataset in so many
+/// Writes everything that belongs to all images. A [`Kind::Damaged`](crate::error::Kind::Damaged) names the images that are missing, and, of a dataset in so many
 /// `shards`, those.
 pub fn finish(set: &Set, shards: Option<u64>) -> Result<Vec<PathBuf>> {
     let Set { folder, recipe } = set;
@@ -26,7 +26,7 @@ pub fn finish(set: &Set, shards: Option<u64>) -> Result<Vec<PathBuf>> {
         }
     }
     if !missing.is_empty() {
-        return Err(Error::Damaged(lacks(set, &missing, shards)));
+        return Err(lacks(set, &missing, shards));
     }
     remove_unfinished(folder)?;
     let mut whole = Whole::new(folder);
@@ -44,7 +44,7 @@ pub fn finish(set: &Set, shards: Option<u64>) -> Result<Vec<PathBuf>> {
 }
 
 /// Says which images are missing, for a person, and, where their number is known, which shards, for a scheduler.
-pub fn lacks(set: &Set, missing: &[u64], shards: Option<u64>) -> String {
+pub fn lacks(set: &Set, missing: &[u64], shards: Option<u64>) -> Error {
     let again = match shards {
         None => "run `trace dataset render` again; it makes what is missing".to_owned(),
         Some(of) => {
@@ -53,13 +53,8 @@ pub fn lacks(set: &Set, missing: &[u64], shards: Option<u64>) -> String {
             format!("run the shards again that have them: --array={}", ranges(&lacking))
         }
     };
-    format!(
-        "{}: {} of {} images are missing: {}\n help: {again}",
-        set.folder.display(),
-        missing.len(),
-        set.recipe.count,
-        ranges(missing)
-    )
+    let words = format!("{} of {} images are missing: {}", missing.len(), set.recipe.count, ranges(missing));
+    Error::damaged(words).help(again).in_file(&set.folder)
 }
 
 /// Numbers in rising order as `1-3,7`: what Slurm's `--array` takes.
@@ -84,10 +79,10 @@ fn own_files(folder: &Path, recipe: &Recipe) -> Result<BTreeMap<String, Print>> 
     let mut files = BTreeMap::new();
     while let Some(path) = todo.pop() {
         if path.is_dir() {
-            let entries = std::fs::read_dir(&path).map_err(Error::io(&path))?;
+            let entries = std::fs::read_dir(&path).map_err(Error::reading(&path))?;
             todo.extend(entries.filter_map(|e| Some(e.ok()?.path())));
         } else {
-            let bytes = std::fs::read(&path).map_err(Error::io(&path))?;
+            let bytes = std::fs::read(&path).map_err(Error::reading(&path))?;
             let name = path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().replace('\\', "/");
             files.insert(name, Print::of(&bytes));
         }
@@ -104,7 +99,7 @@ fn manifest(set: &Set, files: &BTreeMap<String, Print>, out: &mut Stream<'_>) ->
     if let Ok(rendering) = recipe.rendering() {
         let page = folder.join(&rendering.scene);
         out.put(",\n\"scene_text\": ")?;
-        out.json(&std::fs::read_to_string(&page).map_err(Error::io(&page))?)?;
+        out.json(&std::fs::read_to_string(&page).map_err(Error::reading(&page))?)?;
         out.put(",\n\"times\": \"ledger/*.jsonl\"")?;
     }
     out.put(",\n\"files\": {")?;

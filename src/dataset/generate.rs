@@ -9,6 +9,7 @@ use super::render::{Times, render, renderer, scene_file};
 use super::seal::{Seal, write_files};
 use super::set::Set;
 use super::{File, format, native};
+use crate::error::Kind;
 use crate::job::{Renderer, SceneFile, Threads};
 use crate::render::Watch;
 use crate::{Error, Result};
@@ -91,7 +92,7 @@ fn share(threads: usize, lanes: usize, lane: usize) -> usize {
     (threads / lanes + usize::from(lane < threads % lanes)).max(1)
 }
 
-/// Makes what is missing of a shard. Stopped, it returns [`Error::Interrupted`], and the same call goes on later.
+/// Makes what is missing of a shard. Stopped, it returns [`Kind::Interrupted`], and the same call goes on later.
 pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()> {
     let renderer = renderer(set)?;
     let all = Threads::new(work.threads)?;
@@ -122,8 +123,7 @@ pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()>
     let failed = AtomicBool::new(false);
     let fail = |index: u64, error: Error| {
         // What is wrong with one field is no reason to lose a night; what is wrong with the disk is.
-        let own = matches!(error, Error::Page(_) | Error::Scene(_) | Error::Damaged(_));
-        failed.fetch_or(!own, Ordering::Relaxed);
+        failed.fetch_or(!error.is_of_one_field(), Ordering::Relaxed);
         failures.lock().unwrap_or_else(PoisonError::into_inner).insert(index, error);
     };
     let stopped = || callbacks.soon.load(Ordering::Relaxed) || callbacks.now.load(Ordering::Relaxed);
@@ -145,7 +145,7 @@ pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()>
         return Err(together(failures));
     }
     // Stopped after the last image is done.
-    if next.load(Ordering::Relaxed) < tasks.len() { Err(Error::Interrupted) } else { Ok(()) }
+    if next.load(Ordering::Relaxed) < tasks.len() { Err(Error::interrupted()) } else { Ok(()) }
 }
 
 /// What went wrong in a run, by image: the whole run's failure alone, or those of single images in one.
@@ -153,17 +153,18 @@ fn together(failures: BTreeMap<u64, Error>) -> Error {
     let mut words = Vec::new();
     let mut input = true;
     for (index, error) in failures {
-        match error {
-            Error::Page(_) | Error::Scene(_) => words.push(format!("image {}: {error}", Set::name(index))),
-            Error::Damaged(_) => {
-                input = false;
-                words.push(error.to_string());
-            }
-            other => return other,
+        if !error.is_of_one_field() {
+            return error;
+        }
+        if error.kind() == Kind::Damaged {
+            input = false;
+            words.push(error.to_string());
+        } else {
+            words.push(format!("image {}: {error}", Set::name(index)));
         }
     }
     let words = words.join("\nerror: ");
-    if input { Error::Dataset(words) } else { Error::Damaged(words) }
+    if input { Error::input(words) } else { Error::damaged(words) }
 }
 
 /// What remains to be done for an image, from what lies on the disk.
@@ -236,7 +237,7 @@ impl Run<'_> {
             (files, made.times)
         };
         if self.callbacks.now.load(Ordering::Relaxed) {
-            return Err(Error::Interrupted);
+            return Err(Error::interrupted());
         }
         write_files(folder, &files)?;
         let mut seal = Seal::of(index, recipe, &files)?;
@@ -267,10 +268,9 @@ fn derived(set: &Set, index: u64) -> Result<Vec<File>> {
 
 /// An image that nothing can make again.
 fn lost(set: &Set, index: u64) -> Error {
-    Error::Damaged(format!(
-        "{}: image {index} is damaged, and nothing here can make it again\n help: import the images again",
-        set.folder.display()
-    ))
+    Error::damaged(format!("image {index} is damaged, and nothing here can make it again"))
+        .in_file(&set.folder)
+        .help("import the images again")
 }
 
 #[cfg(test)]

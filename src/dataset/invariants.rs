@@ -25,7 +25,7 @@ pub fn check(recipe: &Recipe, sample: &Sample) -> Result<()> {
     if faults.is_empty() {
         return Ok(());
     }
-    Err(Error::Damaged(format!("image {}: {}", sample.record.name, faults.join("; "))))
+    Err(Error::damaged(format!("image {}: {}", sample.record.name, faults.join("; "))))
 }
 
 /// What does not hold, in words.

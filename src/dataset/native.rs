@@ -112,8 +112,8 @@ pub fn read(dataset: &Path, name: &str) -> Result<Sample> {
 /// Reads what is known of an image, without its maps.
 pub fn read_record(dataset: &Path, name: &str) -> Result<Record> {
     let path = dataset.join(folder(name)).join("record.json");
-    let bytes = std::fs::read(&path).map_err(Error::io(&path))?;
-    serde_json::from_slice(&bytes).map_err(|e| Error::Dataset(format!("{}: this is no record: {e}", path.display())))
+    let bytes = std::fs::read(&path).map_err(Error::reading(&path))?;
+    serde_json::from_slice(&bytes).map_err(|e| Error::damaged(format!("this is no record: {e}")).in_file(path))
 }
 
 fn check(path: &Path, expected: (u32, u32), found: (u32, u32)) -> Result<()> {
@@ -121,5 +121,5 @@ fn check(path: &Path, expected: (u32, u32), found: (u32, u32)) -> Result<()> {
         return Ok(());
     }
     let ((w, h), (x, y)) = (expected, found);
-    Err(Error::Image { path: path.into(), what: format!("it has {x} × {y} pixels, its record says {w} × {h}") })
+    Err(Error::damaged(format!("it has {x} × {y} pixels, its record says {w} × {h}")).in_file(path))
 }

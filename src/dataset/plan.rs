@@ -66,9 +66,8 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
     // Names are checked before anything is written.
     let options = order.edit.options(order.options.clone());
     if !options.quality.is_fixed() {
-        return Err(Error::Dataset(
-            "the images of a dataset have a fixed number of samples\n help: give --spp instead of --target-error or --time".into(),
-        ));
+        return Err(Error::input("the images of a dataset have a fixed number of samples")
+            .help("give --spp instead of --target-error or --time"));
     }
     // Before anything grows: what could not be rendered here.
     let kernels = Renderer::open(&options)?.kernels().to_owned();
@@ -76,11 +75,12 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
     let first = scene_file.seed(order.seed).width(order.width).height(order.height).field(0)?;
     let field = first.grown();
     if field.species.len() > MOST_SPECIES {
-        return Err(Error::Dataset(format!(
-            "{}: {} species, more than the {MOST_SPECIES} that species.png numbers\n help: make two pages of it",
-            order.scene.display(),
+        return Err(Error::input(format!(
+            "{} species, more than the {MOST_SPECIES} that species.png numbers",
             field.species.len()
-        )));
+        ))
+        .in_file(&order.scene)
+        .help("make two pages of it"));
     }
     let (files, scene) = gather(&field.files, &order.scene)?;
     let camera = &field.scene.camera;
@@ -143,11 +143,9 @@ pub(super) fn refuse_full(folder: &Path) -> Result<()> {
     let other = names.find(|name| name != "scene" && !is_unfinished(name));
     match other {
         None => Ok(()),
-        Some(name) => Err(Error::Dataset(format!(
-            "{}: other things lie in this folder, {} among them\n help: give --out a folder that is empty or not there yet",
-            folder.display(),
-            name.display()
-        ))),
+        Some(name) => Err(Error::misuse(format!("other things lie in this folder, {} among them", name.display()))
+            .in_file(folder)
+            .help("give --out a folder that is empty or not there yet")),
     }
 }
 
@@ -166,7 +164,7 @@ fn gather(paths: &[PathBuf], page: &Path) -> Result<(Vec<File>, String)> {
     };
     let mut files = Vec::new();
     for path in &plain {
-        let bytes = std::fs::read(path).map_err(Error::io(path))?;
+        let bytes = std::fs::read(path).map_err(Error::reading(path))?;
         files.push(File { path: below(path), bytes });
     }
     Ok((files, below(&absolute(page)?)))
@@ -174,7 +172,7 @@ fn gather(paths: &[PathBuf], page: &Path) -> Result<(Vec<File>, String)> {
 
 /// An absolute path without `.` and `..`.
 fn absolute(path: &Path) -> Result<PathBuf> {
-    let full = std::path::absolute(path).map_err(Error::io(path))?;
+    let full = std::path::absolute(path).map_err(Error::reading(path))?;
     let mut plain = PathBuf::new();
     for part in full.components() {
         match part {
@@ -198,11 +196,14 @@ pub fn add_formats(set: &mut Set, names: &[String]) -> Result<Vec<String>> {
     if recipe.rendering().is_err()
         && let Some((name, _)) = format::all(&recipe)?.into_iter().find(|(_, f)| f.needs_film())
     {
-        return Err(Error::Dataset(format!(
-            "{}: --format {name} holds what only the renderer knows, and these images were not rendered\n help: other formats can be \
+        return Err(Error::input(format!(
+            "--format {name} holds what only the renderer knows, and these images were not rendered"
+        ))
+        .in_file(&set.folder)
+        .help(
+            "other formats can be \
              added; `trace dataset finish --help` lists them",
-            set.folder.display()
-        )));
+        ));
     }
     let warnings = warnings(&recipe)?;
     seal::write_files(&set.folder, &[File { path: FILE.into(), bytes: recipe.text()? }])?;

@@ -104,18 +104,16 @@ impl Recipe {
         let path = folder.join(FILE);
         let bytes = match std::fs::read(&path) {
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
-                return Err(Error::Dataset(format!(
-                    "{}: this is no dataset, it has no {FILE}\n help: `trace dataset plan` begins one, `trace dataset import` brings one in",
-                    folder.display()
-                )));
+                return Err(Error::input(format!("this is no dataset, it has no {FILE}"))
+                    .in_file(folder)
+                    .help("`trace dataset plan` begins one, `trace dataset import` brings one in"));
             }
-            other => other.map_err(Error::io(&path))?,
+            other => other.map_err(Error::reading(&path))?,
         };
         serde_json::from_slice(&bytes).map_err(|e| {
-            Error::Dataset(format!(
-                "{}: this is not a dataset's recipe: {e}\n help: run the command that began the dataset again with another --out, or restore the file",
-                path.display()
-            ))
+            Error::damaged(format!("this is not a dataset's recipe: {e}"))
+                .in_file(path)
+                .help("run the command that began the dataset again with another --out, or restore the file")
         })
     }
 
@@ -134,10 +132,12 @@ impl Recipe {
     pub fn rendering(&self) -> Result<&Rendering> {
         match &self.made {
             Made::Rendered(rendering) => Ok(rendering),
-            Made::Imported { from, .. } => Err(Error::Dataset(format!(
-                "these images were imported from {from} and cannot be rendered\n help: `trace dataset verify` checks them, \
-                 `trace dataset finish --format …` writes further formats"
-            ))),
+            Made::Imported { from, .. } => {
+                Err(Error::misuse(format!("these images were imported from {from} and cannot be rendered")).help(
+                    "`trace dataset verify` checks them, \
+                 `trace dataset finish --format …` writes further formats",
+                ))
+            }
         }
     }
 
@@ -168,11 +168,10 @@ impl Recipe {
         } else {
             differs.join("; ")
         };
-        Err(Error::Dataset(format!(
-            "{}: another dataset lies in this folder: {what}\n help: give another --out, or the same arguments to go on with it; \
+        Err(Error::misuse(format!("another dataset lies in this folder: {what}")).in_file(folder).help(
+            "give another --out, or the same arguments to go on with it; \
              --count may grow and --format may be longer",
-            folder.display()
-        )))
+        ))
     }
 }
 
@@ -190,7 +189,7 @@ fn fields(recipe: &Recipe) -> Result<std::collections::BTreeMap<String, String>>
 }
 
 fn failed(e: impl std::fmt::Display) -> Error {
-    Error::Dataset(format!("cannot write JSON: {e}"))
+    Error::failed(format!("cannot write JSON: {e}"))
 }
 
 /// Readable JSON with a line's end.

@@ -50,10 +50,13 @@ pub fn renderer(set: &Set) -> Result<Option<Renderer>> {
         if there == here {
             return Ok(());
         }
-        Err(Error::Dataset(format!(
-            "{}: the dataset was begun with {what} {there}, this is {here}: its images would differ\n help: go on with {there}, \
-             or begin another dataset",
+        Err(Error::misuse(format!(
+            "{}: the dataset was begun with {what} {there}, this is {here}: its images would differ",
             set.folder.display()
+        ))
+        .help(format!(
+            "go on with {there}, \
+             or begin another dataset"
         )))
     };
     same("furrow", &set.recipe.furrow, env!("CARGO_PKG_VERSION"))?;
@@ -78,12 +81,10 @@ pub fn render(
     let rendering = recipe.rendering()?;
     let field = scene_file.field(index)?;
     if field.grown().hash != rendering.scene_sha256 {
-        return Err(Error::Dataset(format!(
-            "{}: the page or something that it names was changed since the dataset was begun\n help: restore {}/scene/, or begin \
-             another dataset",
-            folder.join(&rendering.scene).display(),
-            folder.display()
-        )));
+        let help = format!("restore {}/scene/, or begin another dataset", folder.display());
+        return Err(Error::misuse("the page or something that it names was changed since the dataset was begun")
+            .help(help)
+            .in_file(folder.join(&rendering.scene)));
     }
     field.geometry()?;
     let (grow, build) = field.times();
@@ -115,7 +116,7 @@ fn describe(recipe: &Recipe, image: Image<'_>) -> Result<Sample> {
             ignored: 0,
             plants: Vec::new(),
             conditions: serde_json::to_value(&field.conditions)
-                .map_err(|e| Error::Dataset(format!("cannot write down the conditions: {e}")))?,
+                .map_err(|e| Error::failed(format!("cannot write down the conditions: {e}")))?,
             exposure: Some(Exposure {
                 gain: photograph.gain,
                 nir_gain: photograph.nir_gain,

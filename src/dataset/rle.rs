@@ -114,7 +114,7 @@ impl Rle {
     }
 
     fn fault(&self, what: &str) -> Error {
-        Error::Scene(format!("a mask of {} × {} pixels cannot be read: {what}", self.size[1], self.size[0]))
+        Error::input(format!("a mask of {} × {} pixels cannot be read: {what}", self.size[1], self.size[0]))
     }
 }
 

@@ -129,7 +129,7 @@ pub(super) fn write_files(folder: &Path, files: &[File]) -> Result<()> {
     let mut large: BTreeMap<&[u8], PathBuf> = BTreeMap::new();
     for file in files {
         if file.bytes.is_empty() {
-            return Err(Error::Dataset(format!("{}: refused to write an empty file", file.path)));
+            return Err(Error::failed(format!("{}: refused to write an empty file", file.path)));
         }
         let path = folder.join(&file.path);
         if let Some(there) = large.get(file.bytes.as_slice()) {

@@ -37,9 +37,9 @@ impl Findings {
             words.push(format!("and {} more", self.faults.len() - MOST));
         }
         if !self.missing.is_empty() {
-            words.push(lacks(set, &self.missing, shards));
+            words.push(lacks(set, &self.missing, shards).to_string());
         }
-        if words.is_empty() { Ok(()) } else { Err(Error::Damaged(words.join("\nerror: "))) }
+        if words.is_empty() { Ok(()) } else { Err(Error::damaged(words.join("\nerror: "))) }
     }
 }
 
@@ -55,7 +55,7 @@ pub fn verify(
     let count = set.recipe.count;
     let look_at = |index: u64| {
         if stop.load(std::sync::atomic::Ordering::Relaxed) {
-            return Err(Error::Interrupted);
+            return Err(Error::interrupted());
         }
         let looked = look(set, index)?;
         done(index);

@@ -61,7 +61,7 @@ impl Field {
             let built = self.threads.install(|| EmbreeAccel::build(&surfaces, self.threads.count() as u32))?;
             let _ = self.geometry.set((built, begin.elapsed()));
         }
-        self.geometry.get().map(|(built, _)| built).ok_or_else(|| Error::Embree("the scene was not built".into()))
+        self.geometry.get().map(|(built, _)| built).ok_or_else(|| Error::failed("the scene was not built"))
     }
 
     /// Scene and geometry, as integrators take them.

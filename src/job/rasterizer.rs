@@ -46,9 +46,8 @@ impl Card {
 impl Card {
     /// An error: there is none.
     pub(super) fn open(_: &Techniques) -> Result<Self> {
-        Err(crate::Error::Raster(
-            "this program was built without the rasterizer\n help: cargo build --release --features raster".into(),
-        ))
+        Err(crate::Error::missing("this program was built without the rasterizer")
+            .help("cargo build --release --features raster"))
     }
 
     /// No name.

@@ -119,10 +119,8 @@ impl Renderer {
 
     fn rasterize<'f>(&self, field: &'f Field, request: &Request<'_>, card: &Card) -> Result<Image<'f>> {
         if request.view != View::Path {
-            return Err(Error::Scene(
-                "--integrator says nothing with --engine raster, which has no rays\n help: use --engine trace, or leave it out"
-                    .into(),
-            ));
+            return Err(Error::misuse("--integrator says nothing with --engine raster, which has no rays")
+                .help("use --engine trace, or leave it out"));
         }
         let start = Instant::now();
         let scene = &field.grown().scene;

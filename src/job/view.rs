@@ -41,10 +41,8 @@ impl View {
         let path_only = techniques.left_out().iter().any(|technique| *technique != Technique::Qmc);
         let limited = techniques.max_depth.is_some() || techniques.clamp.is_some();
         if self != Self::Path && (path_only || limited || options.quality.denoise) {
-            return Err(Error::Scene(
-                "--without, --max-depth, --clamp and --denoise are about light\n help: use them with --integrator path"
-                    .into(),
-            ));
+            return Err(Error::misuse("--without, --max-depth, --clamp and --denoise are about light")
+                .help("use them with --integrator path"));
         }
         Ok(())
     }

@@ -100,7 +100,7 @@ pub(super) fn bright_cloud() -> Vary<Positive> {
 }
 
 impl SunDesc {
-    /// Draws the sun's elevation and azimuth, degrees. An [`Error::Scene`] when a place and time give a sun below the horizon:
+    /// Draws the sun's elevation and azimuth, degrees. A [`Kind::Input`](crate::error::Kind::Input) when a place and time give a sun below the horizon:
     /// there is no twilight.
     pub fn draw(&self, stream: &mut Stream) -> Result<SunPosition> {
         match self {
@@ -114,11 +114,7 @@ impl SunDesc {
                 let at = sun_position(utc, later, latitude, longitude, true)?;
                 if at.elevation_deg < 0.0 {
                     let moment = if later == 0.0 { utc.to_string() } else { format!("{utc} and {later:.2} h") };
-                    return Err(Error::Scene(format!(
-                        "the sun is {:.1} degrees below the horizon at {moment}, latitude {latitude}, longitude {longitude}\n \
-                         help: choose a time of day (UTC, not local), or light the field with Overcast or Lamp",
-                        -at.elevation_deg
-                    )));
+                    return Err(Error::input(format!("the sun is {:.1} degrees below the horizon at {moment}, latitude {latitude}, longitude {longitude}", -at.elevation_deg)).help("choose a time of day (UTC, not local), or light the field with Overcast or Lamp"));
                 }
                 Ok(at)
             }

@@ -255,7 +255,7 @@ pub(super) fn origin() -> PointDesc {
 }
 
 impl Lamp {
-    /// Draws a lamp around `position_m` that shines at `look_at_m`. An [`Error::Scene`] where the two are the same.
+    /// Draws a lamp around `position_m` that shines at `look_at_m`. A [`Kind::Input`](crate::error::Kind::Input) where the two are the same.
     pub fn draw(
         shape: &ShapeDesc,
         position_m: &PointDesc,
@@ -272,9 +272,7 @@ impl Lamp {
         let mut point = |at: &PointDesc| vec3(at.0.draw32(stream), at.1.draw32(stream), at.2.draw32(stream));
         let centre = point(position_m);
         let axis = (point(look_at_m) - centre).try_normalize().ok_or_else(|| {
-            Error::Scene(
-                "a lamp looks at its own position and shines nowhere\n help: give look_at_m another point".into(),
-            )
+            Error::input("a lamp looks at its own position and shines nowhere").help("give look_at_m another point")
         })?;
         let level = Vec3::Z.cross(axis);
         let frame = Frame::with_tangent(axis, if level.length() > 1e-6 { level } else { Vec3::X });

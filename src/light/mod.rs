@@ -238,8 +238,10 @@ pub enum LightDesc {
 }
 
 /// What is wrong with lists inside lists.
-pub(crate) const ONE_OF_INSIDE: &str = "a OneOf stands among a page's lights, not inside another one\n help: write all lists side by \
-                                        side: OneOf([[…], […], […]])";
+pub(crate) fn one_of_inside() -> Error {
+    Error::input("a OneOf stands among a page's lights, not inside another one")
+        .help("write all lists side by side: OneOf([[…], […], […]])")
+}
 
 impl LightDesc {
     /// The pictures that it names, those of all its lists.
@@ -259,7 +261,7 @@ impl LightDesc {
     }
 
     /// Draws the lights as [`LightDesc::build`] does, and tells what was drawn. `open` reads a file that the page names. An
-    /// [`Error::Scene`] for a [`LightDesc::OneOf`], from which the field draws.
+    /// [`Kind::Input`](crate::error::Kind::Input) for a [`LightDesc::OneOf`], from which the field draws.
     pub fn draw(&self, stream: &mut Stream, open: &mut Open<'_>) -> Result<(LightRecord, Vec<Light>)> {
         let sky = |sky: Option<Sky>| sky.map(|sky| Light::Sky(Box::new(sky)));
         let given = |light: Option<&Light>| light.map_or(Spectrum::ZERO, Light::horizontal_irradiance);
@@ -305,7 +307,7 @@ impl LightDesc {
                 let lamp = Lamp::draw(shape, position_m, look_at_m, glow, stream)?;
                 (LightRecord::lamp(&lamp), vec![Light::Lamp(lamp)])
             }
-            Self::OneOf(_) => return Err(Error::Scene(ONE_OF_INSIDE.into())),
+            Self::OneOf(_) => return Err(one_of_inside()),
         })
     }
 }

@@ -85,7 +85,7 @@ pub(super) fn draw_infrared(desc: Option<&InfraredDesc>, stream: &mut Stream) ->
 impl Table {
     /// Reads a .exr or .hdr file.
     pub fn load(path: &Path, infrared: Infrared) -> Result<Self> {
-        let wrong = |what: &str| Error::Image { path: path.into(), what: what.into() };
+        let wrong = |what: &str| Error::input(what).in_file(path);
         Self::new(&Panorama::load(path)?, infrared).map_err(wrong)
     }
 

@@ -116,7 +116,7 @@ pub fn sun_position(
     longitude_deg: f64,
     refracted: bool,
 ) -> Result<SunPosition> {
-    let refused = |e: solar_positioning::Error| Error::Scene(format!("no sun position at {utc}: {e}"));
+    let refused = |e: solar_positioning::Error| Error::input(format!("no sun position at {utc}: {e}"));
     let delta_t = delta_t::estimate_from_date(utc.year, utc.month).map_err(refused)?;
     let Utc { year, month, day, hour, minute, second } = utc;
     let start = JulianDate::from_utc(year, month, day, hour, minute, f64::from(second), delta_t)

@@ -9,8 +9,8 @@ use super::document::{
 };
 use super::uri::{Target, follow};
 use super::{
-    Label, MOST_TRIANGLES, Model, Part, Relief, Surface, Transmission, Up, bytes, faceted, fraction, glb,
-    into_one_tile, settle,
+    Label, MOST_TRIANGLES, Model, Part, Relief, Surface, Transmission, Up, Wrong, bytes, faceted, fraction, glb,
+    into_one_tile, settle, too_many_triangles,
 };
 use crate::geometry::{AlphaMask, Mesh};
 use crate::math::{DMat4, DQuat, DVec3, Vec2, Vec3, vec2};
@@ -34,18 +34,17 @@ const KNOWN: [&str; 9] = [
 ];
 
 /// Reads a file; in words what is wrong with it.
-pub(super) fn read(path: &Path, up: Up) -> Result<Model, String> {
+pub(super) fn read(path: &Path, up: Up) -> Result<Model, Wrong> {
     let mut files = Vec::new();
     let file = bytes(path, &mut files)?;
     let (json, own) = if glb::is_glb(&file) { glb::split(&file)? } else { (&file[..], None) };
     let document: Document = serde_json::from_slice(json).map_err(|e| format!("its JSON cannot be read: {e}"))?;
     if !document.asset.version.starts_with("2.") {
-        return Err(format!("it is glTF \"{}\"; glTF 2.0 can be read", document.asset.version));
+        return Err(format!("it is glTF \"{}\"; glTF 2.0 can be read", document.asset.version).into());
     }
     if let Some(name) = document.extensions_required.iter().find(|e| !KNOWN.contains(&e.as_str())) {
-        return Err(format!(
-            "it requires the extension {name}, which cannot be read\n help: export it without compression and extensions"
-        ));
+        let what = format!("it requires the extension {name}, which cannot be read");
+        return Err(Wrong { what, help: "export it without compression and extensions" });
     }
     let folder = path.parent().unwrap_or(Path::new(""));
     let buffers = buffers(&document, own, folder, &mut files)?;
@@ -73,13 +72,13 @@ fn buffers<'a>(
     own: Option<&'a [u8]>,
     folder: &Path,
     files: &mut Vec<PathBuf>,
-) -> Result<Vec<Cow<'a, [u8]>>, String> {
+) -> Result<Vec<Cow<'a, [u8]>>, Wrong> {
     let mut all = Vec::new();
     for (i, buffer) in document.buffers.iter().enumerate() {
         let data: Cow<'a, [u8]> = match &buffer.uri {
             None => match own {
                 Some(own) if i == 0 => own.into(),
-                _ => return Err(format!("buffer {i} has no bytes")),
+                _ => return Err(format!("buffer {i} has no bytes").into()),
             },
             Some(uri) => match follow(uri)? {
                 Target::Bytes(data) => data.into(),
@@ -87,7 +86,7 @@ fn buffers<'a>(
             },
         };
         if data.len() < buffer.byte_length {
-            return Err(format!("buffer {i} has {} of its {} bytes", data.len(), buffer.byte_length));
+            return Err(format!("buffer {i} has {} of its {} bytes", data.len(), buffer.byte_length).into());
         }
         all.push(data);
     }
@@ -125,7 +124,7 @@ fn item<'a, T>(of: &'a [T], index: usize, what: &str) -> Result<&'a T, String> {
 
 impl Reader<'_> {
     /// Visits the nodes of the scene, parents before children.
-    fn walk(&mut self, up: Up, looks: &[Look], model: &mut Model) -> Result<(), String> {
+    fn walk(&mut self, up: Up, looks: &[Look], model: &mut Model) -> Result<(), Wrong> {
         let document = self.document;
         let shown = document.scene.or((!document.scenes.is_empty()).then_some(0));
         let roots = if let Some(scene) = shown {
@@ -143,7 +142,7 @@ impl Reader<'_> {
         while let Some((index, above)) = open.pop() {
             let node = item(&document.nodes, index, "node")?;
             if std::mem::replace(&mut seen[index], true) {
-                return Err(format!("node {index} has two parents"));
+                return Err(format!("node {index} has two parents").into());
             }
             let to = above * placement(node);
             open.extend(node.children.iter().rev().map(|child| (*child, to)));
@@ -159,9 +158,7 @@ impl Reader<'_> {
                 let Some(mut mesh) = self.mesh(primitive, look, &name)? else { continue };
                 triangles += mesh.triangles.len();
                 if triangles > MOST_TRIANGLES {
-                    return Err(format!(
-                        "it has more than {MOST_TRIANGLES} triangles\n help: reduce it in your program"
-                    ));
+                    return Err(too_many_triangles());
                 }
                 settle(&mut mesh, &to, &name)?;
                 let surface = primitive.material.unwrap_or(looks.len());
@@ -172,7 +169,7 @@ impl Reader<'_> {
     }
 
     /// One piece; `None` for points and lines.
-    fn mesh(&self, primitive: &Primitive, look: Option<&Look>, name: &str) -> Result<Option<Mesh>, String> {
+    fn mesh(&self, primitive: &Primitive, look: Option<&Look>, name: &str) -> Result<Option<Mesh>, Wrong> {
         let attribute = |what: &str| primitive.attributes.get(what).copied();
         let mode = primitive.mode.unwrap_or(4);
         if mode < 4 {
@@ -198,10 +195,12 @@ impl Reader<'_> {
             None => (0..positions.len() as u32).collect(),
         };
         if let Some(i) = corners.iter().find(|i| **i as usize >= positions.len()) {
-            return Err(format!("`{name}` names corner {i}, but it has {}", positions.len()));
+            return Err(format!("`{name}` names corner {i}, but it has {}", positions.len()).into());
         }
         if uvs.len() != positions.len() {
-            return Err(format!("`{name}` has {} corners and {} texture coordinates", positions.len(), uvs.len()));
+            return Err(
+                format!("`{name}` has {} corners and {} texture coordinates", positions.len(), uvs.len()).into()
+            );
         }
         let triangles = match mode {
             4 => corners.as_chunks::<3>().0.to_vec(),
@@ -211,7 +210,7 @@ impl Reader<'_> {
                 .map(|(i, t)| if i % 2 == 0 { [t[0], t[1], t[2]] } else { [t[0], t[2], t[1]] })
                 .collect(),
             6 => (2..corners.len()).map(|i| [corners[i - 1], corners[i], corners[0]]).collect(),
-            _ => return Err(format!("`{name}` is of the unknown kind {mode}")),
+            _ => return Err(format!("`{name}` is of the unknown kind {mode}").into()),
         };
         let mut mesh = Mesh { positions, normals: Vec::new(), uvs, triangles };
         match attribute("NORMAL") {
@@ -219,7 +218,7 @@ impl Reader<'_> {
                 mesh.normals = self.elements::<3>(normals)?.into_iter().map(Vec3::from).collect();
                 if mesh.normals.len() != mesh.positions.len() {
                     let (n, p) = (mesh.normals.len(), mesh.positions.len());
-                    return Err(format!("`{name}` has {p} corners and {n} normals"));
+                    return Err(format!("`{name}` has {p} corners and {n} normals").into());
                 }
             }
             None => faceted(&mut mesh),
@@ -228,22 +227,25 @@ impl Reader<'_> {
     }
 
     /// The bytes of each element of an accessor, and its component type.
-    fn span(&self, index: usize, components: usize) -> Result<(impl Iterator<Item = &[u8]>, u32, bool), String> {
+    fn span(&self, index: usize, components: usize) -> Result<(impl Iterator<Item = &[u8]>, u32, bool), Wrong> {
         let accessor = item(&self.document.accessors, index, "accessor")?;
         let words = |what: &str| format!("accessor {index} {what}");
         let kind = ["", "SCALAR", "VEC2", "VEC3"][components];
         if accessor.kind != kind {
-            return Err(words(&format!("holds {} where {kind} is needed", accessor.kind)));
+            return Err(words(&format!("holds {} where {kind} is needed", accessor.kind)).into());
         }
         if !accessor.sparse.is_null() {
-            return Err(words("is sparse, which cannot be read\n help: export it without sparse accessors"));
+            return Err(Wrong {
+                what: words("is sparse, which cannot be read"),
+                help: "export it without sparse accessors",
+            });
         }
         let size = components
             * match accessor.component_type {
                 5120 | UNSIGNED_BYTE => 1,
                 5122 | UNSIGNED_SHORT => 2,
                 UNSIGNED_INT | FLOAT => 4,
-                other => return Err(words(&format!("has the unknown component type {other}"))),
+                other => return Err(words(&format!("has the unknown component type {other}")).into()),
             };
         let view = accessor.buffer_view.ok_or_else(|| words("has no bytes"))?;
         let view = item(&self.document.buffer_views, view, "buffer view")?;
@@ -253,20 +255,20 @@ impl Reader<'_> {
         let data = buffer.get(view.byte_offset..end).and_then(|d| d.get(accessor.byte_offset..)).ok_or_else(past)?;
         let stride = view.byte_stride.unwrap_or(size);
         if stride < size {
-            return Err(words(&format!("has elements of {size} bytes every {stride} bytes")));
+            return Err(words(&format!("has elements of {size} bytes every {stride} bytes")).into());
         }
         let needed = match accessor.count {
             0 => Some(0),
             n => (n - 1).checked_mul(stride).and_then(|b| b.checked_add(size)),
         };
         if needed.is_none_or(|n| n > data.len()) {
-            return Err(past());
+            return Err(past().into());
         }
         let element = move |i: usize| &data[i * stride..i * stride + size];
         Ok(((0..accessor.count).map(element), accessor.component_type, accessor.normalized))
     }
 
-    fn elements<const N: usize>(&self, index: usize) -> Result<Vec<[f32; N]>, String> {
+    fn elements<const N: usize>(&self, index: usize) -> Result<Vec<[f32; N]>, Wrong> {
         let (elements, kind, normalized) = self.span(index, N)?;
         let one = |whole: f32, most: f32| if normalized { (whole / most).max(-1.0) } else { whole };
         let component = |e: &[u8], i: usize| match kind {
@@ -280,17 +282,17 @@ impl Reader<'_> {
         Ok(elements.map(|e| std::array::from_fn(|i| component(e, i))).collect())
     }
 
-    fn indices(&self, index: usize) -> Result<Vec<u32>, String> {
+    fn indices(&self, index: usize) -> Result<Vec<u32>, Wrong> {
         let (elements, kind, _) = self.span(index, 1)?;
         Ok(match kind {
             UNSIGNED_BYTE => elements.map(|e| u32::from(e[0])).collect(),
             UNSIGNED_SHORT => elements.map(|e| u32::from(u16::from_le_bytes([e[0], e[1]]))).collect(),
             UNSIGNED_INT => elements.map(|e| word(e, 0)).collect(),
-            _ => return Err(format!("accessor {index} holds indices that are no whole numbers")),
+            _ => return Err(format!("accessor {index} holds indices that are no whole numbers").into()),
         })
     }
 
-    fn look(&mut self, material: &Material) -> Result<Look, String> {
+    fn look(&mut self, material: &Material) -> Result<Look, Wrong> {
         let name = material.name.clone().unwrap_or_default();
         let pbr = &material.pbr_metallic_roughness;
         let [r, g, b, opacity] = pbr.base_color_factor.unwrap_or([1.0; 4]);
@@ -352,7 +354,7 @@ impl Reader<'_> {
     }
 
     /// The image's number, the texture, and whether it repeats.
-    fn texture(&mut self, info: &TextureInfo) -> Result<(usize, Arc<Texture>, bool), String> {
+    fn texture(&mut self, info: &TextureInfo) -> Result<(usize, Arc<Texture>, bool), Wrong> {
         let (image, repeats) = self.image(info.index)?;
         if let Some(known) = self.textures.get(&(image, repeats)) {
             return Ok((image, known.clone(), repeats));
@@ -363,17 +365,18 @@ impl Reader<'_> {
     }
 
     /// The number of a texture's image, and whether it repeats.
-    fn image(&self, texture: usize) -> Result<(usize, bool), String> {
+    fn image(&self, texture: usize) -> Result<(usize, bool), Wrong> {
         let of = item(&self.document.textures, texture, "texture")?;
-        let image = of.source.ok_or_else(|| {
-            format!("texture {texture} has no PNG or JPEG image\n help: export its pictures as PNG or JPEG")
+        let image = of.source.ok_or_else(|| Wrong {
+            what: format!("texture {texture} has no PNG or JPEG image"),
+            help: "export its pictures as PNG or JPEG",
         })?;
         let sampler = of.sampler.map(|s| item(&self.document.samplers, s, "sampler")).transpose()?;
         let wraps = |code: Option<u32>| code.unwrap_or(REPEAT) != CLAMP_TO_EDGE;
         Ok((image, sampler.is_none_or(|s| wraps(s.wrap_s) || wraps(s.wrap_t))))
     }
 
-    fn decode(&mut self, image: usize, repeats: bool, space: ColorSpace) -> Result<Texture, String> {
+    fn decode(&mut self, image: usize, repeats: bool, space: ColorSpace) -> Result<Texture, Wrong> {
         let source = item(&self.document.images, image, "image")?;
         let data: Cow<'_, [u8]> = match (&source.uri, source.buffer_view) {
             (Some(uri), _) => match follow(uri)? {
@@ -387,7 +390,7 @@ impl Reader<'_> {
                 let data = end.and_then(|end| buffer.get(view.byte_offset..end));
                 data.ok_or_else(|| format!("image {image} reaches past its bytes"))?.into()
             }
-            (None, None) => return Err(format!("image {image} has no bytes")),
+            (None, None) => return Err(format!("image {image} has no bytes").into()),
         };
         let name = source.uri.as_deref().filter(|u| !u.starts_with("data:")).or(source.name.as_deref());
         let name = name.map_or_else(|| format!("image {image}"), |n| format!("`{n}`"));

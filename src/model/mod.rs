@@ -142,26 +142,42 @@ pub struct Transmission {
 }
 
 impl Model {
-    /// Reads a model. Formats are told by the name: `.glb`, `.gltf`, `.obj`. Errors are [`Error::Model`] and name what is wrong.
+    /// Reads a model. Formats are told by the name: `.glb`, `.gltf`, `.obj`. An [`Error`] about the file says what is wrong with it.
     pub fn load(path: &Path, up: Up) -> Result<Self> {
-        let wrong = |what: String| Error::Model { path: path.into(), what };
+        let wrong = |Wrong { what, help }: Wrong| Error::input(what).help(help).in_file(path);
         let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         let model = match extension.as_str() {
             "glb" | "gltf" => gltf::read(path, up).map_err(wrong)?,
             "obj" => obj::read(path, up).map_err(wrong)?,
             _ => {
-                return Err(wrong(
-                    "models are .glb, .gltf or .obj files\n help: export it as glTF binary (.glb) from your program"
-                        .into(),
-                ));
+                let help = "export it as glTF binary (.glb) from your program";
+                return Err(Error::input("models are .glb, .gltf or .obj files").help(help).in_file(path));
             }
         };
         let triangles: usize = model.parts.iter().map(|p| p.mesh.triangles.len()).sum();
         if triangles == 0 {
-            return Err(wrong("it holds no triangles".into()));
+            return Err(Error::input("it holds no triangles").in_file(path));
         }
         Ok(model)
     }
+}
+
+/// What is wrong with a file, in words.
+struct Wrong {
+    what: String,
+    /// What to do; empty where a fresh export is all that helps.
+    help: &'static str,
+}
+
+impl From<String> for Wrong {
+    fn from(what: String) -> Self {
+        Self { what, help: "" }
+    }
+}
+
+/// What is wrong with a file of too many triangles.
+fn too_many_triangles() -> Wrong {
+    Wrong { what: format!("it has more than {MOST_TRIANGLES} triangles"), help: "reduce it in your program" }
 }
 
 /// A file's bytes, noted in `files`; in words why there are none.

@@ -3,7 +3,10 @@
 //! Of materials: `Kd`, `map_Kd`, `d`, `map_d`, `Ns`. A picture's own opacity cuts the surface as `map_d` does; `map_d` counts
 //! by its opacity where it has one, else by its brightness. v runs up in OBJ and down here.
 
-use super::{MOST_TRIANGLES, Model, Part, Surface, Up, bytes, faceted, fraction, into_one_tile, settle};
+use super::{
+    MOST_TRIANGLES, Model, Part, Surface, Up, Wrong, bytes, faceted, fraction, into_one_tile, settle,
+    too_many_triangles,
+};
 use crate::geometry::{AlphaMask, Mesh};
 use crate::math::{Vec3, vec2};
 use crate::texture::{ColorSpace, Texture, Wrap};
@@ -17,7 +20,7 @@ const OPTIONS: tobj::LoadOptions =
     tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
 
 /// Reads a file; in words what is wrong with it.
-pub(super) fn read(path: &Path, up: Up) -> Result<Model, String> {
+pub(super) fn read(path: &Path, up: Up) -> Result<Model, Wrong> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut files = Vec::new();
     let text = bytes(path, &mut files)?;
@@ -39,7 +42,7 @@ pub(super) fn read(path: &Path, up: Up) -> Result<Model, String> {
     let (more, fault) = asked.into_inner();
     files.extend(more);
     if let Some(fault) = fault {
-        return Err(fault);
+        return Err(fault.into());
     }
     let (objects, materials) = read.map_err(|e| format!("it cannot be read: {e}"))?;
     let materials = materials.map_err(|e| format!("its materials cannot be read: {e}"))?;
@@ -55,7 +58,7 @@ pub(super) fn read(path: &Path, up: Up) -> Result<Model, String> {
     for object in objects {
         let surface = object.mesh.material_id.unwrap_or(materials.len());
         let Some(look) = model.surfaces.get(surface) else {
-            return Err(format!("`{}` has no such material", object.name));
+            return Err(format!("`{}` has no such material", object.name).into());
         };
         if materials.get(surface).and_then(|m| m.dissolve).is_some_and(|d| d < 0.5) || object.mesh.indices.is_empty() {
             continue;
@@ -64,7 +67,7 @@ pub(super) fn read(path: &Path, up: Up) -> Result<Model, String> {
         let mut mesh = mesh(&object.mesh, &name)?;
         triangles += mesh.triangles.len();
         if triangles > MOST_TRIANGLES {
-            return Err(format!("it has more than {MOST_TRIANGLES} triangles\n help: reduce it in your program"));
+            return Err(too_many_triangles());
         }
         if look.mask.is_some() {
             into_one_tile(&mut mesh.uvs, &name)?;

@@ -33,11 +33,10 @@ impl Denoiser {
         let found = folders.iter().map(|folder| folder.join(PROGRAM)).find(|program| program.is_file());
         found.map(|program| Self { program }).ok_or_else(|| {
             let place = if std::env::var_os("OIDN_DIR").is_some() { "in bin/ of OIDN_DIR" } else { "on the PATH" };
-            Error::Scene(format!(
-                "--denoise needs Open Image Denoise: there is no program {PROGRAM} {place}\n \
-                 help: python3 -m venv oidn && oidn/bin/pip install --no-deps pyoidn==2.5.1.0\n       \
-                 export OIDN_DIR=$(echo $PWD/oidn/lib/python3*/site-packages/pyoidn/oidn)"
-            ))
+            Error::missing(format!("--denoise needs Open Image Denoise: there is no program {PROGRAM} {place}")).help(
+                "python3 -m venv oidn && oidn/bin/pip install --no-deps pyoidn==2.5.1.0\n       \
+                 export OIDN_DIR=$(echo $PWD/oidn/lib/python3*/site-packages/pyoidn/oidn)",
+            )
         })
     }
 
@@ -97,7 +96,7 @@ impl Job<'_> {
         self.run(&[&picture[..], &guides[..]].concat())?;
         let bytes = std::fs::read(&clean).unwrap_or_default();
         let (w, h) = (self.film.window.width(), self.film.window.height());
-        read_pfm(&bytes, w, h).ok_or_else(|| Error::Denoise(format!("{PROGRAM} wrote no picture of {w} × {h} pixels")))
+        read_pfm(&bytes, w, h).ok_or_else(|| Error::failed(format!("{PROGRAM} wrote no picture of {w} × {h} pixels")))
     }
 
     fn write(&self, name: &str, of: impl Fn(&Pixel) -> [f32; 3]) -> Result<PathBuf> {
@@ -121,7 +120,7 @@ impl Job<'_> {
         }
         let said =
             String::from_utf8_lossy(if done.stderr.is_empty() { &done.stdout } else { &done.stderr }).into_owned();
-        Err(Error::Denoise(format!("{} failed ({}): {}", self.program.display(), done.status, said.trim())))
+        Err(Error::failed(format!("{} failed ({}): {}", self.program.display(), done.status, said.trim())))
     }
 }
 

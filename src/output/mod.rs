@@ -127,9 +127,9 @@ pub fn stream_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> Resu
     let file = builder.tempfile_in(folder).map_err(Error::io(path))?;
     let mut buffer = std::io::BufWriter::with_capacity(1 << 16, file);
     write(&mut buffer)?;
-    let file = buffer.into_inner().map_err(|e| Error::Io { path: path.into(), source: e.into_error() })?;
+    let file = buffer.into_inner().map_err(|e| Error::io(path)(e.into_error()))?;
     file.as_file().sync_all().map_err(Error::io(path))?;
-    file.persist(path).map_err(|e| Error::Io { path: path.into(), source: e.error })?;
+    file.persist(path).map_err(|e| Error::io(path)(e.error))?;
     Ok(())
 }
 
@@ -183,7 +183,7 @@ pub fn link_atomically(there: &Path, path: &Path, bytes: &[u8]) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
     let link = tempfile::Builder::new().prefix(UNFINISHED).make_in(folder, |name| std::fs::hard_link(there, name));
     match link {
-        Ok(link) => link.into_temp_path().persist(path).map_err(|e| Error::Io { path: path.into(), source: e.error }),
+        Ok(link) => link.into_temp_path().persist(path).map_err(|e| Error::io(path)(e.error)),
         Err(_) => write_atomically(path, bytes),
     }
 }

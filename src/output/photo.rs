@@ -18,11 +18,9 @@ pub fn read_photo(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
 pub fn read_color_photo(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
     let photo = decode(path)?;
     if !photo.color().has_color() {
-        return Err(Error::Image {
-            path: path.into(),
-            what: "this picture is gray, and the network sees colours\n help: give photographs in red, green and blue"
-                .into(),
-        });
+        return Err(Error::input("this picture is gray, and the network sees colours")
+            .help("give photographs in red, green and blue")
+            .in_file(path));
     }
     let photo = photo.into_rgb8();
     let (w, h) = photo.dimensions();
@@ -46,13 +44,13 @@ fn decode(path: &Path) -> Result<DynamicImage> {
 }
 
 fn open(path: &Path) -> Result<ImageReader<BufReader<File>>> {
-    ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(Error::io(path))
+    ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(Error::reading(path))
 }
 
 fn unreadable(path: &Path, error: ImageError) -> Error {
     match error {
-        ImageError::IoError(source) if source.kind() != ErrorKind::UnexpectedEof => Error::io(path)(source),
-        e => Error::Image { path: path.into(), what: format!("this image cannot be read: {e}; PNG and JPEG can") },
+        ImageError::IoError(source) if source.kind() != ErrorKind::UnexpectedEof => Error::reading(path)(source),
+        e => Error::input(format!("this image cannot be read: {e}; PNG and JPEG can")).in_file(path),
     }
 }
 
@@ -91,7 +89,7 @@ pub fn encode_jpeg(width: u32, height: u32, rgb: &[[u8; 3]], quality: u8) -> Res
     let mut bytes = Vec::new();
     JpegEncoder::new_with_quality(&mut bytes, quality)
         .encode(rgb.as_flattened(), width, height, ExtendedColorType::Rgb8)
-        .map_err(|e| Error::Scene(format!("cannot encode a JPEG: {e}")))?;
+        .map_err(|e| Error::failed(format!("cannot encode a JPEG: {e}")))?;
     Ok(bytes)
 }
 

@@ -23,7 +23,7 @@ pub enum Picture<'a> {
 }
 
 fn failed(error: impl std::fmt::Display) -> Error {
-    Error::Scene(format!("cannot encode a PNG: {error}"))
+    Error::failed(format!("cannot encode a PNG: {error}"))
 }
 
 /// Encodes a picture; `text` goes into its `Comment`.
@@ -79,8 +79,8 @@ pub fn write_png(path: &Path, width: u32, height: u32, picture: &Picture<'_>, te
 }
 
 fn read(path: &Path, depth: BitDepth, color: ColorType, what: &str) -> Result<(u32, u32, Vec<u8>)> {
-    let wrong = |e: &dyn std::fmt::Display| Error::Image { path: path.into(), what: e.to_string() };
-    let file = std::fs::File::open(path).map_err(Error::io(path))?;
+    let wrong = |e: &dyn std::fmt::Display| Error::input(e.to_string()).in_file(path);
+    let file = std::fs::File::open(path).map_err(Error::reading(path))?;
     let mut decoder = png::Decoder::new(std::io::BufReader::new(file));
     decoder.set_transformations(png::Transformations::IDENTITY);
     let mut reader = decoder.read_info().map_err(|e| wrong(&e))?;
@@ -143,8 +143,8 @@ impl Map {
 /// Reads a PNG whose numbers or colours stand for something, as they are: width, height, pixels. A picture in colour that is gray
 /// all over is one of numbers.
 pub fn read_map(path: &Path) -> Result<(u32, u32, Map)> {
-    let wrong = |what: String| Error::Image { path: path.into(), what };
-    let file = std::fs::File::open(path).map_err(Error::io(path))?;
+    let wrong = |what: String| Error::input(what).in_file(path);
+    let file = std::fs::File::open(path).map_err(Error::reading(path))?;
     let mut decoder = png::Decoder::new(std::io::BufReader::new(file));
     decoder.set_transformations(png::Transformations::IDENTITY);
     let unreadable = |e: png::DecodingError| wrong(format!("this mask cannot be read: {e}; masks are PNG files"));

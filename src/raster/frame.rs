@@ -45,13 +45,8 @@ pub(super) fn draw(gpu: &Gpu, pipelines: &Pipelines, scene: &Scene, settings: &S
     let limits = gpu.device.limits();
     let size = (scene.camera.width(), scene.camera.height());
     if size.0.max(size.1) > limits.max_texture_dimension_2d {
-        return Err(Error::Raster(format!(
-            "{} × {} pixels are more than {} can draw\n help: at most {} across and down",
-            size.0,
-            size.1,
-            gpu.name(),
-            limits.max_texture_dimension_2d
-        )));
+        return Err(Error::missing(format!("{} × {} pixels are more than {} can draw", size.0, size.1, gpu.name()))
+            .help(format!("at most {} across and down", limits.max_texture_dimension_2d)));
     }
     let sheets = Sheets::new(scene, gpu, limits.max_texture_dimension_2d);
     let vertices = Vertices::new(scene, &sheets.worn, sheets.all.len());
@@ -59,7 +54,7 @@ pub(super) fn draw(gpu: &Gpu, pipelines: &Pipelines, scene: &Scene, settings: &S
     let corners = bytemuck::cast_slice(&vertices.corners);
     let most = limits.max_buffer_size.min(u64::from(u32::MAX));
     if corners.len() as u64 > most {
-        return Err(Error::Raster(format!("{} triangles are more than {} can hold", scene.triangles(), gpu.name())));
+        return Err(Error::input(format!("{} triangles are more than {} can hold", scene.triangles(), gpu.name())));
     }
     let scale = scale(scene);
     let storage = |bytes: &[u8]| gpu.buffer(BufferUsages::STORAGE, bytes);

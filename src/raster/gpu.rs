@@ -20,7 +20,7 @@ pub(super) struct Gpu {
 }
 
 impl Gpu {
-    /// The fastest there is. An [`Error::Raster`] that names the package where there is none.
+    /// The fastest there is. A [`Kind::Missing`](crate::error::Kind::Missing) that names the package where there is none.
     pub(super) fn open() -> Result<Self> {
         let instance = Instance::new(InstanceDescriptor {
             backends: Backends::VULKAN,
@@ -29,16 +29,15 @@ impl Gpu {
         let options =
             RequestAdapterOptions { power_preference: PowerPreference::HighPerformance, ..Default::default() };
         let adapter = pollster::block_on(instance.request_adapter(&options)).map_err(|_| {
-            Error::Raster(
-                "--engine raster needs a Vulkan driver and finds none\n help: apt-get install mesa-vulkan-drivers libvulkan1 \
-                 brings one that runs on any processor"
-                    .into(),
+            Error::missing("--engine raster needs a Vulkan driver and finds none").help(
+                "apt-get install mesa-vulkan-drivers libvulkan1 \
+                 brings one that runs on any processor",
             )
         })?;
         let name = name(&adapter);
         let wanted = DeviceDescriptor { required_limits: adapter.limits(), ..Default::default() };
         let (device, queue) = pollster::block_on(adapter.request_device(&wanted))
-            .map_err(|e| Error::Raster(format!("{name} cannot be used: {e}\n help: update its driver")))?;
+            .map_err(|e| Error::missing(format!("{name} cannot be used: {e}")).help("update its driver"))?;
         let fault = Arc::new(Mutex::new(None));
         let told = Arc::clone(&fault);
         device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| {
@@ -47,11 +46,11 @@ impl Gpu {
         Ok(Self { device, queue, name, fault })
     }
 
-    /// An [`Error::Raster`] where the card could not do what it was told, nearly always for want of memory. It stays: of pictures that are
+    /// A [`Kind::Missing`](crate::error::Kind::Missing) where the card could not do what it was told, nearly always for want of memory. It stays: of pictures that are
     /// drawn at the same time nobody can tell which one lacks something.
     pub(super) fn check(&self) -> Result<()> {
         match self.fault.lock().unwrap_or_else(PoisonError::into_inner).as_deref().map(str::trim_end) {
-            Some(words) => Err(Error::Raster(format!("{}: {words}\n help: try a smaller --width", self.name))),
+            Some(words) => Err(Error::missing(format!("{}: {words}", self.name)).help("try a smaller --width")),
             None => Ok(()),
         }
     }
@@ -134,7 +133,7 @@ impl Gpu {
         buffer.map_async(MapMode::Read, .., |_| ());
         self.check()?;
         let lost = |e: &dyn std::fmt::Display| {
-            Error::Raster(format!("{} stopped answering: {e}\n help: try a smaller --width", self.name))
+            Error::missing(format!("{} stopped answering: {e}", self.name)).help("try a smaller --width")
         };
         self.device.poll(PollType::wait_indefinitely()).map_err(|e| lost(&e))?;
         let mapped = buffer.get_mapped_range(..).map_err(|e| lost(&e))?;

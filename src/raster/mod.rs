@@ -92,7 +92,7 @@ pub struct Rasterizer {
 }
 
 impl Rasterizer {
-    /// On the fastest card there is. An [`Error::Raster`](crate::Error::Raster) where there is none.
+    /// On the fastest card there is. A [`Kind::Missing`](crate::error::Kind::Missing) where there is none.
     pub fn new() -> Result<Self> {
         let gpu = Gpu::open()?;
         let pipelines = Pipelines::new(&gpu);
@@ -104,7 +104,7 @@ impl Rasterizer {
         self.gpu.name()
     }
 
-    /// Draws the whole of what the camera sees. An [`Error::Raster`](crate::Error::Raster) where the picture is larger than the card can hold.
+    /// Draws the whole of what the camera sees. A [`Kind::Missing`](crate::error::Kind::Missing) where the picture is larger than the card can hold.
     pub fn draw(&self, scene: &Scene, settings: &Settings) -> Result<Drawn> {
         frame::draw(&self.gpu, &self.pipelines, scene, settings)
     }

@@ -68,7 +68,7 @@ pub fn pool(threads: usize) -> Result<rayon::ThreadPool> {
         .num_threads(threads)
         .start_handler(|_| prepare_thread())
         .build()
-        .map_err(|e| Error::Scene(format!("cannot start {threads} threads: {e}")))
+        .map_err(|e| Error::failed(format!("cannot start {threads} threads: {e}")))
 }
 
 /// Renders a window. Call it inside [`pool`]'s `install`.
@@ -87,7 +87,7 @@ pub fn render(world: &World<'_>, integrator: &dyn Integrator, settings: &Setting
         })
         .collect();
     if watch.stopped() {
-        return Err(Error::Interrupted);
+        return Err(Error::interrupted());
     }
     let pixels = tiles::assemble(settings.window, tiles.into_iter().zip(rendered));
     Ok(Film { window: settings.window, pixels })

@@ -63,7 +63,7 @@ impl<'a> Progressive<'a> {
             (watch.done)((range.len() * tile.sums.len()) as u64);
         });
         // Some sums may have more samples than their tile knows of: nothing may be shown of them.
-        if watch.stopped() { Err(Error::Interrupted) } else { Ok(()) }
+        if watch.stopped() { Err(Error::interrupted()) } else { Ok(()) }
     }
 
     /// Adds passes until each tile has its goal or the time is up, and tells whether the goals are met. At least one pass is

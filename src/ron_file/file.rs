@@ -3,7 +3,7 @@
 use super::fault::{Fault, locate, offset_of};
 use super::place::{Step, place};
 use super::suggest::nearest;
-use crate::error::PageError;
+use crate::error::{Kind, Place, Span};
 use crate::{Error, Result};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -27,21 +27,19 @@ pub struct RonFile {
 impl RonFile {
     /// Reads a file.
     pub fn read(path: &Path) -> Result<Self> {
-        let refuse = |what: &str| Err(Error::Scene(format!("{}: {what}", path.display())));
-        let about = std::fs::metadata(path).map_err(Error::io(path))?;
+        let refuse = |what: &str, help: &str| Err(Error::input(what).help(help).in_file(path));
+        let about = std::fs::metadata(path).map_err(Error::reading(path))?;
         if about.is_dir() {
-            return refuse("this is a folder\n help: name a page in it, a file that ends in .ron");
+            return refuse("this is a folder", "name a page in it, a file that ends in .ron");
         }
         if about.len() > LARGEST {
-            return refuse(
-                "this file is too large for a page\n help: a page is text of at most 4 MiB that ends in .ron",
-            );
+            return refuse("this file is too large for a page", "a page is text of at most 4 MiB that ends in .ron");
         }
-        let bytes = std::fs::read(path).map_err(Error::io(path))?;
+        let bytes = std::fs::read(path).map_err(Error::reading(path))?;
         // Some editors begin a file with a byte order mark.
         let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
         if bytes.contains(&0) {
-            return refuse("this is not a text file\n help: a page is text that ends in .ron");
+            return refuse("this is not a text file", "a page is text that ends in .ron");
         }
         match std::str::from_utf8(bytes) {
             Ok(text) => Ok(Self { path: path.into(), text: text.to_owned() }),
@@ -84,7 +82,7 @@ impl RonFile {
         let pretty = ron::ser::PrettyConfig::new().struct_names(true).compact_arrays(true);
         options()
             .to_string_pretty(value, pretty)
-            .map_err(|e| Error::Scene(format!("this cannot be written as a page: {e}")))
+            .map_err(|e| Error::failed(format!("this cannot be written as a page: {e}")))
     }
 
     /// A path written in the page, relative to the page's folder.
@@ -100,18 +98,19 @@ impl RonFile {
         self.fault(&Fault { raw_len: self.text.len(), start, end: start + len, message, help })
     }
 
-    /// An error about the value that `path` leads to. What was found while building, in words with ` help:` on a line of
-    /// its own, gets its place in the page; other errors stay as they are.
+    /// An error about the value that `path` leads to. A wrong value that was found while building gets its place in the page; errors
+    /// of other kinds, and those that have a place, stay as they are.
     pub fn blame(&self, path: &[Step<'_>], error: Error) -> Error {
-        let Error::Scene(words) = error else { return error };
-        let (message, help) = words.split_once("\n help: ").unwrap_or((&words, ""));
+        if error.kind() != Kind::Input || error.place().is_some() {
+            return error;
+        }
         let mut at = place(&self.text, path);
         // Of a long value only its name or bracket.
         let value = &self.text[at.clone()];
         if value.len() > MOST_UNDERLINED || value.contains('\n') {
             at.end = at.start + value.find(['(', '[', '{']).map_or(value.len(), |i| i.max(1));
         }
-        let (message, help) = (message.to_owned(), help.to_owned());
+        let (message, help) = (error.message().to_owned(), error.advice().unwrap_or_default().to_owned());
         self.fault(&Fault { raw_len: self.text.len(), start: at.start, end: at.end, message, help })
     }
 
@@ -148,16 +147,8 @@ impl RonFile {
         let column = text[line_start..start].chars().count() + 1;
         let end = fault.end.clamp(start, line_start + line_text.len()).max(start);
         let width = text.get(start..end).map_or(1, |t| t.trim_end().chars().count()).max(1);
-        PageError {
-            path: self.path.clone(),
-            line,
-            column,
-            width,
-            text: line_text.to_owned(),
-            message: fault.message.clone(),
-            help: fault.help.clone(),
-        }
-        .into()
+        let span = Some(Span { line, column, width, text: line_text.to_owned() });
+        Error::input(fault.message.as_str()).help(fault.help.as_str()).at(Place { file: self.path.clone(), span })
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::assemble::Growing;
 use super::desc::SpeciesDesc;
+use crate::error::{Kind, Place};
 use crate::geometry::{AlphaMask, Margin};
 use crate::light::{Infrared, Table};
 use crate::material::{LeafMaterial, Picture, Tones};
@@ -111,7 +112,7 @@ impl Library {
                 return Err(if own.text.contains(&format!("\"{key}\"")) {
                     own.about(&key, message, help)
                 } else {
-                    own.blame(&[Step::Field("skins")], Error::Scene(format!("{message}\n help: {help}")))
+                    own.blame(&[Step::Field("skins")], Error::input(message).help(help))
                 });
             }
         }
@@ -148,12 +149,12 @@ impl Library {
             return Ok(known.clone());
         }
         self.note(&full)?;
-        let color = Texture::load(&full, ColorSpace::Srgb).map_err(|e| at_its_place(page, path, e))?;
+        let color = Texture::load(&full, ColorSpace::Srgb).map_err(|e| at_its_place(page, path, IMAGE_HELP, e))?;
         // A height map drawn or measured for the picture lies beside it; without one the relief is read off the colours.
         let beside = full.with_extension("height.png");
         let maps = if beside.is_file() {
             self.note(&beside)?;
-            Maps::from_height(Height::load(&beside, relief_range).map_err(|e| at_its_place(page, path, e))?)
+            Maps::from_height(Height::load(&beside, relief_range).map_err(|e| at_its_place(page, path, IMAGE_HELP, e))?)
         } else {
             Maps::derive(&color, &Relief::LEAF)
         };
@@ -171,7 +172,7 @@ impl Library {
         if let Some(known) = self.models.get(&key) {
             return Ok(known.clone());
         }
-        let model = Arc::new(Model::load(&full, up).map_err(|e| at_its_place(page, path, e))?);
+        let model = Arc::new(Model::load(&full, up).map_err(|e| at_its_place(page, path, MODEL_HELP, e))?);
         for file in &model.files {
             self.note(file)?;
         }
@@ -193,13 +194,9 @@ impl Library {
             return Ok(known.clone());
         }
         self.surround_file(page, path)?;
-        let table = Arc::new(Table::load(&full, infrared).map_err(|error| match error {
-            Error::Image { what, .. } => {
-                let name = full.file_name().unwrap_or_default().to_string_lossy().into_owned();
-                let help = "name an equirectangular .exr or .hdr; `nir` says where near infrared comes from: Channel, Sky or OfRed(0.8)";
-                page.about(path, format!("`{name}` cannot be used: {what}"), help)
-            }
-            other => other,
+        let table = Arc::new(Table::load(&full, infrared).map_err(|error| {
+            let help = "name an equirectangular .exr or .hdr; `nir` says where near infrared comes from: Channel, Sky or OfRed(0.8)";
+            at_its_place(page, path, help, error)
         })?);
         self.surrounds.insert(key, table.clone());
         Ok(table)
@@ -218,13 +215,14 @@ impl Library {
             Ok((full, text))
         };
         let (albedo, albedo_text) = need(&desc.albedo)?;
-        let albedo = Texture::load(&albedo, ColorSpace::Srgb).map_err(|e| at_its_place(page, &albedo_text, e))?;
+        let albedo =
+            Texture::load(&albedo, ColorSpace::Srgb).map_err(|e| at_its_place(page, &albedo_text, IMAGE_HELP, e))?;
         let albedo = albedo.wrapped(Wrap::Repeat);
         let height = if desc.height.as_os_str().is_empty() {
             read_off(&albedo)
         } else {
             let (height, text) = need(&desc.height)?;
-            Height::load(&height, 1.0).map_err(|e| at_its_place(page, &text, e))?
+            Height::load(&height, 1.0).map_err(|e| at_its_place(page, &text, IMAGE_HELP, e))?
         };
         let layer = Arc::new(Layer { albedo, height: height.wrapped(Wrap::Repeat) });
         self.layers.insert(key, layer.clone());
@@ -232,7 +230,7 @@ impl Library {
     }
 
     fn note(&mut self, path: &Path) -> Result<()> {
-        let bytes = std::fs::read(path).map_err(Error::io(path))?;
+        let bytes = std::fs::read(path).map_err(Error::reading(path))?;
         self.files.insert(path.into(), Sha256::digest(&bytes).into());
         Ok(())
     }
@@ -246,24 +244,22 @@ fn read_off(albedo: &Texture) -> Height {
     Height::from_values(columns, rows, height.values().iter().map(unit).collect())
 }
 
-/// A file that cannot be read as an image or a model is the page's fault: shown where the page names it.
-fn at_its_place(page: &RonFile, literal: &str, error: Error) -> Error {
-    match error {
-        Error::Image { path, what } => {
-            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            page.about(
-                literal,
-                format!("`{name}` cannot be used: {what}"),
-                "name a PNG or JPEG image, or draw it: trace texture RECIPE.ron",
-            )
+/// What helps where an image cannot be used.
+const IMAGE_HELP: &str = "name a PNG or JPEG image, or draw it: trace texture RECIPE.ron";
+
+/// What helps where a model cannot be used and nothing more is known.
+const MODEL_HELP: &str = "export it again from the program that made it";
+
+/// A file that cannot be read as an image or a model is the page's fault: shown where the page names it, with `help` where the error
+/// has none of its own.
+fn at_its_place(page: &RonFile, literal: &str, help: &str, error: Error) -> Error {
+    match error.place() {
+        Some(Place { file, span: None }) if error.kind() == Kind::Input => {
+            let name = file.file_name().unwrap_or_default().to_string_lossy();
+            let message = format!("`{name}` cannot be used: {}", error.message());
+            page.about(literal, message, error.advice().unwrap_or(help))
         }
-        Error::Model { path, what } => {
-            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            let (what, help) =
-                what.split_once("\n help: ").unwrap_or((&what, "export it again from the program that made it"));
-            page.about(literal, format!("`{name}` cannot be used: {what}"), help)
-        }
-        other => other,
+        _ => error,
     }
 }
 

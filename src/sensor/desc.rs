@@ -67,7 +67,7 @@ macro_rules! cameras {
         }
 
         impl CameraDesc {
-            /// Draws the camera. An [`crate::Error::Scene`] where no image could be taken: a folded lens, an aperture without a focal length in
+            /// Draws the camera. A [`Kind::Input`](crate::error::Kind::Input) where no image could be taken: a folded lens, an aperture without a focal length in
             /// millimetres, a target at the camera's own place.
             pub fn build(&self, stream: &mut Stream) -> Result<Camera> {
                 match self {

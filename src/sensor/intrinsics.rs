@@ -51,10 +51,10 @@ impl IntrinsicsDesc {
             Self::FieldOfView { horizontal_deg } => {
                 let angle = horizontal_deg.draw(stream);
                 if angle >= 180.0 {
-                    return Err(Error::Scene(format!(
-                        "horizontal_deg {angle} is out of range: a pinhole sees less than 180 degrees\n \
-                         help: write an angle of view such as 60"
-                    )));
+                    return Err(Error::input(format!(
+                        "horizontal_deg {angle} is out of range: a pinhole sees less than 180 degrees"
+                    ))
+                    .help("write an angle of view such as 60"));
                 }
                 ([middle[0] / (angle / 2.0).to_radians().tan(); 2], middle, None)
             }
@@ -76,10 +76,9 @@ impl ApertureDesc {
     /// Draws the aperture of a lens of a focal length.
     pub(super) fn draw(&self, focal_mm: Option<f64>, stream: &mut Stream) -> Result<Aperture> {
         let Some(focal) = focal_mm else {
-            return Err(Error::Scene(
-                "an f_number needs a focal length in millimetres\n help: write intrinsics: Millimetres(focal_mm: …, \
-                 pixel_um: …)"
-                    .into(),
+            return Err(Error::input("an f_number needs a focal length in millimetres").help(
+                "write intrinsics: Millimetres(focal_mm: …, \
+                 pixel_um: …)",
             ));
         };
         let radius = (focal * 1e-3 / (2.0 * self.f_number.draw(stream))) as f32;

@@ -87,7 +87,7 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// A camera of `size` pixels with intrinsics in pixels. An [`Error::Scene`] where the size or focal length is not above
+    /// A camera of `size` pixels with intrinsics in pixels. A [`Kind::Input`](crate::error::Kind::Input) where the size or focal length is not above
     /// zero, or the distortion folds the image over within its corners.
     pub fn new(
         size: (u32, u32),
@@ -98,9 +98,10 @@ impl Camera {
     ) -> Result<Self> {
         let (width, height) = size;
         if width == 0 || height == 0 || focal.iter().any(|f| !(f.is_finite() && *f > 0.0)) {
-            return Err(Error::Scene(format!(
-                "a camera of {width} × {height} pixels and focal lengths {focal:?} sees nothing\n help: all of them must be above 0"
-            )));
+            return Err(Error::input(format!(
+                "a camera of {width} × {height} pixels and focal lengths {focal:?} sees nothing"
+            ))
+            .help("all of them must be above 0"));
         }
         let (horizon, aperture, motion) = (f64::INFINITY, None, Motion::default());
         let mut camera = Self { width, height, scale: 1.0, focal, centre, distortion, horizon, aperture, pose, motion };
@@ -288,10 +289,9 @@ impl Camera {
                     self.distortion.stretch([at[0] * s, at[1] * s]) <= 0.0
                 });
                 if error.is_nan() || error > 1e-6 || folds {
-                    return Err(Error::Scene(
-                        "the lens distortion folds the image over before its corners\n help: check the coefficients' signs and \
-                         that they belong to this focal length"
-                            .into(),
+                    return Err(Error::input("the lens distortion folds the image over before its corners").help(
+                        "check the coefficients' signs and \
+                         that they belong to this focal length",
                     ));
                 }
                 horizon = horizon.max(at[0] * at[0] + at[1] * at[1]);

@@ -117,7 +117,7 @@ impl PoseDesc {
                 };
                 let (position, target) = (point(position_m), point(target_m));
                 Pose::look_at(position, target).ok_or_else(|| {
-                    Error::Scene("the camera looks at its own position\n help: give target_m another point".into())
+                    Error::input("the camera looks at its own position").help("give target_m another point")
                 })
             }
         }

@@ -48,9 +48,10 @@ impl RenderOptions {
         let useless =
             [(self.quality.denoise, "--denoise says"), (!self.quality.is_fixed(), "--time and --target-error say")];
         match useless.into_iter().find(|(given, _)| *given && self.engine == Engine::Raster) {
-            Some((_, flags)) => Err(Error::Scene(format!(
-                "{flags} nothing with --engine raster, which has no rays and no noise\n help: use --engine trace, or leave it out"
-            ))),
+            Some((_, flags)) => {
+                Err(Error::misuse(format!("{flags} nothing with --engine raster, which has no rays and no noise"))
+                    .help("use --engine trace, or leave it out"))
+            }
             None => Ok(()),
         }
     }

@@ -137,7 +137,7 @@ impl Techniques {
             None if limits => "--max-depth and --clamp say nothing".into(),
             None => return Ok(()),
         };
-        Err(Error::Scene(format!("{words} with --engine {engine}\n help: `trace --help` tells which is whose")))
+        Err(Error::misuse(format!("{words} with --engine {engine}")).help("`trace --help` tells which is whose"))
     }
 }
 

@@ -401,12 +401,10 @@ fn up(slope: Vec2) -> Vec3 {
 
 fn check(desc: &SoilDesc, maps: usize, site: &Site) -> Result<()> {
     let layers = desc.layers.len();
-    let fault = |what: String| Err(Error::Scene(what));
+    let fault = |what: String| Err(Error::input(what));
     if layers == 0 || layers > MAX_LAYERS {
-        return fault(format!(
-            "the soil has {layers} layers: give one to {MAX_LAYERS}\n \
-             help: a layer is (albedo: \"…\", height: \"…\", size_m: 0.5, height_mm: (-4, 8))"
-        ));
+        return Err(Error::input(format!("the soil has {layers} layers: give one to {MAX_LAYERS}"))
+            .help("a layer is (albedo: \"…\", height: \"…\", size_m: 0.5, height_mm: (-4, 8))"));
     }
     if maps != layers {
         return fault(format!("the soil has {layers} layers but {maps} were loaded"));

@@ -202,7 +202,7 @@ impl Fault {
 
 /// Opens and decodes an image file, with errors that say what to do.
 fn decode(path: &Path) -> Result<image::DynamicImage> {
-    let wrong = |what: String| Error::Image { path: path.to_path_buf(), what };
+    let wrong = |what: String| Error::input(what).in_file(path);
     let file = std::fs::File::open(path).map_err(|e| match e.kind() {
         ErrorKind::NotFound => wrong("there is no such image; a path in a page counts from the page's folder".into()),
         _ => Error::io(path)(e),

@@ -38,8 +38,8 @@ pub(super) struct Texels {
 impl Panorama {
     /// Reads a .exr or .hdr file, told apart by their first bytes.
     pub fn load(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(Error::io(path))?;
-        Self::decode(&bytes).map_err(|what| Error::Image { path: path.into(), what })
+        let bytes = std::fs::read(path).map_err(Error::reading(path))?;
+        Self::decode(&bytes).map_err(|what| Error::input(what).in_file(path))
     }
 
     /// From the bytes of a file; in words what is wrong with them.

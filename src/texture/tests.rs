@@ -1,6 +1,7 @@
 //! Tests of the runtime textures.
 
 use super::*;
+use crate::error::Kind;
 use crate::math::vec2;
 
 /// A green disc on transparent black, in an odd size.
@@ -80,7 +81,9 @@ fn a_missing_or_broken_image_says_so() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cut.png");
     std::fs::write(&path, [0x89, b'P', b'N', b'G', 13, 10, 26, 10, 0, 0]).unwrap();
-    assert!(matches!(Texture::load(&path, ColorSpace::Srgb), Err(Error::Image { .. })));
+    let error = Texture::load(&path, ColorSpace::Srgb).unwrap_err();
+    assert_eq!(error.kind(), Kind::Input);
+    assert_eq!(error.place().map(|place| &place.file), Some(&path));
 }
 
 /// A hill of height 0.1 in the middle of a wide image.

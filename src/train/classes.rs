@@ -100,16 +100,19 @@ impl Classes {
         for label in self.0.iter().flat_map(|c| &c.labels) {
             let unknown = !SEMANTICS.contains(&label.as_str()) && !species.contains(&label.as_str());
             if unknown && !species.is_empty() {
-                return Err(Error::Dataset(format!(
-                    "the class map names the label `{label}`, which the set does not have\n help: its labels are {}",
+                return Err(Error::input(format!(
+                    "the class map names the label `{label}`, which the set does not have"
+                ))
+                .help(format!(
+                    "its labels are {}",
                     SEMANTICS.iter().chain(&species).copied().collect::<Vec<_>>().join(", ")
                 )));
             }
             if unknown {
-                return Err(Error::Dataset(format!(
-                    "the class map names the species `{label}`, and the set knows no species\n help: for such sets the labels are {}",
-                    SEMANTICS.join(", ")
-                )));
+                return Err(Error::input(format!(
+                    "the class map names the species `{label}`, and the set knows no species"
+                ))
+                .help(format!("for such sets the labels are {}", SEMANTICS.join(", "))));
             }
         }
         Ok(Map { semantics: SEMANTICS.map(number), species: species.iter().map(|s| number(s)).collect() })

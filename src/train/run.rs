@@ -71,13 +71,10 @@ impl Identity {
         let differ: Vec<String> = differ
             .map(|(k, v)| format!("{k} is {} there and {v} here", a.get(k).map_or("none", String::as_str)))
             .collect();
-        Err(Error::Run {
-            path,
-            what: format!(
-                "another training lies in this folder: {}\n help: give another --out, or the same arguments to go on with it",
-                if differ.is_empty() { "its images are others".into() } else { differ.join("; ") }
-            ),
-        })
+        let what = if differ.is_empty() { "its images are others".into() } else { differ.join("; ") };
+        Err(Error::misuse(format!("another training lies in this folder: {what}"))
+            .help("give another --out, or the same arguments to go on with it")
+            .in_file(path))
     }
 }
 
@@ -141,23 +138,20 @@ impl Learnt {
     pub fn open(folder: &Path) -> Result<Self> {
         let path = folder.join(MODEL);
         if !path.exists() {
-            return Err(Error::Run {
-                path: folder.into(),
-                what: if folder.join(PLAN).exists() {
-                    "this training is not done\n help: the command that began it goes on with it".into()
-                } else {
-                    "there is no trained network in this folder\n help: `train fit --out DIR` makes one".into()
-                },
-            });
+            let error = if folder.join(PLAN).exists() {
+                Error::input("this training is not done").help("the command that began it goes on with it")
+            } else {
+                Error::input("there is no trained network in this folder").help("`train fit --out DIR` makes one")
+            };
+            return Err(error.in_file(folder));
         }
         let card: Card = read_json(&path)?;
         let path = folder.join(&card.weights);
         let (values, _) = weights::read(&path)?;
         if weights::hash(&values) != card.weights_sha256 {
-            return Err(Error::Run {
-                path,
-                what: format!("these are not the weights that {MODEL} beside them is about"),
-            });
+            return Err(
+                Error::damaged(format!("these are not the weights that {MODEL} beside them is about")).in_file(path)
+            );
         }
         Ok(Self { card, values })
     }
@@ -178,10 +172,9 @@ pub fn results(folder: &Path) -> Result<Option<Results>> {
 
 /// Reads a JSON file of a run.
 pub fn read_json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T> {
-    let bytes = std::fs::read(path).map_err(Error::io(path))?;
-    let unreadable = |e| Error::Run {
-        path: path.into(),
-        what: format!("this file cannot be read: {e}\n help: delete it to have it made again"),
+    let bytes = std::fs::read(path).map_err(Error::reading(path))?;
+    let unreadable = |e| {
+        Error::damaged(format!("this file cannot be read: {e}")).help("delete it to have it made again").in_file(path)
     };
     serde_json::from_slice(&bytes).map_err(unreadable)
 }
@@ -194,5 +187,5 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
 }
 
 fn failed(e: &serde_json::Error) -> Error {
-    Error::Training(format!("cannot write JSON: {e}"))
+    Error::failed(format!("cannot write JSON: {e}"))
 }

@@ -32,7 +32,7 @@ impl Machine {
     /// The device and the precision of a plan on it.
     pub fn place(&self, precision: &str) -> Result<Where> {
         let device = device::find(&self.device)?;
-        Ok(Where { device, precision: Precision::named(precision, device).map_err(Error::Training)? })
+        Ok(Where { device, precision: Precision::named(precision, device).map_err(Error::input)? })
     }
 }
 
@@ -47,10 +47,8 @@ pub fn fit(plan: &Plan, begin: Option<&Path>, machine: &Machine, folder: &Path, 
     let train = open(&plan.train, Pick::Split(Split::Train))?;
     let val = open(&plan.val, Pick::Split(Split::Val))?;
     if train.is_empty() {
-        return Err(Error::Training(
-            "there is no image to learn from\n help: name sets with --set DIR, or other images of them with DIR@all"
-                .into(),
-        ));
+        return Err(Error::misuse("there is no image to learn from")
+            .help("name sets with --set DIR, or other images of them with DIR@all"));
     }
     let begin = begin.map(Learnt::open).transpose()?.map(|l| l.values).unwrap_or_default();
     let plan = Plan { begin_with: (!begin.is_empty()).then(|| weights::hash(&begin)), ..plan.clone() };
@@ -113,9 +111,7 @@ pub fn calibrated(
     let model = Model::with(card.network, card.input.bands.len(), card.classes.len(), &learnt.values, place)?;
     let store = Store::open(on, Pick::Split(Split::Train), 0, &card.classes, &card.input, false, 0)?;
     if store.is_empty() {
-        return Err(Error::Training(
-            "there is no image to calibrate on\n help: name others of the set, such as DIR@all".into(),
-        ));
+        return Err(Error::misuse("there is no image to calibrate on").help("name others of the set, such as DIR@all"));
     }
     let values = calibrate(&model, &store, &card.normalisation, images)?;
     let card = Card { weights_sha256: weights::hash(&values), ..card.clone() };
@@ -151,7 +147,7 @@ pub fn evaluate(
     let mut evaluation = Evaluation::new(card.classes.names());
     for place in 0..store.len() {
         if stop.load(Ordering::Relaxed) {
-            return Err(Error::Interrupted);
+            return Err(Error::interrupted());
         }
         let example = store.get(place)?;
         let mut pixels = augment::interleave(&example, 1);

@@ -39,7 +39,7 @@ pub fn read(path: &Path) -> Result<(Vec<Array>, String)> {
     let damaged = |e: &dyn std::fmt::Display| {
         unusable(path, &format!("these are no weights of `train`, or they are damaged: {e}"))
     };
-    let bytes = std::fs::read(path).map_err(Error::io(path))?;
+    let bytes = std::fs::read(path).map_err(Error::reading(path))?;
     let (_, header) = SafeTensors::read_metadata(&bytes).map_err(|e| damaged(&e))?;
     let text =
         header.metadata().as_ref().and_then(|m| m.get(KEY)).ok_or_else(|| damaged(&"words of ours are missing"))?;
@@ -83,12 +83,13 @@ fn hex(bytes: &[u8]) -> String {
 }
 
 fn unusable(path: &Path, what: &str) -> Error {
-    Error::Run { path: path.into(), what: what.into() }
+    Error::damaged(what).in_file(path)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Kind;
 
     fn arrays() -> Vec<Array> {
         let array = |name: &str, shape: &[usize], values: &[f32]| Array {
@@ -112,7 +113,7 @@ mod tests {
             let mut broken = bytes.clone();
             broken[at] ^= 4;
             std::fs::write(&path, &broken).unwrap();
-            assert!(matches!(read(&path), Err(Error::Run { .. })), "byte {at}");
+            assert_eq!(read(&path).unwrap_err().kind(), Kind::Damaged, "byte {at}");
         }
         std::fs::write(&path, &bytes[..bytes.len() - 5]).unwrap();
         assert!(read(&path).is_err());

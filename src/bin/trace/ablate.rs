@@ -127,10 +127,11 @@ fn chosen(args: &Args) -> Result<Vec<&'static Edit>> {
         let options = edit.options(full.clone());
         if matches!(edit.change, Change::Rendering(_)) && options == full {
             if named {
-                return Err(Error::Dataset(format!(
-                    "--only {}: the full dataset is drawn like that already\n help: leave it out, or give other arguments",
+                return Err(Error::misuse(format!(
+                    "--only {}: the full dataset is drawn like that already",
                     edit.name
-                )));
+                ))
+                .help("leave it out, or give other arguments"));
             }
             if !args.work.quiet {
                 eprintln!("{} is left out: the full dataset is drawn like that", edit.name);
@@ -183,8 +184,7 @@ fn begun(folder: &Path) -> Result<Set> {
     if folder.join(furrow::dataset::recipe::FILE).is_file() {
         return Set::open(folder);
     }
-    Err(Error::Dataset(format!(
-        "{}: no dataset was begun here\n help: the same command with --plan instead of --shard begins all of them; then run the shards",
-        folder.display()
-    )))
+    Err(Error::input("no dataset was begun here")
+        .in_file(folder)
+        .help("the same command with --plan instead of --shard begins all of them; then run the shards"))
 }

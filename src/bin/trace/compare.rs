@@ -53,7 +53,7 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     match (args.real.as_deref(), args.synthetic.as_deref(), args.a.as_deref(), args.b.as_deref()) {
         (Some(real), Some(synthetic), ..) => sets(args, real, synthetic),
         (.., Some(a), Some(b)) => pairs(args, a, b),
-        _ => Err(Error::Compare("nothing to compare\n help: give two paths, or --real and --synthetic".into())),
+        _ => Err(Error::misuse("nothing to compare").help("give two paths, or --real and --synthetic")),
     }
 }
 

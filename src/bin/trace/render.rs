@@ -64,10 +64,8 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let edit = args.edit.as_deref().map_or(Ok(&FULL), Edit::named)?;
     let options = edit.options(args.technique.options(args.quality.quality(args.denoise)));
     if args.pixel.is_some() && options.engine == Engine::Raster {
-        return Err(Error::Scene(
-            "--pixel says nothing with --engine raster, which has no rays\n help: use --engine trace, or leave it out"
-                .into(),
-        ));
+        return Err(Error::misuse("--pixel says nothing with --engine raster, which has no rays")
+            .help("use --engine trace, or leave it out"));
     }
     // Before hours are spent on what could not be rendered or written then.
     args.integrator.check(&options)?;

@@ -30,10 +30,9 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     let learnt = Learnt::open(&args.run)?;
     cli::check_folder(&args.out)?;
     if [run::MODEL, run::PLAN].iter().any(|file| args.out.join(file).exists()) {
-        return Err(Error::Training(format!(
-            "{}: there is a network in this folder already\n help: give another --out",
-            args.out.display()
-        )));
+        return Err(Error::misuse("there is a network in this folder already")
+            .in_file(&args.out)
+            .help("give another --out"));
     }
     let MachineArgs { precision, .. } = &args.machine;
     let machine = args.machine.machine();

@@ -40,15 +40,13 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     };
     let out = args.out.clone().unwrap_or_else(|| args.run.join(usual));
     if out.is_dir() {
-        return Err(Error::Training(format!(
-            "{}: this is a folder\n help: give --out a file, such as {}",
-            out.display(),
-            out.join(usual).display()
-        )));
+        return Err(Error::misuse("this is a folder")
+            .in_file(&out)
+            .help(format!("give --out a file, such as {}", out.join(usual).display())));
     }
     match (args.format, args.size) {
         (Format::Onnx, Some(_)) => {
-            Err(Error::Training("an ONNX graph takes pictures of any size\n help: leave --size out".into()))
+            Err(Error::misuse("an ONNX graph takes pictures of any size").help("leave --size out"))
         }
         (Format::Onnx, None) => {
             onnx::write(&learnt, &out)?;

@@ -162,9 +162,10 @@ impl Args {
             self.machine.threads_asked().or(before.map(|b| b.plan.threads)).unwrap_or_else(|| self.machine.threads());
         let (width, height) = learn.size;
         if learn.window.is_some_and(|(w, h)| w > width || h > height) {
-            return Err(Error::Training(format!(
-                "--window is larger than the images, which are brought to {width}x{height}\n help: a larger --size, or a smaller window"
-            )));
+            return Err(Error::misuse(format!(
+                "--window is larger than the images, which are brought to {width}x{height}"
+            ))
+            .help("a larger --size, or a smaller window"));
         }
         Ok(Plan {
             network: learn.network,
@@ -188,7 +189,7 @@ impl Args {
             exposure: learn.normalise,
             watch_every: learn.watch_every,
             patience: learn.patience,
-            precision: precision.map_err(Error::Training)?.name().into(),
+            precision: precision.map_err(Error::input)?.name().into(),
             threads,
             begin_with: None,
             seconds: self.time.map(|t| t.as_secs()),

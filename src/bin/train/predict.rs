@@ -75,7 +75,7 @@ fn told(mut answered: Answered, asked: usize) -> Result<Vec<PathBuf>> {
         1 if asked == 1 => Err(answered.faults.remove(0)),
         n => {
             let faults: Vec<String> = answered.faults.iter().map(ToString::to_string).collect();
-            Err(Error::Training(format!(
+            Err(Error::input(format!(
                 "{n} of {asked} pictures could not be read, the others are answered:\n{}",
                 faults.join("\n")
             )))

@@ -97,7 +97,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let machine = args.machine.machine();
     // First of all: for a GPU the program replaces itself.
     let precision = Precision::named(&args.machine.precision, device::find(&machine.device)?);
-    let precision = precision.map_err(Error::Training)?.name();
+    let precision = precision.map_err(Error::input)?.name();
     let scale = args.scale.as_ref().map(|s| format!("// At the scale \"{s}\".\n")).unwrap_or_default();
     let order = Order {
         bound: &bound,

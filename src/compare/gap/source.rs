@@ -26,10 +26,8 @@ pub struct Photo {
 pub fn photos(folder: &Path, option: &str) -> Result<Vec<Photo>> {
     if !folder.is_dir() {
         let what = if folder.exists() { "this is no folder" } else { "there is no such folder" };
-        return Err(Error::Compare(format!(
-            "{option} {}: {what}\n help: give a folder with images/ and, if there are any, labels/ and nir/; or a dataset",
-            folder.display()
-        )));
+        return Err(Error::input(format!("{option} {}: {what}", folder.display()))
+            .help("give a folder with images/ and, if there are any, labels/ and nir/; or a dataset"));
     }
     let mut found = BTreeMap::new();
     let (images, rendered) = (folder.join("images"), folder.join("rgb.png"));
@@ -44,10 +42,8 @@ pub fn photos(folder: &Path, option: &str) -> Result<Vec<Photo>> {
     let partners: Vec<PathBuf> = found.values().filter_map(|rgb| beside_rgb(rgb, "nir")).collect();
     found.retain(|_, rgb| !partners.contains(rgb));
     if found.is_empty() {
-        return Err(Error::Compare(format!(
-            "{option} {}: there is no PNG or JPEG in this folder\n help: give a folder with images/, or a dataset",
-            folder.display()
-        )));
+        return Err(Error::input(format!("{option} {}: there is no PNG or JPEG in this folder", folder.display()))
+            .help("give a folder with images/, or a dataset"));
     }
     let photo = |(name, rgb): (String, PathBuf)| {
         let below = |other: &str| first([folder.join(other).join(format!("{name}.png"))]);

@@ -81,7 +81,7 @@ pub(super) fn json(of: &Gap) -> Result<String> {
         warnings: &of.warnings,
     };
     let text = serde_json::to_string_pretty(&document);
-    text.map(|text| text + "\n").map_err(|e| Error::Compare(format!("cannot write figures as JSON: {e}")))
+    text.map(|text| text + "\n").map_err(|e| Error::failed(format!("cannot write figures as JSON: {e}")))
 }
 
 /// A row for each distance; means of several channels are apart by spaces.

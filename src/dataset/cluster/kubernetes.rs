@@ -41,5 +41,5 @@ pub(super) fn files(dir: &str, job: &Job, pod: &Pod) -> Result<Vec<File>> {
 /// A text of a YAML document: JSON is YAML. A `$(` of an argument would name a variable.
 fn text(of: &str) -> Result<String> {
     serde_json::to_string(&of.replace("$(", "$$("))
-        .map_err(|e| Error::Dataset(format!("{of:?} cannot be written as YAML: {e}")))
+        .map_err(|e| Error::failed(format!("{of:?} cannot be written as YAML: {e}")))
 }

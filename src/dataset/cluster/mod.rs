@@ -75,10 +75,9 @@ pub fn emit(set: &Set, job: &Job, folder: &Path) -> Result<(Vec<PathBuf>, Vec<St
     for file in &files {
         let path = folder.join(&file.path);
         if std::fs::read(&path).is_ok_and(|there| there != file.bytes) {
-            return Err(Error::Dataset(format!(
-                "{}: this file is there and says something else: it may have been edited\n help: remove it, or give another --out",
-                path.display()
-            )));
+            return Err(Error::misuse("this file is there and says something else: it may have been edited")
+                .in_file(path)
+                .help("remove it, or give another --out"));
         }
     }
     let mut paths = Vec::new();
@@ -99,19 +98,14 @@ pub fn emit(set: &Set, job: &Job, folder: &Path) -> Result<(Vec<PathBuf>, Vec<St
 
 fn check(set: &Set, job: &Job) -> Result<()> {
     set.recipe.rendering()?;
-    let fault = |words: String| Err(Error::Dataset(words));
+    let fault = |words: String, help: &str| Err(Error::misuse(words).help(help));
     if job.shards > set.recipe.count {
-        return fault(format!(
-            "{} shards of {} images: some would be empty\n help: give fewer --shards; a shard should last minutes",
-            job.shards, set.recipe.count
-        ));
+        let words = format!("{} shards of {} images: some would be empty", job.shards, set.recipe.count);
+        return fault(words, "give fewer --shards; a shard should last minutes");
     }
     if job.grace >= job.time {
-        return fault(format!(
-            "--grace {} leaves nothing of --time {} s\n help: --grace is how long before the end of --time a shard is told to stop",
-            job.grace.as_secs(),
-            job.time.as_secs()
-        ));
+        let words = format!("--grace {} leaves nothing of --time {} s", job.grace.as_secs(), job.time.as_secs());
+        return fault(words, "--grace is how long before the end of --time a shard is told to stop");
     }
     Ok(())
 }
@@ -119,10 +113,9 @@ fn check(set: &Set, job: &Job) -> Result<()> {
 /// A path as it may stand in a script, comments included.
 fn plain(path: &Path) -> Result<String> {
     path.to_str().filter(|p| !p.contains(char::is_control)).map(str::to_owned).ok_or_else(|| {
-        Error::Dataset(format!(
-            "{}: this path cannot be written into a script\n help: use a folder whose name has no control characters and is UTF-8",
-            path.display()
-        ))
+        Error::misuse("this path cannot be written into a script")
+            .in_file(path)
+            .help("use a folder whose name has no control characters and is UTF-8")
     })
 }
 

@@ -176,11 +176,8 @@ impl Labels {
 }
 
 fn too_many() -> Error {
-    Error::Dataset(format!(
-        "the page has more than {} species that CropAndWeed has no labels for, more than 8 bits number\n help: make two pages of it, or \
-         leave out --format {FOLDER}",
-        OWN.len()
-    ))
+    Error::input(format!("the page has more than {} species that CropAndWeed has no labels for, more than 8 bits number", OWN.len())).help(format!("make two pages of it, or \
+         leave out --format {FOLDER}"))
 }
 
 /// An image's circumstances in the steps of CropAndWeed; empty where they are not known.

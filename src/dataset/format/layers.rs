@@ -28,7 +28,7 @@ impl Format for Writer {
     fn image(&self, recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
         let record = &sample.record;
         let rendered = sample.film.as_ref().ok_or_else(|| {
-            Error::Dataset(format!("image {}: only the renderer knows what --format {FOLDER} holds", record.name))
+            Error::misuse(format!("image {}: only the renderer knows what --format {FOLDER} holds", record.name))
         })?;
         let text = provenance(recipe, record.index);
         let bytes = output::encode_layers(&rendered.film, &rendered.labels, &rendered.tags, &text)?;

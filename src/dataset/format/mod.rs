@@ -79,7 +79,7 @@ pub fn all(recipe: &Recipe) -> Result<Vec<(&str, &'static dyn Format)>> {
         let format = named(name).ok_or_else(|| {
             let known: Vec<&str> = NAMES.iter().map(|(name, _)| *name).collect();
             let help = crate::ron_file::choose("formats", &known, name);
-            Error::Dataset(format!("there is no format `{name}`\n help: {help}"))
+            Error::misuse(format!("there is no format `{name}`")).help(help)
         })?;
         all.push((name.as_str(), format));
     }

@@ -119,9 +119,9 @@ fn segments(sample: &Sample) -> (Vec<u32>, Value) {
 
 fn annotation(set: &Set, record: &Record) -> Result<Value> {
     let path = set.folder.join(segments_path(record.split.name(), &record.name));
-    let bytes = std::fs::read(&path).map_err(Error::io(&path))?;
+    let bytes = std::fs::read(&path).map_err(Error::reading(&path))?;
     let segments: Value = serde_json::from_slice(&bytes)
-        .map_err(|e| Error::Damaged(format!("{}: these are no segments: {e}", path.display())))?;
+        .map_err(|e| Error::damaged(format!("these are no segments: {e}")).in_file(path))?;
     let file = format!("{}.png", record.name);
     Ok(json!({ "image_id": coco::image_id(record), "file_name": file, "segments_info": segments }))
 }

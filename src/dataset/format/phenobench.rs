@@ -99,11 +99,8 @@ fn crop_leaves(sample: &Sample) -> Result<BTreeMap<(u16, u16), CropLeaf>> {
 }
 
 fn too_many(name: &str) -> Error {
-    Error::Dataset(format!(
-        "image {name} shows more than the {} crop leaves that PhenoBench's 16 bits number\n help: sow fewer plants, or leave out \
-         --format {FOLDER}",
-        u16::MAX
-    ))
+    Error::input(format!("image {name} shows more than the {} crop leaves that PhenoBench's 16 bits number", u16::MAX)).help(format!("sow fewer plants, or leave out \
+         --format {FOLDER}"))
 }
 
 fn semantics(class: u8, plant: Option<&Plant>) -> u16 {

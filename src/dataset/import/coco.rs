@@ -110,10 +110,10 @@ impl Coco {
         }
         found.sort_by(|a, b| a.0.cmp(&b.0));
         if let Some(pair) = found.windows(2).find(|pair| pair[0].0 == pair[1].0) {
-            return Err(Error::Dataset(format!("{}: it is listed twice", pair[0].1.path.display())));
+            return Err(Error::input("it is listed twice").in_file(&pair[0].1.path));
         }
         if found.is_empty() {
-            return Err(Error::Dataset(format!("{}: there are no images in it", from.display())));
+            return Err(Error::input("there are no images in it").in_file(from));
         }
         for (one, image) in found {
             let _ = writeln!(all.words, "{one:?} {}", length(&image.path)?);
@@ -131,9 +131,9 @@ impl Coco {
         folder: &Path,
         classes: Option<&Names>,
     ) -> Result<Vec<(Listed, Annotated)>> {
-        let bytes = std::fs::read(path).map_err(Error::io(path))?;
+        let bytes = std::fs::read(path).map_err(Error::reading(path))?;
         let _ = writeln!(self.words, "{split:?} {:x?}", Sha256::digest(&bytes));
-        let wrong = |what: String| Error::Dataset(format!("{}: {what}", path.display()));
+        let wrong = |what: String| Error::input(what).in_file(path);
         let Document { images, annotations, categories } =
             serde_json::from_slice(&bytes).map_err(|e| wrong(format!("this is not a COCO file of instances: {e}")))?;
         let mut kinds: BTreeMap<u64, (Meaning, Vec<String>)> = BTreeMap::new();
@@ -145,10 +145,9 @@ impl Coco {
             if let Some(meaning) = known {
                 kinds.insert(category.id, (meaning, category.keypoints));
             } else if annotations.iter().any(|a| a.category_id == category.id) {
-                return Err(wrong(format!(
-                    "no class was given for the category `{0}`\n help: give --classes '{0}=crop,…'; classes are soil, crop, weed, leaf, ignore",
-                    category.name
-                )));
+                let name = &category.name;
+                let help = format!("give --classes '{name}=crop,…'; classes are soil, crop, weed, leaf, ignore");
+                return Err(wrong(format!("no class was given for the category `{name}`")).help(help));
             }
         }
         let mut found: BTreeMap<u64, (Listed, Annotated)> = BTreeMap::new();
@@ -156,10 +155,8 @@ impl Coco {
             let of_split = split.map(|s| folder.join(s.name()).join(&file_name)).filter(|p| p.is_file());
             let image = of_split.unwrap_or_else(|| folder.join(&file_name));
             if !image.is_file() {
-                return Err(wrong(format!(
-                    "its image {} is missing\n help: say where images lie with --images",
-                    image.display()
-                )));
+                let what = format!("its image {} is missing", image.display());
+                return Err(wrong(what).help("say where images lie with --images"));
             }
             let annotated = Annotated { path: image, document: path.into(), size: (width, height), things: Vec::new() };
             if found.insert(id, (Listed { split, name: file_name }, annotated)).is_some() {
@@ -197,10 +194,9 @@ fn documents(from: &Path) -> Result<Vec<(Option<Split>, PathBuf)>> {
     let file = |split: Split| from.join("annotations").join(format!("instances_{}.json", split.name()));
     let found: Vec<_> = Split::ALL.into_iter().map(|s| (Some(s), file(s))).filter(|(_, path)| path.is_file()).collect();
     if found.is_empty() {
-        return Err(Error::Dataset(format!(
-            "{}: there is no annotations/instances_train.json, …_val.json or …_test.json in it\n help: give --from such a folder or one JSON file",
-            from.display()
-        )));
+        return Err(Error::input("there is no annotations/instances_train.json, …_val.json or …_test.json in it")
+            .in_file(from)
+            .help("give --from such a folder or one JSON file"));
     }
     Ok(found)
 }
@@ -321,7 +317,7 @@ fn plant_numbers(things: &[Thing]) -> Vec<u32> {
 /// The pixels of a mask, as places in the image row by row.
 fn pixels(image: &Annotated, thing: &Thing) -> Result<Vec<u32>> {
     let (w, h) = image.size;
-    let wrong = |what: String| Error::Dataset(format!("{}: annotation {}: {what}", image.document.display(), thing.id));
+    let wrong = |what: String| Error::input(format!("annotation {}: {what}", thing.id)).in_file(&image.document);
     let rle = match &thing.segmentation {
         Segmentation::Polygons(polygons) => return Ok(inside(w, h, polygons)),
         Segmentation::Packed(rle) => rle.clone(),

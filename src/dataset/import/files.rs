@@ -22,8 +22,8 @@ const SPLITS: [(&str, Split); 6] = [
 /// The pictures of a folder whose stems end in `suffix`, by the rest of the stem.
 pub(super) fn pictures(folder: &Path, suffix: &str) -> Result<BTreeMap<String, PathBuf>> {
     let mut all: BTreeMap<String, PathBuf> = BTreeMap::new();
-    for entry in std::fs::read_dir(folder).map_err(Error::io(folder))? {
-        let path = entry.map_err(Error::io(folder))?.path();
+    for entry in std::fs::read_dir(folder).map_err(Error::reading(folder))? {
+        let path = entry.map_err(Error::reading(folder))?.path();
         let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
         if !PICTURES.contains(&ending.as_str()) || !path.is_file() {
             continue;
@@ -31,11 +31,8 @@ pub(super) fn pictures(folder: &Path, suffix: &str) -> Result<BTreeMap<String, P
         let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let Some(name) = stem.strip_suffix(suffix) else { continue };
         if let Some(other) = all.insert(name.to_owned(), path.clone()) {
-            return Err(Error::Dataset(format!(
-                "{} and {} have the same name\n help: take one of them away",
-                other.display(),
-                path.display()
-            )));
+            return Err(Error::input(format!("{} and {} have the same name", other.display(), path.display()))
+                .help("take one of them away"));
         }
     }
     Ok(all)
@@ -60,7 +57,7 @@ pub(super) fn listed(folder: &Path, suffix: &str) -> Result<BTreeMap<Listed, Pat
 
 /// A file's length, bytes: with its name, what tells it without reading it.
 pub(super) fn length(path: &Path) -> Result<u64> {
-    Ok(std::fs::metadata(path).map_err(Error::io(path))?.len())
+    Ok(std::fs::metadata(path).map_err(Error::reading(path))?.len())
 }
 
 /// Refuses a picture of another size than its image's.
@@ -69,8 +66,5 @@ pub(super) fn same_size(path: &Path, found: (u32, u32), expected: (u32, u32)) ->
         return Ok(());
     }
     let ((w, h), (x, y)) = (found, expected);
-    Err(Error::Image {
-        path: path.into(),
-        what: format!("it has {w} × {h} pixels, its image has {x} × {y}; they must be the same"),
-    })
+    Err(Error::input(format!("it has {w} × {h} pixels, its image has {x} × {y}; they must be the same")).in_file(path))
 }

@@ -90,7 +90,7 @@ fn plant_numbers(path: &Path, kept: &[(u8, u32)]) -> Result<BTreeMap<(u32, u8), 
 }
 
 fn too_many(path: &Path, what: &str) -> Error {
-    Error::Image { path: path.into(), what: format!("it has more {what} than 16 bits number; cut the image in two") }
+    Error::input(format!("it has more {what} than 16 bits number; cut the image in two")).in_file(path)
 }
 
 #[cfg(test)]

@@ -90,11 +90,11 @@ impl Masks {
             None => BTreeMap::new(),
         };
         if images.is_empty() {
-            return Err(Error::Dataset(format!(
-                "{}: there is no PNG or JPEG image in this folder{}",
-                folders.images.display(),
+            return Err(Error::input(format!(
+                "there is no PNG or JPEG image in this folder{}",
                 ending(&folders.image_suffix)
-            )));
+            ))
+            .in_file(folders.images));
         }
         let mut words = format!("{:?} {}\n", folders.coding, folders.ignore_others);
         let (mut list, mut files) = (Vec::new(), Vec::new());
@@ -123,13 +123,12 @@ fn ending(suffix: &str) -> String {
 
 fn lacks(image: &Path, what: &str, folder: &Path, suffix: &str, one: &Listed) -> Error {
     let split = one.split.map(|s| format!("{}/", s.name())).unwrap_or_default();
-    Error::Dataset(format!(
-        "{}: its {what} is missing: {}/{split}{}{suffix}.png\n help: names match but for --image-suffix, --mask-suffix and --nir-suffix; add the \
+    Error::input(format!("its {what} is missing: {}/{split}{}{suffix}.png", folder.display(), one.name))
+        .in_file(image)
+        .help(
+            "names match but for --image-suffix, --mask-suffix and --nir-suffix; add the \
          file, or take the image away",
-        image.display(),
-        folder.display(),
-        one.name
-    ))
+        )
 }
 
 impl Source for Masks {
@@ -170,13 +169,14 @@ impl Masks {
         match (&self.folders.coding, map) {
             (Coding::Numbers(names), Map::Numbers(numbers) | Map::Indexed(numbers, _)) => {
                 let mut table = BTreeMap::new();
-                let meaning = |n: &u16| *table.entry(*n).or_insert_with(|| names.0.get(&n.to_string()).map(|m| m.number()));
+                let meaning =
+                    |n: &u16| *table.entry(*n).or_insert_with(|| names.0.get(&n.to_string()).map(|m| m.number()));
                 self.all(path, width, &numbers, meaning, |n| format!("the number {n}"), "--classes")
             }
-            (Coding::Numbers(_), Map::Colors(_)) => Err(Error::Image {
-                path: path.into(),
-                what: "this mask holds colours, not numbers; name them with --colors '0,255,0=crop;…' instead of --classes".into(),
-            }),
+            (Coding::Numbers(_), Map::Colors(_)) => Err(Error::input(
+                "this mask holds colours, not numbers; name them with --colors '0,255,0=crop;…' instead of --classes",
+            )
+            .in_file(path)),
             (Coding::Colors(colors), map) => {
                 let pixels = map.colors();
                 let meaning = |c: &[u8; 3]| colors.0.get(c).map(|m| m.number());
@@ -197,15 +197,14 @@ impl Masks {
         let one = |(place, pixel): (usize, &T)| match meaning(pixel) {
             Some(number) => Ok(number),
             None if self.folders.ignore_others => Ok(IGNORE),
-            None => Err(Error::Image {
-                path: path.into(),
-                what: format!(
-                    "pixel {},{} has {}, which no class was given for\n help: name it in {option}, or give --others ignore",
-                    place as u32 % width,
-                    place as u32 / width,
-                    words(*pixel)
-                ),
-            }),
+            None => Err(Error::input(format!(
+                "pixel {},{} has {}, which no class was given for",
+                place as u32 % width,
+                place as u32 / width,
+                words(*pixel)
+            ))
+            .help(format!("name it in {option}, or give --others ignore"))
+            .in_file(path)),
         };
         pixels.iter().enumerate().map(one).collect()
     }

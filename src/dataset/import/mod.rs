@@ -105,7 +105,7 @@ pub fn import(
     let each = |what: &(dyn Fn(u64) -> Result<()> + Sync)| {
         (0..source.images().len() as u64).into_par_iter().try_for_each(|index| {
             if stop.load(Ordering::Relaxed) {
-                return Err(Error::Interrupted);
+                return Err(Error::interrupted());
             }
             what(index)
         })

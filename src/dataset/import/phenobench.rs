@@ -58,10 +58,9 @@ impl PhenoBench {
             }
         }
         if all.images.is_empty() {
-            return Err(Error::Dataset(format!(
-                "{}: there are no images with labels in it\n help: give --from the folder that holds train/images, train/semantics, …",
-                root.display()
-            )));
+            return Err(Error::input("there are no images with labels in it")
+                .in_file(root)
+                .help("give --from the folder that holds train/images, train/semantics, …"));
         }
         Ok(all)
     }
@@ -97,9 +96,7 @@ impl Source for PhenoBench {
             same_size(&path, (x, y), (w, h))?;
             match map {
                 Map::Numbers(numbers) | Map::Indexed(numbers, _) => Ok(numbers.into_iter().map(u32::from).collect()),
-                Map::Colors(_) => {
-                    Err(Error::Image { path, what: "this is a picture in colour, not a map of numbers".into() })
-                }
+                Map::Colors(_) => Err(Error::input("this is a picture in colour, not a map of numbers").in_file(path)),
             }
         };
         let path = folder.join(LABELS[0]).join(format!("{name}.png"));
@@ -124,13 +121,11 @@ fn class(path: &Path, width: u32, place: usize, number: u32) -> Result<u8> {
         0..=2 => Ok(number as u8),
         3 | 4 => Ok(number as u8 - 2),
         255 => Ok(IGNORE),
-        other => Err(Error::Image {
-            path: path.into(),
-            what: format!(
-                "pixel {},{} has the number {other}; PhenoBench has 0 to 4 and 255",
-                place as u32 % width,
-                place as u32 / width
-            ),
-        }),
+        other => Err(Error::input(format!(
+            "pixel {},{} has the number {other}; PhenoBench has 0 to 4 and 255",
+            place as u32 % width,
+            place as u32 / width
+        ))
+        .in_file(path)),
     }
 }

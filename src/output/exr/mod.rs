@@ -131,8 +131,8 @@ pub type Geometry = (u32, u32, Vec<f32>, Vec<[f32; 3]>);
 
 /// Reads what [`encode_geometry`] wrote.
 pub fn read_geometry(path: &Path) -> Result<Geometry> {
-    let wrong = |what: String| Error::Image { path: path.into(), what };
-    let bytes = std::fs::read(path).map_err(Error::io(path))?;
+    let wrong = |what: String| Error::input(what).in_file(path);
+    let bytes = std::fs::read(path).map_err(Error::reading(path))?;
     let reader = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
     let image = reader.from_buffered(std::io::Cursor::new(bytes)).map_err(|e| wrong(e.to_string()))?;
     let layer = image.layer_data;
@@ -153,7 +153,7 @@ fn write(w: Window, channels: Channels, text: &str) -> Result<Vec<u8>> {
 
 /// The same with further words in the header, by their names.
 fn write_with(w: Window, channels: Channels, text: &str, words: Vec<(String, String)>) -> Result<Vec<u8>> {
-    let failed = |e: &dyn std::fmt::Display| Error::Scene(format!("cannot encode an EXR: {e}"));
+    let failed = |e: &dyn std::fmt::Display| Error::failed(format!("cannot encode an EXR: {e}"));
     let mut attributes = LayerAttributes {
         layer_position: Vec2(w.x0 as i32, w.y0 as i32),
         comments: Text::new_or_none(text),

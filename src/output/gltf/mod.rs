@@ -82,7 +82,7 @@ pub fn encode(scene: &Scene, provenance: &str) -> Result<(Vec<u8>, Vec<String>)>
         document.extensions_used.push(DIFFUSE_TRANSMISSION.into());
     }
     let own = pack.finish(&mut document);
-    let failed = |what: String| Error::Scene(format!("this scene cannot be written as glTF: {what}"));
+    let failed = |what: String| Error::failed(format!("this scene cannot be written as glTF: {what}"));
     let json = serde_json::to_vec(&document).map_err(|e| failed(e.to_string()))?;
     Ok((glb::join(json, own).map_err(failed)?, warnings(scene)))
 }

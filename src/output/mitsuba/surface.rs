@@ -309,6 +309,6 @@ fn picture(name: &str, path: &str, filter: &str) -> Element {
 pub(super) fn rough(kind: Kind) -> Result<[f32; 2]> {
     match kind {
         Kind::Soil { shape, film: None } => Ok(shape),
-        _ => Err(Error::Scene("a sheet whose colour varies over the world cannot be exported".into())),
+        _ => Err(Error::input("a sheet whose colour varies over the world cannot be exported")),
     }
 }

@@ -1,6 +1,6 @@
 //! The lights of a field: those that its page lists, and where it has lists side by side, those of the list that the field draws.
 
-use crate::light::{LightDesc, ONE_OF_INSIDE};
+use crate::light::{LightDesc, one_of_inside};
 use crate::ron_file::RonFile;
 use crate::ron_file::Step;
 use crate::sampling::Stream;
@@ -52,18 +52,18 @@ impl Lighting {
 
 /// Refuses lists without lights and lists inside lists.
 fn check(page: &RonFile, lists: &[Vec<LightDesc>], at: &[Step<'_>]) -> Result<()> {
-    let fault = |to: &[Step<'_>], words: &str| Err(page.blame(&[at, to].concat(), Error::Scene(words.into())));
+    let fault = |to: &[Step<'_>], error: Error| Err(page.blame(&[at, to].concat(), error));
     if lists.is_empty() {
-        let words = "an empty list: there is nothing to draw\n help: OneOf([[Daylight(…)], [Lamp(…), Lamp(…)]])";
-        return fault(&[], words);
+        let help = "OneOf([[Daylight(…)], [Lamp(…), Lamp(…)]])";
+        return fault(&[], Error::input("an empty list: there is nothing to draw").help(help));
     }
     for (i, list) in lists.iter().enumerate() {
         if list.is_empty() {
-            let words = "a list without lights\n help: write at least one light in it; Constant(radiance: (0, 0, 0, 0)) is dark";
-            return fault(&[Step::Item(i)], words);
+            let help = "write at least one light in it; Constant(radiance: (0, 0, 0, 0)) is dark";
+            return fault(&[Step::Item(i)], Error::input("a list without lights").help(help));
         }
         if let Some(k) = list.iter().position(|light| matches!(light, LightDesc::OneOf(_))) {
-            return fault(&[Step::Item(i), Step::Item(k)], ONE_OF_INSIDE);
+            return fault(&[Step::Item(i), Step::Item(k)], one_of_inside());
         }
     }
     Ok(())

@@ -186,10 +186,9 @@ impl<'a> Builder<'a> {
         };
         let (w, h) = (camera.width(), camera.height());
         if u64::from(w) * u64::from(h) > MOST_PIXELS {
-            let words = format!(
-                "an image of {w} × {h} pixels is too large\n help: at most {MOST_PIXELS} pixels, 16384 × 16384"
-            );
-            return Err(page.blame(&[Step::Field("camera"), Step::Field("size")], Error::Scene(words)));
+            let fault = Error::input(format!("an image of {w} × {h} pixels is too large"))
+                .help(format!("at most {MOST_PIXELS} pixels, 16384 × 16384"));
+            return Err(page.blame(&[Step::Field("camera"), Step::Field("size")], fault));
         }
         let (mut lights, mut light_records) = (Vec::new(), Vec::new());
         let lists = |place| Stream::of(seed, index, Purpose::Page, LIGHTING + place as u64);
@@ -234,9 +233,9 @@ impl<'a> Builder<'a> {
         let (Some(lo), Some(hi)) =
             (corners.iter().copied().reduce(Vec2::min), corners.iter().copied().reduce(Vec2::max))
         else {
-            let words =
-                "the camera does not look at the ground\n help: turn it down; its height is counted from the ground";
-            return Err(self.page.blame(&[Step::Field("camera")], Error::Scene(words.into())));
+            let fault = Error::input("the camera does not look at the ground")
+                .help("turn it down; its height is counted from the ground");
+            return Err(self.page.blame(&[Step::Field("camera")], fault));
         };
         // A camera that looks along the ground sees to the horizon; only what is near can be made of crumbs.
         let below = camera.pose().position.truncate();
@@ -390,12 +389,10 @@ impl<'a> Builder<'a> {
         if known <= MOST_PLANTS && places <= 2.0 * MOST_PLANTS as f64 {
             return Ok(());
         }
-        let words = format!(
-            "about {plants:.3e} plants or places for them: labels can number {MOST_PLANTS}\n \
-             help: lower the density here, widen the distances in the rows, or lower the camera"
-        );
+        let words = format!("about {plants:.3e} plants or places for them: labels can number {MOST_PLANTS}");
+        let help = "lower the density here, widen the distances in the rows, or lower the camera";
         let path = [Step::Field(fields[0]), Step::Item(item), Step::Field(fields[1])];
-        Err(self.page.blame(&path, Error::Scene(words)))
+        Err(self.page.blame(&path, Error::input(words).help(help)))
     }
 
     fn seedling(&self, species: &Arc<Species>, growth: &Growth, spot: Spot, population: u64) -> Seedling {
@@ -443,10 +440,11 @@ impl<'a> Builder<'a> {
             for organ in organs {
                 if let Some(fault) = organ.part.mesh.fault() {
                     let (species, number) = (&record.species, record.number);
-                    return Err(Error::Scene(format!(
-                        "{}: plant {number}, a {species}, grew a broken mesh: {fault}\n help: look for extreme sizes in its page",
+                    return Err(Error::input(format!(
+                        "{}: plant {number}, a {species}, grew a broken mesh: {fault}",
                         self.page.path.display()
-                    )));
+                    ))
+                    .help("look for extreme sizes in its page"));
                 }
                 let same = |m: &&(String, usize, u32)| !organ.own && m.0 == organ.skin && m.1 == organ.choice;
                 let known = made.iter().find(same).map(|m| m.2);

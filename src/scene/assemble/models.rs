@@ -40,8 +40,9 @@ impl Builder<'_> {
         let at = [Step::Field("models"), Step::Item(k)];
         let model = self.library.model(self.page, &desc.file, desc.up)?;
         if desc.class.is_none() && !model.parts.iter().any(|p| known(p.label.as_ref()).is_some()) {
-            let words = "this model's file says no class\n help: add class: Crop, class: Weed, or class: Soil for whatever is no plant";
-            return Err(self.page.blame(&at, Error::Scene(words.into())));
+            let fault = Error::input("this model's file says no class")
+                .help("add class: Crop, class: Weed, or class: Soil for whatever is no plant");
+            return Err(self.page.blame(&at, fault));
         }
         let mut stream = self.stream(Purpose::Scatter, 3000 + k as u64);
         let (x, y) = (desc.position_m.0.draw32(&mut stream), desc.position_m.1.draw32(&mut stream));
@@ -58,9 +59,8 @@ impl Builder<'_> {
         let mut plants: BTreeMap<u16, Vec<usize>> = BTreeMap::new();
         for part in &model.parts {
             let tag = tag(desc.class, part.label.as_ref(), numbered).ok_or_else(|| {
-                let words =
-                    format!("labels can number {MOST_PLANTS} plants, and this model has more\n help: place fewer");
-                self.page.blame(&at, Error::Scene(words))
+                let words = format!("labels can number {MOST_PLANTS} plants, and this model has more");
+                self.page.blame(&at, Error::input(words).help("place fewer"))
             })?;
             let mut mesh = part.mesh.clone();
             // A model at the origin as it is keeps its bits.
@@ -71,11 +71,9 @@ impl Builder<'_> {
             let reach = lo.abs().max(hi.abs()).max_element();
             if !reach.is_finite() || reach > FARTHEST {
                 let size = (hi - lo).max_element();
-                let words = format!(
-                    "`{}` of this model is {size:.0} m large or lies that far away\n help: lengths are metres; a file in millimetres takes scale: 0.001",
-                    part.name
-                );
-                return Err(self.page.blame(&at, Error::Scene(words)));
+                let words = format!("`{}` of this model is {size:.0} m large or lies that far away", part.name);
+                let fault = Error::input(words).help("lengths are metres; a file in millimetres takes scale: 0.001");
+                return Err(self.page.blame(&at, fault));
             }
             if tag.plant > 0 {
                 plants.entry(tag.plant).or_default().push(self.scene.parts.len());

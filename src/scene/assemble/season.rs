@@ -23,24 +23,19 @@ impl Season {
         for (room, k, growth) in growths(desc) {
             let Growth::Either(list) = growth else { continue };
             let at = [Step::Field(room), Step::Item(k), Step::Field("growth"), Step::Item(0)];
-            let fault = |at: &[Step<'_>], words: String| Err(page.blame(at, Error::Scene(words)));
+            let fault = |at: &[Step<'_>], words: &str, help: &str| Err(page.blame(at, Error::input(words).help(help)));
             if list.is_empty() {
-                return fault(
-                    &at,
-                    "an empty list: there is nothing to draw\n help: Either([AgeDays(12), AgeDays(40)])".into(),
-                );
+                return fault(&at, "an empty list: there is nothing to draw", "Either([AgeDays(12), AgeDays(40)])");
             }
             if let Some(i) = list.iter().position(|g| matches!(g, Growth::Either(_))) {
-                let words = "an Either inside an Either\n help: write all growths side by side in one list";
-                return fault(&[&at[..], &[Step::Item(i)]].concat(), words.into());
+                let at = [&at[..], &[Step::Item(i)]].concat();
+                return fault(&at, "an Either inside an Either", "write all growths side by side in one list");
             }
             if of > 0 && list.len() != of {
-                let words = format!(
-                    "this list has {} growths, an earlier one of this page {of}\n help: one place is drawn for all lists \
-                     of a page, so give all of them the same length; a growth may be written twice",
-                    list.len()
-                );
-                return fault(&at, words);
+                let words = format!("this list has {} growths, an earlier one of this page {of}", list.len());
+                let help = "one place is drawn for all lists of a page, so give all of them the same length; a growth may be \
+                            written twice";
+                return fault(&at, &words, help);
             }
             of = list.len();
         }

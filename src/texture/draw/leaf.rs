@@ -127,12 +127,12 @@ pub(super) fn draw(recipe: &LeafRecipe) -> Result<Drawn> {
     if let Outline::Power { a, b } = recipe.outline
         && !(a > 0.0 && b > 0.0 && a < 20.0 && b < 20.0)
     {
-        return Err(Error::Scene(format!("outline Power(a: {a}, b: {b}): both must be above 0 and below 20")));
+        return Err(Error::input(format!("outline Power(a: {a}, b: {b}): both must be above 0 and below 20")));
     }
     let height = recipe.size.get() as usize;
     let width = (height as f64 * recipe.aspect.get()).round().max(1.0) as usize;
     if height.max(width) > 4096 {
-        return Err(Error::Scene(format!("a leaf of {width} × {height} pixels: at most 4096 can be drawn")));
+        return Err(Error::input(format!("a leaf of {width} × {height} pixels: at most 4096 can be drawn")));
     }
     let (pairs, fine) = match recipe.veins {
         Veins::Pinnate { pairs, fine, .. } => (pairs.get(), fine.get()),
@@ -152,7 +152,7 @@ pub(super) fn draw(recipe: &LeafRecipe) -> Result<Drawn> {
         ("blotches or spots", marks, 2000.0),
     ] {
         if asked > most {
-            return Err(Error::Scene(format!("{asked} {what}: at most {most} can be drawn")));
+            return Err(Error::input(format!("{asked} {what}: at most {most} can be drawn")));
         }
     }
     Ok(Painter::new(recipe, width, height).paint())

@@ -127,14 +127,14 @@ pub enum Ground {
 pub(super) fn draw(recipe: &SoilRecipe) -> Result<Drawn> {
     let size = recipe.size.get() as usize;
     if size > 4096 {
-        return Err(Error::Scene(format!("ground of {size} × {size} pixels: at most 4096 can be drawn")));
+        return Err(Error::input(format!("ground of {size} × {size} pixels: at most 4096 can be drawn")));
     }
     let check = |what: &str, low: Num<Positive>, high: Num<Positive>| {
         let (low, high) = (low.get(), high.get());
         if low < high && high * 2.0 < recipe.period_mm.get() && low * 200.0 > high {
             return Ok(());
         }
-        Err(Error::Scene(format!(
+        Err(Error::input(format!(
             "{what} of {low}..{high} mm: the smallest must be below the largest (by at most 200 times), and that below half the period"
         )))
     };
@@ -150,7 +150,7 @@ pub(super) fn draw(recipe: &SoilRecipe) -> Result<Drawn> {
     let bits = litter.grains.get().max(litter.humus.get()).max(litter.fibres.get()) * area * 1e-6;
     for (what, asked, most) in [("crumbs", crumbs, 4e6), ("bits of litter", bits, 1e5)] {
         if asked > most {
-            return Err(Error::Scene(format!("about {asked:.0} {what} on the tile: at most {most:.0} can be drawn")));
+            return Err(Error::input(format!("about {asked:.0} {what} on the tile: at most {most:.0} can be drawn")));
         }
     }
     let mut tile = Tile::new(recipe, size);

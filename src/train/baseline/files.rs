@@ -28,7 +28,7 @@ pub fn fit(kind: Kind, from: &[Selection], seed: u64, like: &Shape, stop: &Atomi
     let (width, height) = (like.width, like.height);
     let image = |place| {
         if stop.load(Ordering::Relaxed) {
-            return Err(Error::Interrupted);
+            return Err(Error::interrupted());
         }
         let example = store.get(place)?;
         Ok(Example { width, height, rgb: colours(&example), truth: example.labels.clone() })
@@ -49,7 +49,7 @@ pub fn judge(
     let mut evaluation = Evaluation::new(Classes::default().names());
     for place in 0..store.len() {
         if stop.load(Ordering::Relaxed) {
-            return Err(Error::Interrupted);
+            return Err(Error::interrupted());
         }
         let example = store.get(place)?;
         let rgb = colours(&example);

@@ -155,10 +155,7 @@ impl Baseline {
         let found = ways.iter().zip(&counts).filter_map(|(way, [soil, plants])| Some((way, threshold(soil, plants)?)));
         let best = found.reduce(|a, b| if b.1.0 > a.1.0 { b } else { a });
         let ((blur, index), (_, level)) = best.ok_or_else(|| {
-            Error::Dataset(
-                "no pixel of the training images is a plant: what is green cannot be fitted, but Otsu's threshold needs no training"
-                    .into(),
-            )
+            Error::input("no pixel of the training images is a plant: what is green cannot be fitted, but Otsu's threshold needs no training")
         })?;
         Ok(Self { kind, index: *index, blur: *blur, threshold: Some(begin(level)), sizes: None })
     }
@@ -171,11 +168,7 @@ impl Baseline {
             sizes.add(image.width, image.height, &self.green(image.width, image.height, &image.rgb), &image.truth);
             any = true;
         }
-        if any {
-            Ok(sizes.best())
-        } else {
-            Err(Error::Dataset("there is no image to learn sizes of plants from".into()))
-        }
+        if any { Ok(sizes.best()) } else { Err(Error::input("there is no image to learn sizes of plants from")) }
     }
 }
 
@@ -209,13 +202,13 @@ fn check(image: &Example) -> Result<()> {
     let n = image.width as usize * image.height as usize;
     if image.rgb.len() != n || image.truth.len() != n {
         let (rgb, truth) = (image.rgb.len(), image.truth.len());
-        return Err(Error::Dataset(format!(
+        return Err(Error::misuse(format!(
             "a training image of {} × {} pixels has {rgb} colours and {truth} labels",
             image.width, image.height
         )));
     }
     match image.truth.iter().find(|class| **class != IGNORE && usize::from(**class) >= CLASSES) {
-        Some(class) => Err(Error::Dataset(format!(
+        Some(class) => Err(Error::misuse(format!(
             "a training image has the class {class}; colour baselines know soil 0, crop 1, weed 2, and 255 for no label"
         ))),
         None => Ok(()),

@@ -98,20 +98,18 @@ pub(super) fn read(folder: &Path, bands: &[Band]) -> Result<(u32, u32, Vec<Vec<u
         } else {
             let path = folder.join(format!("{}.png", band.name()));
             if !path.is_file() {
-                return Err(Error::Dataset(format!(
-                    "{}: this image has no band `{}`\n help: choose bands that all sets have, such as --bands rgb",
-                    path.display(),
-                    band.name()
-                )));
+                return Err(Error::input(format!("this image has no band `{}`", band.name()))
+                    .in_file(path)
+                    .help("choose bands that all sets have, such as --bands rgb"));
             }
             let (w, h, values) = output::read_gray(&path)?;
             if *size.get_or_insert((w, h)) != (w, h) {
-                return Err(Error::Image { path, what: format!("it is {w} × {h} pixels, the others are not") });
+                return Err(Error::input(format!("it is {w} × {h} pixels, the others are not")).in_file(path));
             }
             values
         });
     }
-    let (w, h) = size.ok_or_else(|| Error::Dataset("no band was named\n help: --bands rgb".into()))?;
+    let (w, h) = size.ok_or_else(|| Error::misuse("no band was named").help("--bands rgb"))?;
     Ok((w, h, planes))
 }
 

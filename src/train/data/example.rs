@@ -48,15 +48,14 @@ impl Example {
         let name = Set::name(number);
         let folder = set.folder.join(native::folder(&name));
         if !folder.is_dir() {
-            return Err(Error::Dataset(format!(
-                "{}: this image is not there yet\n help: `trace dataset verify` tells what the set lacks, the command that began it makes it",
-                folder.display()
-            )));
+            return Err(Error::input("this image is not there yet")
+                .in_file(folder)
+                .help("`trace dataset verify` tells what the set lacks, the command that began it makes it"));
         }
         let (w, h, planes) = bands::read(&folder, &shape.bands)?;
         let same = |path: &Path, found: (u32, u32)| {
             let what = || format!("it is {} × {} pixels, the photograph {w} × {h}", found.0, found.1);
-            if found == (w, h) { Ok(()) } else { Err(Error::Image { path: path.into(), what: what() }) }
+            if found == (w, h) { Ok(()) } else { Err(Error::input(what()).in_file(path)) }
         };
         let path = folder.join("semantics.png");
         let (lw, lh, semantics) = output::read_indexed(&path)?;

@@ -78,10 +78,9 @@ impl Selection {
             Pick::Every(first, of) => (first..count).step_by(of as usize).collect(),
             Pick::Random(n) if n <= count => sample(count, n, seed),
             Pick::Range(..) | Pick::Random(_) => {
-                return Err(Error::Dataset(format!(
-                    "{}: the set has {count} images, too few for what was asked of it\n help: numbers count from 0 to {count}, the last is left out",
-                    self.folder.display()
-                )));
+                return Err(Error::misuse(format!("the set has {count} images, too few for what was asked of it"))
+                    .in_file(&self.folder)
+                    .help(format!("numbers count from 0 to {count}, the last is left out")));
             }
         };
         let all = numbers.iter().copied().cycle().take(numbers.len() * self.repeat as usize).collect();

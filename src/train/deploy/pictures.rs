@@ -77,13 +77,11 @@ impl Picture {
             };
             let (w, h, values) = output::read_gray_photo(path)?;
             if (w, h) != (width, height) {
-                return Err(Error::Image {
-                    path: path.clone(),
-                    what: format!(
-                        "it is {w} × {h} pixels, the photograph {} is {width} × {height}",
-                        self.photo.display()
-                    ),
-                });
+                return Err(Error::input(format!(
+                    "it is {w} × {h} pixels, the photograph {} is {width} × {height}",
+                    self.photo.display()
+                ))
+                .in_file(path.clone()));
             }
             Ok(values)
         };
@@ -98,13 +96,10 @@ pub fn find(inputs: &[PathBuf], shape: &Shape, elsewhere: &[(Band, PathBuf)]) ->
     for (band, folder) in elsewhere {
         if !shape.bands.contains(band) {
             let names: Vec<&str> = shape.bands.iter().map(Band::name).collect();
-            return Err(Error::Training(format!(
-                "the network does not see the band `{}`\n help: its bands are {}",
-                band.name(),
-                names.join(", ")
-            )));
+            return Err(Error::misuse(format!("the network does not see the band `{}`", band.name()))
+                .help(format!("its bands are {}", names.join(", "))));
         }
-        std::fs::read_dir(folder).map_err(Error::io(folder))?;
+        std::fs::read_dir(folder).map_err(Error::reading(folder))?;
     }
     let mut pictures: Vec<Picture> = Vec::new();
     let mut add = |name: String, photo: PathBuf, planes: Vec<Plane>| {
@@ -142,7 +137,7 @@ fn selection(input: &Path) -> Result<Option<Selection>> {
         return Ok(input.join(crate::dataset::recipe::FILE).is_file().then(|| Selection::of(input)));
     }
     match input.to_str() {
-        Some(text) if !input.exists() && text.contains('@') => Selection::parse(text).map(Some).map_err(Error::Dataset),
+        Some(text) if !input.exists() && text.contains('@') => Selection::parse(text).map(Some).map_err(Error::input),
         _ => Ok(None),
     }
 }
@@ -156,10 +151,7 @@ fn images(selection: &Selection) -> Result<Vec<(String, PathBuf)>> {
         if folder.is_dir() {
             return Ok((name, folder));
         }
-        Err(Error::Dataset(format!(
-            "{}: this image is not there yet\n help: the command that began the set makes it",
-            folder.display()
-        )))
+        Err(Error::input("this image is not there yet").in_file(folder).help("the command that began the set makes it"))
     };
     numbers.into_iter().map(image).collect()
 }
@@ -167,19 +159,16 @@ fn images(selection: &Selection) -> Result<Vec<(String, PathBuf)>> {
 /// A photograph, or all in a folder.
 fn photos(input: &Path, shape: &Shape) -> Result<Vec<PathBuf>> {
     if !input.exists() {
-        return Err(Error::Image {
-            path: input.into(),
-            what:
-                "there is no such picture\n help: name PNG or JPEG files, folders of them, or images of a set: DIR@PICK"
-                    .into(),
-        });
+        return Err(Error::input("there is no such picture")
+            .help("name PNG or JPEG files, folders of them, or images of a set: DIR@PICK")
+            .in_file(input));
     }
     if !input.is_dir() {
         return Ok(vec![input.into()]);
     }
     let mut photos = Vec::new();
-    for entry in std::fs::read_dir(input).map_err(Error::io(input))? {
-        let path = entry.map_err(Error::io(input))?.path();
+    for entry in std::fs::read_dir(input).map_err(Error::reading(input))? {
+        let path = entry.map_err(Error::reading(input))?.path();
         let ending = path.extension().and_then(OsStr::to_str).map(str::to_ascii_lowercase);
         if path.is_file() && ending.is_some_and(|e| ENDINGS.contains(&e.as_str())) {
             photos.push(path);
@@ -192,13 +181,12 @@ fn photos(input: &Path, shape: &Shape) -> Result<Vec<PathBuf>> {
         photos.iter().flat_map(|photo| bands.iter().filter_map(|band| companion(photo, band))).collect();
     photos.retain(|photo| !others.contains(photo));
     if photos.is_empty() {
-        return Err(Error::Image {
-            path: input.into(),
-            what: format!(
-                "there is no picture in this folder\n help: pictures are PNG or JPEG files directly in it; a set has a {}",
+        return Err(Error::input("there is no picture in this folder")
+            .help(format!(
+                "pictures are PNG or JPEG files directly in it; a set has a {}",
                 crate::dataset::recipe::FILE
-            ),
-        });
+            ))
+            .in_file(input));
     }
     Ok(photos)
 }
@@ -212,13 +200,12 @@ fn planes(photo: &Path, shape: &Shape, beside: &dyn Fn(&Band) -> Option<PathBuf>
         Band::Gray(name) => match beside(band) {
             Some(path) => Ok(Plane::File(path)),
             None if shape.bands.len() == 1 => Ok(Plane::Photo),
-            None => Err(Error::Image {
-                path: photo.into(),
-                what: format!(
-                    "the network sees the band `{name}`, which this picture lacks\n help: put {}.{name}.png beside it, or name the folder of such pictures with --band {name}=DIR",
+            None => Err(Error::input(format!("the network sees the band `{name}`, which this picture lacks"))
+                .help(format!(
+                    "put {}.{name}.png beside it, or name the folder of such pictures with --band {name}=DIR",
                     stem(photo)
-                ),
-            }),
+                ))
+                .in_file(photo)),
         },
     };
     shape.bands.iter().map(plane).collect()
@@ -256,11 +243,12 @@ fn one_name_each(pictures: &[Picture]) -> Result<()> {
     for picture in pictures {
         for file in answers(&picture.name) {
             if let Some(other) = taken.insert(file.clone(), picture) {
-                return Err(Error::Training(format!(
-                    "{} and {} would both become {file}\n help: ask about them one after the other, each with its own --out",
+                return Err(Error::misuse(format!(
+                    "{} and {} would both become {file}",
                     other.photo.display(),
                     picture.photo.display()
-                )));
+                ))
+                .help("ask about them one after the other, each with its own --out"));
             }
         }
     }
@@ -290,16 +278,14 @@ impl Prediction {
     /// to these pictures and would be written over.
     pub fn claim(folder: &Path, card: &Card, pictures: &[Picture]) -> Result<Self> {
         let path = folder.join(PREDICTION);
-        let refuse = |path: &Path, what: String| {
-            Err(Error::Run { path: path.into(), what: what + "\n help: give another --out" })
-        };
+        let refuse = |path: &Path, what: String| Err(Error::misuse(what).help("give another --out").in_file(path));
         let there: Option<Self> = path.exists().then(|| run::read_json(&path)).transpose()?;
         if there.as_ref().is_some_and(|t| t.weights_sha256 != card.weights_sha256) {
             return refuse(&path, "answers of another network lie in this folder".into());
         }
         let mut all = there.map(|t| t.pictures).unwrap_or_default();
         for picture in pictures {
-            let photo = std::fs::canonicalize(&picture.photo).map_err(Error::io(&picture.photo))?;
+            let photo = std::fs::canonicalize(&picture.photo).map_err(Error::reading(&picture.photo))?;
             let photo = photo.to_string_lossy().into_owned();
             match all.get(&picture.name) {
                 Some(other) if *other == photo => {}

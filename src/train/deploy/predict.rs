@@ -108,7 +108,7 @@ pub fn predict(
         Ok(())
     })?;
     if how.stop.load(Ordering::Relaxed) {
-        return Err(Error::Interrupted);
+        return Err(Error::interrupted());
     }
     if !unread.is_empty() {
         prediction.forget(out, &unread)?;

@@ -27,7 +27,7 @@ pub fn write(learnt: &Learnt, (width, height): (u32, u32), path: &Path) -> Resul
     let bands = card.input.bands.len();
     let least = card.network.least_side();
     if width.min(height) < least {
-        return Err(Error::Training(format!(
+        return Err(Error::misuse(format!(
             "{} needs pictures of {least} pixels at least, down and across, not {width} × {height}",
             card.network.name()
         )));

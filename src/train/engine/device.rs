@@ -56,7 +56,7 @@ const CUDA: &str = "libtorch_cuda.so";
 /// from a torch of the same version on `LD_LIBRARY_PATH`, must be in the process before the first call of libtorch: the program
 /// replaces itself by one that the loader gave it to.
 pub fn find(name: &str) -> Result<Device> {
-    let wrong = || Error::Training(format!("there is no device `{name}`: write cpu, cuda or cuda:1"));
+    let wrong = || Error::misuse(format!("there is no device `{name}`: write cpu, cuda or cuda:1"));
     let number = match name.split_once(':') {
         None if name == "cpu" => return Ok(Device::Cpu),
         None if name == "cuda" => 0,
@@ -70,8 +70,8 @@ pub fn find(name: &str) -> Result<Device> {
     if (number as i64) < devices {
         return Ok(Device::Cuda(number));
     }
-    Err(Error::Training(format!(
-        "{name}: libtorch sees {devices} CUDA devices\n help: LD_LIBRARY_PATH must name the folder of a {CUDA} of torch 2.11.0, such as \
+    Err(Error::missing(format!("{name}: libtorch sees {devices} CUDA devices")).help(format!(
+        "LD_LIBRARY_PATH must name the folder of a {CUDA} of torch 2.11.0, such as \
          VENV/lib/python3.11/site-packages/torch/lib after `pip install torch==2.11.0`"
     )))
 }

@@ -118,7 +118,7 @@ pub(super) fn values(tensor: &Tensor) -> Result<Vec<f32>> {
 /// An error of libtorch, without the stack of its calls.
 pub(super) fn failed(e: &tch::TchError) -> Error {
     let words = e.to_string();
-    Error::Training(format!("libtorch: {}", words.lines().next().unwrap_or_default()))
+    Error::failed(format!("libtorch: {}", words.lines().next().unwrap_or_default()))
 }
 
 fn tensor(parameter: &Parameter, values: &[f32], device: Device) -> Tensor {

@@ -37,7 +37,7 @@ pub fn calibrate(model: &Model, store: &Store, normalisation: &Normalisation, im
     }
     let mut arrays = model.arrays()?;
     let head = arrays.iter_mut().find(|array| array.name == HEAD);
-    let head = head.ok_or_else(|| Error::Training(format!("this network has no `{HEAD}` to set")))?;
+    let head = head.ok_or_else(|| Error::input(format!("this network has no `{HEAD}` to set")))?;
     head.values.iter_mut().zip(offsets(&values, &labels, model.classes)).for_each(|(bias, offset)| *bias += offset);
     Ok(arrays)
 }

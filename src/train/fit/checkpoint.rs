@@ -1,5 +1,6 @@
 //! A training between two steps, in one file: values, the optimiser's memory, the best values so far, and what was seen.
 
+use crate::error::Kind;
 use crate::train::weights::{self, Array};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -92,7 +93,7 @@ impl Checkpoint {
         let all = [named("values", &self.values), named("memory", &self.memory), named("best", &self.best)].concat();
         let (step, pending, seconds, history) = (self.step, self.pending, self.seconds, self.history.clone());
         let words = Words { step, pending, seconds, history, plan: plan.into() };
-        let text = serde_json::to_string(&words).map_err(|e| Error::Training(format!("cannot write JSON: {e}")))?;
+        let text = serde_json::to_string(&words).map_err(|e| Error::failed(format!("cannot write JSON: {e}")))?;
         weights::write(&folder.join(FILE), &all, &text)
     }
 
@@ -102,12 +103,11 @@ impl Checkpoint {
         if !path.exists() {
             return Ok(None);
         }
-        let unusable = |what: &str| Error::Run {
-            path: path.clone(),
-            what: format!("{what}\n help: delete the file to begin this training again"),
+        let unusable = |what: &str| {
+            Error::damaged(what).help("delete the file to begin this training again").in_file(path.clone())
         };
         let (arrays, text) = match weights::read(&path) {
-            Err(Error::Run { what, .. }) => return Err(unusable(&what)),
+            Err(e) if e.kind() == Kind::Damaged => return Err(unusable(e.message())),
             other => other?,
         };
         let words: Words = serde_json::from_str(&text).map_err(|e| unusable(&format!("this is no checkpoint: {e}")))?;

@@ -57,7 +57,7 @@ pub struct Outcome {
 const POINTS: u64 = 200;
 
 /// Trains a plan, from its checkpoint in `folder` where there is one. `hash` is the plan's; `begin` the values to begin with where
-/// they are another run's. Told to stop, it leaves a checkpoint and ends with [`Error::Interrupted`].
+/// they are another run's. Told to stop, it leaves a checkpoint and ends with [`Kind::Interrupted`](crate::error::Kind::Interrupted).
 pub fn teach(
     plan: &Plan,
     hash: &str,
@@ -94,56 +94,54 @@ pub fn teach(
     let (begun, before) = (Instant::now(), at.seconds);
     let every = (plan.steps / POINTS).max(1);
     let out_of_patience = |at: &Checkpoint| at.history.since_best() >= plan.patience && !data.val.is_empty();
-    let ended = loop {
-        at.seconds = before + begun.elapsed().as_secs_f64();
-        if at.step >= plan.steps {
-            break "steps";
-        }
-        if out_of_patience(&at) {
-            break "patience";
-        }
-        if plan.seconds.is_some_and(|most| at.seconds >= most as f64) {
-            break "time";
-        }
-        if watch.stop.load(Ordering::Relaxed) {
-            save(&mut at, &model, &optimiser, folder, hash)?;
-            return Err(Error::Interrupted);
-        }
-        let batch = loader.next().unwrap_or_else(|| Err(Error::Training("the loading threads have ended".into())))?;
-        let in_time = plan.seconds.map_or(0.0, |most| at.seconds / most as f64);
-        let done = in_time.max(at.step as f64 / plan.steps as f64);
-        let rate = plan.rate * plan.schedule.share(done);
-        let weights = Tensor::from_slice(&plan.balance.weights(&rarities, done)).to_device(place.device);
-        let loss = step(&model, &mut optimiser, &batch, plan, &weights, rate)?;
-        if !loss.is_finite() {
-            return Err(Error::Training(format!(
-                "the loss of step {} is no number any more\n help: a smaller --rate than {} (this training lies in {})",
-                at.step + 1,
-                plan.rate,
-                folder.display()
-            )));
-        }
-        at.step += 1;
-        at.pending = (at.pending.0 + loss, at.pending.1 + 1);
-        if at.step % every == 0 {
-            let (sum, n) = std::mem::take(&mut at.pending);
-            at.history.losses.push(Loss { step: at.step, loss: sum / n as f64, rate });
-        }
-        (watch.step)(at.step, loss);
-        if at.step % plan.watch_every == 0 || at.step == plan.steps {
-            if !data.val.is_empty() {
-                let look = look(&model, &data.val, &normalisation, at.step)?;
-                at.history.looks.push(look.clone());
-                let best = at.history.since_best() == 0;
-                if best {
-                    at.best = model.arrays()?;
-                }
-                (watch.look)(&look, best);
-            }
+    let ended =
+        loop {
             at.seconds = before + begun.elapsed().as_secs_f64();
-            save(&mut at, &model, &optimiser, folder, hash)?;
-        }
-    };
+            if at.step >= plan.steps {
+                break "steps";
+            }
+            if out_of_patience(&at) {
+                break "patience";
+            }
+            if plan.seconds.is_some_and(|most| at.seconds >= most as f64) {
+                break "time";
+            }
+            if watch.stop.load(Ordering::Relaxed) {
+                save(&mut at, &model, &optimiser, folder, hash)?;
+                return Err(Error::interrupted());
+            }
+            let batch = loader.next().unwrap_or_else(|| Err(Error::failed("the loading threads have ended")))?;
+            let in_time = plan.seconds.map_or(0.0, |most| at.seconds / most as f64);
+            let done = in_time.max(at.step as f64 / plan.steps as f64);
+            let rate = plan.rate * plan.schedule.share(done);
+            let weights = Tensor::from_slice(&plan.balance.weights(&rarities, done)).to_device(place.device);
+            let loss = step(&model, &mut optimiser, &batch, plan, &weights, rate)?;
+            if !loss.is_finite() {
+                return Err(Error::input(format!("the loss of step {} is no number any more", at.step + 1)).help(
+                    format!("a smaller --rate than {} (this training lies in {})", plan.rate, folder.display()),
+                ));
+            }
+            at.step += 1;
+            at.pending = (at.pending.0 + loss, at.pending.1 + 1);
+            if at.step % every == 0 {
+                let (sum, n) = std::mem::take(&mut at.pending);
+                at.history.losses.push(Loss { step: at.step, loss: sum / n as f64, rate });
+            }
+            (watch.step)(at.step, loss);
+            if at.step % plan.watch_every == 0 || at.step == plan.steps {
+                if !data.val.is_empty() {
+                    let look = look(&model, &data.val, &normalisation, at.step)?;
+                    at.history.looks.push(look.clone());
+                    let best = at.history.since_best() == 0;
+                    if best {
+                        at.best = model.arrays()?;
+                    }
+                    (watch.look)(&look, best);
+                }
+                at.seconds = before + begun.elapsed().as_secs_f64();
+                save(&mut at, &model, &optimiser, folder, hash)?;
+            }
+        };
     let values = if at.best.is_empty() { model.arrays()? } else { at.best };
     Ok(Outcome { values, normalisation, history: at.history, steps: at.step, ended, seconds: at.seconds })
 }

@@ -27,7 +27,7 @@ impl Confusion {
         let classes = rows.len();
         if !(1..=usize::from(IGNORE)).contains(&classes) || rows.iter().any(|row| row.len() != classes) {
             let lengths: Vec<usize> = rows.iter().map(Vec::len).collect();
-            return Err(Error::Dataset(format!(
+            return Err(Error::misuse(format!(
                 "a confusion matrix has as many columns as rows, 1 to 255; this one has {classes} rows of {lengths:?}"
             )));
         }
@@ -47,7 +47,7 @@ impl Confusion {
     /// Counts the pixels of an image: classes from 0, 255 in the truth where there is no label. A fault leaves the matrix as it was.
     pub fn add(&mut self, truth: &[u8], predicted: &[u8]) -> Result<()> {
         if truth.len() != predicted.len() {
-            return Err(Error::Dataset(format!(
+            return Err(Error::misuse(format!(
                 "the truth has {} pixels, the prediction {}",
                 truth.len(),
                 predicted.len()
@@ -71,7 +71,7 @@ impl Confusion {
     fn stranger(&self, at: usize, truth: u8, predicted: u8) -> Error {
         let last = self.classes - 1;
         let (who, what) = if usize::from(truth) > last { ("the truth", truth) } else { ("the prediction", predicted) };
-        Error::Dataset(format!(
+        Error::input(format!(
             "pixel {at} of {who} has the class {what}; classes are 0 to {last}, and 255 in the truth is no label"
         ))
     }

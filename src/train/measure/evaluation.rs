@@ -75,7 +75,7 @@ impl Evaluation {
     /// Judges an image without counting it, so that several threads can: [`Self::push`] counts it. Images may come in any order.
     pub fn judge(&self, answer: &Answer<'_>) -> Result<Judged> {
         let Answer { name, width, height, truth, predicted, plants, seconds } = *answer;
-        let wrong = |what: String| Error::Dataset(format!("{name}: {what}"));
+        let wrong = |what: String| Error::input(format!("{name}: {what}"));
         let (w, h) = (width as usize, height as usize);
         let maps = [
             ("truth", truth.len()),

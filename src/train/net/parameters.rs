@@ -79,7 +79,7 @@ pub fn parameters(network: Network, bands: usize, classes: usize) -> Vec<Paramet
 pub fn fitting(network: Network, bands: usize, classes: usize, arrays: &[Array]) -> Result<Vec<&Array>> {
     let fit = |parameter: &Parameter| {
         let wrong = |what: String| {
-            Error::Training(format!(
+            Error::input(format!(
                 "these weights are not those of {} with {bands} bands and {classes} classes: {what}",
                 network.name(),
             ))

@@ -144,8 +144,7 @@ type At<'a> = &'a [Step<'a>];
 impl Checker<'_> {
     /// What is wrong with the value at a place, and what to do.
     fn fault(&self, at: At<'_>, what: impl AsRef<str>, help: impl AsRef<str>) -> Error {
-        let words = format!("{}\n help: {}", what.as_ref(), help.as_ref());
-        self.page.blame(at, Error::Scene(words))
+        self.page.blame(at, Error::input(what.as_ref()).help(help.as_ref()))
     }
 
     fn experiment(&self, scale: Option<&str>) -> Result<Experiment> {
@@ -196,10 +195,10 @@ impl Checker<'_> {
         let scales = &self.desc.scales;
         match scales.find(name) {
             Some(i) => Ok((i, &scales.0[i].1)),
-            None => Err(Error::Training(format!(
-                "{}: the page has no scale `{name}`\n help: {}",
-                self.page.path.display(),
-                choose("its scales", &scales.names(), name)
+            None => Err(Error::input(format!("the page has no scale `{name}`")).in_file(&self.page.path).help(choose(
+                "its scales",
+                &scales.names(),
+                name,
             ))),
         }
     }

@@ -114,8 +114,5 @@ pub(super) fn seconds(folder: &Path, test: &str) -> Option<Seconds> {
 
 /// An error about a row's folder in which something else lies.
 pub(super) fn foreign(folder: &Path, what: &str) -> Error {
-    Error::Run {
-        path: folder.into(),
-        what: format!("{what}\n help: give another --out, or delete this folder to have it made again"),
-    }
+    Error::input(what).help("give another --out, or delete this folder to have it made again").in_file(folder)
 }

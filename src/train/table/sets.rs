@@ -7,6 +7,7 @@ use crate::dataset::import::masks::{Folders, Masks};
 use crate::dataset::import::{self, Source as _};
 use crate::dataset::split::Shares;
 use crate::dataset::{self, recipe};
+use crate::error::Kind;
 use crate::job::Threads;
 use crate::settings::{Quality, RenderOptions};
 use crate::train::data::Selection;
@@ -66,7 +67,7 @@ impl Bound {
     /// Binds the sets of an experiment that lies in `out`. Training and test sets that need one of `without` are left out.
     pub fn new(mut experiment: Experiment, reals: &[Real], without: &[String], out: &Path) -> Result<Self> {
         let names: Vec<&str> = experiment.sets.iter().map(|(name, _)| name.as_str()).collect();
-        let wrong = |(what, help): (String, String)| Error::Training(format!("{what}\n help: {help}"));
+        let wrong = |(what, help): (String, String)| Error::input(what).help(help);
         if let Some(name) = without.iter().find(|w| !names.contains(&w.as_str())) {
             return Err(wrong(unknown("set", &names, name)));
         }
@@ -98,10 +99,8 @@ impl Bound {
         experiment.test = split(&experiment.test, &mut left_out, |t| out(&t.part), |t| &t.name);
         if experiment.train.is_empty() || experiment.test.is_empty() {
             let what = if experiment.train.is_empty() { "training" } else { "test" };
-            return Err(Error::Training(format!(
-                "without {} there is no {what} set left\n help: bind it instead with --real NAME=DIR",
-                without.join(", ")
-            )));
+            return Err(Error::input(format!("without {} there is no {what} set left", without.join(", ")))
+                .help("bind it instead with --real NAME=DIR"));
         }
         Ok(Self { experiment, left_out, sets })
     }
@@ -135,10 +134,11 @@ impl Bound {
             (name, _) => format!("`{name}`"),
         };
         let name = &self.experiment.sets[*first].0;
-        Err(Error::Training(format!(
-            "nobody has said where the images of {} lie\n help: --real {name}=DIR leads to them, --without {name} leaves out what needs them",
+        Err(Error::input(format!(
+            "nobody has said where the images of {} lie",
             missing.iter().map(told).collect::<Vec<_>>().join(" and of ")
-        )))
+        ))
+        .help(format!("--real {name}=DIR leads to them, --without {name} leaves out what needs them")))
     }
 
     /// Makes what is missing of a set: renders or imports it. Waits where another process is at it.
@@ -181,12 +181,14 @@ impl Bound {
             (_, Origin::Imported(from)) => import(from, folder, &progress, warn, stop),
             _ => Ok(Vec::new()),
         };
-        made.map(drop).map_err(|error| match error {
-            Error::Interrupted => error,
-            error if error.exit_code() == 2 => Error::Training(format!("the set `{name}` cannot be made: {error}")),
-            error => Error::Damaged(format!(
-                "the set `{name}` was not made: {error}\n help: the same command goes on with it"
-            )),
+        made.map(drop).map_err(|error| match error.kind() {
+            Kind::Interrupted => error,
+            _ if error.exit_code() == 2 => error.within(format!("the set `{name}` cannot be made")),
+            _ => {
+                let known = error.advice().is_some();
+                let error = error.within(format!("the set `{name}` was not made"));
+                if known { error } else { error.help("the same command goes on with it") }
+            }
         })
     }
 }
@@ -263,10 +265,7 @@ fn real_set(real: &Real, own: PathBuf) -> Result<(PathBuf, Origin)> {
         return Ok((own, Origin::Imported(folder.clone())));
     }
     let what = if folder.is_dir() { "in this folder are no labelled images" } else { "there is no such folder" };
-    Err(Error::Training(format!(
-        "--real {name}={}: {what}\n help: name a dataset (`trace dataset import` makes one), or a folder with images/ and with masks of the same names in labels/",
-        folder.display()
-    )))
+    Err(Error::input(format!("--real {name}={}: {what}", folder.display())).help("name a dataset (`trace dataset import` makes one), or a folder with images/ and with masks of the same names in labels/"))
 }
 
 /// Between two looks at what is waited for.
@@ -287,7 +286,7 @@ fn lock(folder: &Path, name: &str, tell: &(dyn Fn(&str) + Sync), stop: &AtomicBo
             Err(TryLockError::WouldBlock) => {}
         }
         if stop.load(Ordering::Relaxed) {
-            return Err(Error::Interrupted);
+            return Err(Error::interrupted());
         }
         if !std::mem::replace(&mut told, true) {
             tell(&format!("waiting for another process that makes the set `{name}`"));

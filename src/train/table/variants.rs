@@ -25,7 +25,7 @@ const LEAST: u32 = 32;
 /// real images that it asks for.
 pub fn variants(sets: &[(Set, &str)], reals: &[String]) -> Result<String> {
     let Some((full, _)) = sets.first() else {
-        return Err(Error::Training("there is no dataset to learn from\n help: make one first".into()));
+        return Err(Error::misuse("there is no dataset to learn from").help("make one first"));
     };
     let rendering = full.recipe.rendering()?;
     let size = (rendering.width.max(LEAST), rendering.height.max(LEAST));

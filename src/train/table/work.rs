@@ -229,12 +229,13 @@ impl Work<'_> {
         for test in &bound.experiment.test {
             let (set, numbers) = bound.selection(&test.part).open(Pick::All, 0)?;
             if let Some(n) = numbers.into_iter().find(|n| seen.contains(&(set.folder.clone(), *n))) {
-                return Err(Error::Training(format!(
-                    "`{}` is judged on image {n} of `{}`, which `{}` learns from or is watched by\n help: what was seen proves nothing; give them other images of the page",
+                return Err(Error::input(format!(
+                    "`{}` is judged on image {n} of `{}`, which `{}` learns from or is watched by",
                     test.name,
                     bound.experiment.sets[test.part.set].0,
                     self.set().name
-                )));
+                ))
+                .help("what was seen proves nothing; give them other images of the page"));
             }
         }
         let Some((network, _)) = self.network() else { return Ok(()) };
@@ -307,7 +308,7 @@ impl Work<'_> {
                 Known::Missing => {}
             }
             if self.hands.stop.load(Ordering::Relaxed) {
-                return Err(Error::Interrupted);
+                return Err(Error::interrupted());
             }
             let answerer = match &of {
                 Judged::Baseline(baseline) => Answerer::Baseline(baseline, &bound.experiment.learn.shape),

@@ -90,7 +90,7 @@ impl Args {
             pages.iter().try_for_each(|page| cli::check_scene(page))?;
             return Ok(pages);
         }
-        let entries = std::fs::read_dir(&self.pages).map_err(Error::io(&self.pages))?;
+        let entries = std::fs::read_dir(&self.pages).map_err(Error::reading(&self.pages))?;
         let mut pages: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
         pages.retain(|p| p.extension().is_some_and(|e| e == "ron"));
         pages.sort();
@@ -104,7 +104,7 @@ impl Args {
         for stage in &desc.plant.stages {
             let bare = self.field(page, stage.bbch, None)?;
             let plant = bare.plants.first().cloned();
-            let plant = plant.ok_or_else(|| Error::Scene(format!("{}: nothing grows", page.display())))?;
+            let plant = plant.ok_or_else(|| Error::input("nothing grows").in_file(page))?;
             stages.push((plant, bare.provenance()));
         }
         let path = self.out.join(page.file_stem().unwrap_or_default()).with_extension("png");
@@ -169,7 +169,7 @@ impl Args {
         let foot = field.plants.first().map_or(vec3(0.0, 0.0, 0.0), |p| p.position);
         let ends = [-5e-4, 5e-4].map(|x| field.scene.camera.project(foot + vec3(x, 0.0, 0.0)));
         let [Some(from), Some(to)] = ends else {
-            return Err(Error::Scene(format!("{}: the plant is out of sight", page.display())));
+            return Err(Error::input("the plant is out of sight").in_file(page));
         };
         let pixels = field.photograph(&film).rgb.as_chunks::<3>().0.to_vec();
         Ok(sheet::Shot { pixels, pixels_per_mm: from.distance(to) })

@@ -109,7 +109,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
 fn source(args: &Args) -> Result<Box<dyn Source>> {
     let needed = |path: &Option<PathBuf>, option: &str| {
         path.clone().ok_or_else(|| {
-            Error::Dataset(format!("this --format needs {option}\n help: `trace dataset import --help` tells what for"))
+            Error::misuse(format!("this --format needs {option}")).help("`trace dataset import --help` tells what for")
         })
     };
     let useless = [
@@ -122,7 +122,7 @@ fn source(args: &Args) -> Result<Box<dyn Source>> {
         (args.images.is_some() || args.classes.is_some(), args.format == Format::Phenobench, "--images and --classes"),
     ];
     if let Some((.., options)) = useless.into_iter().find(|(given, useless, _)| *given && *useless) {
-        return Err(Error::Dataset(format!("{options} say nothing for this --format\n help: leave them out")));
+        return Err(Error::misuse(format!("{options} say nothing for this --format")).help("leave them out"));
     }
     Ok(match args.format {
         Format::Masks => {

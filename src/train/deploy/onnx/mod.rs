@@ -58,7 +58,7 @@ pub fn model(learnt: &Learnt) -> Result<Model> {
         value("classes", "number of each pixel's class", DataType::Uint8, [any("images"), any("height"), any("width")]),
     ];
     let facts = serde_json::to_value(Facts::of(card, (card.input.width, card.input.height)));
-    let facts = facts.map_err(|e| Error::Training(format!("cannot write JSON: {e}")))?;
+    let facts = facts.map_err(|e| Error::failed(format!("cannot write JSON: {e}")))?;
     let words = facts.as_object().into_iter().flatten().map(|(key, value)| Entry {
         key: key.clone(),
         value: value.as_str().map_or_else(|| value.to_string(), str::to_owned),
