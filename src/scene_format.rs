@@ -1,0 +1,45 @@
+//! What stands in scene files and species files: every type with its fields, units, ranges and defaults.
+//!
+//! A scene file holds one [`FieldDesc`], a species file one [`SpeciesDesc`]. Wherever a [`Num`] stands, a number or a
+//! [`Distribution`] may stand. Its parameter bounds what is drawn: [`Positive`], [`Fraction`] and so on; anything else is an error with line
+//! and column.
+//!
+//! ```
+//! # use furrow::ron_file::RonFile;
+//! use furrow::scene_format::FieldDesc;
+//!
+//! let text = r#"Field(
+//!     camera: JaiAd130(height_m: Normal(mean: 0.85, sd: 0.03)),
+//!     lights: [Daylight(sun: Angles(elevation_deg: Uniform(30, 60), azimuth_deg: 140))],
+//!     soil: (layers: [(albedo: "dirt.png", height: "dirt.height.png", size_m: 0.5, height_mm: (-4, 8))]),
+//!     crops: [(species: "species/sugar_beet.ron", growth: AgeDays(Uniform(18, 28)), rows: (spacing_m: 0.45, in_row_m: 0.18))],
+//! )"#;
+//! let field: FieldDesc = RonFile::of(text).parse()?;
+//! assert_eq!(field.crops.len(), 1);
+//! # Ok::<(), furrow::Error>(())
+//! ```
+
+#[doc(inline)]
+pub use crate::light::{GlowDesc, InfraredDesc, LightDesc, PointDesc, ShapeDesc, SunDesc};
+#[doc(inline)]
+pub use crate::material::LeafDesc;
+#[doc(inline)]
+pub use crate::plant::{ConditionDesc, LayerDesc, LeafKind, PlantDesc, Shape, Stage, StageDesc};
+#[doc(inline)]
+pub use crate::ron_file::{
+    Bound, Count, Distribution, Elevation, Finite, Fraction, NonNegative, Num, Pick, Positive, PositiveCount, Vary,
+};
+#[doc(inline)]
+pub use crate::scatter::{ClustersDesc, RowsDesc, WeedsDesc};
+#[doc(inline)]
+pub use crate::scene::desc::{CropDesc, FieldDesc, Growth, ModelDesc, PlacedDesc, Role, SpeciesDesc, WeedDesc};
+#[doc(inline)]
+pub use crate::sensor::{
+    AdcDesc, ApertureDesc, CameraDesc, DistortionDesc, ExposureDesc, IntrinsicsDesc, JpegDesc, MatrixDesc, MosaicDesc,
+    MotionDesc, NoiseDesc, PoseDesc, PsfDesc, SensorDesc, SharpenDesc, Tone, WhiteBalanceDesc,
+};
+#[doc(inline)]
+pub use crate::soil::{
+    BlendDesc, ClodsDesc, CrumbsDesc, LayerDesc as SoilLayerDesc, LitterDesc, MoistureDesc, ReliefDesc, RowReliefDesc,
+    SoilColor, SoilDesc, StonesDesc, WheelDesc,
+};
