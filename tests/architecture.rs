@@ -61,6 +61,8 @@ const DOORS: &[(&str, &str)] = &[
     ("exr", "output/exr/mod.rs texture/panorama.rs"),
     // Vectors are re-exported by `math`; two files sum in double precision.
     ("glam", "math/ film/ accel/brute.rs"),
+    // Checksums as text.
+    ("hex", "scene/library.rs dataset/ train/run.rs train/weights.rs"),
     ("humantime", "bin/"),
     ("hw_skymodel", "light/hosek.rs"),
     // Photographs in, and small ones out for pages that people look at.
@@ -85,6 +87,8 @@ const DOORS: &[(&str, &str)] = &[
     ),
     // One reader for all RON files; faults inside a value are found where they lie.
     ("ron", "ron_file/"),
+    // Spectra of pictures.
+    ("rustfft", "compare/gap/frequency.rs"),
     ("serde", "*"),
     // glTF documents, read and written; records and formats of datasets.
     (

@@ -1,7 +1,7 @@
 //! What belongs to all images together, written when all are there: the formats' lists, the manifest, the report.
 
 use super::generate::{self, Task};
-use super::recipe::{FILE, Recipe, hex};
+use super::recipe::{FILE, Recipe};
 use super::seal::{Print, Seal};
 use super::set::{Set, Stream, Whole};
 use super::{format, report};
@@ -129,7 +129,7 @@ fn manifest(set: &Set, files: &BTreeMap<String, Print>, out: &mut Stream<'_>) ->
     };
     out.items(seals.into_iter().map(image))?;
     out.put("],\n\"content_sha256\": ")?;
-    out.json(&hex(&content.finalize()))?;
+    out.json(&hex::encode(content.finalize()))?;
     out.put("\n}\n")
 }
 

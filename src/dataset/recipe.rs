@@ -125,7 +125,7 @@ impl Recipe {
     /// What decides the bytes of an image's native files: SHA-256 of the recipe without its length, formats and words.
     pub fn fingerprint(&self) -> Result<String> {
         let same = Self { count: 0, formats: Vec::new(), licence: String::new(), ..self.clone() };
-        Ok(hex(&Sha256::digest(json(&same)?)))
+        Ok(hex::encode(Sha256::digest(json(&same)?)))
     }
 
     /// How it is rendered; an error for images from elsewhere.
@@ -204,13 +204,4 @@ pub(super) fn compact(value: &impl Serialize) -> Result<Vec<u8>> {
     let mut bytes = serde_json::to_vec(value).map_err(failed)?;
     bytes.push(b'\n');
     Ok(bytes)
-}
-
-/// Bytes in hex.
-pub(super) fn hex(bytes: &[u8]) -> String {
-    use std::fmt::Write;
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
 }

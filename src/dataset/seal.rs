@@ -3,7 +3,7 @@
 //! A seal is written last. It holds a hash of itself, so a damaged seal is no seal.
 
 use super::File;
-use super::recipe::{Recipe, compact, hex};
+use super::recipe::{Recipe, compact};
 use super::set::Set;
 use crate::output::{link_atomically, write_atomically};
 use crate::{Error, Result};
@@ -35,7 +35,7 @@ pub struct Print {
 impl Print {
     /// Of a file's contents.
     pub fn of(bytes: &[u8]) -> Self {
-        Self { sha256: hex(&Sha256::digest(bytes)), bytes: bytes.len() as u64 }
+        Self { sha256: hex::encode(Sha256::digest(bytes)), bytes: bytes.len() as u64 }
     }
 
     /// Whether the file is there and has these contents.
@@ -103,7 +103,7 @@ impl Seal {
 
     /// SHA-256 over everything in it, hex.
     pub fn hash(&self) -> Result<String> {
-        Ok(hex(&Sha256::digest(compact(self)?)))
+        Ok(hex::encode(Sha256::digest(compact(self)?)))
     }
 
     /// The same over its native files alone, whatever formats there are.

@@ -1,7 +1,7 @@
 //! A dataset that lies in a folder: its recipe, its images by name, the files that belong to all of them.
 
 use super::native;
-use super::recipe::{Recipe, hex};
+use super::recipe::Recipe;
 use super::record::Record;
 use super::seal::Print;
 use super::split::Split;
@@ -69,7 +69,7 @@ impl<'a> Whole<'a> {
         stream_atomically(&full, |file| {
             let mut stream = Stream { path: &full, file, hash: Sha256::new(), bytes: 0 };
             write(&mut stream)?;
-            print = Some(Print { sha256: hex(&stream.hash.finalize()), bytes: stream.bytes });
+            print = Some(Print { sha256: hex::encode(stream.hash.finalize()), bytes: stream.bytes });
             Ok(())
         })?;
         self.files.extend(print.map(|print| (path.to_owned(), print)));

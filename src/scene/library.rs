@@ -15,7 +15,6 @@ use crate::texture::{ColorSpace, Height, Maps, Relief, Texture, Wrap};
 use crate::{Error, Result};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
@@ -85,11 +84,7 @@ impl Library {
         for digest in self.files.values() {
             all.update(digest);
         }
-        let mut hex = String::new();
-        for byte in all.finalize() {
-            let _ = write!(hex, "{byte:02x}");
-        }
-        hex
+        hex::encode(all.finalize())
     }
 
     /// The species page that `page` names.

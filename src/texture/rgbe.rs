@@ -1,85 +1,35 @@
-//! Radiance pictures (.hdr): three mantissas and one exponent a pixel, L = m · 2^(e − 136).
+//! Radiance pictures (.hdr): three mantissas and one exponent a pixel, L = m · 2^(e − 136), over the exposure that the file states.
 //!
-//! Source: Ward 1991, "Real Pixels", Graphics Gems II; the run lengths are those of Radiance's `ray/src/common/color.c`.
+//! Source: Ward 1991, "Real Pixels", Graphics Gems II. The decoder is that of the crate `image`; it leaves out the exposure, which is
+//! checked and divided by here.
 
 use super::panorama::Texels;
+use image::codecs::hdr::HdrDecoder;
+use image::{DynamicImage, ImageDecoder};
 
 /// Reads a whole file; in words what is wrong with it.
 pub(super) fn decode(bytes: &[u8]) -> Result<Texels, String> {
-    let mut rest = bytes;
-    let mut line = || -> Result<String, String> {
-        let end = rest.iter().position(|b| *b == b'\n').ok_or("its head has no end")?;
-        let line = String::from_utf8_lossy(&rest[..end]).trim().to_owned();
-        rest = &rest[end + 1..];
-        Ok(line)
-    };
-    let mut exposure = 1.0_f32;
-    loop {
-        let line = line()?;
-        if line.is_empty() {
-            break;
-        }
-        if line.strip_prefix("FORMAT=").is_some_and(|format| format != "32-bit_rle_rgbe") {
-            return Err("its pixels are not RGBE".into());
-        }
-        if let Some(factor) = line.strip_prefix("EXPOSURE=") {
-            let factor: f32 = factor.trim().parse().map_err(|_| "its exposure is no number")?;
-            if !(factor > 0.0 && factor.is_finite()) {
-                return Err("its exposure is not above zero".into());
-            }
-            exposure *= factor;
-        }
-    }
-    let size = line()?;
-    let ["-Y", height, "+X", width] = size.split_whitespace().collect::<Vec<_>>()[..] else {
-        return Err(format!("its rows do not run from the top left (`{size}`)"));
-    };
-    let number = |text: &str| text.parse::<usize>().map_err(|_| format!("`{text}` is no size"));
-    let (width, height) = (number(width)?, number(height)?);
-    super::panorama::check(width, height)?;
-    let mut rgba = Vec::with_capacity(width * height);
-    let mut row = vec![[0_u8; 4]; width];
-    for _ in 0..height {
-        read_row(&mut rest, &mut row).ok_or("it ends too early or its runs are broken")?;
-        rgba.extend(row.iter().map(|[r, g, b, e]| {
-            let unit = if *e == 0 { 0.0 } else { 2.0_f32.powi(i32::from(*e) - 136) / exposure };
-            [*r, *g, *b].map(|m| f32::from(m) * unit)
-        }));
-    }
-    Ok(Texels { width, height, rgb: rgba, nir: None })
+    // Not strict: many programs sign their files `#?RGBE`.
+    let decoder = HdrDecoder::new_nonstrict(bytes).map_err(|e| e.to_string())?;
+    let exposure = exposure(&decoder.metadata().custom_attributes)?;
+    let (width, height) = decoder.dimensions();
+    super::panorama::check(width as usize, height as usize)?;
+    let image = DynamicImage::from_decoder(decoder).map_err(|e| e.to_string())?;
+    let rgb = image.into_rgb32f().pixels().map(|pixel| pixel.0.map(|value| value * (1.0 / exposure))).collect();
+    Ok(Texels { width: width as usize, height: height as usize, rgb, nir: None })
 }
 
-/// One row; `None` where the bytes do not suffice.
-fn read_row(rest: &mut &[u8], row: &mut [[u8; 4]]) -> Option<()> {
-    let width = row.len();
-    let coded =
-        rest.len() >= 4 && rest[0] == 2 && rest[1] == 2 && usize::from(rest[2]) << 8 | usize::from(rest[3]) == width;
-    if !coded || !(8..0x8000).contains(&width) {
-        for pixel in row {
-            *pixel = take(rest, 4)?.try_into().ok()?;
+/// The product of all exposures that a file's head states; 1 without any.
+fn exposure(attributes: &[(String, String)]) -> Result<f32, String> {
+    let mut product = 1.0;
+    for (_, value) in attributes.iter().filter(|(name, _)| name == "EXPOSURE") {
+        let factor: f32 = value.trim().parse().map_err(|_| "its exposure is no number")?;
+        if !(factor > 0.0 && factor.is_finite()) {
+            return Err("its exposure is not above zero".into());
         }
-        return Some(());
+        product *= factor;
     }
-    take(rest, 4)?;
-    for channel in 0..4 {
-        let mut at = 0;
-        while at < width {
-            let count = usize::from(take(rest, 1)?[0]);
-            let (run, count) = if count > 128 { (true, count - 128) } else { (false, count) };
-            let values = take(rest, if run { 1 } else { count })?;
-            for k in 0..count {
-                row.get_mut(at + k)?[channel] = values[if run { 0 } else { k }];
-            }
-            at += count.max(1);
-        }
-    }
-    Some(())
-}
-
-fn take<'a>(rest: &mut &'a [u8], n: usize) -> Option<&'a [u8]> {
-    let (taken, left) = rest.split_at_checked(n)?;
-    *rest = left;
-    Some(taken)
+    Ok(product)
 }
 
 #[cfg(test)]
@@ -100,6 +50,13 @@ mod tests {
         }
         let texels = decode(&coded).unwrap();
         assert!(texels.rgb.iter().all(|c| *c == [0.5, 0.25, 0.125]) && texels.rgb.len() == 32);
+        // An exposure that is no power of two: one rounding of its inverse, one of the product.
+        let at = plain.windows(10).position(|w| w == b"EXPOSURE=2").unwrap() + 9;
+        let mut thirds = plain.clone();
+        thirds[at] = b'3';
+        assert_eq!(decode(&thirds).unwrap().rgb[0], [128.0, 64.0, 32.0].map(|m: f32| m * (2.0_f32.powi(-7) / 3.0)));
+        thirds[at] = b'0';
+        assert!(decode(&thirds).is_err_and(|what| what.contains("exposure")));
         for broken in [&coded[..coded.len() - 1], &plain[..20], b"#?RADIANCE\n\n+Y 2 +X 4\n"] {
             assert!(decode(broken).is_err());
         }

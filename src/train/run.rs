@@ -53,7 +53,7 @@ impl Identity {
             selection.folder = "".into();
         }
         let text = serde_json::to_string(&Self { plan, ..self.clone() }).map_err(|e| failed(&e))?;
-        Ok(Sha256::digest(text).iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}")))
+        Ok(hex::encode(Sha256::digest(text)))
     }
 
     /// Takes a folder for this training: writes its plan, or finds the same one there.

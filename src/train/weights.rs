@@ -70,16 +70,12 @@ pub fn hash(arrays: &[Array]) -> String {
             sha.update(v.to_le_bytes());
         }
     }
-    hex(sha.finalize().as_slice())
+    hex::encode(sha.finalize())
 }
 
 /// Over the arrays and the text beside them.
 fn seal(arrays: &[Array], text: &str) -> String {
-    hex(Sha256::new().chain_update(hash(arrays)).chain_update(text).finalize().as_slice())
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"))
+    hex::encode(Sha256::new().chain_update(hash(arrays)).chain_update(text).finalize())
 }
 
 fn unusable(path: &Path, what: &str) -> Error {

@@ -20,7 +20,7 @@ pub mod phenobench;
 
 use super::generate::{self, Task};
 use super::plan::refuse_full;
-use super::recipe::{FILE, Made, Recipe, hex};
+use super::recipe::{FILE, Made, Recipe};
 use super::record::{Keypoint, Record};
 use super::sample::Sample;
 use super::seal::{Seal, write_files};
@@ -133,7 +133,7 @@ fn begin(folder: &Path, source: &dyn Source, order: &Order) -> Result<Set> {
     let split = if counts == [0; 3] { order.split } else { Shares(counts) };
     let mut recipe = Recipe {
         furrow: env!("CARGO_PKG_VERSION").into(),
-        made: Made::Imported { from: source.name().into(), source_sha256: hex(&Sha256::digest(source.words())) },
+        made: Made::Imported { from: source.name().into(), source_sha256: hex::encode(Sha256::digest(source.words())) },
         count: images.len() as u64,
         split,
         formats: Vec::new(),
