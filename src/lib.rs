@@ -59,7 +59,7 @@
 //! | 7 | `material`, `scatter` |
 //! | 6 | `bsdf`, `light`, `sensor`, `plant`, `soil`, `accel`, `model` |
 //! | 5 | `texture` |
-//! | 4 | `optics`, [`film`], `html`, `cli`, [`settings`] |
+//! | 4 | `optics`, [`film`], `report`, `cli`, [`settings`] |
 //! | 3 | `ron_file` |
 //! | 2 | `sampling`, `geometry` |
 //! | 1 | `math`, [`error`] |
@@ -79,8 +79,6 @@ pub mod error;
 pub mod film;
 #[doc(hidden)]
 pub mod geometry;
-#[doc(hidden)]
-pub mod html;
 #[doc(hidden)]
 pub mod integrator;
 pub mod job;
@@ -104,6 +102,8 @@ pub mod prelude;
 pub mod raster;
 #[doc(hidden)]
 pub mod render;
+#[doc(hidden)]
+pub mod report;
 #[doc(hidden)]
 pub mod ron_file;
 #[doc(hidden)]

@@ -9,7 +9,8 @@ mod common;
 use common::browser::{browser, probe};
 use common::program::scratch;
 use common::python::python;
-use furrow::train::figure::{Chart, Curve, Page, Shot, sheet, spread};
+use furrow::report::chart::{Chart, Curve};
+use furrow::train::figure::{Page, Shot, sheet, spread};
 use furrow::train::measure::{Answer, Evaluation, Report};
 use std::process::Command;
 
@@ -168,7 +169,7 @@ fn page(report: &Report, shots: &[Shot]) -> String {
         title: "run <1>",
         lead: "Two images & a curve.",
         facts: &[("weights".into(), "a<b".into())],
-        answer: None,
+        effects: None,
         report: Some(report),
         charts: &[chart(true), chart(false)],
         shots,

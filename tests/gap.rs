@@ -142,7 +142,11 @@ fn files_say_the_same_whatever_the_threads() {
         assert_eq!(row["distance"].as_f64(), cells[2].parse().ok(), "{line}");
     }
     // Nothing is asked of a network; a part of each picture is there, and curves.
-    assert!(!page.contains("http") && page.matches("<img").count() == 2 * 8 - 2 && page.contains("<polyline"));
+    assert!(
+        !page.contains("http")
+            && page.matches("<img").count() == 2 * 8 - 2
+            && page.contains("data-curve=\"synthetic\"")
+    );
 }
 
 #[test]

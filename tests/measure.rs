@@ -7,6 +7,7 @@
 mod common;
 
 use common::python::python;
+use furrow::report::{Cell, Table};
 use furrow::sampling::rng::{Purpose, Stream};
 use furrow::train::baseline::{Baseline, Cut, Example, Kind, SizeRule};
 use furrow::train::measure::bootstrap;
@@ -14,7 +15,7 @@ use furrow::train::measure::boundary::{Boundary, TOLERANCE};
 use furrow::train::measure::components::Components;
 use furrow::train::measure::report::Report;
 use furrow::train::measure::size::{SizeBin, Sizes};
-use furrow::train::measure::{Answer, Cell, Confusion, Evaluation, Scores, Table};
+use furrow::train::measure::{Answer, Confusion, Evaluation, Scores};
 use proptest::prelude::*;
 use std::path::Path;
 use std::process::Command;

@@ -1,9 +1,9 @@
-//! Figures as JSON and CSV for programs, as Markdown for people.
+//! Figures as JSON and CSV for programs, as tables for people.
 
-use super::comparison::{Compared, Comparison};
+use super::comparison::Comparison;
 use super::figures::{Band, Region, Row};
 use super::summary::{Mean, Summary};
-use crate::html::{count, number};
+use crate::report::{self, Cell, Lines, Table, count, number};
 use crate::{Error, Result};
 use serde::Serialize;
 use std::fmt::Write;
@@ -107,23 +107,18 @@ pub(super) fn json(of: &Comparison) -> Result<String> {
 
 /// A row for each pair, band and region.
 pub(super) fn csv(of: &Comparison) -> String {
-    let mut out = "name,band,region,pixels,mse,psnr_db,ssim,flip,ciede2000\n".to_owned();
     let value = |v: Option<f64>| v.map(|v| v.to_string()).unwrap_or_default();
-    for pair in &of.pairs {
-        let name = &pair.name;
-        let name = if name.contains([',', '"', '\n', '\r']) {
-            format!("\"{}\"", name.replace('"', "\"\""))
-        } else {
-            name.clone()
-        };
-        for row in &pair.figures.rows {
-            let (band, region, pixels, mse) = (row.band.name(), row.region.name(), row.pixels, row.mse);
-            let psnr = row.psnr_db().unwrap_or(f64::INFINITY);
-            let [ssim, flip, color] = [row.ssim, row.flip, row.ciede2000].map(value);
-            let _ = writeln!(out, "{name},{band},{region},{pixels},{mse},{psnr},{ssim},{flip},{color}");
-        }
-    }
-    out
+    let fields = |name: &str, row: &Row| -> Vec<String> {
+        let words = [name, row.band.name(), row.region.name()].map(str::to_owned);
+        let psnr = row.psnr_db().unwrap_or(f64::INFINITY);
+        let [ssim, flip, color] = [row.ssim, row.flip, row.ciede2000].map(value);
+        let numbers = [row.pixels.to_string(), row.mse.to_string(), psnr.to_string(), ssim, flip, color];
+        words.into_iter().chain(numbers).collect()
+    };
+    let rows = of.pairs.iter().flat_map(|pair| pair.figures.rows.iter().map(move |row| (pair, row)));
+    let rows = rows.map(|(pair, row)| fields(&pair.name, row));
+    let heads = ["name", "band", "region", "pixels", "mse", "psnr_db", "ssim", "flip", "ciede2000"];
+    report::csv(&heads, rows, Lines::Lf)
 }
 
 /// Means, then each pair where there are more.
@@ -131,15 +126,22 @@ pub(super) fn markdown(of: &Comparison) -> String {
     let name = |name: &str| name.replace('|', "\\|").replace(char::is_control, "·");
     let mut out = format!("# {} against {}\n\n{}\n\n{}", name(&of.found.b), name(&of.found.a), lead(of), means(of));
     if of.pairs.len() > 1 {
-        let head: Vec<String> = ["pair"].into_iter().chain(MEASURES).map(str::to_owned).collect();
-        let row = |pair: &Compared| [vec![name(&pair.name)], cells(pair.figures.all())].concat();
-        let rows: Vec<Vec<String>> = [head].into_iter().chain(of.pairs.iter().map(row)).collect();
-        let _ = write!(out, "\nOf each pair, all pixels in colour:\n\n{}", columns(&rows));
+        let _ = write!(out, "\nOf each pair, all pixels in colour:\n\n{}", each(of).markdown());
     }
     for warning in of.found.warnings() {
         let _ = write!(out, "\nNot compared: {}.\n", name(&warning));
     }
     out
+}
+
+/// The measures of every pair, all pixels in colour.
+pub(super) fn each(of: &Comparison) -> Table {
+    let mut table = Table::new("", ["pair"].into_iter().chain(MEASURES));
+    for pair in &of.pairs {
+        let name = Cell::text(pair.name.replace(char::is_control, "·"));
+        table.push([name].into_iter().chain(cells(pair.figures.all()).into_iter().map(Cell::Shown)));
+    }
+    table
 }
 
 /// What was measured, in a sentence.
@@ -150,11 +152,14 @@ pub(super) fn lead(of: &Comparison) -> String {
     format!("{pairs}{around}. FLIP at {} pixels a degree.", number(f64::from(of.pixels_per_degree)))
 }
 
-/// Means over pairs, a row for each band and region.
+/// Means over pairs as Markdown, a row for each band and region.
 pub(super) fn means(of: &Comparison) -> String {
-    let head: Vec<String> = [""].into_iter().chain(MEASURES).map(str::to_owned).collect();
-    let row = |s: &Summary| [vec![label(s.band, s.region)], mean_cells(s)].concat();
-    columns(&[head].into_iter().chain(of.means.iter().map(row)).collect::<Vec<_>>())
+    let mut table = Table::new("", [""].into_iter().chain(MEASURES));
+    for s in &of.means {
+        let name = Cell::text(label(s.band, s.region));
+        table.push([name].into_iter().chain(mean_cells(s).into_iter().map(Cell::Shown)));
+    }
+    table.markdown()
 }
 
 /// What a row is of.
@@ -200,22 +205,4 @@ fn digits(k: usize, value: f64) -> String {
 /// What stands where there is no value: PSNR is then infinite, others do not exist.
 fn missing(k: usize) -> String {
     if k == 1 { "∞".into() } else { "–".into() }
-}
-
-/// Rows, the first of them the head, as a table in Markdown whose columns are aligned.
-pub(super) fn columns(rows: &[Vec<String>]) -> String {
-    let width = |k: usize| rows.iter().map(|row| row[k].chars().count()).max().unwrap_or(0).max(2);
-    let widths: Vec<usize> = (0..rows[0].len()).map(width).collect();
-    let line = |row: &Vec<String>| {
-        let cell = |(k, text): (usize, &String)| {
-            let width = widths[k];
-            if k == 0 { format!("| {text:<width$} ") } else { format!("| {text:>width$} ") }
-        };
-        row.iter().enumerate().map(cell).collect::<String>() + "|\n"
-    };
-    let rule = |(k, width): (usize, &usize)| {
-        if k == 0 { format!("|{:-<1$}", "", width + 2) } else { format!("|{:-<1$}:", "", width + 1) }
-    };
-    let rule = widths.iter().enumerate().map(rule).collect::<String>() + "|\n";
-    line(&rows[0]) + &rule + &rows[1..].iter().map(line).collect::<String>()
 }

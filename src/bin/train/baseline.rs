@@ -49,7 +49,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let json = args.out.join("baseline.json");
     run::write_json(&json, &rule)?;
     let title = format!("{} on {}", args.kind.name(), args.set.folder.display());
-    let lead = "What colour alone can do; a network below this has learnt nothing of shape.";
+    let lead = "The score of colour alone; a network that scores lower has learned nothing about shape.";
     let mut paths = report::write(&args.out, &title, lead, &report, &shots.kept, &Classes::default().colors())?;
     paths.push(json);
     eprint!("{}", report.summary().markdown());

@@ -2,12 +2,13 @@
 
 use furrow::Result;
 use furrow::output::write_atomically;
+use furrow::report::chart::{Chart, Curve};
+use furrow::report::{Lines, csv};
 use furrow::train::data::Example;
-use furrow::train::figure::{Chart, Curve, Page, Shot, sheet, spread};
+use furrow::train::figure::{Page, Shot, sheet, spread};
 use furrow::train::fit::checkpoint::History;
 use furrow::train::measure::Report;
 use furrow::train::run;
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 /// Images that the figure and the page show.
@@ -122,12 +123,12 @@ pub(crate) fn write_training(
     };
     write_atomically(&html, page.html()?.as_bytes())?;
     write_atomically(&svg, charts[0].svg().as_bytes())?;
-    let mut lines = String::from("step,loss,rate,validation_mean_iou\n");
-    for loss in &results.history.losses {
+    let rows = results.history.losses.iter().map(|loss| {
         let look = results.history.looks.iter().find(|look| look.step == loss.step);
         let miou = look.map_or(String::new(), |look| look.miou.to_string());
-        let _ = writeln!(lines, "{},{},{},{miou}", loss.step, loss.loss, loss.rate);
-    }
+        vec![loss.step.to_string(), loss.loss.to_string(), loss.rate.to_string(), miou]
+    });
+    let lines = csv(&["step", "loss", "rate", "validation_mean_iou"], rows, Lines::Lf);
     write_atomically(&log, lines.as_bytes())?;
     Ok(vec![html, svg, log])
 }

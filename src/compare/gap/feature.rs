@@ -1,8 +1,9 @@
 //! What is measured of every picture, and the distance of two sets of pictures in it.
 
 use super::frequency::decibels;
-use super::histogram::{self, Histogram};
+use super::wasserstein;
 use crate::compare::Region;
+use crate::report::Histogram;
 use std::collections::BTreeMap;
 
 /// One thing to measure; each has one distance.
@@ -179,7 +180,7 @@ impl Pool {
             (Self::Counts(a), Self::Counts(b)) => {
                 a.iter().zip(b).map(|(a, b)| a.distance(b)).sum::<f64>() / a.len() as f64
             }
-            (Self::Values(a), Self::Values(b)) => histogram::distance(a, b),
+            (Self::Values(a), Self::Values(b)) => wasserstein::distance(a, b),
             (Self::Power(a), Self::Power(b)) => {
                 let squares = a.iter().zip(b).map(|(a, b)| (decibels(*a) - decibels(*b)).powi(2));
                 (squares.sum::<f64>() / a.len() as f64).sqrt()

@@ -1,10 +1,10 @@
 //! One picture, measured.
 
 use super::feature::{Feature, Sample, Samples};
-use super::histogram::Histogram;
 use super::{frequency, noise, outline, regions};
 use crate::compare::color::{lab, linear};
 use crate::compare::{Picture, Region};
+use crate::report::{Bins, Histogram};
 
 /// Bins and ends of L*, of a* and b*, of NDVI, of gradients in dB, of log₁₀ of areas.
 const LIGHTNESS: (f64, f64, usize) = (0.0, 100.0, 400);
@@ -43,7 +43,7 @@ pub(super) fn measure(picture: &Picture, labels: Option<&[u8]>, tile: Option<usi
 }
 
 fn empty((from, to, bins): (f64, f64, usize)) -> Histogram {
-    Histogram::new(from, to, bins)
+    Histogram::new(Bins::between(from, to, bins))
 }
 
 /// Colours and NDVI of a region's pixels.

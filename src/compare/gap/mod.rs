@@ -16,22 +16,21 @@
 //! | contrast | a class and the soil around it, L* and a*b* | W₁ |
 //! | outlines | how far outside of the leaves labels end, pixels | W₁ |
 //!
-//! W₁ is the Wasserstein distance of `histogram`. Classes are compared where both sets have labels, NDVI where both have near infrared.
+//! W₁ is the Wasserstein distance of [`Histogram`](crate::report::Histogram). Classes are compared where both sets have labels, NDVI where both have near infrared.
 //!
 //! | file | idea |
 //! |---|---|
 //! | `source` | which pictures there are |
 //! | `feature` | what is measured, and how sets differ in it |
 //! | `measure` | one picture, measured |
-//! | `histogram`, `frequency`, `noise`, `regions`, `outline` | how |
+//! | `wasserstein`, `frequency`, `noise`, `regions`, `outline` | how |
 //! | `sets` | all of it, from two folders to distances |
 //! | `window` | what the page shows of a picture |
-//! | `table`, `chart`, `page` | how it is written: JSON, CSV, text; curves; one HTML page |
+//! | `table`, `curves`, `page` | how it is written: JSON, CSV, text; curves; one HTML page |
 
-mod chart;
+mod curves;
 mod feature;
 mod frequency;
-mod histogram;
 mod measure;
 mod noise;
 mod outline;
@@ -40,10 +39,10 @@ mod regions;
 mod sets;
 mod source;
 mod table;
+mod wasserstein;
 mod window;
 
 pub use feature::{Feature, Pool};
-pub use histogram::Histogram;
 pub use sets::{Distance, FILES, Gap, LARGE, Options, Set};
 pub use source::{Photo, photos};
 pub use window::Window;

@@ -3,7 +3,7 @@
 use super::feature::{Feature, Pool, Samples};
 use super::source::{Photo, photos, warnings};
 use super::window::Window;
-use super::{frequency, histogram, measure, page, table};
+use super::{frequency, measure, page, table, wasserstein};
 use crate::compare::{Picture, pairs, read_labels};
 use crate::sampling::rng::{Purpose, Stream};
 use crate::{Result, output};
@@ -214,5 +214,5 @@ fn halves(pictures: &[Samples]) -> BTreeMap<Feature, f64> {
             drawn.entry(feature).or_default().push(distance);
         }
     }
-    drawn.into_iter().filter_map(|(feature, distances)| Some((feature, histogram::median(distances)?))).collect()
+    drawn.into_iter().filter_map(|(feature, distances)| Some((feature, wasserstein::median(distances)?))).collect()
 }

@@ -1,13 +1,11 @@
-//! Distances as JSON and CSV for programs, as text for people.
+//! Distances as JSON and CSV for programs, as a table for people.
 
 use super::feature::Pool;
 use super::frequency;
 use super::sets::{Distance, Gap, Set};
-use crate::compare::table::columns;
-use crate::html::{count, number};
+use crate::report::{self, Cell, Lines, Table, count, number};
 use crate::{Error, Result};
 use serde::Serialize;
-use std::fmt::Write;
 
 #[derive(Serialize)]
 struct Document<'a> {
@@ -86,24 +84,26 @@ pub(super) fn json(of: &Gap) -> Result<String> {
 
 /// A row for each distance; means of several channels are apart by spaces.
 pub(super) fn csv(of: &Gap) -> String {
-    let mut out = "feature,unit,distance,halves,ratio,large,real_mean,synthetic_mean\n".to_owned();
     let value = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
     let list = |values: &[f64]| values.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
-    for (row, distance) in rows(of).iter().zip(&of.distances) {
+    let rows = rows(of).into_iter().zip(&of.distances).map(|(row, distance)| {
         let (halves, ratio) = (value(row.halves), value(distance.ratio()));
         let (real, synthetic) = (list(&row.real_mean), list(&row.synthetic_mean));
-        let (key, unit) = (&row.key, row.unit);
-        let _ = writeln!(out, "{key},{unit},{},{halves},{ratio},{},{real},{synthetic}", row.distance, row.large);
-    }
-    out
+        let [distance, large] = [row.distance.to_string(), row.large.to_string()];
+        vec![row.key, row.unit.to_owned(), distance, halves, ratio, large, real, synthetic]
+    });
+    let heads = ["feature", "unit", "distance", "halves", "ratio", "large", "real_mean", "synthetic_mean"];
+    report::csv(&heads, rows, Lines::Lf)
 }
 
 /// The table, then what is large.
 pub(super) fn text(of: &Gap) -> String {
-    let head = ["", "distance", "halves", "ratio", "real", "synthetic"].map(str::to_owned).to_vec();
-    let row = |distance: &Distance| [vec![named(distance)], cells(of, distance)].concat();
-    let rows: Vec<Vec<String>> = [head].into_iter().chain(of.distances.iter().map(row)).collect();
-    columns(&rows) + "\n" + &verdict(of) + "\n"
+    let mut table = Table::new("", ["", "distance", "halves", "ratio", "real", "synthetic"]);
+    for distance in &of.distances {
+        let name = Cell::text(named(distance));
+        table.push([name].into_iter().chain(cells(of, distance).into_iter().map(Cell::Shown)));
+    }
+    table.markdown() + "\n" + &verdict(of) + "\n"
 }
 
 /// Feature and unit.
@@ -138,11 +138,11 @@ fn tenths(value: f64) -> String {
 
 /// Which distances are large, in a sentence.
 pub(super) fn verdict(of: &Gap) -> String {
-    let judged = of.distances.iter().filter(|distance| distance.ratio().is_some()).count() as u64;
+    let compared = of.distances.iter().filter(|distance| distance.ratio().is_some()).count() as u64;
     let mut large: Vec<&Distance> = of.distances.iter().filter(|distance| distance.is_large()).collect();
     large.sort_by(|a, b| b.ratio().unwrap_or(0.0).total_cmp(&a.ratio().unwrap_or(0.0)));
     let names: Vec<String> = large.iter().map(|distance| distance.feature.name()).collect();
-    let all = count(judged, "distance", "distances");
+    let all = count(compared, "distance", "distances");
     match names.len() {
         0 => format!("None of {all} is more than twice that of two halves of the real set."),
         1 => format!("1 of {all} is more than twice that of two halves of the real set: {}.", names[0]),

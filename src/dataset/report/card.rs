@@ -4,12 +4,12 @@ use super::statistics::{Species, Statistics};
 use crate::dataset::format;
 use crate::dataset::recipe::{Made, Recipe, Rendering};
 use crate::dataset::split::Split;
-use crate::html::{count, escape, keyed, pairs, percent, whole};
+use crate::report::{count, keyed, legend, list, pairs, percent, whole};
 use crate::scene::tag::Class;
 use crate::settings::Engine;
-use std::fmt::Write;
+use maud::{Markup, html};
 
-/// The page's name without folder and ending, or where the images come from.
+/// The scene file's name without folder and ending, or where the images come from.
 pub(super) fn title(recipe: &Recipe) -> String {
     match &recipe.made {
         Made::Rendered(rendering) => {
@@ -29,143 +29,164 @@ pub(super) fn lead(recipe: &Recipe, found: &Statistics) -> String {
     };
     match &recipe.made {
         Made::Rendered(Rendering { engine, spp, .. }) => {
-            let how = if *engine == Engine::Trace { "path traced" } else { "drawn" };
+            let how = if *engine == Engine::Trace { "path traced" } else { "rasterized" };
             format!(
                 "Procedurally grown crop fields, {how} with {} a pixel in colour and near infrared at {size}, every pixel labelled \
                  exactly by the geometry that was drawn.",
                 count(u64::from(*spp), "sample", "samples")
             )
         }
-        Made::Imported { from, .. } => format!("Images and labels brought in from {}, {size}.", escape(from)),
+        Made::Imported { from, .. } => format!("Images and labels imported from {from}, {size}."),
     }
 }
 
 /// What decides the images.
-pub(super) fn provenance(recipe: &Recipe) -> String {
-    let mut rows: Vec<(&str, String)> = Vec::new();
-    let code = |text: &str| format!("<code>{}</code>", escape(text));
+pub(super) fn provenance(recipe: &Recipe) -> Markup {
+    let mut rows: Vec<(&str, Markup)> = Vec::new();
     match &recipe.made {
         Made::Rendered(made) => {
-            rows.push(("scene", code(&made.scene)));
-            rows.push(("scene SHA-256", code(&made.scene_sha256)));
-            rows.push(("seed", made.seed.to_string()));
-            rows.push(("image size", format!("{} × {} pixels", made.width, made.height)));
+            rows.push(("scene", html! { code { (made.scene) } }));
+            rows.push(("scene SHA-256", html! { code { (made.scene_sha256) } }));
+            rows.push(("seed", html! { (made.seed) }));
+            rows.push(("image size", html! { (made.width) " × " (made.height) " pixels" }));
             let engine = if made.engine == Engine::Trace { "path tracer" } else { made.engine.name() };
-            rows.push(("engine", engine.into()));
-            rows.push(("samples a pixel", made.spp.to_string()));
-            rows.push(("denoised", if made.denoise { "yes, Open Image Denoise".into() } else { "no".into() }));
+            rows.push(("engine", html! { (engine) }));
+            rows.push(("samples a pixel", html! { (made.spp) }));
+            rows.push(("denoised", html! { (if made.denoise { "yes, Open Image Denoise" } else { "no" }) }));
             let mut deviations: Vec<String> = made.without.iter().map(|t| format!("without {}", t.name())).collect();
             deviations.extend(made.max_depth.map(|n| format!("at most {n} surfaces on a path")));
-            deviations.extend(made.clamp.map(|x| format!("radiance of a path cut at {x}")));
-            deviations.extend(made.edit.as_ref().map(|name| format!("edit {}", escape(name))));
+            deviations.extend(made.clamp.map(|x| format!("radiance of a path clamped to {x}")));
+            deviations.extend(made.edit.as_ref().map(|name| format!("edit {name}")));
             if !deviations.is_empty() {
-                rows.push(("deviations", deviations.join(", ")));
+                rows.push(("deviations", html! { (deviations.join(", ")) }));
             }
-            rows.push(("kernels", escape(&made.kernels)));
+            rows.push(("kernels", html! { (made.kernels) }));
         }
-        Made::Imported { from, .. } => rows.push(("imported from", escape(from))),
+        Made::Imported { from, .. } => rows.push(("imported from", html! { (from) })),
     }
-    rows.push(("program", format!("Furrow {}", escape(&recipe.furrow))));
-    rows.push(("licence of the images", escape(&recipe.licence)));
+    rows.push(("program", html! { "Furrow " (recipe.furrow) }));
+    rows.push(("licence of the images", html! { (recipe.licence) }));
     pairs(&rows)
 }
 
 /// Splits with their numbers of images.
-pub(super) fn splits(recipe: &Recipe, names: &[Vec<String>; 3], images: u64) -> String {
-    let mut rows = String::new();
-    for (split, names) in Split::ALL.into_iter().zip(names) {
-        let n = names.len() as u64;
-        let key = format!("split.{}", split.name());
-        let share = percent(n as f64 / images.max(1) as f64);
-        let _ =
-            write!(rows, "<tr><th>{}</th><td>{}</td><td>{share}</td></tr>", split.name(), keyed(&key, n, &whole(n)));
-    }
+pub(super) fn splits(recipe: &Recipe, names: &[Vec<String>; 3], images: u64) -> Markup {
     let words = match &recipe.made {
         Made::Rendered(_) => "Every image is a field of its own: no plant and no patch of soil is in two splits.",
         Made::Imported { .. } => "Whether one plant or one field is in two splits only the source can tell.",
     };
-    format!(
-        "<table><thead><tr><th>split</th><th>images</th><th>share</th></tr></thead><tbody>{rows}</tbody></table><p>{words}</p>"
-    )
+    html! {
+        table {
+            thead { tr { th { "split" } th { "images" } th { "share" } } }
+            tbody {
+                @for (split, names) in Split::ALL.into_iter().zip(names) {
+                    @let n = names.len() as u64;
+                    tr {
+                        th { (split.name()) }
+                        td { (keyed(&format!("split.{}", split.name()), n, &whole(n))) }
+                        td { (percent(n as f64 / images.max(1) as f64)) }
+                    }
+                }
+            }
+        }
+        p { (words) }
+    }
 }
 
 /// Species with what the images show of them.
-pub(super) fn species(recipe: &Recipe, found: &Statistics) -> String {
-    let none = Species::default();
-    let all: u64 = found.pixels.iter().sum::<u64>() + found.ignored;
-    let mut rows = String::new();
-    let mut row = |name: &str, eppo: &str, class: &str, kind: u16| {
-        let of = found.species.get(&kind).unwrap_or(&none);
-        let stages = match of.bbch {
-            Some((a, b)) if a == b => a.to_string(),
-            Some((a, b)) => format!("{a} to {b}"),
-            None => "–".into(),
-        };
-        let _ = write!(
-            rows,
-            "<tr><th><i class=\"dot {class}\"></i>{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{stages}</td></tr>",
-            escape(name),
-            escape(eppo),
-            class,
-            keyed(&format!("species.{kind}.plants"), of.plants, &whole(of.plants)),
-            keyed(&format!("species.{kind}.images"), of.images, &whole(of.images)),
-            percent(of.pixels as f64 / all.max(1) as f64),
-        );
+pub(super) fn species(recipe: &Recipe, found: &Statistics) -> Markup {
+    let of = |(k, one): (usize, &'_ crate::scene::record::SpeciesRecord)| {
+        (k as u16 + 1, one.name.clone(), one.eppo.clone(), one.class.name())
     };
-    for (k, one) in recipe.species.iter().enumerate() {
-        row(&one.name, &one.eppo, one.class.name(), k as u16 + 1);
-    }
+    let mut rows: Vec<(u16, String, String, &str)> = recipe.species.iter().enumerate().map(of).collect();
     if found.species.contains_key(&0) {
-        row("not told", "", "", 0);
+        rows.push((0, "unknown".into(), String::new(), ""));
     }
     if rows.is_empty() {
-        return String::new();
+        return html! {};
     }
-    format!(
-        "<div class=\"wide\"><table><thead><tr><th>species</th><th>EPPO</th><th>class</th><th>plants seen</th><th>images</th>\
-         <th>pixels</th><th>BBCH</th></tr></thead><tbody>{rows}</tbody></table></div>"
-    )
+    let none = Species::default();
+    let all: u64 = found.pixels.iter().sum::<u64>() + found.ignored;
+    html! {
+        div.wide {
+            table {
+                thead {
+                    tr {
+                        th { "species" } th { "EPPO" } th { "class" } th { "plants seen" } th { "images" } th { "pixels" } th { "BBCH" }
+                    }
+                }
+                tbody {
+                    @for (kind, name, eppo, class) in rows {
+                        @let of = found.species.get(&kind).unwrap_or(&none);
+                        tr {
+                            th { i.dot.(class) {} (name) }
+                            td { (eppo) }
+                            td { (class) }
+                            td { (keyed(&format!("species.{kind}.plants"), of.plants, &whole(of.plants))) }
+                            td { (keyed(&format!("species.{kind}.images"), of.images, &whole(of.images))) }
+                            td { (percent(of.pixels as f64 / all.max(1) as f64)) }
+                            td { (stages(of)) }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn stages(of: &Species) -> String {
+    match of.bbch {
+        Some((a, b)) if a == b => a.to_string(),
+        Some((a, b)) => format!("{a} to {b}"),
+        None => "–".into(),
+    }
 }
 
 /// The files of an image, and how they are opened.
-pub(super) fn reading(recipe: &Recipe, nir: bool) -> String {
+pub(super) fn reading(recipe: &Recipe, nir: bool) -> Markup {
     let rendered = matches!(recipe.made, Made::Rendered(_));
-    let mut rows: Vec<(&str, String)> = vec![("rgb.png", "photograph in colour, 8-bit sRGB".into())];
+    let mut rows = vec![("rgb.png", html! { "photograph in colour, 8-bit sRGB" })];
     if nir {
-        rows.push(("nir.png", "photograph in near infrared, 8 bit".into()));
+        rows.push(("nir.png", html! { "photograph in near infrared, 8 bit" }));
     }
-    rows.push(("semantics.png", "class, indexed: 0 soil, 1 crop, 2 weed, 255 no label".into()));
+    rows.push(("semantics.png", html! { "class, indexed: 0 soil, 1 crop, 2 weed, 255 no label" }));
     if rendered {
-        rows.push(("species.png", "number of the species in the table above, 0 for none".into()));
+        rows.push(("species.png", html! { "number of the species in the table above, 0 for none" }));
     }
-    rows.push(("plants.png", "number of the plant, 16 bit, 0 for none".into()));
-    rows.push(("leaves.png", "number of the leaf on its plant, 16 bit, 0 for none".into()));
+    rows.push(("plants.png", html! { "number of the plant, 16 bit, 0 for none" }));
+    rows.push(("leaves.png", html! { "number of the leaf on its plant, 16 bit, 0 for none" }));
     if rendered {
-        rows.push(("coverage.png", "share of soil, crop, weed in the pixel as R, G, B; they sum to 255".into()));
-        rows.push((
-            "geometry.exr",
-            "<code>depth.Z</code> in metres along the optical axis, <code>normal.X/Y/Z</code> in the world".into(),
-        ));
-    }
-    rows.push((
-        "record.json",
-        "plants and leaves with boxes, masks, visible fractions and keypoints; what was drawn for the image".into(),
-    ));
-    let mut html = pairs(&rows);
-    html.push_str(EXAMPLE);
-    if !recipe.formats.is_empty() {
-        let of =
-            |table: &[(&str, &'static str)], name: &str| table.iter().find(|(n, _)| *n == name).map_or("", |(_, t)| t);
-        let told = |name: &str| {
-            format!("{}<br><code>{}</code>", escape(of(format::NAMES, name)), escape(of(format::READ, name)))
+        let coverage = "share of soil, crop, weed in the pixel as R, G, B; they sum to 255";
+        rows.push(("coverage.png", html! { (coverage) }));
+        let geometry = html! {
+            code { "depth.Z" } " in metres along the optical axis, " code { "normal.X/Y/Z" } " in world coordinates"
         };
-        let rows: Vec<(&str, String)> = recipe.formats.iter().map(|f| (f.as_str(), told(f))).collect();
-        let _ = write!(html, "<p>The same images for other tools, each in the folder of its name:</p>{}", pairs(&rows));
+        rows.push(("geometry.exr", geometry));
     }
-    html
+    let record =
+        "plants and leaves with boxes, masks, visible fractions and keypoints; the conditions drawn for the image";
+    rows.push(("record.json", html! { (record) }));
+    html! {
+        (pairs(&rows))
+        pre { code { (EXAMPLE) } }
+        p {
+            code { "manifest.json" } " lists every file with its SHA-256; " code { "trace dataset verify DIR" }
+            " checks them and every label."
+        }
+        @if !recipe.formats.is_empty() {
+            p { "The same images for other tools, each in the folder of its name:" }
+            (pairs(&recipe.formats.iter().map(|name| (name, told(name))).collect::<Vec<_>>()))
+        }
+    }
 }
 
-const EXAMPLE: &str = "<pre><code>import json, numpy as np
+/// What a format is, and how it is opened.
+fn told(name: &str) -> Markup {
+    let of = |table: &[(&str, &'static str)]| table.iter().find(|(n, _)| *n == name).map_or("", |(_, text)| text);
+    html! { (of(format::NAMES)) br; code { (of(format::READ)) } }
+}
+
+const EXAMPLE: &str = "import json, numpy as np
 from PIL import Image
 folder = \"images/000000\"
 semantics = np.array(Image.open(f\"{folder}/semantics.png\"))
@@ -173,16 +194,16 @@ plants = np.array(Image.open(f\"{folder}/plants.png\"))
 record = json.load(open(f\"{folder}/record.json\"))
 for plant in record[\"plants\"]:
     print(plant[\"number\"], plant[\"class\"], plant[\"seen\"][\"pixels\"], np.sum(plants == plant[\"number\"]))
-</code></pre>
-<p><code>manifest.json</code> lists every file with its SHA-256; <code>trace dataset verify DIR</code> checks them and every label.</p>";
+";
 
 /// What whoever uses it should know.
-pub(super) fn limits(recipe: &Recipe, found: &Statistics) -> String {
+pub(super) fn limits(recipe: &Recipe, found: &Statistics) -> Markup {
     let mut all: Vec<String> = Vec::new();
     match &recipe.made {
         Made::Rendered(made) => {
             all.push(
-                "The images are synthetic. What they are worth for real fields shows only on real images: keep some to judge by.".into(),
+                "The images are synthetic. What they are worth for real fields shows only on real images: keep some as a test set."
+                    .into(),
             );
             all.push(
                 "A label is that of the surface at the pixel's centre; coverage tells what share of an edge pixel each class has."
@@ -204,38 +225,42 @@ pub(super) fn limits(recipe: &Recipe, found: &Statistics) -> String {
             all.push("How much of a plant others hide is not known: visible fractions stand at 1.".into());
         }
     }
-    for (words, n) in &found.warnings {
-        all.push(format!("{}: {}", count(*n, "image", "images"), escape(words)));
-    }
-    format!("<ul><li>{}</li></ul>", all.join("</li><li>"))
+    all.extend(found.warnings.iter().map(|(words, n)| format!("{}: {words}", count(*n, "image", "images"))));
+    list(&all)
 }
 
 /// Whose work it stands on.
-pub(super) fn sources(recipe: &Recipe) -> &'static str {
+pub(super) fn sources(recipe: &Recipe) -> Markup {
     match &recipe.made {
-        Made::Rendered(_) => {
-            "<p>Procedural fields for plant detection: Di Cicco, Potena, Grisetti &amp; Pretto, <cite>Automatic Model Based Dataset \
-             Generation for Fast and Accurate Crop and Weeds Detection</cite>, IROS 2017. Growth stages: Meier 2001 (BBCH). Leaf optics: \
-             Féret, Gitelson, Noble &amp; Jacquemoud 2017 (PROSPECT-D). Sky: Hošek &amp; Wilkie 2012. Rays: Embree, Wald et al. 2014.</p>"
-        }
-        Made::Imported { .. } => "<p>Cite the source of the images, and keep to its licence.</p>",
+        Made::Rendered(_) => html! {
+            p {
+                "Procedural fields for plant detection: Di Cicco, Potena, Grisetti & Pretto, "
+                cite { "Automatic Model Based Dataset Generation for Fast and Accurate Crop and Weeds Detection" }
+                ", IROS 2017. Growth stages: Meier 2001 (BBCH). Leaf optics: Féret, Gitelson, Noble & Jacquemoud 2017 (PROSPECT-D). \
+                 Sky: Hošek & Wilkie 2012. Rays: Embree, Wald et al. 2014."
+            }
+        },
+        Made::Imported { .. } => html! { p { "Cite the source of the images, and keep to its licence." } },
     }
 }
 
 /// The bar of what the pixels show.
-pub(super) fn pixels(found: &Statistics) -> String {
+pub(super) fn pixels(found: &Statistics) -> Markup {
     let all: u64 = found.pixels.iter().sum::<u64>() + found.ignored;
     let mut parts: Vec<(&str, u64)> = Class::ALL.iter().map(|c| (c.name(), found.pixels[*c as usize])).collect();
     if found.ignored > 0 {
         parts.push(("no label", found.ignored));
     }
     let share = |n: u64| n as f64 / all.max(1) as f64;
-    let (mut bar, mut legend) = (String::new(), String::new());
-    for (name, n) in parts {
-        let class = if Class::named(name).is_some() { name } else { "none" };
-        let _ = write!(bar, "<i class=\"{class}\" style=\"flex-grow:{:.6}\"></i>", share(n));
-        let value = keyed(&format!("pixels.{class}"), n, &percent(share(n)));
-        let _ = write!(legend, "<span><i class=\"dot {class}\"></i>{name} {value}</span>");
+    let class = |name: &str| Class::named(name).map_or("none", Class::name);
+    let entry = |(name, n): &(&str, u64)| {
+        let value = keyed(&format!("pixels.{}", class(name)), n, &percent(share(*n)));
+        (html! { i.dot.(class(name)) {} }, html! { (name) " " (value) })
+    };
+    html! {
+        div.stack aria-hidden="true" {
+            @for (name, n) in &parts { i class=(class(name)) style=(format!("flex-grow:{:.6}", share(*n))) {} }
+        }
+        (legend(parts.iter().map(entry)))
     }
-    format!("<div class=\"stack\" aria-hidden=\"true\">{bar}</div><p class=\"legend\">{legend}</p>")
 }

@@ -1,7 +1,7 @@
 //! How bright the photographs are and of what colour, measured on some of them.
 
-use super::histogram::Histogram;
 use crate::dataset::{Set, native};
+use crate::report::Tally;
 use crate::{Result, output};
 use rayon::prelude::*;
 
@@ -13,11 +13,11 @@ pub(super) struct Photographs {
     /// How many.
     pub(super) measured: u64,
     /// Mean of R, G, B of an image, of 255.
-    pub(super) brightness: Histogram,
+    pub(super) brightness: Tally,
     /// Mean near infrared of an image, of 255.
-    pub(super) nir: Histogram,
+    pub(super) nir: Tally,
     /// Percent of an image's pixels with a channel at 255.
-    pub(super) clipped: Histogram,
+    pub(super) clipped: Tally,
     /// Mean colours, dark ones first.
     pub(super) colors: Vec<[u8; 3]>,
 }
@@ -35,9 +35,9 @@ pub(super) fn measure(set: &Set) -> Result<Photographs> {
     let all: Vec<Means> = places.par_iter().map(|k| means(set, &Set::name(*k))).collect::<Result<_>>()?;
     let mut found = Photographs {
         measured,
-        brightness: Histogram::linear(0.5),
-        nir: Histogram::linear(0.5),
-        clipped: Histogram::linear(0.01),
+        brightness: Tally::linear(0.0, 256.0, 0.5),
+        nir: Tally::linear(0.0, 256.0, 0.5),
+        clipped: Tally::linear(0.0, 100.0, 0.01),
         colors: Vec::new(),
     };
     for Means(rgb, clipped, nir) in &all {

@@ -5,9 +5,10 @@ use crate::dataset::record::Record;
 use crate::dataset::sample::{IGNORE, Sample};
 use crate::dataset::split::Split;
 use crate::dataset::{Set, native};
-use crate::html::{count, escape, inside, percent};
 use crate::output::{self, Picture};
+use crate::report::{count, data_url, percent};
 use crate::scene::tag::Class;
+use maud::{Markup, html};
 use rayon::prelude::*;
 
 /// Most images.
@@ -17,16 +18,16 @@ const SIDE: u32 = 360;
 /// Quality of the JPEGs.
 const QUALITY: u8 = 82;
 
-/// The sheet as HTML. `names` are the images of each split, in the order of [`Split::ALL`].
-pub(super) fn sheet(set: &Set, names: &[Vec<String>; 3]) -> Result<String> {
+/// The sheet. `names` are the images of each split, in the order of [`Split::ALL`].
+pub(super) fn sheet(set: &Set, names: &[Vec<String>; 3]) -> Result<Markup> {
     let all: Vec<&String> = chosen(names.each_ref().map(Vec::len))
         .into_iter()
         .zip(names)
         .flat_map(|(places, names)| places.into_iter().map(move |k| &names[k]))
         .collect();
-    let cards: Vec<String> =
+    let cards: Vec<Markup> =
         all.par_iter().map(|name| card(&native::read(&set.folder, name)?)).collect::<Result<_>>()?;
-    Ok(cards.concat())
+    Ok(html! { @for card in &cards { (card) } })
 }
 
 /// Which images of splits of these sizes are shown: of each the same number as far as they go, spread over it.
@@ -43,20 +44,23 @@ fn chosen(sizes: [usize; Split::ALL.len()]) -> [Vec<usize>; Split::ALL.len()] {
 }
 
 /// One image: photograph, labels, words.
-fn card(sample: &Sample) -> Result<String> {
+fn card(sample: &Sample) -> Result<Markup> {
     let Record { name, source, split, width, height, .. } = &sample.record;
     let (w, h, rgb) = output::shrink(*width, *height, &sample.rgb, SIDE);
-    let photograph = inside("jpeg", &output::encode_jpeg(w, h, &rgb, QUALITY)?);
-    let labels = inside("png", &output::encode_png(w, h, &Picture::Rgba(&overlay(sample, w, h)), "")?);
-    let source = source.as_ref().map(|s| format!(" title=\"{}\"", escape(s))).unwrap_or_default();
-    Ok(format!(
-        "<figure class=\"shot\"><label{source}><input type=\"checkbox\"><span class=\"frame\">\
-         <img src=\"{photograph}\" width=\"{w}\" height=\"{h}\" alt=\"image {name}\">\
-         <img class=\"labels\" src=\"{labels}\" width=\"{w}\" height=\"{h}\" alt=\"its labels\"></span></label>\
-         <figcaption><b>{name}</b> {} · {}</figcaption></figure>\n",
-        split.name(),
-        words(&sample.record)
-    ))
+    let photograph = data_url("jpeg", &output::encode_jpeg(w, h, &rgb, QUALITY)?);
+    let labels = data_url("png", &output::encode_png(w, h, &Picture::Rgba(&overlay(sample, w, h)), "")?);
+    Ok(html! {
+        figure.shot {
+            label title=[source.as_ref()] {
+                input type="checkbox";
+                span.frame {
+                    img src=(photograph) width=(w) height=(h) alt={ "image " (name) };
+                    img.labels src=(labels) width=(w) height=(h) alt={ "labels of image " (name) };
+                }
+            }
+            figcaption { b { (name) } " " (split.name()) " · " (words(&sample.record)) }
+        }
+    })
 }
 
 /// What an image shows: plants, or shares of classes where nobody has told plants apart.

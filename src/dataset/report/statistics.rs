@@ -1,7 +1,7 @@
 //! What the records of a dataset say together, added up one by one: of any number of images in little memory.
 
-use super::histogram::Histogram;
 use crate::dataset::record::{Plant, Record};
+use crate::report::Tally;
 use crate::scene::tag::Class;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -12,8 +12,8 @@ pub(super) const MOST_SUNS: u64 = 600;
 /// Crop and weed.
 pub(super) const PLANTS: [Class; 2] = [Class::Crop, Class::Weed];
 
-/// One histogram for crop, one for weed.
-pub(super) type Pair = [Histogram; 2];
+/// One tally for crop, one for weed.
+pub(super) type Pair = [Tally; 2];
 
 /// What is known of all images.
 pub(super) struct Statistics {
@@ -26,7 +26,7 @@ pub(super) struct Statistics {
     pub(super) pixels: [u64; Class::ALL.len()],
     pub(super) ignored: u64,
     /// Share of each image, by class; percent, as all shares here.
-    pub(super) shares: [Histogram; Class::ALL.len()],
+    pub(super) shares: [Tally; Class::ALL.len()],
     /// Plants, each with at least one pixel, in an image.
     pub(super) plants: Pair,
     /// Pixels of a plant, of a leaf.
@@ -69,30 +69,30 @@ pub(super) struct Light {
     pub(super) kinds: BTreeMap<String, u64>,
     /// Azimuth, elevation (degrees) and cloud of some suns.
     pub(super) suns: Vec<[f64; 3]>,
-    pub(super) elevation_deg: Histogram,
-    pub(super) cloud: Histogram,
-    pub(super) turbidity: Histogram,
+    pub(super) elevation_deg: Tally,
+    pub(super) cloud: Tally,
+    pub(super) turbidity: Tally,
     /// What the ground gets of all lights, mean of R, G, B, W·m⁻²·nm⁻¹.
-    pub(super) irradiance: Histogram,
+    pub(super) irradiance: Tally,
 }
 
 /// Soil over all images.
 pub(super) struct Soil {
-    pub(super) moisture: Histogram,
-    pub(super) roughness_mm: Histogram,
-    pub(super) straw: Histogram,
-    pub(super) clods: Histogram,
+    pub(super) moisture: Tally,
+    pub(super) roughness_mm: Tally,
+    pub(super) straw: Tally,
+    pub(super) clods: Tally,
     /// Sum over images of a layer's share, by its name.
     pub(super) layers: BTreeMap<String, f64>,
 }
 
 /// Cameras over all images.
 pub(super) struct Camera {
-    pub(super) height_m: Histogram,
+    pub(super) height_m: Tally,
     /// Between the optical axis and straight down.
-    pub(super) tilt_deg: Histogram,
+    pub(super) tilt_deg: Tally,
     /// Height over focal length: what a pixel spans straight below.
-    pub(super) pixel_mm: Histogram,
+    pub(super) pixel_mm: Tally,
 }
 
 impl Statistics {
@@ -103,44 +103,44 @@ impl Statistics {
 
     /// Of nothing yet; `of` images will come.
     pub(super) fn new(of: u64) -> Self {
-        let pair = |one: fn() -> Histogram| [one(), one()];
+        let pair = |one: fn() -> Tally| [one(), one()];
         Self {
             images: 0,
             of,
             sizes: BTreeMap::new(),
             pixels: [0; Class::ALL.len()],
             ignored: 0,
-            shares: std::array::from_fn(|_| Histogram::percents()),
-            plants: pair(Histogram::whole),
-            plant_pixels: pair(Histogram::sizes),
-            leaf_pixels: pair(Histogram::sizes),
-            plant_visible: pair(Histogram::percents),
-            leaf_visible: pair(Histogram::percents),
+            shares: std::array::from_fn(|_| Tally::percents()),
+            plants: pair(Tally::whole),
+            plant_pixels: pair(Tally::sizes),
+            leaf_pixels: pair(Tally::sizes),
+            plant_visible: pair(Tally::percents),
+            leaf_visible: pair(Tally::percents),
             hidden: 0,
             cut: 0,
-            bbch: pair(Histogram::whole),
-            age_days: pair(|| Histogram::linear(0.5)),
-            height_cm: pair(|| Histogram::linear(0.1)),
+            bbch: pair(Tally::whole),
+            age_days: pair(|| Tally::linear(0.0, 1000.0, 0.5)),
+            height_cm: pair(|| Tally::linear(0.0, 1000.0, 0.1)),
             species: BTreeMap::new(),
             light: Light {
                 kinds: BTreeMap::new(),
                 suns: Vec::new(),
-                elevation_deg: Histogram::linear(1.0 / 2.0),
-                cloud: Histogram::percents(),
-                turbidity: Histogram::linear(0.05),
-                irradiance: Histogram::linear(0.01),
+                elevation_deg: Tally::linear(-90.0, 90.0, 0.5),
+                cloud: Tally::percents(),
+                turbidity: Tally::linear(0.0, 100.0, 0.05),
+                irradiance: Tally::linear(0.0, 200.0, 0.01),
             },
             soil: Soil {
-                moisture: Histogram::percents(),
-                roughness_mm: Histogram::linear(0.05),
-                straw: Histogram::linear(0.02),
-                clods: Histogram::linear(50.0),
+                moisture: Tally::percents(),
+                roughness_mm: Tally::linear(0.0, 500.0, 0.05),
+                straw: Tally::linear(0.0, 100.0, 0.02),
+                clods: Tally::linear(0.0, 1e6, 50.0),
                 layers: BTreeMap::new(),
             },
             camera: Camera {
-                height_m: Histogram::linear(0.002),
-                tilt_deg: Histogram::linear(0.05),
-                pixel_mm: Histogram::linear(0.002),
+                height_m: Tally::linear(0.0, 50.0, 0.002),
+                tilt_deg: Tally::linear(0.0, 180.0, 0.05),
+                pixel_mm: Tally::linear(0.0, 50.0, 0.002),
             },
             warnings: BTreeMap::new(),
         }
@@ -237,7 +237,7 @@ impl Statistics {
 
 impl Soil {
     fn add(&mut self, soil: &Value) {
-        let add = |to: &mut Histogram, path: &str, scale: f64| {
+        let add = |to: &mut Tally, path: &str, scale: f64| {
             soil.pointer(path).and_then(Value::as_f64).into_iter().for_each(|x| to.add(scale * x));
         };
         add(&mut self.moisture, "/moisture/mean", 100.0);

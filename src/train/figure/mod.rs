@@ -3,15 +3,12 @@
 //! | file | idea |
 //! |---|---|
 //! | `shot`, `sheet` | image, truth and predictions side by side: the paper's figure, as one PNG |
-//! | `curve` | loss and scores over training, as SVG |
 //! | `page` | numbers, curves and pictures of a run or an evaluation on one HTML page |
 
-mod curve;
 mod page;
 mod sheet;
 mod shot;
 
-pub use curve::{Chart, Curve};
 pub use page::Page;
 pub use sheet::{Sheet, sheet};
 pub use shot::{Shot, spread};

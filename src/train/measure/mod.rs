@@ -11,7 +11,6 @@
 //! | `components`, `size` | pixels that hang together; what is found of small and of large plants |
 //! | `bootstrap` | how far scores would stray on other images of the kind |
 //! | `evaluation`, `report` | all of it over a set of images; what came out |
-//! | `table` | rows of numbers as Markdown, CSV, JSON |
 
 pub mod bootstrap;
 pub mod boundary;
@@ -21,11 +20,9 @@ pub mod evaluation;
 pub mod report;
 pub mod scores;
 pub mod size;
-pub mod table;
 
 pub use bootstrap::Interval;
 pub use confusion::Confusion;
 pub use evaluation::{Answer, Evaluation};
 pub use report::Report;
 pub use scores::{ClassMeasures, Measures, Scores};
-pub use table::{Cell, Table};

@@ -6,7 +6,7 @@ use super::confusion::Confusion;
 use super::evaluation::{Evaluation, Judged};
 use super::scores::{Measures, Scores, mean};
 use super::size::SizeBin;
-use super::table::{Cell, Table};
+use crate::report::{Cell, Table};
 use serde::{Deserialize, Serialize};
 
 /// Seed of the resamples: reports of equal images are equal.

@@ -12,9 +12,10 @@ use crate::Result;
 use crate::compare::{Band, Comparison, Options, Pairs, Region};
 use crate::dataset::recipe::{FILE, Rendering};
 use crate::dataset::{Set, ledger, native};
+use crate::report::{Cell, Table};
 use crate::train::data::Pick;
 use crate::train::figure::Shot;
-use crate::train::measure::{Cell, Report, Table};
+use crate::train::measure::Report;
 use crate::train::run;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -30,7 +31,7 @@ const GAP: u32 = 4;
 const MEASURED: usize = 20;
 
 /// What the page says of it all.
-pub(super) const LEAD: &str = "What each change of what is learnt from does: the mean difference over seeds, and the standard deviation of \
+pub(super) const LEAD: &str = "What each change of the training set does: the mean difference over seeds, and the standard deviation of \
                                that difference. A change that is not beyond it may be chance. Pictures show the unchanged field on the left \
                                and the changed one on the right.";
 

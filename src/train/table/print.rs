@@ -7,9 +7,10 @@ use super::rows::{self, Learner, Row};
 use super::sets::Bound;
 use crate::Result;
 use crate::output::write_atomically;
+use crate::report::{Cell, Table};
 use crate::train::classes::Classes;
 use crate::train::figure;
-use crate::train::measure::{Cell, Report, Table};
+use crate::train::measure::Report;
 use crate::train::run::{self, Results};
 use std::path::{Path, PathBuf};
 
@@ -231,14 +232,14 @@ pub(super) fn page(bound: &Bound, tables: &Tables, out: &Path) -> Result<PathBuf
         fact("scale", experiment.scale.clone().unwrap_or_else(|| "that of the page".into())),
         fact("sets", names(experiment.sets.iter().map(|(name, _)| name.as_str()).collect())),
     ];
-    let answer = tables.0.iter().find(|(name, _)| *name == AGAINST).map(|(_, table)| table);
+    let effects = tables.0.iter().find(|(name, _)| *name == AGAINST).map(|(_, table)| table);
     let shown: Vec<Table> =
         tables.0.iter().filter(|(name, _)| ![TIMES, AGAINST].contains(name)).map(|(_, t)| t.clone()).collect();
     let (title, lead) = match &experiment.against {
-        Some(_) => ("What each change matters to a network", against::LEAD),
+        Some(_) => ("Effect of each change on a trained network", against::LEAD),
         None => (
-            "Trained on rendered and real images, judged on real ones",
-            "Means over seeds; a network below the colour baselines has learnt nothing of shape.",
+            "Trained on rendered and real images, evaluated on real ones",
+            "Means over seeds; a network that scores below the colour baselines has learned nothing about shape.",
         ),
     };
     let shots = against::shots(bound)?;
@@ -248,7 +249,7 @@ pub(super) fn page(bound: &Bound, tables: &Tables, out: &Path) -> Result<PathBuf
         title,
         lead,
         facts: &facts,
-        answer,
+        effects,
         tables: &shown,
         shots: &shots,
         predictors: &predictors,
@@ -264,7 +265,7 @@ pub(super) fn page(bound: &Bound, tables: &Tables, out: &Path) -> Result<PathBuf
 /// All rows with their numbers and how far they are.
 pub fn listing(bound: &Bound, out: &Path) -> Result<Table> {
     let experiment = &bound.experiment;
-    let mut table = Table::new("Rows", ["row", "network", "trained on", "seed", "training", "tests judged"]);
+    let mut table = Table::new("Rows", ["row", "network", "trained on", "seed", "training", "tests evaluated"]);
     for (i, row) in rows::rows(experiment).into_iter().enumerate() {
         let folder = row.folder(experiment, out);
         let s = see(experiment, row, out, &mut Vec::new())?;
@@ -334,7 +335,7 @@ fn runs(experiment: &Experiment, seen: &[Seen]) -> Table {
 fn times(experiment: &Experiment, seen: &[Seen]) -> Table {
     let tests = experiment.test.iter().map(|t| format!("{}: seconds an image", t.name));
     let columns = ["network".to_owned()].into_iter().chain(tests);
-    let columns = columns.chain(["images learnt a second", "minutes of a training"].map(str::to_owned));
+    let columns = columns.chain(["training images a second", "minutes of a training"].map(str::to_owned));
     let learn = &experiment.learn;
     let title = format!("Times ({} × {})", learn.shape.width, learn.shape.height);
     let mut table = Table::new(title, columns);

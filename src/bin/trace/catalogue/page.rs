@@ -1,13 +1,12 @@
 //! The page that shows all sheets, in one file.
 
-use furrow::html::{document, escape, inside, number, section};
+use furrow::report::{Cell, Page, Table, data_url, number, section};
 use furrow::scene::PlantRecord;
 use furrow::scene::desc::{Role, SpeciesDesc};
-use std::fmt::Write;
+use maud::html;
 
 /// Rules beyond those of every page.
-const STYLE: &str = ".sheet-wide { width: 100%; height: auto; border-radius: 6px; margin-bottom: .8rem; }\n\
-                     .wide td, .wide th { text-align: right; } .wide th:first-child { text-align: left; }\n";
+const STYLE: &str = ".sheet-wide { width: 100%; height: auto; border-radius: 6px; margin-bottom: .8rem; }\n";
 
 /// One species.
 pub(super) struct Entry {
@@ -21,37 +20,37 @@ pub(super) struct Entry {
 
 /// The page.
 pub(super) fn html(entries: &[Entry]) -> String {
-    let mut body = String::new();
-    for entry in entries {
-        let SpeciesDesc { name, eppo, role, .. } = &entry.desc;
-        let role = if *role == Role::Crop { "crop" } else { "weed" };
-        let picture = inside("jpeg", &entry.picture);
-        let shown = format!("<img class=\"sheet-wide\" src=\"{picture}\" alt=\"{}\">", escape(name));
-        body += &section(&format!("{name} · {eppo} · {role}"), &(shown + &table(&entry.stages)));
-    }
-    let lead = "Every species page at every growth stage: above as a camera sees it that looks straight down, below from about 30° \
-                above the ground. It is one plant in all of its pictures; bars are to scale where it stands.";
-    document("Catalogue", "Species", lead, STYLE, &body, "Grown and traced by <code>trace catalogue</code>.")
+    let body = html! {
+        @for entry in entries {
+            @let SpeciesDesc { name, eppo, role, .. } = &entry.desc;
+            @let role = if *role == Role::Crop { "crop" } else { "weed" };
+            (section(&format!("{name} · {eppo} · {role}"), html! {
+                img.sheet-wide src=(data_url("jpeg", &entry.picture)) alt=(name);
+                div.wide { (table(&entry.stages).html()) }
+            }))
+        }
+    };
+    let lead = html! {
+        "Every species page at every growth stage: above as a camera sees it that looks straight down, below from about 30° above the \
+         ground. It is one plant in all of its pictures; bars are to scale where it stands. Grown and rendered by "
+        code { "trace catalogue" } "."
+    };
+    Page { kind: "Catalogue", title: "Species", lead, style: STYLE, body, script: "" }.html(env!("CARGO_PKG_VERSION"))
 }
 
-fn table(stages: &[PlantRecord]) -> String {
-    let mut rows = String::new();
+fn table(stages: &[PlantRecord]) -> Table {
+    let mut table = Table::new("", ["stage", "days", "leaves", "longest blade, mm", "height, mm", "span, mm"]);
     for plant in stages {
-        let mm = |metres: f32| number(f64::from((metres * 1e3).round()));
+        let mm = |metres: f32| Cell::Shown(number(f64::from((metres * 1e3).round())));
         let longest = plant.leaf_axes.iter().map(|a| a.base.distance(a.tip)).fold(0.0, f32::max);
-        let _ = write!(
-            rows,
-            "<tr><th>BBCH {}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
-            plant.bbch,
-            number(f64::from(plant.age_days)),
-            plant.leaf_axes.len(),
+        table.push([
+            Cell::text(format!("BBCH {}", plant.bbch)),
+            Cell::Shown(number(f64::from(plant.age_days))),
+            Cell::Count(plant.leaf_axes.len() as u64),
             mm(longest),
             mm(plant.height),
             mm(2.0 * plant.radius),
-        );
+        ]);
     }
-    format!(
-        "<div class=\"wide\"><table><thead><tr><th>stage</th><th>days</th><th>leaves</th><th>longest blade, mm</th>\
-         <th>height, mm</th><th>span, mm</th></tr></thead><tbody>{rows}</tbody></table></div>\n"
-    )
+    table
 }

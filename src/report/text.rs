@@ -1,22 +1,6 @@
-//! Text and numbers as a page shows them.
+//! Numbers as a page shows them.
 
-/// Text that a page shows as it is.
-pub fn escape(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\'' => out.push_str("&#39;"),
-            c => out.push(c),
-        }
-    }
-    out
-}
-
-/// A whole number, its thousands apart.
+/// A whole number, with narrow spaces between groups of three digits.
 pub fn whole(n: u64) -> String {
     let digits = n.to_string();
     let mut out = String::new();
@@ -50,20 +34,9 @@ pub fn percent(share: f64) -> String {
     format!("{}\u{202f}%", number(100.0 * share))
 }
 
-/// One thing or many.
+/// A number and its noun: `1 image`, `2 images`.
 pub fn count(n: u64, one: &str, many: &str) -> String {
     format!("{} {}", whole(n), if n == 1 { one } else { many })
-}
-
-/// A number that the page's readers find by its key.
-pub fn keyed(key: &str, value: impl std::fmt::Display, shown: &str) -> String {
-    format!("<span data-key=\"{key}\" data-value=\"{value}\">{shown}</span>")
-}
-
-/// A table of what is what: `<dl>` with a row for each pair of a name and HTML.
-pub fn pairs(rows: &[(&str, String)]) -> String {
-    let row = |(name, value): &(&str, String)| format!("<dt>{}</dt><dd>{value}</dd>", escape(name));
-    format!("<dl class=\"pairs\">{}</dl>", rows.iter().map(row).collect::<String>())
 }
 
 #[cfg(test)]
@@ -77,6 +50,5 @@ mod tests {
         assert_eq!(shown, expected);
         assert_eq!(whole(1_234_567), "1\u{202f}234\u{202f}567");
         assert_eq!(percent(0.5), "50\u{202f}%");
-        assert_eq!(escape("<a href='x'>&\"</a>"), "&lt;a href=&#39;x&#39;&gt;&amp;&quot;&lt;/a&gt;");
     }
 }

@@ -1,7 +1,10 @@
-//! Rows of words and numbers, for people (Markdown) and for programs (CSV, JSON).
+//! Rows of words and numbers, for people (Markdown, HTML) and for programs (CSV, JSON).
 //!
-//! Markdown shows numbers to their decimals. CSV and JSON hold them in full. What is not known is `–`, empty, `null`.
+//! Markdown and HTML show numbers to their decimals. CSV and JSON hold them in full. What is not known is `–`, empty, `null`.
 
+use super::csv::{Lines, csv};
+use super::whole;
+use maud::{Markup, html};
 use serde::{Serialize, Serializer};
 use std::fmt::Write;
 
@@ -14,6 +17,8 @@ pub enum Cell {
     Count(u64),
     /// A number, if it is known and finite; shown to so many decimals.
     Number(Option<f64>, usize),
+    /// Numbers already in words: `∞`, `0.93 (0.91 to 0.95)`.
+    Shown(String),
 }
 
 impl Cell {
@@ -35,7 +40,7 @@ impl Cell {
     /// As people read it.
     pub fn shown(&self) -> String {
         match self {
-            Self::Text(words) => words.clone(),
+            Self::Text(words) | Self::Shown(words) => words.clone(),
             Self::Count(n) => n.to_string(),
             Self::Number(Some(value), decimals) if value.is_finite() => {
                 let text = format!("{value:.decimals$}");
@@ -55,7 +60,7 @@ impl Cell {
 impl Serialize for Cell {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
-            Self::Text(words) => serializer.serialize_str(words),
+            Self::Text(words) | Self::Shown(words) => serializer.serialize_str(words),
             Self::Count(n) => serializer.serialize_u64(*n),
             Self::Number(value, _) => value.filter(|v| v.is_finite()).serialize(serializer),
         }
@@ -120,18 +125,29 @@ impl Table {
         self.rows.iter().any(|row| row[column].is_text())
     }
 
-    /// Comma-separated values with a line of heads, lines ended by CR LF. Source: RFC 4180.
+    /// Comma-separated values with a line of heads, lines ended by CR LF.
     pub fn csv(&self) -> String {
-        let mut out = String::new();
-        let mut line = |fields: Vec<String>| {
-            out.push_str(&fields.iter().map(|field| csv_field(field)).collect::<Vec<_>>().join(","));
-            out.push_str("\r\n");
-        };
-        line(self.columns.clone());
-        for row in &self.rows {
-            line(row.iter().map(Self::csv_text).collect());
+        csv(&self.columns, self.rows.iter().map(|row| row.iter().map(Self::csv_text).collect()), Lines::CrLf)
+    }
+
+    /// An HTML table, its title as the caption; words on the left, numbers on the right.
+    pub fn html(&self) -> Markup {
+        let class: Vec<Option<&str>> = (0..self.columns.len()).map(|k| self.is_words(k).then_some("words")).collect();
+        html! {
+            table.numbers {
+                @if !self.title.is_empty() { caption { (self.title) } }
+                thead { tr { @for (head, class) in self.columns.iter().zip(&class) { td class=[class] { (head) } } } }
+                tbody {
+                    @for row in &self.rows {
+                        tr {
+                            @for (cell, class) in row.iter().zip(&class) {
+                                td class=[class] { @if let Cell::Count(n) = cell { (whole(*n)) } @else { (cell.shown()) } }
+                            }
+                        }
+                    }
+                }
+            }
         }
-        out
     }
 
     fn csv_text(cell: &Cell) -> String {
@@ -145,11 +161,6 @@ impl Table {
     pub fn json(&self) -> String {
         serde_json::to_string_pretty(self).expect("words and numbers") + "\n"
     }
-}
-
-/// A field, in quotes where it must be.
-fn csv_field(text: &str) -> String {
-    if text.contains([',', '"', '\r', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
 }
 
 /// Text that stays in its cell.

@@ -1,13 +1,13 @@
-//! Where the numbers of an axis stand.
+//! Places of the numbers along an axis.
 
 /// 1, 2 or 5 times a power of ten, not below `least`.
-pub fn step(least: f64) -> f64 {
+pub(super) fn step(least: f64) -> f64 {
     let power = 10.0_f64.powf(least.max(1e-9).log10().floor());
     [1.0, 2.0, 5.0, 10.0].map(|f| f * power).into_iter().find(|s| *s >= least * (1.0 - 1e-9)).unwrap_or(power * 10.0)
 }
 
 /// Multiples of a round step from `from` to `to`: at least two unless they are equal, and about `about`.
-pub fn ticks(from: f64, to: f64, about: usize) -> Vec<f64> {
+pub(super) fn ticks(from: f64, to: f64, about: usize) -> Vec<f64> {
     let step = step((to - from) / about.max(1) as f64);
     // Half a thousandth of a step: 0.3 is the third of 0.1 whatever its last bit says.
     let (first, last) = ((from / step - 5e-4).ceil() as i64, (to / step + 5e-4).floor() as i64);

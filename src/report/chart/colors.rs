@@ -1,0 +1,24 @@
+//! Colours side by side.
+
+use super::frame::{WIDTH, figure};
+use crate::report::color;
+use maud::{Markup, html};
+
+/// Room on both sides.
+const MARGIN: f64 = 12.0;
+
+/// Colours from left to right, each 8-bit sRGB; nothing where there are none.
+pub fn colors(title: &str, unit: &str, all: &[[u8; 3]]) -> Markup {
+    if all.is_empty() {
+        return html! {};
+    }
+    let width = (WIDTH - 2.0 * MARGIN) / all.len() as f64;
+    let body = html! {
+        @for (k, rgb) in all.iter().enumerate() {
+            // A little wider, lest the background shows between.
+            rect x=(format!("{:.2}", MARGIN + k as f64 * width)) y="4" width=(format!("{:.2}", width + 0.3)) height="64"
+                style={ "fill:" (color(*rgb)) } {}
+        }
+    };
+    figure(title, unit, 76.0, body)
+}
