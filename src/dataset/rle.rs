@@ -3,6 +3,8 @@
 //! The packing is that of the reference implementation (pycocotools, `rleToString`): each run is told as its difference to the
 //! run before the last, in groups of five bits from the lowest, a sixth bit says whether another follows, and 48 is added to
 //! make it a printable character.
+//!
+//! By hand: no maintained crate writes this packing, and its bytes must not move.
 
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};

@@ -2,6 +2,8 @@
 //!
 //! The generator is PCG-XSL-RR 128/64 (MCG), named and portable between versions and machines (`rand_pcg::Pcg64Mcg`).
 //! Its seed is a hash of the address, so streams are never dealt in a row.
+//!
+//! Normal, Poisson and other draws are by hand: `rand_distr` may draw otherwise in its next version, and every bit follows from draws.
 
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;

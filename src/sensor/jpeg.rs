@@ -3,6 +3,8 @@
 //! Only that part of the format is here. What the entropy coder writes is read back as it was, so no bytes need be made, and the
 //! pictures' files stay PNG. Source: ITU-T T.81 (1992), annexes A and K; tables are scaled by quality as the Independent JPEG Group does,
 //! colours are those of JFIF 1.02. Blocks begin at the window's first pixel.
+//!
+//! By hand: encoders hand out a file, not the loss alone, and their rounding may change from one version to the next; pixels must not.
 
 use crate::ron_file::{Bound, Vary};
 use crate::sampling::rng::Stream;

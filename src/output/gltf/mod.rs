@@ -10,6 +10,8 @@
 //!
 //! glTF has no sky, no lamps with an area, no near infrared and no lens distortion: [`write()`] says so; near infrared and the
 //! lens stand in `extras`. Radiance becomes photometric by 683 lm/W and the width of the eye's curve.
+//!
+//! By hand: the crate `gltf` reads documents but does not write them (tests read these with it).
 
 mod look;
 mod pack;

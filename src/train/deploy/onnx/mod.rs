@@ -6,6 +6,8 @@
 //! `weights_sha256` and `version`.
 //!
 //! SegNets unpool with `MaxUnpool`, which ONNX Runtime has on CPUs but not every runtime has: the U-Net runs on more of them.
+//!
+//! By hand over `prost`: ONNX crates bring a runtime or the whole format, of which the networks need a few messages.
 
 mod graph;
 pub mod proto;
