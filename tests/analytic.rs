@@ -1,12 +1,13 @@
 //! Rationale: scenes whose radiance is known in closed form leave an integrator no excuse. Every technique of the path tracer is
 //! switched on and off on each: the mean must not move.
-//! Expected: the mean over all pixels lies within four standard errors of the closed form, and its error is small enough to mean
-//! something (below 2 %).
+//! Expected: the mean over all pixels lies within five and a half standard errors of the closed form, which all comparisons of the
+//! file together exceed once in 10⁴ draws, and its error is small enough to mean something (below 2 %).
 //! Source: radiometry, each formula stands at its scene.
 
 mod common;
 
 use common::scenes::{camera, scene, shoot, sphere, square};
+use common::stats::{p_value, sidak};
 use furrow::bsdf::{Bsdf, Leaf, OrenNayar};
 use furrow::film::Film;
 use furrow::integrator::{Path, Technique};
@@ -45,6 +46,13 @@ fn mean(film: &Film) -> (Spectrum, Spectrum) {
     (sum / n, variance.map(f32::sqrt) / n)
 }
 
+/// Standard errors that none of the file's comparisons exceeds without a fault, but once in 10⁴ runs of other seeds: two thousand
+/// pixels, bands and means are compared.
+fn limit() -> f32 {
+    let level = sidak(1e-4, 2000);
+    (0..100).map(|i| 4.0 + 0.05 * i as f32).find(|z| p_value(f64::from(*z)) < level).expect("a limit below 9")
+}
+
 fn expect(name: &str, scene: &Scene, by_chance: bool, spp: u32, expected: Spectrum) {
     for (k, path) in techniques(by_chance).iter().enumerate() {
         let (got, error) = mean(&shoot(scene, path, spp, 40 + k as u64));
@@ -52,7 +60,7 @@ fn expect(name: &str, scene: &Scene, by_chance: bool, spp: u32, expected: Spectr
             let (g, e, x) = (got.to_array()[band], error.to_array()[band], expected.to_array()[band]);
             // Rounding of a long sum in single precision: 1e-4 of the value.
             assert!(
-                (g - x).abs() <= 4.0 * e + 2e-4 * x + 1e-7,
+                (g - x).abs() <= limit() * e + 2e-4 * x + 1e-7,
                 "{name}, {:?}, band {band}: {g} ± {e}, not {x}",
                 path.technique
             );
@@ -118,11 +126,11 @@ fn a_white_leaf_vanishes_in_a_furnace() {
         let [r, g, b, n] = p.mean.to_array();
         let error = p.variance.map(f32::sqrt).max();
         for x in [r, g, b, n] {
-            assert!((x - 1.0).abs() < 5.0 * error + 1e-4, "{x} ± {error}");
+            assert!((x - 1.0).abs() < limit() * error + 1e-4, "{x} ± {error}");
         }
     }
     let (got, error) = mean(&film);
-    assert!((got.mean() - 1.0).abs() < 4.0 * error.max() + 1e-4, "{got:?} ± {error:?}");
+    assert!((got.mean() - 1.0).abs() < limit() * error.max() + 1e-4, "{got:?} ± {error:?}");
 }
 
 /// Below the middle of a disc lamp of radius r at height h: E = π L r² / (r² + h²).

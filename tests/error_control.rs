@@ -181,11 +181,16 @@ fn adaptive_sampling_is_unbiased_where_naive_stopping_is_not() {
 fn an_image_by_the_clock_is_that_of_its_number_of_samples() {
     let (_keep, out) = scratch();
     let (timed, counted) = (out.join("timed"), out.join("counted"));
+    // What the program needs beside samples on this machine, as busy as it is.
+    let begin = Instant::now();
+    run(&out.join("one"), &["--width", "64", "--spp", "1"]);
+    let aside = begin.elapsed();
     let begin = Instant::now();
     let small = ["--scene", "tests/ref/small.ron", "--width", "64", "--out", timed.to_str().unwrap()];
     let done = trace(&[&small[..], &["--time", "4s", "--max-spp", "200"]].concat()).output().unwrap();
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
-    assert!(begin.elapsed() < Duration::from_secs(20), "{:?}", begin.elapsed());
+    let most = Duration::from_secs(16) + 4 * aside;
+    assert!(begin.elapsed() < most, "{:?} of {most:?}", begin.elapsed());
     let (_, comment) = read_layers(&timed.join("radiance.exr"));
     let spp = comment.lines().find_map(|l| l.strip_prefix("spp: ")).unwrap().to_owned();
     run(&counted, &["--width", "64", "--spp", &spp]);

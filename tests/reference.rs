@@ -30,7 +30,10 @@ use std::path::{Path, PathBuf};
 const SIZE: (u32, u32) = (48, 36);
 /// Side of the squares that are tested as one.
 const SQUARE: u32 = 6;
-const ALPHA: f64 = 0.01;
+/// Chance that the file's tests together fail without a fault, were samples independent; those of Sobol err less than is told.
+const ALPHA: f64 = 1e-4;
+/// Calls of [`fault`] that expect none, an upper bound.
+const CALLS: usize = 20;
 /// Samples of a reference, and of what is tested against it.
 const REFERENCE_SPP: u32 = 8192;
 const SPP: u32 = 256;
@@ -142,7 +145,7 @@ fn fault(got: &Estimate, reference: &Estimate) -> Option<String> {
         let (got, reference) = (got.over(size), reference.over(size));
         let p = got.p(&reference);
         let p = p.as_flattened();
-        let level = sidak(ALPHA, p.len());
+        let level = sidak(ALPHA, 3 * CALLS * p.len());
         let accepted = p.iter().filter(|p| **p > level).count() as f64 / p.len() as f64;
         if accepted < share {
             let least = p.iter().copied().fold(1.0, f64::min);

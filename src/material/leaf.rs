@@ -107,6 +107,8 @@ pub struct LeafMaterial {
     pictured: bool,
     /// What its condition has made of it.
     wear: Option<Wear>,
+    /// The one mip level that every ray reads; `None` for the level of each ray's width.
+    level: Option<u32>,
 }
 
 impl LeafMaterial {
@@ -128,6 +130,7 @@ impl LeafMaterial {
             transmits: true,
             pictured: true,
             wear: None,
+            level: None,
         }
     }
 
@@ -153,6 +156,10 @@ impl LeafMaterial {
             None => self.upper,
         };
         Self { upper, wear: Some(wear), ..self.clone() }
+    }
+
+    pub(super) fn fix_level(&mut self, level: u32) {
+        self.level = Some(level);
     }
 
     pub(super) fn leave_out(&mut self, feature: Feature) {
@@ -251,7 +258,7 @@ impl LeafMaterial {
 
     pub(super) fn varies(&self) -> Varies {
         match &self.picture {
-            Some(picture) => Varies::Picture(picture.color.width(), picture.color.height()),
+            Some(picture) => Varies::over((picture.color.width(), picture.color.height()), self.level),
             None => Varies::Nowhere,
         }
     }
@@ -263,7 +270,7 @@ impl LeafMaterial {
             Some(picture) => {
                 // The footprint as an extent of the image, by the larger side of a texel on the surface.
                 let metres = tangents.1.length().max(1e-6);
-                let lod = picture.color.lod(at.footprint / metres);
+                let lod = self.level.map_or_else(|| picture.color.lod(at.footprint / metres), |level| level as f32);
                 let color = if self.pictured {
                     let [r, g, b, _] = picture.color.sample(at.uv, lod);
                     Vec3::new(r, g, b)

@@ -48,7 +48,33 @@ pub enum Varies {
     Place,
 }
 
+impl Varies {
+    /// Over a picture of this size, read on `level` or, with `None`, on the level of each ray's width.
+    fn over((width, height): (u32, u32), level: Option<u32>) -> Self {
+        match level {
+            None => Self::Picture(width, height),
+            Some(level) => {
+                let texels = |n: u32| n.checked_shr(level).unwrap_or(0).max(1);
+                Self::Raster(texels(width), texels(height))
+            }
+        }
+    }
+}
+
 impl Material {
+    /// The same material with its pictures read on one mip level (0 the finest) whatever the ray's width, as programs read them
+    /// that have no mip levels. As it is where it has no pictures.
+    #[must_use]
+    pub fn on_level(&self, level: u32) -> Self {
+        let mut same = self.clone();
+        match &mut same {
+            Self::Leaf(m) => m.fix_level(level),
+            Self::Painted(m) => m.fix_level(level),
+            Self::Ground(_) | Self::Solid(_) | Self::Plain(_) => {}
+        }
+        same
+    }
+
     /// Over what the scattering varies: what a program that writes the material down must sample.
     pub fn varies(&self) -> Varies {
         match self {

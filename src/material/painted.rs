@@ -44,6 +44,8 @@ pub struct Painted {
     relief: Option<Relief>,
     transmission: Option<Sheet>,
     coat: Option<Side>,
+    /// The one mip level of the colours' picture that every ray reads; `None` for the level of each ray's width.
+    level: Option<u32>,
 }
 
 /// Near infrared reflectance.
@@ -91,6 +93,7 @@ impl Painted {
             relief: surface.relief.clone(),
             coat: (roughness < MATTE).then(|| Side::new(IOR, [roughness; 2], Spectrum::ZERO)),
             transmission,
+            level: None,
         }
     }
 
@@ -142,13 +145,33 @@ impl Painted {
         }
     }
 
-    pub(super) fn varies(&self) -> Varies {
+    /// The picture whose texels the scattering varies by: that of the colours, else that of what passes.
+    fn finest(&self) -> Option<&Texture> {
         let passed = self.transmission.as_ref().and_then(|sheet| sheet.picture.as_ref());
-        self.picture.as_ref().or(passed).map_or(Varies::Nowhere, |p| Varies::Picture(p.width(), p.height()))
+        self.picture.as_ref().or(passed).map(|p| &**p)
+    }
+
+    pub(super) fn fix_level(&mut self, level: u32) {
+        self.level = Some(level);
+    }
+
+    pub(super) fn varies(&self) -> Varies {
+        self.finest().map_or(Varies::Nowhere, |p| Varies::over((p.width(), p.height()), self.level))
+    }
+
+    /// What a ray reads of the pictures, as an extent of texture coordinates.
+    fn extent(&self, at: &Interaction) -> f32 {
+        if let (Some(level), Some(p)) = (self.level, self.finest()) {
+            return 2.0_f32.powi(level as i32) / p.width().max(p.height()) as f32;
+        }
+        let (along_u, along_v) = at.tangents();
+        at.footprint / along_u.length().max(along_v.length()).max(1e-6)
     }
 
     pub(super) fn scatter(&self, at: &Interaction, wo: Vec3) -> (Bsdf, Frame) {
-        let Tone { reflectance, transmittance } = self.tone(|picture| read(picture, at));
+        let extent = self.extent(at);
+        let read = |picture: &Texture| rgb(picture.sample(at.uv, picture.lod(extent)));
+        let Tone { reflectance, transmittance } = self.tone(read);
         let bsdf = match (&self.coat, &self.transmission) {
             (None, None) => Bsdf::OrenNayar(OrenNayar::new(reflectance, SIGMA)),
             (coat, _) => {
@@ -157,21 +180,10 @@ impl Painted {
             }
         };
         let normal = self.relief.as_ref().map_or(at.ns, |Relief { normals, strength }| {
-            bump(at, at.tangents(), normals.sample(at.uv, normals.lod(extent(at))) * *strength)
+            bump(at, at.tangents(), normals.sample(at.uv, normals.lod(extent)) * *strength)
         });
         (bsdf, frame(at, normal, wo))
     }
-}
-
-/// Linear colour of a picture, averaged over what the ray sees.
-fn read(picture: &Texture, at: &Interaction) -> Vec3 {
-    rgb(picture.sample(at.uv, picture.lod(extent(at))))
-}
-
-/// What the ray sees of the surface, as an extent of texture coordinates.
-fn extent(at: &Interaction) -> f32 {
-    let (along_u, along_v) = at.tangents();
-    at.footprint / along_u.length().max(along_v.length()).max(1e-6)
 }
 
 /// Mean colour of what is opaque of a picture: its coarsest level.

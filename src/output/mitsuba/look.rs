@@ -1,8 +1,7 @@
 //! A material written down: its scattering sampled over its texture, or at the corners of a mesh.
 //!
-//! What a [`Material`] is made of is its own affair; here it is asked, point by point on a flat patch, how it scatters. The
-//! patch is as large as the part's texture lies on the part, and the ray as wide as a texel, so a texture is read on the
-//! level that the camera sees.
+//! What a [`Material`] is made of is its own affair; here it is asked, point by point on a flat patch, how it scatters: at each
+//! texel of the one level that its pictures are read on, see [`super::level`].
 
 use crate::bsdf::microfacet::Ggx;
 use crate::bsdf::{Bsdf, Veil};
@@ -52,23 +51,19 @@ pub(super) struct Look {
 }
 
 impl Look {
-    /// Samples `material` as it lies on `mesh`, whose texture the camera sees `footprint` metres to a pixel.
-    pub(super) fn of(material: &Material, mesh: &Mesh, footprint: f32) -> Self {
-        let metres = image_length(mesh);
-        let (w, h, level) = match material.varies() {
-            Varies::Picture(w, h) => (w, h, (footprint / metres * w.max(h) as f32).max(1.0).log2().round() as u32),
-            Varies::Raster(w, h) => (w, h, 0),
-            Varies::Nowhere | Varies::Place => (1, 1, 0),
+    /// Samples `material`, whose pictures are read on one level.
+    pub(super) fn of(material: &Material) -> Self {
+        let (width, height) = match material.varies() {
+            Varies::Picture(w, h) | Varies::Raster(w, h) => (w, h),
+            Varies::Nowhere | Varies::Place => (1, 1),
         };
-        let (width, height) = ((w >> level.min(31)).max(1), (h >> level.min(31)).max(1));
-        let footprint = metres * 2.0_f32.powi(level as i32) / w.max(h) as f32;
-        let flat = patch(Vec3::ZERO, metres);
+        let flat = patch(Vec3::ZERO);
         let mut kind = None;
         let mut texels = Vec::with_capacity((width * height) as usize);
         for y in 0..height {
             for x in 0..width {
                 let uv = vec2((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
-                let (of, texel) = at(material, &flat, uv, footprint);
+                let (of, texel) = at(material, &flat, uv);
                 kind = Some(kind.map_or(of, |known: Kind| known.and(of)));
                 texels.push(texel);
             }
@@ -99,23 +94,23 @@ impl Kind {
 
 /// Reflectances of a material that varies over the world, at each corner of a mesh.
 pub(super) fn colors(material: &Material, mesh: &Mesh) -> Vec<Spectrum> {
-    let corner = |p: &Vec3| at(material, &patch(*p, 1.0), Vec2::ZERO, 0.0).1.reflect[0];
+    let corner = |p: &Vec3| at(material, &patch(*p), Vec2::ZERO).1.reflect[0];
     mesh.positions.iter().map(corner).collect()
 }
 
-/// A triangle at `p` whose barycentrics are the texture coordinates, on which an image is `metres` high.
-fn patch(p: Vec3, metres: f32) -> Mesh {
+/// A triangle at `p` whose barycentrics are the texture coordinates, on which an image is 1 m high.
+fn patch(p: Vec3) -> Mesh {
     Mesh {
-        positions: vec![p, p - Vec3::Y * metres, p + Vec3::X * metres],
+        positions: vec![p, p - Vec3::Y, p + Vec3::X],
         normals: vec![Vec3::Z; 3],
         uvs: vec![Vec2::ZERO, Vec2::Y, Vec2::X],
         triangles: vec![[0, 1, 2]],
     }
 }
 
-/// The scattering at one point of a patch, seen from above.
-fn at(material: &Material, patch: &Mesh, uv: Vec2, footprint: f32) -> (Kind, Texel) {
-    let point = Interaction::new(patch, &Hit { part: 0, triangle: 0, u: uv.y, v: uv.x, t: 0.0 }, footprint);
+/// The scattering at one point of a patch, seen from above by a ray as wide as its image: what varies nowhere is what it is on the mean.
+fn at(material: &Material, patch: &Mesh, uv: Vec2) -> (Kind, Texel) {
+    let point = Interaction::new(patch, &Hit { part: 0, triangle: 0, u: uv.y, v: uv.x, t: 0.0 }, 1.0);
     let (bsdf, frame) = material.scatter(&point, Vec3::Z);
     let opaque =
         |albedo: Spectrum, film: f32| Texel { reflect: [albedo; 2], transmit: Spectrum::ZERO, film, normal: frame.z };
@@ -133,20 +128,4 @@ fn at(material: &Material, patch: &Mesh, uv: Vec2, footprint: f32) -> (Kind, Tex
             (kind, texel)
         }
     }
-}
-
-/// Mean height of the texture's image on a mesh, metres; 1 where the texture coordinates are degenerate.
-fn image_length(mesh: &Mesh) -> f32 {
-    let (mut sum, mut count) = (0.0_f64, 0.0_f64);
-    for t in &mesh.triangles {
-        let [a, b, c] = t.map(|i| i as usize);
-        let (e1, e2) = (mesh.positions[b] - mesh.positions[a], mesh.positions[c] - mesh.positions[a]);
-        let (t1, t2) = (mesh.uvs[b] - mesh.uvs[a], mesh.uvs[c] - mesh.uvs[a]);
-        let determinant = t1.perp_dot(t2);
-        if determinant.abs() > 1e-20 {
-            sum += f64::from(((e2 * t1.x - e1 * t2.x) / determinant).length());
-            count += 1.0;
-        }
-    }
-    if count > 0.0 { (sum / count) as f32 } else { 1.0 }
 }

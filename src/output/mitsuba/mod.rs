@@ -15,11 +15,13 @@
 //! and more if lengths were metres, 30 µm in this unit. Ours is 0.25 µm: contacts finer than 30 µm are lost there.
 //!
 //! `volpath` alone lets masked surfaces cast their own shadows; for `path` they are solid. Our paths end at 12 surfaces, which
-//! is its `max_depth` 13. Textures are written on the level that the camera sees, and read by every ray.
+//! is its `max_depth` 13. Textures are written on the mip level that the camera sees of each organ, and read by every ray
+//! ([`fix_levels`] gives our renderer the same).
 //! What is exact and what is about equal among materials stands in the table of `surface.rs`; what a scene has of the second kind
 //! is returned as warnings and stands in the files. The filter of the camera is exact for `Box`; `Gaussian`, a
 //! square blurred, is written as the Gaussian of the same variance. Mitsuba has no lens distortion, and square pixels only.
 
+mod level;
 mod light;
 mod look;
 mod ply;
@@ -35,7 +37,8 @@ use crate::integrator::Path as PathTracer;
 use crate::material::Varies;
 use crate::math::{Spectrum, Vec3};
 use crate::scene::{Part, Scene};
-use crate::sensor::Camera;
+use level::Leveled;
+pub use level::fix_levels;
 use light::Lights;
 use look::Look;
 use std::collections::BTreeSet;
@@ -116,6 +119,7 @@ impl Files<'_> {
 struct Group {
     name: String,
     key: Key,
+    /// Index among the materials on their levels.
     material: u32,
     mask: Option<Arc<AlphaMask>>,
     mesh: Mesh,
@@ -127,7 +131,7 @@ struct Group {
 struct Key {
     class: &'static str,
     plant: u16,
-    /// The material, or its roughness where the corners hold the colour.
+    /// The material on its level, or its roughness where the corners hold the colour.
     look: Result<u32, [u32; 2]>,
     /// Address of the mask.
     mask: usize,
@@ -138,7 +142,8 @@ struct Key {
 pub fn write(folder: &Path, scene: &Scene, text: &str) -> Result<Export> {
     let mut files = Files { folder, paths: Vec::new() };
     let mut warnings = camera_warnings(scene);
-    let groups = groups(scene)?;
+    let leveled = Leveled::of(scene);
+    let groups = groups(scene, &leveled)?;
     let lights = Lights::write(&scene.lights, &mut files)?;
     if lights.has_lamps() && lights.has_sky() {
         warnings.push("with lamps in the scene the camera does not see the sky".into());
@@ -148,8 +153,7 @@ pub fn write(folder: &Path, scene: &Scene, text: &str) -> Result<Export> {
     let mut surfaces = Vec::with_capacity(groups.len());
     for group in &groups {
         let mask = group.mask.as_ref().map(|m| mask_file(m, text, &mut masks, &mut files)).transpose()?;
-        let material = &scene.materials[group.material as usize];
-        let look = Look::of(material, &group.mesh, footprint(&scene.camera, &group.mesh));
+        let look = Look::of(&leveled.materials[group.material as usize]);
         let factor = Surface::corner_factor(look.kind);
         let colors: Option<Vec<Spectrum>> = group.colors.as_ref().map(|c| c.iter().map(|s| *s * factor).collect());
         let surface = match colors {
@@ -181,14 +185,15 @@ fn summary(lost: &BTreeSet<(&'static str, String)>) -> Vec<String> {
 }
 
 /// Parts that share material, mask and plant, in the order of their first.
-fn groups(scene: &Scene) -> Result<Vec<Group>> {
+fn groups(scene: &Scene, leveled: &Leveled) -> Result<Vec<Group>> {
     let mut groups: Vec<Group> = Vec::new();
-    for part in scene.parts.iter().filter(|p| !p.mesh.triangles.is_empty()) {
-        let material = &scene.materials[part.material as usize];
+    let parts = scene.parts.iter().zip(&leveled.of_parts);
+    for (part, &index) in parts.filter(|(p, _)| !p.mesh.triangles.is_empty()) {
+        let material = &leveled.materials[index as usize];
         let colors = (material.varies() == Varies::Place).then(|| look::colors(material, &part.mesh));
         let look = match &colors {
-            None => Ok(part.material),
-            Some(_) => Err(surface::rough(Look::of(material, &part.mesh, 0.0).kind)?.map(f32::to_bits)),
+            None => Ok(index),
+            Some(_) => Err(surface::rough(Look::of(material).kind)?.map(f32::to_bits)),
         };
         let key = Key { class: part.tag.class.name(), plant: part.tag.plant, look, mask: address(part) };
         match groups.iter_mut().find(|g| g.key == key) {
@@ -201,7 +206,7 @@ fn groups(scene: &Scene) -> Result<Vec<Group>> {
             None => groups.push(Group {
                 name: format!("{}-{}-{}", key.class, key.plant, groups.len()),
                 key,
-                material: part.material,
+                material: index,
                 mask: part.mask.clone(),
                 mesh: part.mesh.clone(),
                 colors,
@@ -238,12 +243,6 @@ fn mask_file(
     files.write(&name, &png::encode(w, h, &Picture::Gray(&pixels), text)?)?;
     known.push((address, name.clone()));
     Ok(name)
-}
-
-/// What a pixel sees of a mesh, metres: at its middle's distance.
-fn footprint(camera: &Camera, mesh: &Mesh) -> f32 {
-    let middle = mesh.bounds().map_or(Vec3::ZERO, |(lo, hi)| (lo + hi) * 0.5);
-    camera.pixel_angle() * camera.pose().position.distance(middle)
 }
 
 fn camera_warnings(scene: &Scene) -> Vec<String> {
