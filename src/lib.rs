@@ -31,7 +31,7 @@
 //! | 5 | [`texture`] |
 //! | 4 | [`optics`], [`film`], [`html`], [`cli`], [`settings`] |
 //! | 3 | [`ron_file`] |
-//! | 2 | [`sampling`], [`geometry`] |
+//! | 2 | [`sampling`], [`geometry`], [`input`] |
 //! | 1 | [`math`], [`error`] |
 //!
 //! `tests/architecture.rs` reads this table and holds the rooms to it. [`raster`] is there with the feature of its name.
@@ -48,6 +48,7 @@ pub mod error;
 pub mod film;
 pub mod geometry;
 pub mod html;
+pub mod input;
 pub mod integrator;
 pub mod job;
 pub mod light;

@@ -1,8 +1,8 @@
-//! Faults with a place: what is wrong inside one value of a page, and what to do.
+//! Faults with a place: what is wrong inside one value of a file, and what to do.
 //!
 //! RON tells neither where a custom error lies nor whether a number or a name comes next; both are read off the value's raw
 //! text here. A [`Fault`] carries its place outward through serde's string-only errors, between control characters that no
-//! page's text can bring in by itself.
+//! file's text can bring in by itself.
 
 use super::place::{Step, mismatch, place, token};
 use super::suggest::choose;
@@ -120,7 +120,7 @@ pub(super) fn locate(text: &str, error: &SpannedError) -> Fault {
                 }
                 Some((_, Some(open))) => {
                     let message =
-                        format!("the page ends, but the `{}` of line {} is still open", &text[open..=open], line(open));
+                        format!("the file ends, but the `{}` of line {} is still open", &text[open..=open], line(open));
                     fault(text.len()..text.len(), message, "add the closing bracket where it belongs".into())
                 }
                 _ => fault(if end > start { start..end } else { token(text, start) }, message, help),
@@ -199,12 +199,12 @@ fn explain(code: &Ron) -> (String, String) {
         Ron::ExpectedIdentifier | Ron::InvalidIdentifier(_) | Ron::SuggestRawIdentifier(_) => {
             ("a name is expected here", "names are letters, digits and _, without quotes")
         }
-        Ron::Eof => ("the page ends too early", "a bracket or a quote that was opened above is not closed"),
+        Ron::Eof => ("the file ends too early", "a bracket or a quote that was opened above is not closed"),
         Ron::UnclosedBlockComment => ("this comment has no end", "close it with */"),
         Ron::TrailingCharacters => {
-            ("the page's bracket is closed before this", "look for one closing bracket too many above")
+            ("the file's bracket is closed before this", "look for one closing bracket too many above")
         }
-        Ron::ExceededRecursionLimit => ("brackets are nested too deeply", "no page needs a hundred of them"),
+        Ron::ExceededRecursionLimit => ("brackets are nested too deeply", "no file needs a hundred of them"),
         other => return (other.to_string(), String::new()),
     };
     (message.to_owned(), help.to_owned())

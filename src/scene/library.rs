@@ -4,6 +4,7 @@ use super::assemble::Growing;
 use super::desc::SpeciesDesc;
 use crate::error::{Kind, Place};
 use crate::geometry::{AlphaMask, Margin};
+use crate::input;
 use crate::light::{Infrared, Table};
 use crate::material::{LeafMaterial, Picture, Tones};
 use crate::math::{Spectrum, Vec2};
@@ -230,7 +231,7 @@ impl Library {
     }
 
     fn note(&mut self, path: &Path) -> Result<()> {
-        let bytes = std::fs::read(path).map_err(Error::reading(path))?;
+        let bytes = input::read(path, input::LARGEST).map_err(|refusal| refusal.into_error(path))?;
         self.files.insert(path.into(), Sha256::digest(&bytes).into());
         Ok(())
     }
