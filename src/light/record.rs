@@ -5,10 +5,10 @@
 use super::{Lamp, Outline};
 use crate::light::sample::Emitter;
 use crate::math::Spectrum;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A light as it was drawn: one for each that the page lists.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum LightRecord {
     /// Sun and sky.
@@ -84,6 +84,17 @@ impl LightRecord {
             radiance_w_m2_sr_nm: lamp.radiance(),
             power_w_nm: lamp.radiance() * (std::f32::consts::PI * lamp.area()),
             irradiance_w_m2_nm: lamp.horizontal_irradiance(),
+        }
+    }
+
+    /// What kind of light it is, in the word that its record has: `daylight`, `overcast`, `constant`, `environment`, `lamp`.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Daylight { .. } => "daylight",
+            Self::Overcast { .. } => "overcast",
+            Self::Constant { .. } => "constant",
+            Self::Environment { .. } => "environment",
+            Self::Lamp { .. } => "lamp",
         }
     }
 

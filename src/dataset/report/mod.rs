@@ -17,6 +17,8 @@ mod histogram;
 mod photographs;
 mod sheet;
 mod statistics;
+#[cfg(test)]
+mod tests;
 
 use super::set::{Set, Whole};
 use super::split::Split;

@@ -5,10 +5,10 @@ use crate::ron_file::RonFile;
 use crate::ron_file::Step;
 use crate::sampling::Stream;
 use crate::{Error, Result};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// What a field drew where its page has lists of lights side by side: `OneOf([[…], […]])`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Lighting {
     /// Its place among the page's lights, from 0.
     pub place: usize,
