@@ -320,7 +320,10 @@ fn absolute_paths_are_taken_into_the_dataset() {
     let skin = "\"stalk\": Leaf(";
     let grass = fs::read_to_string(from.join("grass.ron")).unwrap();
     assert!(grass.contains(skin));
-    write(&there.join("species/grass.ron"), grass.replace(skin, &format!("{skin}texture: \"../textures/earth.png\", ")));
+    write(
+        &there.join("species/grass.ron"),
+        grass.replace(skin, &format!("{skin}texture: \"../textures/earth.png\", ")),
+    );
     write(&here.join("species/beet.ron"), fs::read_to_string(from.join("beet.ron")).unwrap());
     let scene = here.join("scenes/field.ron");
     let text = fs::read_to_string(from.join("field.ron")).unwrap();

@@ -175,7 +175,7 @@ fn a_dataset_of_an_earlier_version_is_read_to_the_same_report() {
     let read = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
     for name in ["000000", "000001"] {
         let record = furrow::dataset::native::read_record(&out, name).unwrap();
-        let text = serde_json::to_string_pretty(&record).unwrap() + "\n";
+        let text = serde_json::to_string(&record).unwrap() + "\n";
         assert_eq!(text, read(&format!("images/{name}/record.json")), "{name}");
     }
     let before = (read("report.html"), read("imagefolder/train/metadata.jsonl"));

@@ -40,8 +40,9 @@ pub enum LightRecord {
         /// What it gives the ground.
         irradiance_w_m2_nm: Spectrum,
     },
-    /// A picture of all directions.
-    Environment {
+    /// An environment map.
+    #[serde(rename = "environment")]
+    EnvironmentMap {
         /// The file, as the page names it.
         file: String,
         /// By what its values became radiance.
@@ -93,7 +94,7 @@ impl LightRecord {
             Self::Daylight { .. } => "daylight",
             Self::Overcast { .. } => "overcast",
             Self::Constant { .. } => "constant",
-            Self::Environment { .. } => "environment",
+            Self::EnvironmentMap { .. } => "environment",
             Self::Lamp { .. } => "lamp",
         }
     }
@@ -106,7 +107,7 @@ impl LightRecord {
             }
             Self::Overcast { irradiance_w_m2_nm, .. }
             | Self::Constant { irradiance_w_m2_nm, .. }
-            | Self::Environment { irradiance_w_m2_nm, .. }
+            | Self::EnvironmentMap { irradiance_w_m2_nm, .. }
             | Self::Lamp { irradiance_w_m2_nm, .. } => *irradiance_w_m2_nm,
         }
     }

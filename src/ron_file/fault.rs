@@ -5,6 +5,7 @@
 //! file's text can bring in by itself.
 
 use super::place::{Step, mismatch, place, token};
+use super::renamed::{Keyword, is_old};
 use super::suggest::choose;
 use ron::error::{Error as Ron, SpannedError};
 use serde::{Deserialize, Deserializer, de};
@@ -141,15 +142,22 @@ pub(super) fn offset_of(text: &str, line: usize, column: usize) -> usize {
     start + rest.char_indices().nth(column.saturating_sub(1)).map_or(rest.len(), |(i, _)| i)
 }
 
+/// The names that are not old ones: nobody is told to write a name that is about to go.
+fn current<'a>(keyword: Keyword, expected: &[&'a str]) -> Vec<&'a str> {
+    expected.iter().copied().filter(|name| !is_old(keyword, name)).collect()
+}
+
 /// A parser's error in our words: what is wrong, and what to do.
 fn explain(code: &Ron) -> (String, String) {
     let (message, help) = match code {
         Ron::NoSuchStructField { expected, found, outer } => {
             let of = outer.as_ref().map(|o| format!(" in {o}")).unwrap_or_default();
-            return (format!("unknown field `{found}`{of}"), choose("fields", expected, found));
+            let fields = current(Keyword::Field, expected);
+            return (format!("unknown field `{found}`{of}"), choose("fields", &fields, found));
         }
         Ron::NoSuchEnumVariant { expected, found, .. } => {
-            return (format!("unknown name `{found}`"), choose("names that can stand here", expected, found));
+            let names = current(Keyword::Value, expected);
+            return (format!("unknown name `{found}`"), choose("names that can stand here", &names, found));
         }
         Ron::MissingStructField { field, outer } => {
             let of = outer.as_ref().map(|o| format!(" of {o}")).unwrap_or_default();

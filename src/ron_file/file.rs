@@ -2,6 +2,7 @@
 
 use super::fault::{Fault, locate, offset_of};
 use super::place::{Step, place, quoted};
+use super::renamed;
 use super::suggest::nearest;
 use crate::error::{Kind, Place, Span};
 use crate::input::{self, Refusal};
@@ -92,6 +93,13 @@ impl RonFile {
             .map_err(|e| Error::failed(format!("this cannot be written as RON: {e}")))
     }
 
+    /// A warning for each keyword that was renamed, in the order in which they stand: where, and what to write.
+    pub fn renamed(&self) -> Vec<String> {
+        // Without its folder: warnings are recorded in datasets, which name no folder of a machine.
+        let name = self.path.file_name().unwrap_or_default().to_string_lossy();
+        renamed::warnings(&name, &self.text)
+    }
+
     /// A path written in the file, relative to the file's folder.
     pub fn resolve(&self, path: &str) -> PathBuf {
         self.path.parent().unwrap_or(Path::new("")).join(path)
@@ -99,7 +107,8 @@ impl RonFile {
 
     /// An error about a text that stands in quotes in the file, outside comments; about the first line where it stands nowhere.
     pub fn about(&self, literal: &str, message: impl Into<String>, help: impl Into<String>) -> Error {
-        let found = quoted(&self.text).into_iter().find(|at| unquoted(&self.text[at.clone()]).as_deref() == Some(literal));
+        let found =
+            quoted(&self.text).into_iter().find(|at| unquoted(&self.text[at.clone()]).as_deref() == Some(literal));
         let at = found.unwrap_or(0..1);
         let (message, help) = (message.into(), help.into());
         self.fault(&Fault { raw_len: self.text.len(), start: at.start, end: at.end, message, help })
@@ -151,7 +160,8 @@ impl RonFile {
             .unwrap_or_default();
         files.sort();
         let near = nearest(&files, &name).map(|n| format!("did you mean `{n}`? ")).unwrap_or_default();
-        let help = format!("{near}a path counts from the folder of the file that names it: looked in {}", folder.display());
+        let help =
+            format!("{near}a path counts from the folder of the file that names it: looked in {}", folder.display());
         Err(self.about(path, format!("there is no file `{path}`"), help))
     }
 
@@ -256,7 +266,8 @@ mod tests {
     }
     #[test]
     fn a_quoted_text_is_shown_where_it_counts_not_in_a_comment() {
-        let file = RonFile::of("Sun( // \"a.png\" once stood here\n  key: \"not a.png\", /* \"a.png\" */ file: \"a.png\",\n)");
+        let file =
+            RonFile::of("Sun( // \"a.png\" once stood here\n  key: \"not a.png\", /* \"a.png\" */ file: \"a.png\",\n)");
         let m = file.about("a.png", "there is none", "").to_string();
         assert!(m.starts_with("page.ron:2:41: there is none"), "{m}");
         assert!(file.about("b.png", "x", "").to_string().starts_with("page.ron:1:1: x"));

@@ -102,6 +102,32 @@ pub(super) fn quoted(text: &str) -> Vec<Range<usize>> {
     all
 }
 
+/// A name in a text.
+pub(super) struct Word {
+    /// Its bytes.
+    pub(super) at: Range<usize>,
+    /// Whether a colon follows it.
+    pub(super) colon: bool,
+}
+
+/// Every name outside quotes and comments, in their order.
+pub(super) fn words(text: &str) -> Vec<Word> {
+    let is_name = |c: char| c.is_alphanumeric() || c == '_';
+    let mut all = Vec::new();
+    let mut at = skip(text, 0);
+    while let Some(c) = text[at..].chars().next() {
+        let mut next = at + c.len_utf8();
+        if c == '"' {
+            next = quote_end(text, at);
+        } else if is_name(c) {
+            next = text[at..].find(|c| !is_name(c)).map_or(text.len(), |i| at + i);
+            all.push(Word { at: at..next, colon: text[skip(text, next)..].starts_with(':') });
+        }
+        at = skip(text, next);
+    }
+    all
+}
+
 /// The token at or behind `at`: a name, a number, a quoted text or one character; empty at the text's end.
 pub(super) fn token(text: &str, at: usize) -> Range<usize> {
     let start = skip(text, at);
@@ -259,6 +285,7 @@ Field(
             prop_assert!(text.get(range).is_some());
             prop_assert!(text.get(token(&text, 0)).is_some());
             let _ = mismatch(&text);
+            prop_assert!(words(&text).into_iter().all(|word| text.get(word.at).is_some()));
             prop_assert!(quoted(&text).into_iter().all(|at| text.get(at).is_some()));
         }
     }

@@ -87,7 +87,7 @@ fn conditions_come_back_from_json_with_every_kind_of_light() {
     of.lights.extend([
         LightRecord::Overcast { illuminance_klx: 0.1, irradiance_w_m2_nm: s },
         LightRecord::Constant { radiance_w_m2_sr_nm: s, irradiance_w_m2_nm: s },
-        LightRecord::Environment { file: "a.hdr".into(), scale: 0.1, rotate_deg: 0.7, irradiance_w_m2_nm: s },
+        LightRecord::EnvironmentMap { file: "a.hdr".into(), scale: 0.1, rotate_deg: 0.7, irradiance_w_m2_nm: s },
         LightRecord::Lamp {
             size_m: [0.1; 2],
             round: true,

@@ -165,7 +165,7 @@ mod tests {
             std::fs::write(folder.path().join(name), bytes).unwrap();
         }
         let page = folder.path().join("page.ron");
-        let pictures = r#"OneOf([[Environment(file: "day.hdr")], [Environment(file: "dusk.hdr")]])"#;
+        let pictures = r#"OneOf([[EnvironmentMap(file: "day.hdr")], [EnvironmentMap(file: "dusk.hdr")]])"#;
         std::fs::write(&page, text(pictures)).unwrap();
         let fields: Vec<Field> =
             (0..8).map(|index| assemble::field(&page, &Options { index, ..Options::default() }).unwrap()).collect();
