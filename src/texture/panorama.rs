@@ -4,7 +4,7 @@
 //! read as Rec.709. Of OpenEXR the channels R, G, B (of the first layer that has them) and, where it is there, NIR; opacity is left out.
 
 use super::rgbe;
-use crate::input::{self, Refusal};
+use crate::input;
 use crate::{Error, Result};
 use exr::prelude::{ReadChannels, ReadLayers, read};
 use std::io::Cursor;
