@@ -61,7 +61,7 @@
 //! | 5 | `texture` |
 //! | 4 | `optics`, [`film`], `report`, `cli`, [`settings`] |
 //! | 3 | `ron_file` |
-//! | 2 | `sampling`, `geometry` |
+//! | 2 | `sampling`, `geometry`, `input` |
 //! | 1 | `math`, [`error`] |
 
 #[doc(hidden)]
@@ -79,6 +79,8 @@ pub mod error;
 pub mod film;
 #[doc(hidden)]
 pub mod geometry;
+#[doc(hidden)]
+pub mod input;
 #[doc(hidden)]
 pub mod integrator;
 pub mod job;

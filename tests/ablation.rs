@@ -98,8 +98,8 @@ fn lights(field: &Field) -> Vec<String> {
     let told = |light: &Light| match light {
         Light::Sun(sun) => format!("{sun:?}"),
         Light::Sky(sky) => format!("sky {:?}", sky.horizontal_irradiance()),
-        Light::Environment(environment) => format!("{environment:?}"),
-        Light::Surround(surround) => format!("surround {:?}", surround.horizontal_irradiance()),
+        Light::Constant(environment) => format!("{environment:?}"),
+        Light::EnvironmentMap(map) => format!("environment map {:?}", map.horizontal_irradiance()),
         Light::Lamp(lamp) => format!("{lamp:?}"),
     };
     field.scene.lights.iter().map(told).collect()

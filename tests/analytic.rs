@@ -11,7 +11,7 @@ use common::stats::{p_value, sidak};
 use furrow::bsdf::{Bsdf, Leaf, OrenNayar};
 use furrow::film::Film;
 use furrow::integrator::{Path, Technique};
-use furrow::light::{Environment, Lamp, Light, Outline, Sun};
+use furrow::light::{Constant, Lamp, Light, Outline, Sun};
 use furrow::math::{Frame, Spectrum, Vec3, vec3};
 use furrow::scene::Scene;
 
@@ -22,7 +22,7 @@ fn lambert(rho: Spectrum) -> Bsdf {
 }
 
 fn sky(radiance: f32) -> Light {
-    Light::Environment(Environment::new(Spectrum::splat(radiance)))
+    Light::Constant(Constant::new(Spectrum::splat(radiance)))
 }
 
 /// All combinations of techniques under which a scene's light can be found.

@@ -109,8 +109,9 @@ const DOORS: &[(&str, &str)] = &[
     ("strsim", "ron_file/suggest.rs"),
     // libtorch: networks and how they learn.
     ("tch", "train/engine/ train/fit/objective.rs train/fit/optimiser.rs train/fit/teach.rs train/deploy/"),
-    // Files appear whole or not at all: images of fields, and drawn textures below them. The denoiser's go through a folder.
-    ("tempfile", "output/mod.rs output/denoise.rs texture/draw/write.rs"),
+    // Files appear whole or not at all: images of fields, and drawn textures below them. The denoiser's go through a folder,
+    // and so does a scene that is taken into a dataset.
+    ("tempfile", "dataset/plan.rs output/mod.rs output/denoise.rs texture/draw/write.rs"),
     ("tobj", "model/obj.rs"),
     // Graphics cards.
     ("wgpu", "raster/"),

@@ -299,3 +299,58 @@ fn fields_that_cannot_be_do_not_keep_others_from_being() {
     assert!(faults > 0 && sealed > 0 && faults + sealed == 12, "{faults} faults, {sealed} images: {said}");
     assert!(said.contains("below the horizon"), "{said}");
 }
+
+/// Rationale: users name textures and species by absolute paths; such a dataset must go on, and on other machines too. Expected: it is
+/// made, continued and rendered again after it moved and everything that the scene named is gone; no path of the machine is in it.
+#[test]
+fn absolute_paths_are_taken_into_the_dataset() {
+    let (_keep, here) = scratch();
+    let (_keep, there) = scratch();
+    let (_keep, elsewhere) = scratch();
+    fs::create_dir_all(&elsewhere).unwrap();
+    let write = |at: &Path, text: String| {
+        fs::create_dir_all(at.parent().unwrap()).unwrap();
+        fs::write(at, text).unwrap();
+    };
+    let from = Path::new("tests/data/dataset/scene");
+    let texture = there.join("textures/earth.png");
+    fs::create_dir_all(texture.parent().unwrap()).unwrap();
+    fs::copy(from.join("earth.png"), &texture).unwrap();
+    // The species lies elsewhere and names its picture by a relative path; the soil's picture is named by an absolute one.
+    let skin = "\"stalk\": Leaf(";
+    let grass = fs::read_to_string(from.join("grass.ron")).unwrap();
+    assert!(grass.contains(skin));
+    write(
+        &there.join("species/grass.ron"),
+        grass.replace(skin, &format!("{skin}texture: \"../textures/earth.png\", ")),
+    );
+    write(&here.join("species/beet.ron"), fs::read_to_string(from.join("beet.ron")).unwrap());
+    let scene = here.join("scenes/field.ron");
+    let text = fs::read_to_string(from.join("field.ron")).unwrap();
+    let text = text
+        .replace("\"earth.png\"", &format!("{texture:?}"))
+        .replace("\"beet.ron\"", "\"../species/beet.ron\"")
+        .replace("\"grass.ron\"", &format!("{:?}", there.join("species/grass.ron")));
+    write(&scene, text);
+    let data = here.join("data");
+    let make = |count: &str| {
+        trace(&["dataset", "--scene", path(&scene), "--out", path(&data), "--count", count, "--spp", "1", "--quiet"])
+    };
+    succeed(make("1"));
+    succeed(make("2"));
+    assert_eq!(made(&data).len(), 2, "the second run goes on with the first one's dataset");
+    let moved = elsewhere.join("data");
+    fs::rename(&data, &moved).unwrap();
+    for gone in [&here, &there] {
+        fs::remove_dir_all(gone).unwrap();
+    }
+    let said = succeed(verb("verify", &moved, &["--rerender", "2"])).stderr;
+    let said = String::from_utf8_lossy(&said).into_owned();
+    assert!(said.contains("2 of 2 images checked, 2 rendered again and the same; 0 faults"), "{said}");
+    for (name, bytes) in tree(&moved) {
+        for machine in [&here, &there] {
+            let machine = path(machine).as_bytes();
+            assert!(!bytes.windows(machine.len()).any(|w| w == machine), "{name} names a folder of the machine");
+        }
+    }
+}

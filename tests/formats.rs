@@ -164,7 +164,7 @@ fn every_format_takes_an_image_that_little_is_known_of() {
             classes: Vec::new(),
             ignored: 0,
             plants: Vec::new(),
-            conditions: serde_json::Value::Null,
+            conditions: None,
             exposure: None,
             warnings: Vec::new(),
         },

@@ -428,7 +428,20 @@ fn a_page_may_name_a_picture_of_all_directions() {
         furrow::scene::assemble::field(&page, &furrow::scene::assemble::Options::default()).map_err(|e| e.to_string())
     };
     let lit =
+        field(r#"EnvironmentMap(file: "even.hdr", scale: 3, rotate_deg: Uniform(0, 360), nir: OfRed(0.8))"#).unwrap();
+    assert_eq!(lit.warnings, Vec::<String>::new());
+    // Its former name is read for one version, with a warning.
+    let old =
         field(r#"Environment(file: "even.hdr", scale: 3, rotate_deg: Uniform(0, 360), nir: OfRed(0.8))"#).unwrap();
+    assert_eq!(old.conditions, lit.conditions);
+    assert_eq!(old.warnings.len(), 1);
+    assert!(
+        old.warnings[0].starts_with("page.ron:3:12: `Environment` is now called `EnvironmentMap`"),
+        "{:?}",
+        old.warnings
+    );
+    let message = field("Environmant()").err().unwrap_or_default();
+    assert!(message.contains("did you mean `EnvironmentMap`?") && !message.contains("Environment,"), "{message}");
     let [r, g, b, nir] = lit.scene.lights[0].horizontal_irradiance().to_array();
     let pi = std::f32::consts::PI;
     for (found, expected) in [(r, 1.5 * pi), (g, 3.0 * pi), (b, 3.0 * pi), (nir, 1.2 * pi)] {
@@ -436,11 +449,11 @@ fn a_page_may_name_a_picture_of_all_directions() {
     }
     assert!(lit.files.iter().any(|file| file.ends_with("even.hdr")), "{:?}", lit.files);
     for (light, why) in [
-        (r#"Environment(file: "eve.hdr")"#, "did you mean `even.hdr`?"),
-        (r#"Environment(file: "black.hdr")"#, "`black.hdr` cannot be used: it is black"),
-        (r#"Environment(file: "square.hdr")"#, "twice as wide as high"),
-        (r#"Environment(file: "even.hdr", nir: Channel)"#, "it has no channel NIR"),
-        (r#"Environment(file: "even.hdr", scale: 0)"#, "above 0"),
+        (r#"EnvironmentMap(file: "eve.hdr")"#, "did you mean `even.hdr`?"),
+        (r#"EnvironmentMap(file: "black.hdr")"#, "`black.hdr` cannot be used: it is black"),
+        (r#"EnvironmentMap(file: "square.hdr")"#, "twice as wide as high"),
+        (r#"EnvironmentMap(file: "even.hdr", nir: Channel)"#, "it has no channel NIR"),
+        (r#"EnvironmentMap(file: "even.hdr", scale: 0)"#, "above 0"),
     ] {
         let message = field(light).err().unwrap_or_default();
         assert!(message.contains(why) && message.contains("page.ron:3:"), "{light}: {message}");
@@ -453,8 +466,8 @@ fn a_page_of_lights_is_written_as_it_was_read() {
         r#"Daylight(sun:At(latitude_deg:50.6,longitude_deg:7.0,utc:"2016-05-27T11:30:00Z",later_h:0.0),turbidity:3.0,cloud:0.0)"#,
         "Overcast(illuminance_klx:Uniform(5.0,25.0))",
         "Constant(radiance:(1.0,1.0,1.0,0.5))",
-        r#"Environment(file:"sky.exr",scale:1.0,rotate_deg:Uniform(0.0,360.0))"#,
-        r#"Environment(file:"sky.exr",scale:2.0,rotate_deg:0.0,nir:Some(OfRed(0.8)))"#,
+        r#"EnvironmentMap(file:"sky.exr",scale:1.0,rotate_deg:Uniform(0.0,360.0))"#,
+        r#"EnvironmentMap(file:"sky.exr",scale:2.0,rotate_deg:0.0,nir:Some(OfRed(0.8)))"#,
     ] {
         let desc: LightDesc = ron::from_str(page).unwrap();
         assert_eq!(ron::to_string(&desc).unwrap(), page);

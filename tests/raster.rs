@@ -14,7 +14,7 @@ use furrow::accel::EmbreeAccel;
 use furrow::bsdf::{Bsdf, Leaf, OrenNayar};
 use furrow::film::Filter;
 use furrow::geometry::{Intersect, Ray, Window};
-use furrow::light::{Environment, Light, Sun};
+use furrow::light::{Constant, Light, Sun};
 use furrow::material::Material;
 use furrow::math::{Spectrum, Vec2, Vec3, vec2, vec3};
 use furrow::raster::{Drawn, Effect, Rasterizer, Settings};
@@ -127,7 +127,7 @@ fn a_matt_plane_returns_what_the_cosine_law_says() {
     for lens in [Distortion::default(), bent] {
         let sun = plane(bsdf, vec![Light::Sun(Sun::uniform(slant, irradiance))], lens);
         expect(&sun, albedo * irradiance * (0.8 / PI), "sun");
-        let around = plane(bsdf, vec![Light::Environment(Environment::new(irradiance))], lens);
+        let around = plane(bsdf, vec![Light::Constant(Constant::new(irradiance))], lens);
         expect(&around, albedo * irradiance, "surrounding");
     }
 }

@@ -154,3 +154,51 @@ fn a_browser_shows_the_report_in_wide_and_narrow_windows() {
         assert_eq!(seen["requests"], serde_json::json!([]), "{seen}");
     }
 }
+
+/// Rationale: a dataset outlives the program that made it. Expected: images of an earlier version verify, and finishing them again
+/// gives the same lists and a report with the same numbers under the same keys; no field of the conditions is lost on the way.
+/// Source: `tests/data/dataset`, two images of version 0.1.0, when conditions were still read by JSON pointers.
+#[test]
+fn a_dataset_of_an_earlier_version_is_read_to_the_same_report() {
+    let (_kept, out) = scratch();
+    for (name, bytes) in common::dataset::tree(Path::new("tests/data/dataset")) {
+        let path = out.join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, bytes).unwrap();
+    }
+    let run = |verb: &str| {
+        let said = common::dataset::succeed(common::dataset::verb(verb, &out, &[])).stderr;
+        String::from_utf8_lossy(&said).into_owned()
+    };
+    let said = run("verify");
+    assert!(said.contains("2 of 2 images checked") && said.contains("; 0 faults"), "{said}");
+    let read = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
+    for name in ["000000", "000001"] {
+        let record = furrow::dataset::native::read_record(&out, name).unwrap();
+        let text = serde_json::to_string(&record).unwrap() + "\n";
+        assert_eq!(text, read(&format!("images/{name}/record.json")), "{name}");
+    }
+    let before = (read("report.html"), read("imagefolder/train/metadata.jsonl"));
+    std::fs::remove_file(out.join("report.html")).unwrap();
+    std::fs::remove_file(out.join("imagefolder/train/metadata.jsonl")).unwrap();
+    run("finish");
+    assert_eq!(read("imagefolder/train/metadata.jsonl"), before.1);
+    let page = read("report.html");
+    let keys: Vec<&str> = before.0.split("data-key=\"").skip(1).map(|t| t.split('"').next().unwrap()).collect();
+    for key in ["sun_elevation_deg", "irradiance", "cloud", "turbidity", "moisture", "roughness_mm", "clods", "straw"] {
+        assert!(keys.contains(&key), "{key}");
+    }
+    for key in ["camera_height_m", "tilt_deg", "pixel_mm"] {
+        assert!(keys.contains(&key), "{key}");
+    }
+    for key in keys {
+        let of = |page: &str| {
+            let at = page.find(&format!("data-key=\"{key}\"")).unwrap_or_else(|| panic!("nothing has the key {key}"));
+            let tag = page[at..].split('>').next().unwrap();
+            let name = if tag.contains("data-mean") { "data-mean" } else { "data-value" };
+            tag.contains(name).then(|| attribute(page, key, name).to_owned())
+        };
+        assert_eq!(of(&page), of(&before.0), "{key}");
+    }
+    assert!(run("verify").contains("; 0 faults"));
+}

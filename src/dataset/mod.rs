@@ -23,7 +23,7 @@
 //! | `native`, `format` | as files, ours and other people's |
 //! | `seal`, `set` | which files make an image; the dataset on disk |
 //! | `make` | all of it in one call |
-//! | `plan`, `generate`, `ledger`, `finish` | from a scene file to files; what remains to be done is found by looking at the disk |
+//! | `plan`, `gather`, `generate`, `ledger`, `finish` | from a scene file to files; what remains to be done is found by looking at the disk |
 //! | `cluster` | the same on many machines: job files for schedulers |
 //! | `invariants`, `verify` | what must hold of every image, and whether it does |
 //! | `import` | other people's images and labels |
@@ -33,6 +33,7 @@ pub mod annotate;
 pub mod cluster;
 pub mod finish;
 pub mod format;
+mod gather;
 pub mod generate;
 pub mod import;
 pub mod invariants;

@@ -1,15 +1,16 @@
 //! Begins a dataset: checks the page by growing its first field, takes everything that it reads into the folder, writes the recipe.
 
+use super::gather::{Gathered, gather};
 use super::recipe::{FILE, Made, Recipe, Rendering};
 use super::set::Set;
 use super::split::Shares;
 use super::{File, format, seal};
 use crate::ablation::{Edit, FULL};
-use crate::job::{Renderer, SceneFile};
+use crate::job::{Field, Renderer, SceneFile};
 use crate::output::is_unfinished;
 use crate::settings::RenderOptions;
 use crate::{Error, Result};
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 /// A dataset that is asked for.
 #[derive(Clone, Debug)]
@@ -71,8 +72,7 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
     }
     // Before anything grows: what could not be rendered here.
     let kernels = Renderer::open(&options)?.kernels().to_owned();
-    let scene_file = SceneFile::edited(&order.scene, order.edit)?;
-    let first = scene_file.seed(order.seed).width(order.width).height(order.height).field(0)?;
+    let first = first_field(&order.scene, order)?;
     let field = first.grown();
     if field.species.len() > MOST_SPECIES {
         return Err(Error::input(format!(
@@ -82,13 +82,14 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
         .in_file(&order.scene)
         .help("make two pages of it"));
     }
-    let (files, scene) = gather(&field.files, &order.scene)?;
+    let Gathered { files, scene, rewritten } = gather(&field.files, &order.scene)?;
+    let scene_sha256 = if rewritten { hash_of_copies(order, &files, &scene)? } else { field.hash.clone() };
     let camera = &field.scene.camera;
     let mut recipe = Recipe {
         furrow: env!("CARGO_PKG_VERSION").into(),
         made: Made::Rendered(Rendering {
             scene,
-            scene_sha256: field.hash.clone(),
+            scene_sha256,
             seed: field.seed,
             width: camera.width(),
             height: camera.height(),
@@ -126,6 +127,29 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
     Ok((Set { folder: folder.into(), recipe }, told))
 }
 
+/// The first field of a scene file, as an order asks for it.
+fn first_field(scene: &Path, order: &Order) -> Result<Field> {
+    SceneFile::edited(scene, order.edit)?.seed(order.seed).width(order.width).height(order.height).field(0)
+}
+
+/// SHA-256 of a scene whose copies name their files otherwise than the originals do, found by growing the first field from them in
+/// a folder of their own; an error where it still reads something outside.
+fn hash_of_copies(order: &Order, files: &[File], scene: &str) -> Result<String> {
+    let folder = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir()))?;
+    seal::write_files(folder.path(), files)?;
+    let first = first_field(&folder.path().join(scene), order)?;
+    let field = first.grown();
+    match field.files.iter().find(|file| !file.starts_with(folder.path())) {
+        None => Ok(field.hash.clone()),
+        Some(outside) => Err(Error::input(format!(
+            "{} is named by an absolute path in a file that is not a RON file, so it cannot be taken into the dataset",
+            outside.display()
+        ))
+        .in_file(&order.scene)
+        .help("name it relative to the file that needs it")),
+    }
+}
+
 /// What the formats of a recipe cannot hold or do otherwise.
 fn warnings(recipe: &Recipe) -> Result<Vec<String>> {
     let mut all = Vec::new();
@@ -147,41 +171,6 @@ pub(super) fn refuse_full(folder: &Path) -> Result<()> {
             .in_file(folder)
             .help("give --out a folder that is empty or not there yet")),
     }
-}
-
-/// The files of a page as files of the dataset, below `scene/` as they lie to each other, and the page's path there.
-fn gather(paths: &[PathBuf], page: &Path) -> Result<(Vec<File>, String)> {
-    let plain: Vec<PathBuf> = paths.iter().map(|p| absolute(p)).collect::<Result<_>>()?;
-    let mut root = absolute(page)?;
-    root.pop();
-    while !plain.iter().all(|p| p.starts_with(&root)) {
-        root.pop();
-    }
-    let below = |path: &Path| -> String {
-        let rest = path.strip_prefix(&root).unwrap_or(path);
-        let names: Vec<_> = rest.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect();
-        format!("scene/{}", names.join("/"))
-    };
-    let mut files = Vec::new();
-    for path in &plain {
-        let bytes = std::fs::read(path).map_err(Error::reading(path))?;
-        files.push(File { path: below(path), bytes });
-    }
-    Ok((files, below(&absolute(page)?)))
-}
-
-/// An absolute path without `.` and `..`.
-fn absolute(path: &Path) -> Result<PathBuf> {
-    let full = std::path::absolute(path).map_err(Error::reading(path))?;
-    let mut plain = PathBuf::new();
-    for part in full.components() {
-        match part {
-            Component::CurDir => {}
-            Component::ParentDir => drop(plain.pop()),
-            part => plain.push(part),
-        }
-    }
-    Ok(plain)
 }
 
 /// Adds formats to a dataset; their files are made by the next run. Returns what the user should know.

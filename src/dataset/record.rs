@@ -3,8 +3,9 @@
 use super::rle::{Box2, Rle};
 use super::split::Split;
 use crate::plant::Condition;
+use crate::scene::record::Conditions;
 use crate::scene::tag::{Class, lowercase};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer, ser};
 
 /// One image.
 ///
@@ -32,14 +33,20 @@ pub struct Record {
     /// Its plants, by number: those that the image shows and those that others hide in it.
     pub plants: Vec<Plant>,
     /// What was drawn for it: camera, lights, soil, rows, stage; null for an imported image.
-    #[serde(default, skip_serializing_if = "serde_json::Value::is_null")]
-    pub conditions: serde_json::Value,
+    #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "sorted")]
+    pub conditions: Option<Conditions>,
     /// How the sensor was set; null for an imported image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure: Option<Exposure>,
     /// What whoever made it should know.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
+}
+
+/// Writes conditions as records have always had them: keys in the order of the alphabet, numbers with the digits of double precision.
+#[expect(clippy::ref_option, reason = "serde calls it with a reference to the field")]
+fn sorted<S: Serializer>(conditions: &Option<Conditions>, serializer: S) -> Result<S::Ok, S::Error> {
+    serde_json::to_value(conditions).map_err(ser::Error::custom)?.serialize(serializer)
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference to the field")]

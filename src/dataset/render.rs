@@ -92,12 +92,12 @@ pub fn render(
     let begin = Instant::now();
     let (draw, label) = (image.times.draw, image.times.label);
     let text = image.provenance.photograph_text(image.denoised.is_some());
-    let sample = field.threads().install(|| describe(recipe, image))?;
+    let sample = field.threads().install(|| describe(recipe, image));
     Ok(RenderedSample { sample, text, times: Times { grow: grow + build, draw, label: label + begin.elapsed() } })
 }
 
 /// The sample of an image.
-fn describe(recipe: &Recipe, image: Image<'_>) -> Result<Sample> {
+fn describe(recipe: &Recipe, image: Image<'_>) -> Sample {
     let photograph = image.photograph();
     let field = image.field().grown();
     let tags = field.scene.tags();
@@ -115,8 +115,7 @@ fn describe(recipe: &Recipe, image: Image<'_>) -> Result<Sample> {
             classes: Vec::new(),
             ignored: 0,
             plants: Vec::new(),
-            conditions: serde_json::to_value(&field.conditions)
-                .map_err(|e| Error::failed(format!("cannot write down the conditions: {e}")))?,
+            conditions: Some(field.conditions.clone()),
             exposure: Some(Exposure {
                 gain: photograph.gain,
                 nir_gain: photograph.nir_gain,
@@ -139,7 +138,7 @@ fn describe(recipe: &Recipe, image: Image<'_>) -> Result<Sample> {
     (sample.record.classes, sample.record.ignored) = annotate::classes(&sample);
     sample.record.plants = plants(field, &labels, &sample);
     sample.film = Some(Rendered { film, labels, tags });
-    Ok(sample)
+    sample
 }
 
 /// The plants of a field that its image shows or hides, in the order of their numbers.

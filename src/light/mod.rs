@@ -1,24 +1,24 @@
-//! Light: sun, sky, constant and photographed environments, lamps; how a page writes them and how a path tracer draws from them.
+//! Light: sun, sky, constant environments and environment maps, lamps; how a page writes them and how a path tracer draws from them.
 //!
 //! `sample.rs` holds the promise, each variant keeps it in a file of its own, the enum here only chooses. Radiance is
 //! W·m⁻²·sr⁻¹·nm⁻¹ and irradiance W·m⁻²·nm⁻¹, both in the four bands R, G, B, NIR.
 
 pub mod clearsky;
+mod constant;
 mod daylight;
-mod environment;
+mod environment_map;
 pub mod hosek;
 mod lamp;
-mod panorama;
 mod position;
 mod record;
 mod sample;
 mod sky;
 mod sun;
 
+pub use constant::Constant;
 pub use daylight::{AboveHorizon, Latitude, Longitude, SunDesc, Turbidity, daylight, overcast_irradiance};
-pub use environment::Environment;
+pub use environment_map::{EnvironmentMap, Infrared, InfraredDesc, Table};
 pub use lamp::{GlowDesc, Lamp, Outline, PointDesc, ShapeDesc};
-pub use panorama::{Infrared, InfraredDesc, Surround, Table};
 pub use position::{SunPosition, Utc, sun_position};
 pub use record::LightRecord;
 pub use sample::{Emitter, LampHit, LightSample};
@@ -33,7 +33,7 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Reads a picture of all directions that a page names.
+/// Reads an environment map that a scene file names.
 pub type Open<'a> = dyn FnMut(&str, Infrared) -> Result<Arc<Table>> + 'a;
 
 /// A light.
@@ -43,10 +43,10 @@ pub enum Light {
     Sun(Sun),
     /// The sky's dome.
     Sky(Box<Sky>),
-    /// The same radiance from everywhere.
-    Environment(Environment),
-    /// A picture of all directions.
-    Surround(Surround),
+    /// A constant environment: the same radiance from all directions.
+    Constant(Constant),
+    /// An environment map.
+    EnvironmentMap(EnvironmentMap),
     /// A rectangle or disc that shines on one side.
     Lamp(Lamp),
 }
@@ -56,8 +56,8 @@ macro_rules! of {
         match $light {
             Light::Sun($inner) => $call,
             Light::Sky($inner) => $call,
-            Light::Environment($inner) => $call,
-            Light::Surround($inner) => $call,
+            Light::Constant($inner) => $call,
+            Light::EnvironmentMap($inner) => $call,
             Light::Lamp($inner) => $call,
         }
     };
@@ -127,8 +127,8 @@ impl Light {
         let overcast = Sky::new(Dome::overcast(overcast_irradiance(20.0)));
         of.extend(overcast.map(|sky| ("overcast sky", Self::Sky(Box::new(sky)))));
         of.push(("uniform sun", Self::Sun(Sun::uniform(vec3(0.6, 0.0, 0.8), Spectrum::ONE))));
-        of.push(("constant environment", Self::Environment(Environment::new(Spectrum::new(0.5, 1.0, 2.0, 4.0)))));
-        of.extend(Surround::example().map(|light| ("surround", Self::Surround(light))));
+        of.push(("constant environment", Self::Constant(Constant::new(Spectrum::new(0.5, 1.0, 2.0, 4.0)))));
+        of.extend(EnvironmentMap::example().map(|light| ("environment map", Self::EnvironmentMap(light))));
         let radiance = Spectrum::new(2.0, 3.0, 1.0, 0.5);
         let lamp = |outline, centre: Vec3, axis: Vec3| {
             Self::Lamp(Lamp::new(outline, centre, Frame::about(axis.normalize()), radiance))
@@ -206,15 +206,16 @@ pub enum LightDesc {
         /// Radiance in R, G, B, NIR, W·m⁻²·sr⁻¹·nm⁻¹.
         radiance: (Vary<NonNegative>, Vary<NonNegative>, Vary<NonNegative>, Vary<NonNegative>),
     },
-    /// A picture of all directions: light as it was photographed.
-    Environment {
-        /// A .exr or .hdr file, equirectangular, linear, the zenith in its first row; its path counts from the page's folder.
+    /// An environment map: light of all directions as it was photographed.
+    #[serde(alias = "Environment")]
+    EnvironmentMap {
+        /// A .exr or .hdr file, equirectangular, linear, the zenith in its first row; its path counts from the scene file's folder.
         file: String,
         /// By what its values become radiance, W·m⁻²·sr⁻¹·nm⁻¹; default 1.
-        #[serde(default = "panorama::as_it_is")]
+        #[serde(default = "environment_map::as_it_is")]
         scale: Vary<Positive>,
         /// Where its middle column is, degrees clockwise from north; default 0.
-        #[serde(default = "panorama::north")]
+        #[serde(default = "environment_map::north")]
         rotate_deg: Vary<Finite>,
         /// Its near infrared; by default the file's channel NIR, or as of a sky where it has none.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -247,7 +248,7 @@ impl LightDesc {
     /// The pictures that it names, those of all its lists.
     pub fn files(&self) -> Vec<&str> {
         match self {
-            Self::Environment { file, .. } => vec![file],
+            Self::EnvironmentMap { file, .. } => vec![file],
             Self::OneOf(lists) => lists.iter().flatten().flat_map(Self::files).collect(),
             Self::Daylight { .. } | Self::Overcast { .. } | Self::Constant { .. } | Self::Lamp { .. } => Vec::new(),
         }
@@ -289,18 +290,18 @@ impl LightDesc {
             }
             Self::Constant { radiance: (r, g, b, nir) } => {
                 let radiance = Spectrum::from([r, g, b, nir].map(|band| band.draw32(stream)));
-                let light = (!radiance.is_black()).then(|| Light::Environment(Environment::new(radiance)));
+                let light = (!radiance.is_black()).then(|| Light::Constant(Constant::new(radiance)));
                 let record =
                     LightRecord::Constant { radiance_w_m2_sr_nm: radiance, irradiance_w_m2_nm: given(light.as_ref()) };
                 (record, light.into_iter().collect())
             }
-            Self::Environment { file, scale, rotate_deg, nir } => {
+            Self::EnvironmentMap { file, scale, rotate_deg, nir } => {
                 let (scale, rotate_deg) = (scale.draw32(stream), rotate_deg.draw32(stream));
-                let (infrared, share) = panorama::draw_infrared(nir.as_ref(), stream);
+                let (infrared, share) = environment_map::draw_infrared(nir.as_ref(), stream);
                 let bands = Spectrum::new(1.0, 1.0, 1.0, share) * scale;
-                let light = Surround::new(open(file, infrared)?, bands, rotate_deg).map(Light::Surround);
+                let light = EnvironmentMap::new(open(file, infrared)?, bands, rotate_deg).map(Light::EnvironmentMap);
                 let irradiance_w_m2_nm = given(light.as_ref());
-                let record = LightRecord::Environment { file: file.clone(), scale, rotate_deg, irradiance_w_m2_nm };
+                let record = LightRecord::EnvironmentMap { file: file.clone(), scale, rotate_deg, irradiance_w_m2_nm };
                 (record, light.into_iter().collect())
             }
             Self::Lamp { shape, position_m, look_at_m, glow } => {

@@ -5,10 +5,10 @@
 use super::{Lamp, Outline};
 use crate::light::sample::Emitter;
 use crate::math::Spectrum;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A light as it was drawn: one for each that the page lists.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum LightRecord {
     /// Sun and sky.
@@ -40,8 +40,9 @@ pub enum LightRecord {
         /// What it gives the ground.
         irradiance_w_m2_nm: Spectrum,
     },
-    /// A picture of all directions.
-    Environment {
+    /// An environment map.
+    #[serde(rename = "environment")]
+    EnvironmentMap {
         /// The file, as the page names it.
         file: String,
         /// By what its values became radiance.
@@ -87,6 +88,17 @@ impl LightRecord {
         }
     }
 
+    /// What kind of light it is, in the word that its record has: `daylight`, `overcast`, `constant`, `environment`, `lamp`.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Daylight { .. } => "daylight",
+            Self::Overcast { .. } => "overcast",
+            Self::Constant { .. } => "constant",
+            Self::EnvironmentMap { .. } => "environment",
+            Self::Lamp { .. } => "lamp",
+        }
+    }
+
     /// What it gives the ground, sun and sky together.
     pub fn irradiance_w_m2_nm(&self) -> Spectrum {
         match self {
@@ -95,7 +107,7 @@ impl LightRecord {
             }
             Self::Overcast { irradiance_w_m2_nm, .. }
             | Self::Constant { irradiance_w_m2_nm, .. }
-            | Self::Environment { irradiance_w_m2_nm, .. }
+            | Self::EnvironmentMap { irradiance_w_m2_nm, .. }
             | Self::Lamp { irradiance_w_m2_nm, .. } => *irradiance_w_m2_nm,
         }
     }

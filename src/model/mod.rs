@@ -15,6 +15,7 @@ mod obj;
 mod uri;
 
 use crate::geometry::{AlphaMask, Mesh};
+use crate::input::{self, Refusal};
 use crate::math::{DMat4, Vec2, Vec3};
 use crate::texture::{NormalMap, Texture};
 use crate::{Error, Result};
@@ -24,8 +25,6 @@ use std::sync::Arc;
 
 /// Most triangles of one model.
 const MOST_TRIANGLES: usize = 1 << 25;
-/// Largest file that is read, bytes.
-const LARGEST: u64 = 1 << 32;
 
 /// Which of a file's axes points up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -183,18 +182,15 @@ fn too_many_triangles() -> Wrong {
 /// A file's bytes, noted in `files`; in words why there are none.
 fn bytes(path: &Path, files: &mut Vec<PathBuf>) -> Result<Vec<u8>, String> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let about = std::fs::metadata(path).map_err(|e| match e.kind() {
-        std::io::ErrorKind::NotFound => format!("it needs a file `{name}`, which is not there"),
-        _ => format!("{name}: {e}"),
+    let bytes = input::read(path, input::LARGEST).map_err(|refusal| match refusal {
+        Refusal::Io(e) if e.kind() == std::io::ErrorKind::NotFound => {
+            format!("it needs a file `{name}`, which is not there")
+        }
+        Refusal::Folder => format!("it needs a file `{name}`, which is a folder"),
+        other => format!("{name}: {other}"),
     })?;
-    if about.is_dir() {
-        return Err(format!("it needs a file `{name}`, which is a folder"));
-    }
-    if about.len() > LARGEST {
-        return Err(format!("{name} is larger than 4 GiB"));
-    }
     files.push(path.into());
-    std::fs::read(path).map_err(|e| format!("{name}: {e}"))
+    Ok(bytes)
 }
 
 /// Held to 0..1; what is not a number is 0.

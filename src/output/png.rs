@@ -1,6 +1,6 @@
 //! PNG in the shapes that labels and pictures need, through the `png` crate: indexed and 16-bit images keep their bits.
 
-use crate::{Error, Result};
+use crate::{Error, Result, input};
 use png::{BitDepth, ColorType};
 use std::path::Path;
 
@@ -80,7 +80,7 @@ pub fn write_png(path: &Path, width: u32, height: u32, picture: &Picture<'_>, te
 
 fn read(path: &Path, depth: BitDepth, color: ColorType, what: &str) -> Result<(u32, u32, Vec<u8>)> {
     let wrong = |e: &dyn std::fmt::Display| Error::input(e.to_string()).in_file(path);
-    let file = std::fs::File::open(path).map_err(Error::reading(path))?;
+    let file = input::open(path).map_err(|refusal| refusal.into_error(path))?;
     let mut decoder = png::Decoder::new(std::io::BufReader::new(file));
     decoder.set_transformations(png::Transformations::IDENTITY);
     let mut reader = decoder.read_info().map_err(|e| wrong(&e))?;
@@ -144,7 +144,7 @@ impl Map {
 /// all over is one of numbers.
 pub fn read_map(path: &Path) -> Result<(u32, u32, Map)> {
     let wrong = |what: String| Error::input(what).in_file(path);
-    let file = std::fs::File::open(path).map_err(Error::reading(path))?;
+    let file = input::open(path).map_err(|refusal| refusal.into_error(path))?;
     let mut decoder = png::Decoder::new(std::io::BufReader::new(file));
     decoder.set_transformations(png::Transformations::IDENTITY);
     let unreadable = |e: png::DecodingError| wrong(format!("this mask cannot be read: {e}; masks are PNG files"));

@@ -40,7 +40,7 @@ impl Lights {
                 Light::Lamp(lamp) => {
                     each.push(lamplight(lamp.centre(), lamp.frame(), lamp.radiance() * lamp.area()));
                 }
-                Light::Sky(_) | Light::Environment(_) | Light::Surround(_) => {
+                Light::Sky(_) | Light::Constant(_) | Light::EnvironmentMap(_) => {
                     let of = if settings.has(super::Effect::Harmonics) { harmonics(light) } else { even(light) };
                     for (sum, add) in ambient.iter_mut().zip(of) {
                         *sum += add;
@@ -170,7 +170,7 @@ mod tests {
     #[test]
     fn harmonics_hold_the_irradiance_of_the_ground() {
         for (name, light) in Light::examples() {
-            if !matches!(light, Light::Sky(_) | Light::Environment(_)) {
+            if !matches!(light, Light::Sky(_) | Light::Constant(_)) {
                 continue;
             }
             let of = harmonics(&light);

@@ -1,10 +1,11 @@
-//! Faults with a place: what is wrong inside one value of a page, and what to do.
+//! Faults with a place: what is wrong inside one value of a file, and what to do.
 //!
 //! RON tells neither where a custom error lies nor whether a number or a name comes next; both are read off the value's raw
 //! text here. A [`Fault`] carries its place outward through serde's string-only errors, between control characters that no
-//! page's text can bring in by itself.
+//! file's text can bring in by itself.
 
 use super::place::{Step, mismatch, place, token};
+use super::renamed::{Keyword, is_old};
 use super::suggest::choose;
 use ron::error::{Error as Ron, SpannedError};
 use serde::{Deserialize, Deserializer, de};
@@ -120,7 +121,7 @@ pub(super) fn locate(text: &str, error: &SpannedError) -> Fault {
                 }
                 Some((_, Some(open))) => {
                     let message =
-                        format!("the page ends, but the `{}` of line {} is still open", &text[open..=open], line(open));
+                        format!("the file ends, but the `{}` of line {} is still open", &text[open..=open], line(open));
                     fault(text.len()..text.len(), message, "add the closing bracket where it belongs".into())
                 }
                 _ => fault(if end > start { start..end } else { token(text, start) }, message, help),
@@ -141,15 +142,22 @@ pub(super) fn offset_of(text: &str, line: usize, column: usize) -> usize {
     start + rest.char_indices().nth(column.saturating_sub(1)).map_or(rest.len(), |(i, _)| i)
 }
 
+/// The names that are not old ones: nobody is told to write a name that is about to go.
+fn current<'a>(keyword: Keyword, expected: &[&'a str]) -> Vec<&'a str> {
+    expected.iter().copied().filter(|name| !is_old(keyword, name)).collect()
+}
+
 /// A parser's error in our words: what is wrong, and what to do.
 fn explain(code: &Ron) -> (String, String) {
     let (message, help) = match code {
         Ron::NoSuchStructField { expected, found, outer } => {
             let of = outer.as_ref().map(|o| format!(" in {o}")).unwrap_or_default();
-            return (format!("unknown field `{found}`{of}"), choose("fields", expected, found));
+            let fields = current(Keyword::Field, expected);
+            return (format!("unknown field `{found}`{of}"), choose("fields", &fields, found));
         }
         Ron::NoSuchEnumVariant { expected, found, .. } => {
-            return (format!("unknown name `{found}`"), choose("names that can stand here", expected, found));
+            let names = current(Keyword::Value, expected);
+            return (format!("unknown name `{found}`"), choose("names that can stand here", &names, found));
         }
         Ron::MissingStructField { field, outer } => {
             let of = outer.as_ref().map(|o| format!(" of {o}")).unwrap_or_default();
@@ -199,12 +207,12 @@ fn explain(code: &Ron) -> (String, String) {
         Ron::ExpectedIdentifier | Ron::InvalidIdentifier(_) | Ron::SuggestRawIdentifier(_) => {
             ("a name is expected here", "names are letters, digits and _, without quotes")
         }
-        Ron::Eof => ("the page ends too early", "a bracket or a quote that was opened above is not closed"),
+        Ron::Eof => ("the file ends too early", "a bracket or a quote that was opened above is not closed"),
         Ron::UnclosedBlockComment => ("this comment has no end", "close it with */"),
         Ron::TrailingCharacters => {
-            ("the page's bracket is closed before this", "look for one closing bracket too many above")
+            ("the file's bracket is closed before this", "look for one closing bracket too many above")
         }
-        Ron::ExceededRecursionLimit => ("brackets are nested too deeply", "no page needs a hundred of them"),
+        Ron::ExceededRecursionLimit => ("brackets are nested too deeply", "no file needs a hundred of them"),
         other => return (other.to_string(), String::new()),
     };
     (message.to_owned(), help.to_owned())

@@ -1,15 +1,17 @@
 //! A RON file: its text, and the way from it to a value or to an error that shows its place.
 
 use super::fault::{Fault, locate, offset_of};
-use super::place::{Step, place};
+use super::place::{Step, place, quoted};
+use super::renamed;
 use super::suggest::nearest;
 use crate::error::{Kind, Place, Span};
+use crate::input::{self, Refusal};
 use crate::{Error, Result};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
-/// Largest page that is read, bytes: a page is written by hand.
+/// Largest file that is read, bytes: such files are written by hand.
 const LARGEST: u64 = 4 << 20;
 
 /// Bytes of a value that are underlined as a whole.
@@ -28,45 +30,51 @@ impl RonFile {
     /// Reads a file.
     pub fn read(path: &Path) -> Result<Self> {
         let refuse = |what: &str, help: &str| Err(Error::input(what).help(help).in_file(path));
-        let about = std::fs::metadata(path).map_err(Error::reading(path))?;
-        if about.is_dir() {
-            return refuse("this is a folder", "name a page in it, a file that ends in .ron");
-        }
-        if about.len() > LARGEST {
-            return refuse("this file is too large for a page", "a page is text of at most 4 MiB that ends in .ron");
-        }
-        let bytes = std::fs::read(path).map_err(Error::reading(path))?;
+        let bytes = match input::read(path, LARGEST) {
+            Ok(bytes) => bytes,
+            Err(Refusal::Folder) => return refuse("this is a folder", "name a file in it that ends in .ron"),
+            Err(Refusal::NotRegular) => {
+                return refuse(
+                    "this is a pipe, a socket or a device, not a file",
+                    "write the text to a file that ends in .ron, and name that",
+                );
+            }
+            Err(Refusal::TooLarge(_)) => {
+                return refuse("this file is too large", "RON files are text of at most 4 MiB that ends in .ron");
+            }
+            Err(other) => return Err(other.into_error(path)),
+        };
         // Some editors begin a file with a byte order mark.
         let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
         if bytes.contains(&0) {
-            return refuse("this is not a text file", "a page is text that ends in .ron");
+            return refuse("this is not a text file", "name a text file that ends in .ron");
         }
         match std::str::from_utf8(bytes) {
             Ok(text) => Ok(Self { path: path.into(), text: text.to_owned() }),
             Err(e) => {
                 let at = e.valid_up_to();
-                let page = Self { path: path.into(), text: String::from_utf8_lossy(bytes).into_owned() };
+                let file = Self { path: path.into(), text: String::from_utf8_lossy(bytes).into_owned() };
                 let message = format!("byte {:#04x} is not UTF-8 text", bytes[at]);
-                let help = "save the page as UTF-8".to_owned();
-                Err(page.fault(&Fault { raw_len: page.text.len(), start: at, end: at + 1, message, help }))
+                let help = "save the file as UTF-8".to_owned();
+                Err(file.fault(&Fault { raw_len: file.text.len(), start: at, end: at + 1, message, help }))
             }
         }
     }
 
-    /// A page that lies nowhere, for tests and tools; its paths are relative to the working directory.
+    /// A file that lies nowhere, for tests and tools; its paths are relative to the working directory.
     pub fn of(text: &str) -> Self {
         Self { path: "page.ron".into(), text: text.to_owned() }
     }
 
-    /// Reads the page as `T`.
+    /// Reads the text as `T`.
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T> {
         if self.text.trim().is_empty() {
-            let help = "a page begins with a name and a bracket, as scenes/field.ron with `Field(`".to_owned();
+            let help = "it begins with a name and a bracket, as scenes/field.ron with `Field(`".to_owned();
             return Err(self.fault(&Fault {
                 raw_len: 0,
                 start: 0,
                 end: 0,
-                message: "this page is empty".to_owned(),
+                message: "this file is empty".to_owned(),
                 help,
             }));
         }
@@ -77,28 +85,49 @@ impl RonFile {
         })
     }
 
-    /// The text of a page that reads as `value`.
+    /// The text of a file that reads as `value`.
     pub fn print<T: Serialize>(value: &T) -> Result<String> {
         let pretty = ron::ser::PrettyConfig::new().struct_names(true).compact_arrays(true);
         options()
             .to_string_pretty(value, pretty)
-            .map_err(|e| Error::failed(format!("this cannot be written as a page: {e}")))
+            .map_err(|e| Error::failed(format!("this cannot be written as RON: {e}")))
     }
 
-    /// A path written in the page, relative to the page's folder.
+    /// A warning for each keyword that was renamed, in the order in which they stand: where, and what to write.
+    pub fn renamed(&self) -> Vec<String> {
+        // Without its folder: warnings are recorded in datasets, which name no folder of a machine.
+        let name = self.path.file_name().unwrap_or_default().to_string_lossy();
+        renamed::warnings(&name, &self.text)
+    }
+
+    /// A path written in the file, relative to the file's folder.
     pub fn resolve(&self, path: &str) -> PathBuf {
         self.path.parent().unwrap_or(Path::new("")).join(path)
     }
 
-    /// An error about a text that stands in quotes in the page; about the first line where it stands nowhere.
+    /// An error about a text that stands in quotes in the file, outside comments; about the first line where it stands nowhere.
     pub fn about(&self, literal: &str, message: impl Into<String>, help: impl Into<String>) -> Error {
-        let quoted = format!("\"{literal}\"");
-        let (start, len) = self.text.find(&quoted).map_or((0, 1), |at| (at, quoted.len()));
+        let found =
+            quoted(&self.text).into_iter().find(|at| unquoted(&self.text[at.clone()]).as_deref() == Some(literal));
+        let at = found.unwrap_or(0..1);
         let (message, help) = (message.into(), help.into());
-        self.fault(&Fault { raw_len: self.text.len(), start, end: start + len, message, help })
+        self.fault(&Fault { raw_len: self.text.len(), start: at.start, end: at.end, message, help })
     }
 
-    /// An error about the value that `path` leads to. A wrong value that was found while building gets its place in the page; errors
+    /// The text with some of its quoted texts, outside comments, replaced: `with` gets what stands in the quotes and says what
+    /// shall stand there instead, `None` to leave it. `None` where all stay.
+    pub fn replace_quoted(&self, mut with: impl FnMut(&str) -> Option<String>) -> Option<String> {
+        let mut text = self.text.clone();
+        // From the end, so that places before stay where they are.
+        for at in quoted(&self.text).into_iter().rev() {
+            if let Some(new) = unquoted(&self.text[at.clone()]).and_then(|old| with(&old)) {
+                text.replace_range(at, &ron::ser::to_string(&new).unwrap_or_else(|_| format!("{new:?}")));
+            }
+        }
+        (text != self.text).then_some(text)
+    }
+
+    /// An error about the value that `path` leads to. A wrong value that was found while building gets its place in the file; errors
     /// of other kinds, and those that have a place, stay as they are.
     pub fn blame(&self, path: &[Step<'_>], error: Error) -> Error {
         if error.kind() != Kind::Input || error.place().is_some() {
@@ -114,11 +143,15 @@ impl RonFile {
         self.fault(&Fault { raw_len: self.text.len(), start: at.start, end: at.end, message, help })
     }
 
-    /// Checks that a file named in the page is there.
+    /// Checks that a file named in this one is there.
     pub fn need_file(&self, path: &str) -> Result<PathBuf> {
         let full = self.resolve(path);
         if full.is_file() {
             return Ok(full);
+        }
+        if full.exists() {
+            let what = if full.is_dir() { "a folder" } else { "a pipe, a socket or a device" };
+            return Err(self.about(path, format!("`{path}` is {what}, not a file"), "name a file"));
         }
         let folder = tidy(full.parent().unwrap_or(Path::new("")));
         let name = full.file_name().unwrap_or_default().to_string_lossy();
@@ -127,7 +160,8 @@ impl RonFile {
             .unwrap_or_default();
         files.sort();
         let near = nearest(&files, &name).map(|n| format!("did you mean `{n}`? ")).unwrap_or_default();
-        let help = format!("{near}a path counts from the page's folder: looked in {}", folder.display());
+        let help =
+            format!("{near}a path counts from the folder of the file that names it: looked in {}", folder.display());
         Err(self.about(path, format!("there is no file `{path}`"), help))
     }
 
@@ -150,6 +184,11 @@ impl RonFile {
         let span = Some(Span { line, column, width, text: line_text.to_owned() });
         Error::input(fault.message.as_str()).help(fault.help.as_str()).at(Place { file: self.path.clone(), span })
     }
+}
+
+/// What stands in a quoted text.
+fn unquoted(text: &str) -> Option<String> {
+    ron::from_str(text).ok()
 }
 
 /// A folder without `..` behind other folders, as a reader would name it.
@@ -184,7 +223,7 @@ fn decimal_comma(text: &str, fault: &Fault) -> Option<String> {
     Some(format!("decimals are written with a point: {whole}.{part}"))
 }
 
-/// `notch: 0.05`, `Leaf(size: …)`: a page needs neither `Some` nor doubled brackets.
+/// `notch: 0.05`, `Leaf(size: …)`: a file needs neither `Some` nor doubled brackets.
 fn options() -> ron::Options {
     use ron::extensions::Extensions;
     ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME | Extensions::UNWRAP_VARIANT_NEWTYPES)
@@ -224,5 +263,21 @@ mod tests {
         assert!(m.contains(" ^^\n") || m.ends_with(" ^^"), "{m}");
         let m = message("Sun(elevation_deg: Unifrom(1, 2), azimuth_deg: 1)");
         assert!(m.contains("page.ron:1:20") && m.contains("did you mean `Uniform`"), "{m}");
+    }
+    #[test]
+    fn a_quoted_text_is_shown_where_it_counts_not_in_a_comment() {
+        let file =
+            RonFile::of("Sun( // \"a.png\" once stood here\n  key: \"not a.png\", /* \"a.png\" */ file: \"a.png\",\n)");
+        let m = file.about("a.png", "there is none", "").to_string();
+        assert!(m.starts_with("page.ron:2:41: there is none"), "{m}");
+        assert!(file.about("b.png", "x", "").to_string().starts_with("page.ron:1:1: x"));
+    }
+
+    #[test]
+    fn quoted_texts_are_replaced_and_nothing_else() {
+        let file = RonFile::of(r##"(a: "x", /* "x" */ b: r#"x"#, c: "y\"", d: "xx")"##);
+        let new = file.replace_quoted(|old| (old == "x").then(|| "a \"b\" \\".to_owned())).unwrap();
+        assert_eq!(new, r#"(a: "a \"b\" \\", /* "x" */ b: "a \"b\" \\", c: "y\"", d: "xx")"#);
+        assert_eq!(file.replace_quoted(|_| None), None);
     }
 }

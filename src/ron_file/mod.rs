@@ -11,6 +11,7 @@ mod fault;
 mod file;
 mod num;
 mod place;
+mod renamed;
 mod suggest;
 mod vary;
 
@@ -19,5 +20,6 @@ pub use fault::{Fault, from_raw, inside, parse_in, whole};
 pub use file::RonFile;
 pub use num::Num;
 pub use place::{Step, place};
+pub use renamed::{Keyword, RENAMED, Renamed};
 pub use suggest::{choose, nearest};
 pub use vary::{Distribution, Pick, Vary};

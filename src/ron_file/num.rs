@@ -28,7 +28,7 @@ impl<B: Bound> Num<B> {
         self.0
     }
 
-    /// Whether it is nothing: what a page need not write where that is the default.
+    /// Whether it is nothing: what a file need not write where that is the default.
     pub fn is_zero(&self) -> bool {
         self.0 == 0.0
     }

@@ -1,4 +1,4 @@
-//! Where a value stands in a page's text, by the fields and items that lead to it.
+//! Where a value stands in a file's text, by the fields and items that lead to it.
 //!
 //! What is found wrong after the parser is done (two numbers that do not fit together, a sun below the horizon) has lost its
 //! place; this reads it off the text again. The text has been parsed before, so brackets match; where they do not, the
@@ -83,6 +83,49 @@ pub(super) fn mismatch(text: &str) -> Option<(usize, Option<usize>)> {
         at = skip(text, if c == '"' { quote_end(text, at) } else { at + c.len_utf8() });
     }
     open.pop().map(|o| (text.len(), Some(o.0)))
+}
+
+/// The bytes of every text in quotes, quotes and the signs of raw texts included, outside comments; in their order.
+pub(super) fn quoted(text: &str) -> Vec<Range<usize>> {
+    let mut all = Vec::new();
+    let mut at = skip(text, 0);
+    while let Some(c) = text[at..].chars().next() {
+        let mut next = at + c.len_utf8();
+        if c == '"' {
+            next = quote_end(text, at);
+            let hashes = text[..at].bytes().rev().take_while(|b| *b == b'#').count();
+            let raw = text[..at - hashes].ends_with('r');
+            all.push(if raw { at - hashes - 1 } else { at }..next);
+        }
+        at = skip(text, next);
+    }
+    all
+}
+
+/// A name in a text.
+pub(super) struct Word {
+    /// Its bytes.
+    pub(super) at: Range<usize>,
+    /// Whether a colon follows it.
+    pub(super) colon: bool,
+}
+
+/// Every name outside quotes and comments, in their order.
+pub(super) fn words(text: &str) -> Vec<Word> {
+    let is_name = |c: char| c.is_alphanumeric() || c == '_';
+    let mut all = Vec::new();
+    let mut at = skip(text, 0);
+    while let Some(c) = text[at..].chars().next() {
+        let mut next = at + c.len_utf8();
+        if c == '"' {
+            next = quote_end(text, at);
+        } else if is_name(c) {
+            next = text[at..].find(|c| !is_name(c)).map_or(text.len(), |i| at + i);
+            all.push(Word { at: at..next, colon: text[skip(text, next)..].starts_with(':') });
+        }
+        at = skip(text, next);
+    }
+    all
 }
 
 /// The token at or behind `at`: a name, a number, a quoted text or one character; empty at the text's end.
@@ -192,8 +235,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const PAGE: &str = r##"#![enable(implicit_some)]
-// A page, with (odd) things in it.
+    const TEXT: &str = r##"#![enable(implicit_some)]
+// A file, with (odd) things in it.
 Field(
     name: "a \" b, (", /* one /* two */ , */ raw: r#"c " ("#,
     plants: [(at: (1, -2)), Beet(at: (3, 4), /* é */ age: Uniform(5, 6))],
@@ -201,7 +244,7 @@ Field(
 )"##;
 
     fn at<'a>(path: &[Step<'_>]) -> &'a str {
-        &PAGE[place(PAGE, path)]
+        &TEXT[place(TEXT, path)]
     }
 
     #[test]
@@ -229,6 +272,12 @@ Field(
         assert_eq!(mismatch("(a: [1, 2]"), Some((10, Some(0))));
     }
 
+    #[test]
+    fn quoted_texts_are_found_outside_comments() {
+        let found: Vec<&str> = quoted(TEXT).into_iter().map(|at| &TEXT[at]).collect();
+        assert_eq!(found, [r#""a \" b, (""#, r##"r#"c " ("#"##, "\"leaf\"", "\"stalk\""]);
+    }
+
     proptest! {
         #[test]
         fn any_text_has_a_place(text in "[ -~\n\"()\\[\\]{},:#r/*é]{0,60}", n in 0_usize..4) {
@@ -236,6 +285,8 @@ Field(
             prop_assert!(text.get(range).is_some());
             prop_assert!(text.get(token(&text, 0)).is_some());
             let _ = mismatch(&text);
+            prop_assert!(words(&text).into_iter().all(|word| text.get(word.at).is_some()));
+            prop_assert!(quoted(&text).into_iter().all(|at| text.get(at).is_some()));
         }
     }
 }

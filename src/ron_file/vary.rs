@@ -23,7 +23,7 @@ const DRAWN: &str =
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub enum Distribution {
-    /// Uniform between the two.
+    /// Uniform between the two; where only whole numbers make sense, each of them as likely as the others, both ends included.
     Uniform(f64, f64),
     /// Normal, cut to `min..=max`.
     Normal {
@@ -89,6 +89,8 @@ impl<B: Bound> Vary<B> {
     pub fn draw(&self, stream: &mut Stream) -> f64 {
         let x = match self {
             Self::Fixed(x) => x.get(),
+            // Every whole number between the ends, both of them included, has a share of the same width.
+            Self::Drawn(Distribution::Uniform(lo, hi)) if B::WHOLE => stream.range(*lo, hi + 1.0).floor().min(*hi),
             Self::Drawn(Distribution::Uniform(lo, hi)) => stream.range(*lo, *hi),
             Self::Drawn(Distribution::Normal { mean, sd, min, max }) => {
                 cut::<B>(*min, *max, || mean + sd * stream.normal())
@@ -218,7 +220,7 @@ const NOTHING: &str = "an empty choice: there is nothing to draw";
 type Wrong = (Vec<Step<'static>>, String, String);
 
 /// Draws until the value lies within both ranges, so that the shape between the cuts stays; the median of what remains is
-/// inside by the page's checks, so a hundred misses in a row only happen at the far end of a bound, where it clamps.
+/// inside by the checks of [`Vary::check`], so a hundred misses in a row only happen at the far end of a bound, where it clamps.
 fn cut<B: Bound>(min: f64, max: f64, mut draw: impl FnMut() -> f64) -> f64 {
     for _ in 0..100 {
         let x = draw();
@@ -347,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn a_page_may_fix_or_draw_any_number() {
+    fn a_file_may_fix_or_draw_any_number() {
         for (text, lo, hi) in [
             ("3", 3.0, 3.0),
             ("Uniform(1, 2)", 1.0, 2.0),
@@ -390,5 +392,26 @@ mod tests {
         let v: Vary<Count> = Vary::uniform(1.0, 6.0);
         let mut s = stream();
         assert!((0..50).all(|_| v.draw(&mut s).fract() == 0.0));
+    }
+    /// Method: frequencies. Expected: each face of a die within five standard deviations of a sixth; a continuous draw that is
+    /// rounded would show 1 and 6 half as often. The stream goes on as behind any other uniform number.
+    #[test]
+    fn every_whole_number_is_equally_likely() {
+        let v: Vary<Count> = Vary::uniform(1.0, 6.0);
+        let (mut s, mut plain) = (stream(), stream());
+        let mut seen = [0_u32; 8];
+        let n = 60_000;
+        for _ in 0..n {
+            seen[v.draw(&mut s) as usize] += 1;
+            plain.uniform();
+        }
+        assert_eq!((seen[0], seen[7]), (0, 0));
+        let sd = (f64::from(n) / 6.0 * 5.0 / 6.0).sqrt();
+        for face in &seen[1..7] {
+            assert!((f64::from(*face) - f64::from(n) / 6.0).abs() < 5.0 * sd, "{seen:?}");
+        }
+        assert_eq!(s.uniform(), plain.uniform(), "one number a draw");
+        let one: Vary<Count> = Vary::uniform(4.0, 4.0);
+        assert_eq!(one.draw(&mut s), 4.0);
     }
 }

@@ -2,10 +2,10 @@
 
 use super::{Rows, WeedsDesc};
 use crate::sampling::{Purpose, Stream};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The rows of one field.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RowsRecord {
     /// From row to row.
     pub spacing_m: f32,
@@ -42,7 +42,7 @@ impl Rows {
 }
 
 /// One species of weed in one field.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WeedsRecord {
     /// Mean number of the distribution, not of this piece of ground.
     pub per_m2: f32,

@@ -4,6 +4,7 @@ use super::assemble::Growing;
 use super::desc::SpeciesDesc;
 use crate::error::{Kind, Place};
 use crate::geometry::{AlphaMask, Margin};
+use crate::input;
 use crate::light::{Infrared, Table};
 use crate::material::{LeafMaterial, Picture, Tones};
 use crate::math::{Spectrum, Vec2};
@@ -60,7 +61,9 @@ pub(super) struct Library {
     species: BTreeMap<PathBuf, Arc<Species>>,
     models: BTreeMap<(PathBuf, bool), Arc<Model>>,
     layers: BTreeMap<(PathBuf, PathBuf), Arc<Layer>>,
-    surrounds: BTreeMap<(PathBuf, Infrared), Arc<Table>>,
+    environment_maps: BTreeMap<(PathBuf, Infrared), Arc<Table>>,
+    /// Keywords of species files that were renamed, by file.
+    renamed: BTreeMap<PathBuf, Vec<String>>,
     /// How species grow otherwise than their pages say.
     pub(super) growing: Growing,
 }
@@ -76,6 +79,11 @@ impl Library {
     /// Everything that was read, in order.
     pub(super) fn files(&self) -> Vec<PathBuf> {
         self.files.keys().cloned().collect()
+    }
+
+    /// What to tell of the species files that were read, in the order of their paths.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        self.renamed.values().flatten().cloned().collect()
     }
 
     /// SHA-256 over the contents of everything that was read, in hex: contents, not names, so a moved project keeps it.
@@ -95,6 +103,7 @@ impl Library {
         }
         let own = self.page(&full)?;
         let mut desc: SpeciesDesc = own.parse()?;
+        self.renamed.insert(full.clone(), own.renamed());
         for key in desc.plant.skins() {
             if !desc.skins.contains_key(&key) {
                 let known: Vec<&str> = desc.skins.keys().map(String::as_str).collect();
@@ -175,25 +184,25 @@ impl Library {
         Ok(model)
     }
 
-    /// The file of a light of all directions that `page` names, whether or not a field draws it.
-    pub(super) fn surround_file(&mut self, page: &RonFile, path: &str) -> Result<()> {
+    /// The file of an environment map that `page` names, whether or not a field draws it.
+    pub(super) fn environment_map_file(&mut self, page: &RonFile, path: &str) -> Result<()> {
         let full = page.need_file(path)?;
         if self.files.contains_key(&full) { Ok(()) } else { self.note(&full) }
     }
 
-    /// The light of all directions that `page` names.
-    pub(super) fn surround(&mut self, page: &RonFile, path: &str, infrared: Infrared) -> Result<Arc<Table>> {
+    /// The environment map that `page` names.
+    pub(super) fn environment_map(&mut self, page: &RonFile, path: &str, infrared: Infrared) -> Result<Arc<Table>> {
         let full = page.need_file(path)?;
         let key = (full.clone(), infrared);
-        if let Some(known) = self.surrounds.get(&key) {
+        if let Some(known) = self.environment_maps.get(&key) {
             return Ok(known.clone());
         }
-        self.surround_file(page, path)?;
+        self.environment_map_file(page, path)?;
         let table = Arc::new(Table::load(&full, infrared).map_err(|error| {
             let help = "name an equirectangular .exr or .hdr; `nir` says where near infrared comes from: Channel, Sky or OfRed(0.8)";
             at_its_place(page, path, help, error)
         })?);
-        self.surrounds.insert(key, table.clone());
+        self.environment_maps.insert(key, table.clone());
         Ok(table)
     }
 
@@ -225,7 +234,7 @@ impl Library {
     }
 
     fn note(&mut self, path: &Path) -> Result<()> {
-        let bytes = std::fs::read(path).map_err(Error::reading(path))?;
+        let bytes = input::read(path, input::LARGEST).map_err(|refusal| refusal.into_error(path))?;
         self.files.insert(path.into(), Sha256::digest(&bytes).into());
         Ok(())
     }

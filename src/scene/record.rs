@@ -21,17 +21,17 @@ pub struct SpeciesRecord {
 }
 
 /// What was drawn for one field. Every number is SI or carries its unit in its name; bands are R, G, B, NIR.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Conditions {
     /// Who looks, at the size of the image.
     pub camera: CameraRecord,
     /// What its sensor does beyond counting light; none where that is all.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensor: Option<SensorRecord>,
     /// What shines, in the order of the page.
     pub lights: Vec<LightRecord>,
     /// Which of the page's lists of lights are among them; left out where it has none.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lighting: Vec<Lighting>,
     /// The ground; none where the page has none.
     pub soil: Option<SoilRecord>,
@@ -44,7 +44,7 @@ pub struct Conditions {
 }
 
 /// One crop of a field.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CropRecord {
     /// Scientific name.
     pub species: String,
@@ -53,7 +53,7 @@ pub struct CropRecord {
 }
 
 /// One weed of a field.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WeedRecord {
     /// Scientific name.
     pub species: String,

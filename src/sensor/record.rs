@@ -1,13 +1,13 @@
 //! A camera and its sensor as they were drawn, for those who measure in their images.
 
 use super::{Camera, Sensor};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A camera in OpenCV's terms: x right, y down, z forward. A world point X (metres; x east, y north, z up) lies at
 /// R (X − position) in the camera's frame.
 ///
 /// Pixel centres are at +0.5; programs that put the first pixel's centre at 0 subtract 0.5 from `cx_px` and `cy_px`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CameraRecord {
     /// Pixels across.
     pub width_px: u32,
@@ -38,12 +38,12 @@ pub struct CameraRecord {
     /// The thin lens; none for a pinhole.
     pub aperture: Option<ApertureRecord>,
     /// How it drives; none at rest. The position is that in the middle of the readout.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<MotionRecord>,
 }
 
 /// A driving camera as it was drawn: row y of h is in the middle of its exposure at (y/h − ½) · readout.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MotionRecord {
     /// Velocity in the world.
     pub velocity_m_s: [f64; 3],
@@ -54,7 +54,7 @@ pub struct MotionRecord {
 }
 
 /// A thin lens as it was drawn.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ApertureRecord {
     /// Radius of the pupil.
     pub radius_m: f32,
@@ -63,22 +63,22 @@ pub struct ApertureRecord {
 }
 
 /// What was drawn of a sensor's steps behind the noise and before it; each is there where it was taken.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SensorRecord {
     /// Standard deviations of the blur, colour and NIR.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub psf_px: Option<[f32; 2]>,
     /// How far outside their places red and blue lie in the corners.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shift_px: Option<[f32; 2]>,
     /// The colour matrix, row by row.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub matrix: Option<[[f32; 3]; 3]>,
     /// Amount of the sharpening, and its radius in pixels.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sharpen: Option<[f32; 2]>,
     /// Quality of the compression.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub jpeg_quality: Option<u32>,
 }
 

@@ -1,10 +1,10 @@
 //! The ground as it was drawn.
 
 use crate::math::Spectrum;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The ground of one field.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SoilRecord {
     /// How wet it is.
     pub moisture: MoistureRecord,
@@ -27,7 +27,7 @@ pub struct SoilRecord {
 }
 
 /// Moisture of one ground: 0 air-dry, 1 saturated.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MoistureRecord {
     /// Mean asked for; patches that would be drier than dry cut it off.
     pub mean: f32,
@@ -38,7 +38,7 @@ pub struct MoistureRecord {
 }
 
 /// One layer of one ground.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LayerRecord {
     /// File of its colour, without its folder.
     pub name: String,
@@ -47,7 +47,7 @@ pub struct LayerRecord {
 }
 
 /// One wheel's track.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WheelRecord {
     /// From the world's origin to the middle of the track, across the rows.
     pub middle_m: f32,
@@ -60,7 +60,7 @@ pub struct WheelRecord {
 }
 
 /// The shape of one ground.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ReliefRecord {
     /// Root mean square height of the noise alone.
     pub rms_mm: f32,
@@ -73,14 +73,14 @@ pub struct ReliefRecord {
     /// Side towards which it rises, clockwise from north.
     pub tilt_azimuth_deg: f32,
     /// Tracks of wheels.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub wheels: Vec<WheelRecord>,
     /// The print of the press wheel along the rows; none where nothing was sown.
     pub row: Option<RowReliefRecord>,
 }
 
 /// The profile across a seed row.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RowReliefRecord {
     /// Depth of the furrow.
     pub depth_mm: f32,
@@ -91,7 +91,7 @@ pub struct RowReliefRecord {
 }
 
 /// The aggregates of one ground: how many are longer than L goes as L^−exponent.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ClodsRecord {
     /// How many are longer than 5 mm.
     pub over_5mm_per_m2: f32,
@@ -108,7 +108,7 @@ pub struct ClodsRecord {
 }
 
 /// The litter of one ground.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LitterRecord {
     /// Share of the ground under straw.
     pub straw_cover: f32,

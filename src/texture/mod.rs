@@ -21,6 +21,7 @@ pub use srgb::ColorSpace;
 
 use crate::error::{Error, Result};
 use crate::geometry::AlphaMask;
+use crate::input::{self, Refusal};
 use crate::math::Vec2;
 use pyramid::{Level, Plane, Pyramid, halve};
 use std::io::{BufRead, BufReader, Cursor, ErrorKind, Seek};
@@ -203,9 +204,11 @@ impl Fault {
 /// Opens and decodes an image file, with errors that say what to do.
 fn decode(path: &Path) -> Result<image::DynamicImage> {
     let wrong = |what: String| Error::input(what).in_file(path);
-    let file = std::fs::File::open(path).map_err(|e| match e.kind() {
-        ErrorKind::NotFound => wrong("there is no such image; a path in a page counts from the page's folder".into()),
-        _ => Error::io(path)(e),
+    let file = input::open(path).map_err(|refusal| match refusal {
+        Refusal::Io(e) if e.kind() == ErrorKind::NotFound => {
+            wrong("there is no such image; a path in a scene file counts from the file's folder".into())
+        }
+        other => other.into_error(path),
     })?;
     read(BufReader::new(file)).map_err(|fault| match fault {
         Fault::Io(e) => Error::io(path)(e),

@@ -4,6 +4,7 @@
 //! read as Rec.709. Of OpenEXR the channels R, G, B (of the first layer that has them) and, where it is there, NIR; opacity is left out.
 
 use super::rgbe;
+use crate::input;
 use crate::{Error, Result};
 use exr::prelude::{ReadChannels, ReadLayers, read};
 use std::io::Cursor;
@@ -38,7 +39,7 @@ pub(super) struct Texels {
 impl Panorama {
     /// Reads a .exr or .hdr file, told apart by their first bytes.
     pub fn load(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(Error::reading(path))?;
+        let bytes = input::read(path, input::LARGEST).map_err(|refusal| refusal.into_error(path))?;
         Self::decode(&bytes).map_err(|what| Error::input(what).in_file(path))
     }
 

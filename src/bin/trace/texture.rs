@@ -1,5 +1,6 @@
 //! `trace texture`: draws textures from their recipes.
 
+use furrow::ron_file::RonFile;
 use furrow::{Result, texture};
 use std::path::PathBuf;
 
@@ -15,6 +16,9 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     let mut paths = Vec::new();
     for recipe in &args.recipes {
+        for warning in RonFile::read(recipe)?.renamed() {
+            eprintln!("warning: {warning}");
+        }
         paths.extend(texture::draw::write(recipe)?);
     }
     Ok(paths)

@@ -80,6 +80,9 @@ enum Part {
 /// Does what is missing.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let page = RonFile::read(&args.page)?;
+    for warning in page.renamed() {
+        eprintln!("warning: {warning}");
+    }
     let experiment = Experiment::of(&page, args.scale.as_deref())?;
     let out = args.out.clone().unwrap_or_else(|| usual_folder(&args.page, args.scale.as_deref()));
     cli::check_folder(&out)?;

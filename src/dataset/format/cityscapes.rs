@@ -142,7 +142,7 @@ mod tests {
             classes: Vec::new(),
             ignored: 0,
             plants: (1..=count).map(weed).collect(),
-            conditions: serde_json::Value::Null,
+            conditions: None,
             exposure: None,
             warnings: Vec::new(),
         }

@@ -180,7 +180,7 @@ fn sample(recipe: &Recipe, listed: &Listed, index: u64, read: Labelled) -> Sampl
             classes: Vec::new(),
             ignored: 0,
             plants: Vec::new(),
-            conditions: serde_json::Value::Null,
+            conditions: None,
             exposure: None,
             warnings: read.warnings,
         },

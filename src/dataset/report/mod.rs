@@ -15,6 +15,8 @@ mod card;
 mod photographs;
 mod sheet;
 mod statistics;
+#[cfg(test)]
+mod tests;
 
 use super::set::{Set, Whole};
 use super::split::Split;

@@ -1,9 +1,11 @@
 //! What the records of a dataset say together, added up one by one: of any number of images in little memory.
 
 use crate::dataset::record::{Plant, Record};
+use crate::light::LightRecord;
 use crate::report::Tally;
 use crate::scene::tag::Class;
-use serde_json::Value;
+use crate::sensor::CameraRecord;
+use crate::soil::SoilRecord;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Most suns that a chart shows, spread over the images.
@@ -166,12 +168,13 @@ impl Statistics {
             self.species.entry(kind).or_default().images += 1;
         }
         record.warnings.iter().for_each(|words| *self.warnings.entry(words.clone()).or_default() += 1);
-        let conditions = &record.conditions;
-        if let Some(lights) = conditions["lights"].as_array() {
-            self.add_lights(lights);
+        if let Some(conditions) = &record.conditions {
+            self.add_lights(&conditions.lights);
+            if let Some(soil) = &conditions.soil {
+                self.soil.add(soil);
+            }
+            self.camera.add(&conditions.camera);
         }
-        self.soil.add(&conditions["soil"]);
-        self.camera.add(&conditions["camera"]);
         self.images += 1;
     }
 
@@ -204,30 +207,30 @@ impl Statistics {
         }
     }
 
-    fn add_lights(&mut self, lights: &[Value]) {
+    fn add_lights(&mut self, lights: &[LightRecord]) {
         let light = &mut self.light;
         let mut ground = 0.0;
         for one in lights {
-            let kind = one["kind"].as_str().unwrap_or("other");
-            *light.kinds.entry(kind.to_owned()).or_default() += 1;
-            for bands in ["sun_irradiance_w_m2_nm", "sky_irradiance_w_m2_nm", "irradiance_w_m2_nm"] {
-                ground += (0..3).filter_map(|k| one[bands][k].as_f64()).sum::<f64>() / 3.0;
-            }
-            let number = |name: &str| one[name].as_f64();
-            let (azimuth, elevation) = (number("sun_azimuth_deg"), number("sun_elevation_deg"));
-            if let (Some(azimuth), Some(elevation)) = (azimuth, elevation) {
-                light.elevation_deg.add(elevation);
-                // Every n-th image, so that any number of them fits a chart.
-                if self.images.is_multiple_of(self.of.div_ceil(MOST_SUNS).max(1)) {
-                    light.suns.push([azimuth, elevation, number("cloud").unwrap_or(0.0)]);
+            *light.kinds.entry(one.kind().to_owned()).or_default() += 1;
+            let given = match one {
+                LightRecord::Daylight { sun_irradiance_w_m2_nm: sun, sky_irradiance_w_m2_nm: sky, .. } => {
+                    vec![*sun, *sky]
                 }
+                other => vec![other.irradiance_w_m2_nm()],
+            };
+            for spectrum in given {
+                ground += spectrum.to_array().into_iter().take(3).map(f64::from).sum::<f64>() / 3.0;
             }
-            if let Some(cloud) = number("cloud") {
-                light.cloud.add(100.0 * cloud);
+            let LightRecord::Daylight { sun_elevation_deg, sun_azimuth_deg, turbidity, cloud, .. } = one else {
+                continue;
+            };
+            light.elevation_deg.add(*sun_elevation_deg);
+            // Every n-th image, so that any number of them fits a chart.
+            if self.images.is_multiple_of(self.of.div_ceil(MOST_SUNS).max(1)) {
+                light.suns.push([*sun_azimuth_deg, *sun_elevation_deg, f64::from(*cloud)]);
             }
-            if let Some(turbidity) = number("turbidity") {
-                light.turbidity.add(turbidity);
-            }
+            light.cloud.add(100.0 * f64::from(*cloud));
+            light.turbidity.add(*turbidity);
         }
         if !lights.is_empty() {
             light.irradiance.add(ground);
@@ -236,32 +239,25 @@ impl Statistics {
 }
 
 impl Soil {
-    fn add(&mut self, soil: &Value) {
-        let add = |to: &mut Tally, path: &str, scale: f64| {
-            soil.pointer(path).and_then(Value::as_f64).into_iter().for_each(|x| to.add(scale * x));
-        };
-        add(&mut self.moisture, "/moisture/mean", 100.0);
-        add(&mut self.roughness_mm, "/relief/rms_mm", 1.0);
-        add(&mut self.straw, "/litter/straw_cover", 100.0);
-        add(&mut self.clods, "/clods/over_5mm_per_m2", 1.0);
-        for layer in soil["layers"].as_array().into_iter().flatten() {
-            if let (Some(name), Some(share)) = (layer["name"].as_str(), layer["share"].as_f64()) {
-                *self.layers.entry(name.to_owned()).or_default() += share;
-            }
+    fn add(&mut self, soil: &SoilRecord) {
+        self.moisture.add(100.0 * f64::from(soil.moisture.mean));
+        self.roughness_mm.add(soil.relief.rms_mm.into());
+        self.straw.add(100.0 * f64::from(soil.litter.straw_cover));
+        self.clods.add(soil.clods.over_5mm_per_m2.into());
+        for layer in &soil.layers {
+            *self.layers.entry(layer.name.clone()).or_default() += f64::from(layer.share);
         }
     }
 }
 
 impl Camera {
-    fn add(&mut self, camera: &Value) {
-        let number = |path: &str| camera.pointer(path).and_then(Value::as_f64);
-        let Some(height) = number("/position_m/2") else { return };
+    fn add(&mut self, camera: &CameraRecord) {
+        let height = camera.position_m[2];
         self.height_m.add(height);
-        if let Some(down) = number("/world_to_camera/2/2") {
-            self.tilt_deg.add((-down).clamp(-1.0, 1.0).acos().to_degrees());
-        }
-        if let Some(focal) = number("/fx_px").filter(|f| *f > 0.0) {
-            self.pixel_mm.add(1000.0 * height / focal);
+        let down = camera.world_to_camera[2][2];
+        self.tilt_deg.add((-down).clamp(-1.0, 1.0).acos().to_degrees());
+        if camera.fx_px > 0.0 {
+            self.pixel_mm.add(1000.0 * height / camera.fx_px);
         }
     }
 }

@@ -166,7 +166,7 @@ fn lights(scene: &Scene, nodes: &mut Vec<Node>) -> Vec<Value> {
                 (frame.y, frame.z) = (-frame.y, -frame.z);
                 ("lamp", "spot", lamp.radiance() * lamp.area(), frame, lamp.centre())
             }
-            Light::Sky(_) | Light::Environment(_) | Light::Surround(_) => continue,
+            Light::Sky(_) | Light::Constant(_) | Light::EnvironmentMap(_) => continue,
         };
         let strength = Spectrum(strength.0.truncate().extend(0.0));
         let most = strength.max().max(f32::MIN_POSITIVE);
@@ -194,7 +194,7 @@ fn warnings(scene: &Scene) -> Vec<String> {
     };
     let lights = &scene.lights;
     say(
-        lights.iter().any(|l| matches!(l, Light::Sky(_) | Light::Environment(_) | Light::Surround(_))),
+        lights.iter().any(|l| matches!(l, Light::Sky(_) | Light::Constant(_) | Light::EnvironmentMap(_))),
         "glTF has no sky: shadows will be black",
     );
     say(lights.iter().any(|l| matches!(l, Light::Lamp(_))), "glTF has no lamps with an area: they become spots");

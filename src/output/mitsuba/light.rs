@@ -42,13 +42,13 @@ impl Lights {
                     of.suns.push((Frame::about(-sun.direction()), half, stem));
                 }
                 Light::Lamp(lamp) => of.lamps.push(*lamp),
-                Light::Sky(_) | Light::Environment(_) | Light::Surround(_) => around.push(light),
+                Light::Sky(_) | Light::Constant(_) | Light::EnvironmentMap(_) => around.push(light),
             }
         }
         let radiance = |d: Vec3| around.iter().fold(Spectrum::ZERO, |sum, l| sum + l.le(d));
         of.sky = if around.is_empty() {
             None
-        } else if around.iter().all(|l| matches!(l, Light::Environment(_))) {
+        } else if around.iter().all(|l| matches!(l, Light::Constant(_))) {
             Some(Dome::Constant(radiance(Vec3::Z)))
         } else {
             let (w, h) = SKY;

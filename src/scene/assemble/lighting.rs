@@ -5,10 +5,10 @@ use crate::ron_file::RonFile;
 use crate::ron_file::Step;
 use crate::sampling::Stream;
 use crate::{Error, Result};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// What a field drew where its page has lists of lights side by side: `OneOf([[…], […]])`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Lighting {
     /// Its place among the page's lights, from 0.
     pub place: usize,
@@ -165,7 +165,7 @@ mod tests {
             std::fs::write(folder.path().join(name), bytes).unwrap();
         }
         let page = folder.path().join("page.ron");
-        let pictures = r#"OneOf([[Environment(file: "day.hdr")], [Environment(file: "dusk.hdr")]])"#;
+        let pictures = r#"OneOf([[EnvironmentMap(file: "day.hdr")], [EnvironmentMap(file: "dusk.hdr")]])"#;
         std::fs::write(&page, text(pictures)).unwrap();
         let fields: Vec<Field> =
             (0..8).map(|index| assemble::field(&page, &Options { index, ..Options::default() }).unwrap()).collect();

@@ -195,16 +195,16 @@ impl<'a> Builder<'a> {
         let (lighting, listed) = Lighting::draw(page, &desc.lights, lists)?;
         // Those of all lists, so that all fields are of one scene whatever each of them draws.
         for file in desc.lights.iter().flat_map(LightDesc::files) {
-            library.surround_file(page, file)?;
+            library.environment_map_file(page, file)?;
         }
         for (i, Listed { desc: light, at }) in listed.into_iter().enumerate() {
-            let mut open = |file: &str, infrared| library.surround(page, file, infrared);
+            let mut open = |file: &str, infrared| library.environment_map(page, file, infrared);
             let drawn = light.draw(&mut Stream::of(seed, index, Purpose::Page, 1 + i as u64), &mut open);
             let (record, drawn) = drawn.map_err(|e| page.blame(&at, e))?;
             light_records.push(record);
             lights.extend(drawn);
         }
-        let mut warnings = Vec::new();
+        let mut warnings = page.renamed();
         if lights.is_empty() {
             warnings.push("no light in the scene: the image will be black".into());
         }
@@ -309,6 +309,7 @@ impl<'a> Builder<'a> {
             weeds: self.weed_records()?,
             season: self.season,
         };
+        self.warnings.extend(self.library.warnings());
         let field = Field {
             scene: self.scene,
             plants,

@@ -5,10 +5,10 @@ use crate::ron_file::Step;
 use crate::sampling::Stream;
 use crate::scene::desc::{FieldDesc, Growth};
 use crate::{Error, Result};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// What a field drew where its page lists growths: `growth: Either([…, …])`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Season {
     /// Place in the lists, from 0; none where the page has no such list.
     pub drawn: Option<usize>,

@@ -99,7 +99,11 @@ impl Args {
 
     /// One species: its sheet's path, and its entry in the page.
     fn species(&self, page: &Path, signals: &Signals) -> Result<(PathBuf, Entry)> {
-        let desc: SpeciesDesc = RonFile::read(page)?.parse()?;
+        let file = RonFile::read(page)?;
+        for warning in file.renamed() {
+            eprintln!("warning: {warning}");
+        }
+        let desc: SpeciesDesc = file.parse()?;
         let mut stages = Vec::new();
         for stage in &desc.plant.stages {
             let bare = self.field(page, stage.bbch, None)?;

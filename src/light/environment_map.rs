@@ -164,7 +164,7 @@ fn cosines(column: usize, row: usize, (width, height): (usize, usize)) -> [f64; 
 
 /// A picture of light, turned and made brighter or darker.
 #[derive(Clone, Debug)]
-pub struct Surround {
+pub struct EnvironmentMap {
     table: Arc<Table>,
     /// By what each band is multiplied.
     scale: Spectrum,
@@ -173,7 +173,7 @@ pub struct Surround {
     faces: [f32; 6],
 }
 
-impl Surround {
+impl EnvironmentMap {
     /// The picture's middle column at `azimuth_deg` clockwise from north, its bands times `scale`; `None` where nothing is left.
     pub fn new(table: Arc<Table>, scale: Spectrum, azimuth_deg: f32) -> Option<Self> {
         let faces = table.faces.map(|face| (face * scale).mean());
@@ -207,7 +207,7 @@ impl Surround {
     }
 }
 
-impl Emitter for Surround {
+impl Emitter for EnvironmentMap {
     #[inline]
     fn sample_li(&self, _p: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let table = &*self.table;
@@ -279,16 +279,16 @@ mod tests {
         Panorama { width, height, rgb, nir: None }
     }
 
-    fn surround(picture: &Panorama, infrared: Infrared, azimuth_deg: f32) -> Surround {
+    fn map(picture: &Panorama, infrared: Infrared, azimuth_deg: f32) -> EnvironmentMap {
         let table = Arc::new(Table::new(picture, infrared).unwrap());
-        Surround::new(table, Spectrum::ONE, azimuth_deg).unwrap()
+        EnvironmentMap::new(table, Spectrum::ONE, azimuth_deg).unwrap()
     }
 
     /// E = πL of any plane, and 1/4π of every direction.
     #[test]
     fn an_even_picture_is_a_constant_environment() {
         for width in [2, 10, 64] {
-            let light = surround(&picture(width, |_, _| [0.5, 1.0, 2.0]), Infrared::Red, 77.0);
+            let light = map(&picture(width, |_, _| [0.5, 1.0, 2.0]), Infrared::Red, 77.0);
             for face in light.table.faces {
                 assert!((face.to_array()[1] / PI - 1.0).abs() < if width < 8 { 0.2 } else { 0.01 }, "{face:?}");
             }
@@ -308,11 +308,8 @@ mod tests {
             |row: usize| f64::cos(PI as f64 * row as f64 / 32.0) - f64::cos(PI as f64 * (row + 1) as f64 / 32.0);
         let others = 2.0 * width as f64 - solid(row);
         let bright = (others / solid(row)) as f32;
-        let light = surround(
-            &picture(width, |x, y| [if (x, y) == (column, row) { bright } else { 1.0 }; 3]),
-            Infrared::Red,
-            90.0,
-        );
+        let light =
+            map(&picture(width, |x, y| [if (x, y) == (column, row) { bright } else { 1.0 }; 3]), Infrared::Red, 90.0);
         // The middle column looks east; 40 is 8.5 texels of 64 clockwise from it.
         let dir = direction(PI * 9.5 / 32.0, 0.5 * PI + TAU * 8.5 / 64.0);
         assert_eq!(light.le(dir).to_array()[0], bright);

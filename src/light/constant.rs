@@ -1,4 +1,4 @@
-//! The same radiance from everywhere: the white furnace of the tests, and the flattest of studios.
+//! A constant environment: the same radiance from all directions, as in the white-furnace test.
 
 use super::sample::{Emitter, LampHit, LightSample};
 use crate::math::{Spectrum, Vec3};
@@ -7,18 +7,18 @@ use std::f32::consts::PI;
 
 /// Constant radiance from all directions, below the horizon too.
 #[derive(Clone, Copy, Debug)]
-pub struct Environment {
+pub struct Constant {
     radiance: Spectrum,
 }
 
-impl Environment {
+impl Constant {
     /// From the radiance, W·m⁻²·sr⁻¹·nm⁻¹ per band.
     pub fn new(radiance: Spectrum) -> Self {
         Self { radiance }
     }
 }
 
-impl Emitter for Environment {
+impl Emitter for Constant {
     #[inline]
     fn sample_li(&self, _p: Vec3, u: [f32; 2]) -> Option<LightSample> {
         Some(LightSample {

@@ -1,0 +1,108 @@
+//! Files that users name: opened and read with limits.
+//!
+//! A folder, a pipe, a socket or a device is refused before it is opened: opening a pipe waits until somebody writes into it, and
+//! a device may never end.
+
+use crate::Error;
+use std::fmt;
+use std::fs::{File, Metadata};
+use std::io::{self, Read};
+use std::path::Path;
+
+/// Largest file of any kind that is read whole, bytes.
+pub const LARGEST: u64 = 4 << 30;
+
+/// Why a file was not read.
+#[derive(Debug)]
+pub enum Refusal {
+    /// The system refused.
+    Io(io::Error),
+    /// It is a folder.
+    Folder,
+    /// It is a pipe, a socket or a device.
+    NotRegular,
+    /// It is larger than this many bytes.
+    TooLarge(u64),
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Io(error) => error.fmt(f),
+            Self::Folder => f.write_str("this is a folder, not a file"),
+            Self::NotRegular => f.write_str("this is a pipe, a socket or a device, not a file"),
+            Self::TooLarge(most) if *most >= 1 << 30 => write!(f, "this file is larger than {} GiB", most >> 30),
+            Self::TooLarge(most) => write!(f, "this file is larger than {} MiB", most >> 20),
+        }
+    }
+}
+
+impl Refusal {
+    /// As an error about the file.
+    pub fn into_error(self, path: &Path) -> Error {
+        match self {
+            Self::Io(error) => Error::reading(path)(error),
+            other => Error::input(other.to_string()).in_file(path),
+        }
+    }
+}
+
+/// Opens a regular file.
+pub fn open(path: &Path) -> Result<File, Refusal> {
+    check(&std::fs::metadata(path).map_err(Refusal::Io)?)?;
+    let file = File::open(path).map_err(Refusal::Io)?;
+    // Once more: another thing may have taken the name in between.
+    check(&file.metadata().map_err(Refusal::Io)?)?;
+    Ok(file)
+}
+
+fn check(about: &Metadata) -> Result<(), Refusal> {
+    if about.is_dir() {
+        return Err(Refusal::Folder);
+    }
+    if about.is_file() { Ok(()) } else { Err(Refusal::NotRegular) }
+}
+
+/// The bytes of a regular file that has at most `most` of them.
+pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, Refusal> {
+    let file = open(path)?;
+    let len = file.metadata().map_err(Refusal::Io)?.len();
+    if len > most {
+        return Err(Refusal::TooLarge(most));
+    }
+    let mut bytes = Vec::with_capacity(len as usize);
+    // A file may grow while it is read.
+    file.take(most + 1).read_to_end(&mut bytes).map_err(Refusal::Io)?;
+    if bytes.len() as u64 > most { Err(Refusal::TooLarge(most)) } else { Ok(bytes) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_regular_files_of_bounded_size_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("file");
+        std::fs::write(&file, [7; 9]).unwrap();
+        assert_eq!(read(&file, 9).unwrap(), [7; 9]);
+        assert!(matches!(read(&file, 8), Err(Refusal::TooLarge(8))));
+        assert!(matches!(read(folder.path(), 9), Err(Refusal::Folder)));
+        let missing = folder.path().join("none");
+        assert_eq!(read(&missing, 9).unwrap_err().into_error(&missing).exit_code(), 2);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_never_ends_is_refused_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        for path in [pipe.as_path(), Path::new("/dev/zero")] {
+            let path = path.to_owned();
+            let (done, wait) = std::sync::mpsc::channel();
+            std::thread::spawn(move || done.send(matches!(read(&path, 9), Err(Refusal::NotRegular))));
+            assert!(wait.recv_timeout(std::time::Duration::from_secs(20)).expect("it waits for ever"));
+        }
+    }
+}

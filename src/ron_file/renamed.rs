@@ -1,0 +1,96 @@
+//! Keywords that were renamed: for one version the old name is read as well, with a warning that tells the new one.
+//!
+//! A renamed keyword gets a row in [`RENAMED`] and `#[serde(alias = "…")]` on its field or variant, both of which go in the version
+//! after. A test holds the aliases of the sources to the table.
+
+use super::fault::offset_of;
+use super::place::{Word, words};
+
+/// Where a keyword stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Keyword {
+    /// Before a colon: the name of a field.
+    Field,
+    /// Elsewhere: the name of a value.
+    Value,
+}
+
+/// One renamed keyword.
+#[derive(Clone, Copy, Debug)]
+pub struct Renamed {
+    /// Where it stands.
+    pub keyword: Keyword,
+    /// What it was called. No other keyword of any RON file, standing there, has this name.
+    pub old: &'static str,
+    /// What it is called now.
+    pub new: &'static str,
+}
+
+/// All renamed keywords that are still read.
+pub const RENAMED: &[Renamed] = &[Renamed { keyword: Keyword::Value, old: "Environment", new: "EnvironmentMap" }];
+
+/// Whether a name is an old one, of fields or of values.
+pub(super) fn is_old(keyword: Keyword, name: &str) -> bool {
+    RENAMED.iter().any(|r| r.keyword == keyword && r.old == name)
+}
+
+/// A warning for each old name in a file's text, in their order; `file` is what the file is called.
+pub(super) fn warnings(file: &str, text: &str) -> Vec<String> {
+    let old = |word: &Word| {
+        let keyword = if word.colon { Keyword::Field } else { Keyword::Value };
+        RENAMED.iter().find(|r| r.keyword == keyword && r.old == &text[word.at.clone()])
+    };
+    let told = |word: Word| {
+        let Renamed { old, new, .. } = old(&word)?;
+        let line = text[..word.at.start].matches('\n').count() + 1;
+        let column = text[offset_of(text, line, 1)..word.at.start].chars().count() + 1;
+        Some(format!(
+            "{file}:{line}:{column}: `{old}` is now called `{new}`: write `{new}`; the next version no longer reads `{old}`"
+        ))
+    };
+    words(text).into_iter().filter_map(told).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn old_names_are_told_with_their_place_and_nothing_else_is() {
+        let text = "(lights: [ // Environment\n  Environment(file: \"Environment(\"), EnvironmentMap(file: \"b\"),\n], Environment: 3)";
+        assert_eq!(
+            warnings("field.ron", text),
+            [
+                "field.ron:2:3: `Environment` is now called `EnvironmentMap`: write `EnvironmentMap`; the next version no longer reads `Environment`"
+            ]
+        );
+    }
+
+    /// Every alias of the sources is in the table and warns, and every row of the table has its alias.
+    #[test]
+    fn the_table_and_the_aliases_are_the_same() {
+        fn read(folder: &Path, found: &mut Vec<String>) {
+            for entry in std::fs::read_dir(folder).unwrap() {
+                let path = entry.unwrap().path();
+                if path.is_dir() {
+                    read(&path, found);
+                } else if path.extension().is_some_and(|e| e == "rs") {
+                    let text = std::fs::read_to_string(&path).unwrap();
+                    let lines = text.lines().map(str::trim).filter(|line| line.starts_with("#[serde("));
+                    for line in lines {
+                        let aliases = line.split("alias = \"").skip(1);
+                        found.extend(aliases.map(|rest| rest.split('"').next().unwrap().to_owned()));
+                    }
+                }
+            }
+        }
+        let mut found = Vec::new();
+        read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut found);
+        found.sort();
+        found.dedup();
+        let mut listed: Vec<&str> = RENAMED.iter().map(|r| r.old).collect();
+        listed.sort_unstable();
+        assert_eq!(found, listed);
+    }
+}
