@@ -1,5 +1,6 @@
 //! Page + seed + index → one field.
 
+mod census;
 mod field;
 mod ground;
 mod growing;
@@ -26,6 +27,7 @@ use crate::sampling::{Purpose, Stream};
 use crate::scatter::{self, Disc, Spot};
 use crate::soil::{Ground, Rect};
 use crate::{Error, Result};
+use census::{Census, Population};
 pub use field::Field;
 use ground::{Earth, Skins};
 pub use growing::Growing;
@@ -342,10 +344,11 @@ impl<'a> Builder<'a> {
         let mut all = Vec::new();
         let area = area.corners();
         let (desc, page) = (self.desc, self.page);
+        let mut census = Census::new(page);
         for (k, crop) in desc.crops.iter().enumerate() {
             let species = self.library.species(page, &crop.species)?;
             let places = scatter::rows_looked_at(&crop.rows, area, &self.stream(Purpose::Scatter, k as u64));
-            self.check_number(places, all.len(), ["crops", "rows"], k)?;
+            census.open(Population::Crop(k), places, all.len())?;
             for spot in scatter::rows(&crop.rows, area, stones, &self.stream(Purpose::Scatter, k as u64)) {
                 let seedling = self.seedling(&species, &crop.growth, spot, 1 + k as u64);
                 all.push(seedling.tended(&crop.vigour, crop.condition.as_ref()));
@@ -354,12 +357,13 @@ impl<'a> Builder<'a> {
         for (k, weed) in desc.weeds.iter().enumerate() {
             let species = self.library.species(page, &weed.species)?;
             let places = scatter::weeds_looked_at(&weed.spread, area, &self.stream(Purpose::Scatter, 1000 + k as u64));
-            self.check_number(places, all.len(), ["weeds", "spread"], k)?;
+            census.open(Population::Weed(k), places, all.len())?;
             for spot in scatter::weeds(&weed.spread, area, stones, &self.stream(Purpose::Scatter, 1000 + k as u64)) {
                 let seedling = self.seedling(&species, &weed.growth, spot, 1001 + k as u64);
                 all.push(seedling.tended(&weed.vigour, weed.condition.as_ref()));
             }
         }
+        census.open(Population::Placed, 0.0, all.len())?;
         for (k, placed) in desc.plants.iter().enumerate() {
             let species = self.library.species(page, &placed.species)?;
             let mut stream = self.stream(Purpose::Scatter, 2000 + k as u64);
@@ -378,21 +382,8 @@ impl<'a> Builder<'a> {
             };
             all.push(seedling.tended(&placed.vigour, placed.condition.as_ref()));
         }
-        self.check_number(0.0, all.len(), ["plants", ""], 0)?;
+        census.close(all.len())?;
         Ok(all)
-    }
-
-    /// Refuses more plants than labels can number, before they take the memory: so many so far, and places for so many more.
-    fn check_number(&self, places: f64, known: usize, fields: [&str; 2], item: usize) -> Result<()> {
-        let plants = places.ceil() + known as f64;
-        // An expected number may be missed; one far beyond the limit may not.
-        if known <= MOST_PLANTS && places <= 2.0 * MOST_PLANTS as f64 {
-            return Ok(());
-        }
-        let words = format!("about {plants:.3e} plants or places for them: labels can number {MOST_PLANTS}");
-        let help = "lower the density here, widen the distances in the rows, or lower the camera";
-        let path = [Step::Field(fields[0]), Step::Item(item), Step::Field(fields[1])];
-        Err(self.page.blame(&path, Error::input(words).help(help)))
     }
 
     fn seedling(&self, species: &Arc<Species>, growth: &Growth, spot: Spot, population: u64) -> Seedling {
