@@ -57,6 +57,46 @@ fn a_list_of_growths_moves_nothing_else() {
     assert_ne!(of(&plain, "GALAP"), of(&other, "GALAP"));
 }
 
+/// Rationale: numbers are dense, so the same beet is 10 in one image and 8 in the next; whoever follows a plant through images needs
+/// what does not change. Expected: with the camera 5 cm further, and with another resolution, plants at the same place have the same
+/// identity, so have their leaves, and no two of a field are equal; another field has others. Source: what `PlantRecord::id` says.
+#[test]
+fn a_plant_keeps_its_identity_wherever_the_camera_stands() {
+    let look = |x: f64, index: u64, width: u32| {
+        let text = format!(
+            r#"Field(
+                seed: 4,
+                camera: Pinhole(size: (32, 24), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.8, at_m: ({x}, 0))),
+                lights: [Constant(radiance: (1, 1, 1, 1))],
+                crops: [(species: "scenes/species/sugar_beet.ron", growth: Bbch(14), rows: (in_row_m: 0.12))],
+                weeds: [(species: "scenes/species/galium.ron", growth: AgeDays(9), spread: (per_m2: 60))],
+                plants: [(species: "scenes/species/sugar_beet.ron", growth: Bbch(12), position_m: (0.03, 0.02))],
+            )"#
+        );
+        field(&text, &Options { index, width: Some(width), ..Options::default() }).plants
+    };
+    let here = look(0.0, 0, 32);
+    let mut ids: Vec<u32> = here.iter().flat_map(|p| p.leaf_ids.iter().copied().chain([p.id])).collect();
+    let all = ids.len();
+    ids.sort_unstable();
+    ids.dedup();
+    assert!(ids.len() == all && ids[0] > 0, "{} of {all}", ids.len());
+    let mut renumbered = 0;
+    for other in [look(0.05, 0, 32), look(0.0, 0, 45), look(0.3, 0, 77)] {
+        let same = |p: &&PlantRecord| here.iter().find(|q| (q.position, &q.eppo) == (p.position, &p.eppo));
+        let shared: Vec<(&PlantRecord, &PlantRecord)> = other.iter().filter_map(|p| Some((same(&p)?, p))).collect();
+        assert!(shared.len() > 15, "{}", shared.len());
+        for (a, b) in shared {
+            assert_eq!((a.id, &a.leaf_ids), (b.id, &b.leaf_ids), "{} at {}", a.species, a.position);
+            assert_eq!(a.leaf_ids.len(), usize::from(a.leaves));
+            renumbered += usize::from(a.number != b.number);
+        }
+    }
+    assert!(renumbered > 0, "no number changed: nothing was tested");
+    let elsewhere = look(0.0, 1, 32);
+    assert!(elsewhere.iter().all(|p| here.iter().all(|q| q.id != p.id)));
+}
+
 /// Lengths of blades, base to tip, metres.
 fn lengths(plant: &PlantRecord) -> Vec<f32> {
     plant.leaf_axes.iter().map(|a| a.base.distance(a.tip)).collect()

@@ -4,6 +4,7 @@ mod census;
 mod field;
 mod ground;
 mod growing;
+mod identity;
 mod known;
 mod lighting;
 mod models;
@@ -61,6 +62,10 @@ const SHADOW: f32 = 2.75;
 const SEASON: u64 = 1 << 32;
 /// Address of the first of the streams from which lists of lights are drawn, one for each place among the page's lights.
 const LIGHTING: u64 = 2 << 32;
+/// The population of single plants in [`identity::of`]; crops and weeds have those of their streams.
+const PLACED: u64 = 2001;
+/// The population of the first model; each is one of its own.
+const MODELS: u64 = 3001;
 /// Most pixels of an image.
 const MOST_PIXELS: u64 = 1 << 28;
 /// Most plants that a field can number.
@@ -132,6 +137,8 @@ struct Seedling {
     /// Factor on its sizes.
     vigour: Vary<Positive>,
     condition: Option<ConditionDesc>,
+    /// See [`identity::of`].
+    id: u32,
 }
 
 impl Seedling {
@@ -336,6 +343,7 @@ impl<'a> Builder<'a> {
     ) -> Result<Vec<PlantRecord>> {
         let mut plants = self.plant(seedlings, floor, shown)?;
         plants.extend(self.models(seedlings.len(), floor)?);
+        identity::settle(&mut plants);
         Ok(plants)
     }
 
@@ -379,6 +387,7 @@ impl<'a> Builder<'a> {
                 individual: self.individual(&species.desc),
                 vigour: placed.vigour.clone(),
                 condition: species.desc.condition.clone(),
+                id: identity::of(self.seed, self.index, PLACED, k as u64),
             };
             all.push(seedling.tended(&placed.vigour, placed.condition.as_ref()));
         }
@@ -398,6 +407,7 @@ impl<'a> Builder<'a> {
             individual: self.individual(&species.desc),
             vigour: Vary::fixed(1.0),
             condition: species.desc.condition.clone(),
+            id: identity::of(self.seed, self.index, population, spot.key),
         }
     }
 
@@ -535,6 +545,8 @@ fn grow(s: &Seedling, number: u16, floor: Option<Floor<'_>>, dust: Spectrum) -> 
     let organs: Vec<Grown> = organs.collect();
     let record = PlantRecord {
         number,
+        id: s.id,
+        leaf_ids: Vec::new(),
         species: desc.name.clone(),
         eppo: desc.eppo.clone(),
         kind: 0,
