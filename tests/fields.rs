@@ -97,6 +97,50 @@ fn a_plant_keeps_its_identity_wherever_the_camera_stands() {
     assert!(elsewhere.iter().all(|p| here.iter().all(|q| q.id != p.id)));
 }
 
+/// A sown field under a camera.
+fn under(camera: &str) -> furrow::Result<Field> {
+    let text = format!(
+        r#"Field(
+            camera: Pinhole(size: (16, 12), {camera}),
+            lights: [Constant(radiance: (1, 1, 1, 1))],
+            crops: [(species: "scenes/species/sugar_beet.ron", growth: Bbch(10), rows: (spacing_m: 0.5, in_row_m: 0.5, emergence: 1))],
+        )"#
+    );
+    assemble::field_of(&text, &Options::default())
+}
+
+/// Rationale: a tall or oblique camera saw bare edges, and labels called them soil. Expected: there is a plant within 0.6 m of each point
+/// of the ground in view, and no warning; where the horizon is in view there is a warning that says so and what to do, and all is
+/// planted to 6 m; a view of which more than half would be bare is refused. Source: rows of 0.5 m by 0.5 m.
+#[test]
+fn all_that_a_camera_sees_is_planted_or_told() {
+    for camera in [
+        "intrinsics: FieldOfView(horizontal_deg: 60), pose: Nadir(height_m: 8)",
+        "intrinsics: FieldOfView(horizontal_deg: 40), pose: LookAt(position_m: (0, 0, 1.2), target_m: (0, 1.8, 0))",
+    ] {
+        let field = under(camera).unwrap();
+        assert_eq!(field.warnings, Vec::<String>::new(), "{camera}");
+        let mut farthest = 0.0_f32;
+        for (x, y) in [(0.0, 0.0), (16.0, 0.0), (0.0, 12.0), (16.0, 12.0), (8.0, 0.0), (0.0, 6.0)] {
+            let (from, along) = field.scene.camera.ray(furrow::math::vec2(x, y), [0.5; 2]);
+            let at = from + along * (from.z / -along.z);
+            let near = field.plants.iter().any(|p| p.position.truncate().distance(at.truncate()) < 0.6);
+            assert!(near, "no plant near {at}: {camera}");
+            farthest = farthest.max(at.truncate().length());
+        }
+        assert!(farthest > 2.5, "{farthest} m: the old bound was not passed");
+    }
+    let level =
+        "intrinsics: FieldOfView(horizontal_deg: 40), pose: LookAt(position_m: (0, 0, 1.2), target_m: (0, 4, 0.5))";
+    let field = under(level).unwrap();
+    let [warning] = field.warnings.as_slice() else { panic!("{:?}", field.warnings) };
+    assert!(warning.contains("to the horizon") && warning.contains("turn it down"), "{warning}");
+    assert!(field.plants.iter().any(|p| p.position.y > 5.4));
+    let refused =
+        under("intrinsics: FieldOfView(horizontal_deg: 60), pose: Nadir(height_m: 30)").err().unwrap().to_string();
+    assert!(refused.contains("m away") && refused.contains("lower the camera"), "{refused}");
+}
+
 /// Lengths of blades, base to tip, metres.
 fn lengths(plant: &PlantRecord) -> Vec<f32> {
     plant.leaf_axes.iter().map(|a| a.base.distance(a.tip)).collect()

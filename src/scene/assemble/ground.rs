@@ -15,6 +15,10 @@ use std::sync::Arc;
 const GROUND_MARGIN: f32 = 0.04;
 /// How far the coarse ground goes on.
 const GROUND_REACH: f32 = 2.5;
+/// How far it goes on where the camera sees ground beyond the planted area: to what is nearly the horizon.
+const OPEN_REACH: f32 = 200.0;
+/// About the most cells of the fine ground: a larger view has larger ones.
+const MOST_CELLS: f32 = 1.5e7;
 /// Addresses of what lies on the ground.
 const STONES: u64 = 0;
 const LITTER: u64 = 1;
@@ -40,7 +44,7 @@ pub(super) struct Skins {
 
 impl Builder<'_> {
     /// The ground and the stones in it: what must be known before plants can be placed.
-    pub(super) fn break_ground(&mut self, desc: &SoilDesc, view: Rect) -> Result<Earth> {
+    pub(super) fn break_ground(&mut self, desc: &SoilDesc, view: Rect, open: bool) -> Result<Earth> {
         let mut maps: Vec<Arc<Layer>> = Vec::new();
         for layer in &desc.layers {
             maps.push(self.library.layer(self.page, layer)?);
@@ -52,8 +56,8 @@ impl Builder<'_> {
         });
         let site = Site {
             area: view.grown(GROUND_MARGIN),
-            grid_m: (2.5 * pixel).clamp(8e-4, 4e-3),
-            margin_m: GROUND_REACH,
+            grid_m: (2.5 * pixel).clamp(8e-4, 4e-3).max((view.area() / MOST_CELLS).sqrt()),
+            margin_m: if open { OPEN_REACH } else { GROUND_REACH },
             rows,
         };
         let ground = Ground::new(desc, &maps, &site, &self.stream(Purpose::Soil, 0))

@@ -9,6 +9,7 @@ mod known;
 mod lighting;
 mod models;
 mod season;
+mod view;
 mod wear;
 
 use super::desc::{FieldDesc, Growth, SpeciesDesc};
@@ -39,6 +40,7 @@ use rayon::prelude::*;
 pub use season::Season;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
+use view::View;
 use wear::{Ailing, Bare};
 
 /// What the command line adds to a page.
@@ -68,6 +70,8 @@ const PLACED: u64 = 2001;
 const MODELS: u64 = 3001;
 /// Most pixels of an image.
 const MOST_PIXELS: u64 = 1 << 28;
+/// About the most texels of the ground's skin: a larger view has larger ones.
+const MOST_TEXELS: f32 = 2.4e8;
 /// Most plants that a field can number.
 const MOST_PLANTS: usize = u16::MAX as usize;
 
@@ -226,34 +230,6 @@ impl<'a> Builder<'a> {
         Stream::of(self.seed, self.index, purpose, index)
     }
 
-    /// The rectangle of the ground plane that the camera sees.
-    fn view(&self) -> Result<Rect> {
-        let camera = &self.scene.camera;
-        let (w, h) = (camera.width(), camera.height());
-        let mut corners = Vec::new();
-        // The corners and the middles of the sides: a barrel distortion bulges between corners.
-        for (x, y) in [(0, 0), (1, 0), (2, 0), (0, 1), (2, 1), (0, 2), (1, 2), (2, 2)] {
-            let at = vec2(w as f32 * x as f32 / 2.0, h as f32 * y as f32 / 2.0);
-            let (origin, direction) = camera.ray(at, [0.5; 2]);
-            if direction.z < -0.05 && origin.z > 0.0 {
-                corners.push((origin + direction * (origin.z / -direction.z)).truncate());
-            }
-        }
-        let (Some(lo), Some(hi)) =
-            (corners.iter().copied().reduce(Vec2::min), corners.iter().copied().reduce(Vec2::max))
-        else {
-            let fault = Error::input("the camera does not look at the ground")
-                .help("turn it down; its height is counted from the ground");
-            return Err(self.page.blame(&[Step::Field("camera")], fault));
-        };
-        // A camera that looks along the ground sees to the horizon; only what is near can be made of crumbs.
-        let below = camera.pose().position.truncate();
-        let reach = Vec2::splat(MOST_VIEW);
-        let (lo, hi) = (lo.max(below - reach), hi.min(below + reach));
-        // Rows' corners are seen in the middle of their exposures.
-        Ok(Rect::new(lo.x, lo.y, hi.x, hi.y).grown(camera.travel()))
-    }
-
     /// Side of a pixel on the ground in the image's middle, metres; 1 mm where the camera does not look down.
     fn ground_pixel(&self) -> f32 {
         let camera = &self.scene.camera;
@@ -273,7 +249,7 @@ impl<'a> Builder<'a> {
     /// The field, and the library with whatever was read for it.
     fn build(mut self) -> Result<(Field, Library)> {
         let wanted = self.desc.soil.is_some() || !self.desc.crops.is_empty() || !self.desc.weeds.is_empty();
-        let view = if wanted { self.view()? } else { Rect::new(-0.5, -0.5, 0.5, 0.5) };
+        let View { area: view, open } = if wanted { self.view()? } else { View::NONE };
         let (sown, shown) = (view.grown(PLANT_MARGIN), wanted.then_some(view));
         let mut known = None;
         let mut plants = match &self.desc.soil {
@@ -282,10 +258,10 @@ impl<'a> Builder<'a> {
                 self.populate(&seedlings, None, shown)?
             }
             Some(soil) => {
-                let Earth { ground, maps, mut pile, mut stones } = self.break_ground(soil, view)?;
+                let Earth { ground, maps, mut pile, mut stones } = self.break_ground(soil, view, open)?;
                 let floor = Floor { ground: &ground, flat: soil.flat };
                 known = Some(self.soil_record(soil, &ground));
-                let texel = (0.9 * self.ground_pixel()).clamp(2e-4, 2e-3);
+                let texel = (0.9 * self.ground_pixel()).clamp(2e-4, 2e-3).max((view.area() / MOST_TEXELS).sqrt());
                 // The skin takes as long as everything else, and neither needs the other.
                 let fabric = |wet| Arc::new(GroundSkin::bake(&ground.fabric(&maps, texel, wet)));
                 let (skins, rest) = rayon::join(
@@ -463,9 +439,6 @@ impl<'a> Builder<'a> {
         Ok(records)
     }
 }
-
-/// Most that a view may measure from the point below the camera, metres.
-const MOST_VIEW: f32 = 1.5;
 
 /// An organ that stands in the field.
 struct Grown {
