@@ -368,6 +368,8 @@ impl<'a> Builder<'a> {
             all.push(seedling.tended(&placed.vigour, placed.condition.as_ref()));
         }
         census.close(all.len())?;
+        let outdated = all.iter().find_map(|s| s.condition.as_ref().and_then(ConditionDesc::outdated));
+        self.warnings.extend(outdated.map(str::to_owned));
         Ok(all)
     }
 
