@@ -3,6 +3,7 @@
 use super::{Builder, Floor};
 use crate::Result;
 use crate::material::{Ground as GroundMaterial, GroundSkin, Material, Solid};
+use crate::math::Spectrum;
 use crate::ron_file::Step;
 use crate::sampling::Purpose;
 use crate::sampling::rng::mix;
@@ -28,6 +29,11 @@ const DEBRIS_SIGMA: f32 = 0.3;
 /// Largest patches of straw, wood and dead leaves, metres.
 const MOTTLE: f32 = 2e-3;
 
+/// Patches of soil on stones, straw and wood, metres.
+const DUST_PATCH: f32 = 3e-3;
+/// Steps of moisture from air-dry to saturated that pieces are told apart by.
+const MOISTURE_STEPS: f32 = 12.0;
+
 /// The ground while it is being covered.
 pub(super) struct Earth {
     pub(super) ground: Ground,
@@ -40,6 +46,8 @@ pub(super) struct Earth {
 pub(super) struct Skins {
     pub(super) ground: Arc<GroundSkin>,
     pub(super) clods: [Arc<GroundSkin>; 2],
+    /// Reflectance of the dry soil that lies on stones and straw.
+    pub(super) dust: Spectrum,
 }
 
 impl Builder<'_> {
@@ -112,6 +120,10 @@ impl Builder<'_> {
             let patch = 0.5 * thing.radius.max(1e-3);
             let patch = if thing.kind == DebrisKind::Stone { patch } else { patch.min(MOTTLE) };
             let solid = solid.with_grain(mix(i as u64) as u32, patch, 0.35);
+            let solid = solid.with_dust(skins.dust, thing.dust, DUST_PATCH);
+            // In steps, so that pieces of the same film can be exported as one.
+            let moisture = floor.ground.moisture(thing.centre.x, thing.centre.y);
+            let solid = solid.moist((moisture * MOISTURE_STEPS).round() / MOISTURE_STEPS);
             let material = self.material(Material::Solid(solid));
             self.part(thing.mesh, material);
         }

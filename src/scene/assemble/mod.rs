@@ -268,6 +268,7 @@ impl<'a> Builder<'a> {
                     || Skins {
                         ground: Arc::new(GroundSkin::bake(&ground.skin(&maps, texel))),
                         clods: ground.clods_moisture().map(fabric),
+                        dust: ground.mean_dry(&maps),
                     },
                     || {
                         let taken: Vec<Disc> = stones.iter().map(|s| (s.centre.truncate(), s.radius)).collect();
