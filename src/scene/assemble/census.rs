@@ -53,9 +53,10 @@ impl<'a> Census<'a> {
 
     fn refusal(&self, population: Population, plants: f64) -> Error {
         let (path, advice) = match population {
-            Population::Crop(k) => {
-                (vec![Step::Field("crops"), Step::Item(k), Step::Field("rows")], "widen spacing_m or in_row_m here")
-            }
+            Population::Crop(k) => (
+                vec![Step::Field("crops"), Step::Item(k), Step::Field("rows")],
+                "widen the distances or lower the jitter here",
+            ),
             Population::Weed(k) => {
                 (vec![Step::Field("weeds"), Step::Item(k), Step::Field("spread")], "lower per_m2 here")
             }
