@@ -167,7 +167,7 @@ fn leaflets_are_eaten_one_by_one() {
 /// the blades is what leaves absorb below it.
 #[test]
 fn sick_leaves_return_no_more_than_they_receive() {
-    let ill = "(chlorosis: 1, spots: 20, scorch_mm: 3, dust: 0.5, splash: 15, reddening: 8)";
+    let ill = "(chlorosis: 1, spots: 20, scorched: 1, scorch: 0.2, dust: 0.5, splash: 15, reddening: 8)";
     let field = plants((120, 60), &[("sugar_beet", 16, &condition(ill))]);
     let (film, labels) = shoot(&field, 64, 2);
     let least = |p: &furrow::film::Pixel| (p.mean.0 - 5.0 * p.variance.map(f32::sqrt).0).max_element();
@@ -190,4 +190,26 @@ fn wilted_plants_are_lower_and_stay_above_the_ground() {
     };
     let all = [0.0, 0.4, 0.8].map(height);
     assert!(all[1] < 0.95 * all[0] && all[2] < 0.9 * all[1], "{all:?}");
+}
+
+/// Expected: a page with the keyword of the last version reads, has its rims, and is told the new one; a page with the new one is not.
+/// No leaf of the synthetic sets has a rim, for no frame that they stand for has any.
+#[test]
+fn the_old_keyword_of_rims_is_read_and_told() {
+    let field = plants((24, 12), &[("sugar_beet", 16, &condition("(scorch_mm: 2)"))]);
+    let [warning] = field.warnings.as_slice() else { panic!("{:?}", field.warnings) };
+    assert!(warning.contains("`scorch_mm`") && warning.contains("`scorched`"), "{warning}");
+    assert_eq!(field.plants[0].condition.unwrap().scorch_mm, 2.0);
+    let field = plants((24, 12), &[("sugar_beet", 16, &condition("(scorched: 1, scorch: 0.1)"))]);
+    assert_eq!(field.warnings, Vec::<String>::new());
+    for set in ["a", "b", "c", "d"] {
+        let page = std::path::PathBuf::from(format!("scenes/synthetic-{set}.ron"));
+        let desc: furrow::scene::desc::FieldDesc = furrow::ron_file::RonFile::read(&page).unwrap().parse().unwrap();
+        let none =
+            |c: &Option<ConditionDesc>| c.as_ref().is_none_or(|c| c.scorched == furrow::ron_file::Vary::fixed(0.0));
+        assert!(
+            desc.crops.iter().all(|c| none(&c.condition)) && desc.weeds.iter().all(|w| none(&w.condition)),
+            "{set}"
+        );
+    }
 }

@@ -177,6 +177,8 @@ fn every_broken_invariant_is_told() {
         ("is not among the", Box::new(|s| s.species.iter_mut().filter(|k| **k > 0).for_each(|k| *k = 200))),
         ("it is in the split", Box::new(|s| s.record.split = furrow::dataset::split::Split::Test)),
         ("a keypoint is not a number", Box::new(|s| s.record.plants[0].stem.as_mut().unwrap().x = f32::NAN)),
+        ("the identity", Box::new(|s| s.record.plants[1].id = s.record.plants[0].id)),
+        ("the identity 0", Box::new(|s| s.record.plants[0].id = Some(0))),
         ("pixels of a class", Box::new(|s| s.record.classes[0].pixels += 1)),
         (
             "plants, boxes or masks",

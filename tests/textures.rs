@@ -272,3 +272,116 @@ fn odd_leaves_are_drawn_too() {
         }
     }
 }
+
+/// A photograph of a leaf as a camera takes it: three stops under, redder than the leaf, lit from one side, with veins, a highlight, noise,
+/// colours smeared over blocks of 8 as JPEG smears them, and an edge that fades over some pixels.
+fn photograph() -> (u32, Vec<u8>) {
+    const SIDE: u32 = 160;
+    let mut state = 7_u64;
+    let mut noise = || {
+        state = furrow::sampling::rng::mix(state);
+        (state >> 40) as f32 / (1_u64 << 24) as f32 - 0.5
+    };
+    let mut pixels = Vec::new();
+    for y in 0..SIDE {
+        for x in 0..SIDE {
+            let (u, v) = (x as f32 / SIDE as f32 - 0.5, y as f32 / SIDE as f32 - 0.5);
+            let light = 0.12 * (1.0 + 1.1 * u) * (1.0 + 0.4 * v);
+            let vein = if (u + 0.3 * v.abs()).rem_euclid(0.12) < 0.012 || u.abs() < 0.01 { 1.5 } else { 1.0 };
+            let shine = 0.5 * (-((u - 0.2).powi(2) + (v + 0.15).powi(2)) / 0.002).exp();
+            let block = 1.0 + 0.06 * (((x / 8 * 37 + y / 8 * 61) % 11) as f32 / 10.0 - 0.5);
+            let value = |band: f32, tint: f32| {
+                let linear = band * light * vein * tint + 0.12 * shine;
+                // The sRGB curve, about.
+                linear.max(0.0).powf(1.0 / 2.2) * 255.0
+            };
+            let rgb = [value(0.10, block), value(0.14, 1.0), value(0.03, 2.0 - block)]
+                .map(|c| (c + 6.0 * noise()).clamp(0.0, 255.0) as u8);
+            // An ellipse, its edge fading over about five pixels; what lies around it is the table that it was laid on.
+            let inside = ((1.0 - (u / 0.32).hypot(v / 0.45)) * 12.0 + 0.5).clamp(0.0, 1.0);
+            let table = [200.0, 195.0, 190.0];
+            let mixed = |k: usize| (f32::from(rgb[k]) * inside + table[k] * (1.0 - inside)) as u8;
+            pixels.extend([mixed(0), mixed(1), mixed(2), (255.0 * inside) as u8]);
+        }
+    }
+    (SIDE, pixels)
+}
+
+/// Rationale: whoever gives a photograph of a leaf knows neither its exposure nor its white balance, and a picture of three stops under would
+/// be a black leaf. Expected: as a species' texture, read from its file, the blade's mean is the pigments' reflectance in each band, within 2 % in
+/// R, G, B and 6 % in near infrared, and light passes through it; its veins stay paler than the blade and its lit side brighter; with
+/// `calibrated: true` its own values stay.
+#[test]
+fn a_photograph_is_exposed_as_the_pigments_say() {
+    use furrow::material::Material;
+    use furrow::math::Spectrum;
+    use furrow::scene::assemble::{self, Options};
+    let folder = tempfile::tempdir().unwrap();
+    let (side, pixels) = photograph();
+    let picture = Texture::from_rgba8(side, side, &pixels, ColorSpace::Srgb);
+    image::save_buffer(folder.path().join("leaf.png"), &pixels, side, side, image::ColorType::Rgba8).unwrap();
+    let of = |calibrated: &str| {
+        let species = format!(
+            r#"Species(name: "photographed", eppo: "TEST", role: Weed, chlorophyll_sd: 0,
+                skins: {{
+                    "leaf": Leaf(texture: "leaf.png", roughness: 0.4{calibrated}),
+                    "stalk": Leaf(roughness: 0.4),
+                }},
+                plant: (form: Rosette, kinds: {{"leaf": (shape: Sheet(outline: Power(a: 0.6, b: 0.6)))}}, stages: [
+                    (bbch: 12, days: 9, hypocotyl_mm: 3, stem_mm: 1, layers: [
+                        (kind: "leaf", leaves: 2, blade_mm: 60, width_mm: 30, stalk_mm: 10, angle_deg: 60),
+                    ]),
+                ]),
+            )"#
+        );
+        std::fs::write(folder.path().join("species.ron"), species).unwrap();
+        let page = r#"Field(
+            camera: Pinhole(size: (16, 12), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.5)),
+            lights: [Constant(radiance: (1, 1, 1, 1))],
+            plants: [(species: "species.ron", growth: Bbch(12))],
+        )"#;
+        std::fs::write(folder.path().join("field.ron"), page).unwrap();
+        assemble::field(&folder.path().join("field.ron"), &Options::default()).unwrap()
+    };
+    let opaque = |x: u32, y: u32| picture.texel(x, y)[3] >= 0.5;
+    let mean = |calibrated: &str| {
+        let field = of(calibrated);
+        let blade = field.scene.parts.iter().find(|p| p.mask.is_some()).expect("a blade");
+        let Material::Leaf(leaf) = &field.scene.materials[blade.material as usize] else { panic!("not a leaf") };
+        let material = Material::Leaf(leaf.clone());
+        let swatch = material.swatch();
+        assert_eq!(swatch.size, Some((side, side)));
+        let (mut sum, mut passed, mut n) = (Spectrum::ZERO, Spectrum::ZERO, 0.0);
+        for (x, y) in (0..side * side).map(|i| (i % side, i / side)).filter(|(x, y)| opaque(*x, *y)) {
+            sum += swatch.texel(x, y).reflectance;
+            passed += swatch.texel(x, y).transmittance;
+            n += 1.0;
+        }
+        let bright = |x: u32, y: u32| swatch.texel(x, y).reflectance.luminance();
+        // The midrib over the blade beside it, and the lit side over the dark one.
+        let contrast = (bright(80, 60) / bright(77, 60), bright(112, 84) / bright(50, 84));
+        (sum * (1.0 / n), passed * (1.0 / n), contrast)
+    };
+    let wanted = furrow::optics::Pigments::default().bands();
+    let (matched, passed, contrast) = mean("");
+    for k in 0..4 {
+        let off = matched.0[k] / wanted.reflectance.0[k] - 1.0;
+        assert!(off.abs() < if k < 3 { 0.02 } else { 0.06 }, "band {k}: {matched:?}, {:?}", wanted.reflectance);
+        let off = passed.0[k] - wanted.transmittance.0[k];
+        assert!(off.abs() < 0.05, "band {k}: {passed:?}, {:?}", wanted.transmittance);
+    }
+    assert!(contrast.0 > 1.1 && contrast.1 > 1.2, "{contrast:?}");
+    let (own, ..) = mean(", calibrated: true");
+    let mut dark = [0.0_f32; 3];
+    let mut n = 0.0;
+    for (x, y) in (0..side * side).map(|i| (i % side, i / side)).filter(|(x, y)| opaque(*x, *y)) {
+        for (sum, value) in dark.iter_mut().zip(picture.texel(x, y)) {
+            *sum += value;
+        }
+        n += 1.0;
+    }
+    for k in 0..3 {
+        assert!((own.0[k] / (dark[k] / n) - 1.0).abs() < 0.02, "band {k}: {own:?} {dark:?}");
+    }
+    assert!(own.0.y < 0.3 * matched.0.y, "{own:?} {matched:?}: the photograph is not dark");
+}

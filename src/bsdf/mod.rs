@@ -71,9 +71,9 @@ impl Bsdf {
         }
     }
 
-    /// Whether light may pass through.
+    /// Whether light may pass through: only a sheet that lets some through, not an opaque body under a coat.
     pub fn transmits(&self) -> bool {
-        matches!(self, Self::Leaf(_))
+        matches!(self, Self::Leaf(leaf) if !leaf.transmittance().is_black())
     }
 
     /// One of each kind over its range, by name: the tests run over all of them.

@@ -63,6 +63,7 @@ pub fn plants(sample: &Sample) -> Vec<Plant> {
             let kind = first.and_then(|i| sample.species.get(i)).copied().map_or(0, u16::from);
             all.push(Plant {
                 number: key.0,
+                id: None,
                 class,
                 kind,
                 seen: seen(key, found),
@@ -72,7 +73,7 @@ pub fn plants(sample: &Sample) -> Vec<Plant> {
             });
         } else if let Some(plant) = all.last_mut() {
             // Keys are sorted: a leaf follows its plant.
-            plant.leaves.push(Leaf { number: key.1, seen: seen(key, found), base: None, tip: None });
+            plant.leaves.push(Leaf { number: key.1, id: None, seen: seen(key, found), base: None, tip: None });
         }
     }
     all

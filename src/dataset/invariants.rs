@@ -107,7 +107,22 @@ fn numbers(recipe: &Recipe, sample: &Sample) -> Vec<String> {
     if points.into_iter().any(|k| !(k.x.is_finite() && k.y.is_finite())) {
         all.push("a keypoint is not a number".into());
     }
+    all.extend(identities(sample));
     all
+}
+
+/// No two plants or leaves of an image have the same identity, and none is 0. Older records have none.
+fn identities(sample: &Sample) -> Option<String> {
+    let mut ids: Vec<u32> = sample
+        .record
+        .plants
+        .iter()
+        .flat_map(|p| p.id.into_iter().chain(p.leaves.iter().filter_map(|l| l.id)))
+        .collect();
+    ids.sort_unstable();
+    let twice = ids.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0]);
+    let wrong = ids.first().copied().filter(|id| *id == 0).or(twice)?;
+    Some(format!("the identity {wrong} is not that of one plant or leaf alone"))
 }
 
 /// What the record says is what the maps show: pixels, boxes, masks; and nothing is seen of more than there is.

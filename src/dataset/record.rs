@@ -82,6 +82,10 @@ pub struct ClassShare {
 pub struct Plant {
     /// Its number in `plants.png`.
     pub number: u16,
+    /// Its identity, 32 bit and never 0: the same in every image of its field, whatever the camera, the resolution and the other
+    /// plants in view; no other plant or leaf of the field has it. Null in older records and for an imported plant.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub id: Option<u32>,
     /// Crop or weed.
     #[serde(with = "lowercase")]
     pub class: Class,
@@ -130,6 +134,9 @@ pub struct Grown {
 pub struct Leaf {
     /// Its number in `leaves.png`.
     pub number: u16,
+    /// Its identity, as a plant's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub id: Option<u32>,
     /// What the camera sees of it.
     pub seen: Seen,
     /// Where its blade begins.

@@ -164,7 +164,7 @@ fn plants(field: &Field, labels: &LabelMap, sample: &Sample) -> Vec<Plant> {
             if extent.unoccluded > 0
                 && let Err(place) = plant.leaves.binary_search_by_key(number, |l| l.number)
             {
-                let mut leaf = Leaf { number: *number, seen: Seen::default(), base: None, tip: None };
+                let mut leaf = Leaf { number: *number, id: None, seen: Seen::default(), base: None, tip: None };
                 known(&mut leaf.seen, extent);
                 plant.leaves.insert(place, leaf);
             }
@@ -179,6 +179,10 @@ fn plants(field: &Field, labels: &LabelMap, sample: &Sample) -> Vec<Plant> {
                 leaf.tip = keypoint(camera, axis.tip, owns);
             }
         }
+        plant.id = Some(grown.id);
+        for leaf in &mut plant.leaves {
+            leaf.id = usize::from(leaf.number).checked_sub(1).and_then(|place| grown.leaf_ids.get(place)).copied();
+        }
         plant.grown = Some(described(grown));
         plant.kind = grown.kind;
         all.push(plant);
@@ -191,6 +195,7 @@ fn plants(field: &Field, labels: &LabelMap, sample: &Sample) -> Vec<Plant> {
 fn hidden(grown: &PlantRecord) -> Plant {
     Plant {
         number: grown.number,
+        id: Some(grown.id),
         class: grown.class,
         kind: grown.kind,
         seen: Seen::default(),

@@ -39,6 +39,11 @@ impl Margin {
         Self { width, height, distances }
     }
 
+    /// Distance of the innermost place, in heights of the mask.
+    pub fn deepest(&self) -> f32 {
+        self.distances.iter().copied().fold(0.0, f32::max)
+    }
+
     /// Distance at `uv`, in heights of the mask; 0 outside it. Bilinear.
     pub fn at(&self, uv: Vec2) -> f32 {
         let p = Vec2::new(uv.x * self.width as f32, uv.y * self.height as f32) - 0.5;
@@ -89,6 +94,7 @@ mod tests {
             let truth = 0.4 - (x - 0.5_f32).hypot(y - 0.5);
             assert!((margin.at(vec2(x, y)) - truth).abs() < 0.02, "{x} {y}: {} for {truth}", margin.at(vec2(x, y)));
         }
+        assert!((margin.deepest() - 0.4).abs() < 0.01, "{}", margin.deepest());
         assert_eq!(margin.at(vec2(0.02, 0.02)), 0.0);
         assert_eq!(margin.at(vec2(-3.0, 0.5)), 0.0);
     }

@@ -35,8 +35,13 @@ impl Bound for Index {
 #[serde(deny_unknown_fields, default, rename = "Leaf")]
 pub struct LeafDesc {
     /// RGBA picture, sRGB; its alpha cuts the blade's shape. Without one the pigments alone give the colour.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    ///
+    /// A photograph's exposure and white balance are not known: unless `calibrated` is set, each of its bands is scaled by one factor until
+    /// the mean over the blade is the reflectance that the pigments have.
     pub texture: Option<Pick<String>>,
+    /// Whether the picture's linear values are reflectances, as those that `trace texture` draws, and are taken as they are.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub calibrated: bool,
     /// GGX roughness α of the upper side's coat: 0.22–0.38 on a glossy beet leaf, 0.45 dull, 0.6 mealy.
     pub roughness: Num<Fraction>,
     /// Of the lower side's.
@@ -67,6 +72,7 @@ impl Default for LeafDesc {
     fn default() -> Self {
         Self {
             texture: None,
+            calibrated: false,
             roughness: Num::new(0.35),
             roughness_back: Num::new(0.5),
             roughness_along: None,
@@ -99,7 +105,9 @@ pub struct LeafMaterial {
     lower: Side,
     back_paleness: f32,
     relief: f32,
-    /// Colour of this specimen over the picture's, per visible band.
+    /// Reflectance over the picture's values, per visible band: 1 for a calibrated picture.
+    exposure: Vec3,
+    /// Colour of this specimen over its kind's, per visible band.
     tint: Vec3,
     /// Whether light passes through.
     transmits: bool,
@@ -119,9 +127,15 @@ impl LeafMaterial {
         let back = desc.roughness_back.f32().max(0.02);
         let ior = desc.ior.f32();
         let veil = Veil::new(desc.hairs.f32(), desc.bloom.f32());
+        let optics = Arc::new(LeafOptics::new(&desc.pigments));
+        let exposure = match &picture {
+            Some(picture) if !desc.calibrated => exposure(&picture.color, optics.plain().reflectance.0.truncate()),
+            _ => Vec3::ONE,
+        };
         Self {
             picture,
-            optics: Arc::new(LeafOptics::new(&desc.pigments)),
+            optics,
+            exposure,
             upper: Side::new(ior, [across, along], Spectrum::ZERO).veiled(veil),
             lower: Side::new(ior, [back, along.max(back)], Spectrum::ZERO).veiled(veil),
             back_paleness: desc.back_paleness.f32(),
@@ -206,7 +220,7 @@ impl LeafMaterial {
         let lod = picture.color.lod(1.0 / size.0.max(size.1) as f32);
         let tone = move |uv: Vec2| {
             let [r, g, b, _] = picture.color.sample(uv, lod);
-            let leaf = self.optics.at((Vec3::new(r, g, b) * self.tint).to_array());
+            let leaf = self.optics.at((Vec3::new(r, g, b) * self.exposure * self.tint).to_array());
             let Worn { upper, waxy, .. } = self.worn_at(leaf, uv);
             self.tone(upper, waxy)
         };
@@ -240,7 +254,7 @@ impl LeafMaterial {
         if let Some(wear) = &self.wear {
             return self.worn_swatch(picture, wear, roughness);
         }
-        let color = |[r, g, b, _]: [f32; 4]| Vec3::new(r, g, b);
+        let color = |[r, g, b, _]: [f32; 4]| Vec3::new(r, g, b) * self.exposure;
         let texel = move |x, y| read(color(picture.color.texel(x, y)));
         // The picture's coarsest level is its mean over what is opaque.
         let middle = color(picture.color.sample(Vec2::splat(0.5), 32.0));
@@ -273,7 +287,7 @@ impl LeafMaterial {
                 let lod = self.level.map_or_else(|| picture.color.lod(at.footprint / metres), |level| level as f32);
                 let color = if self.pictured {
                     let [r, g, b, _] = picture.color.sample(at.uv, lod);
-                    Vec3::new(r, g, b)
+                    Vec3::new(r, g, b) * self.exposure
                 } else {
                     self.plain()
                 };
@@ -292,4 +306,43 @@ impl LeafMaterial {
         let bsdf = bsdf::Leaf::new(upper, self.lower.with(lower), transmittance);
         (Bsdf::Leaf(bsdf), grained_frame(at, normal, tangents.0, wo))
     }
+}
+
+/// Most that the exposure of a photograph may be off by: beyond it is no photograph of a leaf, but black.
+const MOST_EXPOSURE: f32 = 100.0;
+/// Largest reflectance that a place of a picture may have; see [`LeafOptics::at`].
+const BRIGHTEST: f32 = 0.99;
+
+/// The factor on each band of a photograph with which the mean over what is opaque is `wanted`, places that would be brighter than white
+/// held to it.
+fn exposure(photograph: &Texture, wanted: Vec3) -> Vec3 {
+    // Few values are told apart in 8 bits: a band's mean at any exposure follows from how often each comes.
+    let mut counts: [std::collections::BTreeMap<u32, u32>; 3] = Default::default();
+    for y in 0..photograph.height() {
+        for x in 0..photograph.width() {
+            let texel = photograph.texel(x, y);
+            if texel[3] >= 0.5 {
+                for (band, count) in counts.iter_mut().enumerate() {
+                    *count.entry(texel[band].to_bits()).or_default() += 1;
+                }
+            }
+        }
+    }
+    let band = |k: usize| {
+        let all: u32 = counts[k].values().sum();
+        let mean = |factor: f32| {
+            let sum: f64 = counts[k]
+                .iter()
+                .map(|(value, n)| f64::from((f32::from_bits(*value) * factor).min(BRIGHTEST)) * f64::from(*n))
+                .sum();
+            (sum / f64::from(all.max(1))) as f32
+        };
+        // What is cut off at white is made good by the rest.
+        let mut factor = 1.0_f32;
+        for _ in 0..8 {
+            factor = (factor * wanted[k] / mean(factor).max(1e-6)).clamp(1.0 / MOST_EXPOSURE, MOST_EXPOSURE);
+        }
+        factor
+    };
+    Vec3::new(band(0), band(1), band(2))
 }

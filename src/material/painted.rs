@@ -198,7 +198,24 @@ fn rgb([r, g, b, _]: [f32; 4]) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::{Hit, Mesh};
+    use crate::math::vec2;
     use proptest::prelude::*;
+
+    /// Rationale: what lets light through is sampled and lit from both sides. Expected: an opaque body is not, coat or none; a sheet is.
+    #[test]
+    fn a_coated_body_is_opaque_unless_it_lets_light_through() {
+        let corners = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
+        let mesh = Mesh::smooth(corners, vec![Vec2::ZERO, vec2(1.0, 0.0), vec2(0.0, 1.0)], vec![[0, 1, 2]]);
+        let at = Interaction::new(&mesh, &Hit { t: 1.0, u: 0.3, v: 0.3, part: 0, triangle: 0 }, 1e-3);
+        let transmits = |roughness: f32, passed: Option<f32>| {
+            let transmission = passed.map(|t| Transmission { color: [t; 3], picture: None });
+            let surface = Surface { roughness: Some(roughness), transmission, ..Surface::default() };
+            Painted::new(&surface, &Repaint::default()).scatter(&at, Vec3::Z).0.transmits()
+        };
+        assert!(!transmits(0.2, None) && !transmits(1.0, None));
+        assert!(transmits(0.2, Some(0.1)) && transmits(1.0, Some(0.1)));
+    }
 
     proptest! {
         /// Rationale: files and pages say reflectance and transmittance apart, and nothing keeps them from more than one together.

@@ -306,7 +306,7 @@ mod tests {
             seed in 0u64..40,
         ) {
             let condition =
-                Condition { chlorosis, spots, dust, splash, reddening, scorch_mm: 2.0, ..Condition::default() };
+                Condition { chlorosis, spots, dust, splash, reddening, scorched: 1.0, scorch: 0.1, ..Condition::default() };
             let leaf = LeafOptics::new(&Pigments::default()).at(rgb);
             let worn = wear(&condition, seed).at(leaf, vec2(u, v), None);
             for side in [worn.tissue, worn.upper] {

@@ -43,7 +43,7 @@ pub use kind::{LeafKind, Shape};
 pub use organ::{LeafAxis, Organ, OrganKind};
 pub use stage::{BUD, LayerDesc, StageDesc};
 
-use crate::ron_file::{self, Finite, Positive, Step, Vary};
+use crate::ron_file::{self, Finite, NonNegative, Num, Positive, Step, Vary};
 use crate::sampling::Stream;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
@@ -109,6 +109,11 @@ pub struct PlantDesc {
     pub kinds: BTreeMap<String, LeafKind>,
     /// Its stages, youngest first.
     pub stages: Vec<StageDesc>,
+    /// Age in days at which the crop covers as much of the ground, at its ordinary spacing, as a BBCH code of principal stage 3 says: 31
+    /// for 10 %, 33 for 30 %, 39 for 90 %. Such a code then stands for this age, and leaves are counted by the stages as before: the two
+    /// run side by side. Source of the codes: Meier 2001. Empty: all codes are those of the stages.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub cover_days: BTreeMap<u32, Num<NonNegative>>,
     /// Factor on all sizes of one plant.
     pub vigour: Vary<Positive>,
     /// Factor on the sizes of one leaf, the paper's r.
@@ -130,6 +135,8 @@ struct Written {
     form: Form,
     kinds: BTreeMap<String, LeafKind>,
     stages: Vec<StageDesc>,
+    #[serde(default)]
+    cover_days: BTreeMap<u32, Num<NonNegative>>,
     #[serde(default = "vigour")]
     vigour: Vary<Positive>,
     #[serde(default = "size")]
@@ -168,6 +175,7 @@ impl<'de> Deserialize<'de> for PlantDesc {
                 form: w.form,
                 kinds: w.kinds,
                 stages: w.stages,
+                cover_days: w.cover_days,
                 vigour: w.vigour,
                 size: w.size,
                 azimuth_deg: w.azimuth_deg,
@@ -208,6 +216,15 @@ impl PlantDesc {
                 let message = format!("no kind of leaf is called \"{kind}\"");
                 return Err((at, message, ron_file::choose("kinds", &known, kind)));
             }
+        }
+        let days: Vec<f64> = self.cover_days.values().map(|d| d.get()).collect();
+        if days.windows(2).any(|pair| pair[1] <= pair[0]) {
+            let message = "a higher BBCH code of ground cover must be reached later".into();
+            return Err((
+                vec![Field("cover_days")],
+                message,
+                "write {31: 32, 33: 44}: codes and days rise together".into(),
+            ));
         }
         for (i, pair) in self.stages.windows(2).enumerate() {
             let [from, to] = pair else { continue };
@@ -265,7 +282,8 @@ impl PlantDesc {
 pub enum Stage {
     /// Days after emergence. Outside the page's stages: the nearest of them.
     Age(f32),
-    /// BBCH code. Between two stages of the page: their blend.
+    /// BBCH code, by the ground that the crop covers where the page says at what age it does (see [`PlantDesc::cover_days`]), else by the
+    /// stages. Between two stages of the page: their blend.
     Bbch(u32),
 }
 

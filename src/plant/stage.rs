@@ -170,6 +170,14 @@ impl<'a> Between<'a> {
     }
 }
 
+/// The code of ground cover that `code` stands for and the age in days at which a crop has it; `None` for a code of the stages.
+fn covering(desc: &PlantDesc, code: u32) -> Option<(u32, f32)> {
+    let (before, early) = desc.cover_days.range(..=code).next_back()?;
+    let Some((after, late)) = desc.cover_days.range(code..).next() else { return Some((*before, early.f32())) };
+    let u = (code - before) as f32 / (after - before).max(1) as f32;
+    Some((code, lerp(early.f32(), late.f32(), u)))
+}
+
 /// Azimuth from which the leaves of the plant of `stream` count, radians clockwise from north.
 pub(super) fn turn(stream: &Stream) -> f32 {
     stream.child(Purpose::Plant, 0).child(Purpose::Plant, 1).range32(0.0, 2.0 * PI)
@@ -178,6 +186,11 @@ pub(super) fn turn(stream: &Stream) -> f32 {
 /// What the plant of `stream` looks like at `stage`, all its sizes but its height over the soil times `vigour`; `None` without stages.
 pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, vigour: f32) -> Option<Growth<'a>> {
     const MM: f32 = 1e-3;
+    let covering = match stage {
+        Stage::Bbch(code) => covering(desc, code),
+        Stage::Age(_) => None,
+    };
+    let stage = covering.map_or(stage, |(_, days)| Stage::Age(days));
     let between = Between::find(&desc.stages, stage)?;
     let Between { from, to, u } = between;
     let whole = (Some(from), to);
@@ -230,9 +243,10 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
     }
     Some(Growth {
         desc,
-        bbch: match stage {
-            Stage::Bbch(code) => code.clamp(from.bbch, to.bbch),
-            Stage::Age(_) => from.bbch,
+        bbch: match (covering, stage) {
+            (Some((code, _)), _) => code,
+            (None, Stage::Bbch(code)) => code.clamp(from.bbch, to.bbch),
+            (None, Stage::Age(_)) => from.bbch,
         },
         age_days: match stage {
             Stage::Age(days) => days,

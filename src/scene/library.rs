@@ -57,7 +57,8 @@ pub(super) struct Species {
 #[derive(Clone, Default)]
 pub(super) struct Library {
     files: BTreeMap<PathBuf, [u8; 32]>,
-    pictures: BTreeMap<PathBuf, Cut>,
+    /// By file and by the bits of `relief_range`, which scales the height map beside it.
+    pictures: BTreeMap<(PathBuf, u32), Cut>,
     species: BTreeMap<PathBuf, Arc<Species>>,
     models: BTreeMap<(PathBuf, bool), Arc<Model>>,
     layers: BTreeMap<(PathBuf, PathBuf), Arc<Layer>>,
@@ -149,7 +150,8 @@ impl Library {
 
     fn picture(&mut self, page: &RonFile, path: &str, relief_range: f32) -> Result<Cut> {
         let full = page.need_file(path)?;
-        if let Some(known) = self.pictures.get(&full) {
+        let key = (full.clone(), relief_range.to_bits());
+        if let Some(known) = self.pictures.get(&key) {
             return Ok(known.clone());
         }
         self.note(&full)?;
@@ -165,7 +167,7 @@ impl Library {
         let mask = color.alpha_mask().map(Arc::new);
         let margin = mask.as_deref().map(|m| Arc::new(Margin::of(m)));
         let cut = Cut { picture: Arc::new(Picture { color, maps }), mask, margin };
-        self.pictures.insert(full, cut.clone());
+        self.pictures.insert(key, cut.clone());
         Ok(cut)
     }
 
@@ -295,6 +297,21 @@ impl LayerMaps for Layer {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Rationale: two species may share a picture and say different heights of its relief. Expected: heights in the ratio of what
+    /// each says. Source: the meaning of `relief_range`.
+    #[test]
+    fn one_picture_has_the_relief_that_each_skin_gives_it() {
+        let page = RonFile::of("Species()");
+        let mut library = Library::default();
+        let mut highest = |range: f32| {
+            let cut = library.picture(&page, "textures/leaf/sugar_beet.png", range).unwrap();
+            cut.picture.maps.height.values().iter().fold(0.0_f32, |most, h| most.max(h.abs()))
+        };
+        let (low, high, again) = (highest(0.01), highest(0.04), highest(0.01));
+        assert!(low > 0.0 && (high / low - 4.0).abs() < 0.1, "{low} {high}");
+        assert_eq!(low, again);
+    }
 
     #[test]
     fn a_soil_photograph_without_a_height_map_gets_one() {

@@ -70,7 +70,7 @@ impl Shift {
 }
 
 /// Mean colour of a tile, from 64 × 64 places.
-fn mean<L: LayerMaps>(maps: &L) -> [f32; 3] {
+pub(super) fn mean<L: LayerMaps>(maps: &L) -> [f32; 3] {
     const SIDE: u16 = 64;
     let mut sum = [0.0; 3];
     for k in 0..SIDE * SIDE {

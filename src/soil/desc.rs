@@ -281,6 +281,8 @@ pub struct StonesDesc {
     pub albedo: Spectrum,
     /// Standard deviation of the logarithm of their brightness.
     pub tint_sigma: Num<NonNegative>,
+    /// Share of what faces up of a stone that soil covers, drawn for each.
+    pub dust: Vary<Fraction>,
     /// How many lie together, within about a length of each other: more than 1 for what has fallen to pieces, such as grains of fertiliser.
     pub together: Vary<PositiveCount>,
 }
@@ -295,6 +297,7 @@ impl Default for StonesDesc {
             max_mm: Num::new(60.0),
             albedo: Spectrum::new(0.30, 0.27, 0.23, 0.36),
             tint_sigma: Num::new(0.28),
+            dust: Vary::uniform(0.1, 0.6),
             together: Vary::fixed(1.0),
         }
     }
@@ -322,6 +325,8 @@ pub struct LitterDesc {
     pub bit_mm: Vary<Positive>,
     /// Stubs on a stick.
     pub stubs: Vary<Count>,
+    /// Share of what faces up of a piece that soil covers, drawn for each.
+    pub dust: Vary<Fraction>,
     /// How long straw has lain: 0 fresh and pale yellow, 0.5 orange to grey brown, 1 dark and all but soil. Pieces spread around it.
     pub weathering: Vary<Fraction>,
 }
@@ -348,6 +353,7 @@ impl Default for LitterDesc {
                 max: 15.0,
             }),
             stubs: Vary::uniform(0.0, 3.0),
+            dust: Vary::uniform(0.0, 0.5),
             weathering: Vary::uniform(0.3, 0.8),
         }
     }

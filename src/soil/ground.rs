@@ -1,7 +1,7 @@
 //! One piece of ground: its heights, their interpolation, and the mesh.
 
 use super::blend::{Blend, Weights};
-use super::color::Shift;
+use super::color::{Shift, mean};
 use super::crumb::{Crumbs, Law, Raster};
 use super::grid::Grid;
 use super::record::{ClodsRecord, LayerRecord, LitterRecord, MoistureRecord, ReliefRecord, SoilRecord};
@@ -9,7 +9,8 @@ use super::relief::Relief;
 use super::{LayerMaps, MAX_LAYERS, Rect, SoilDesc};
 use crate::error::{Error, Result};
 use crate::geometry::Mesh;
-use crate::math::{Vec2, Vec3, vec2};
+use crate::math::{Spectrum, Vec2, Vec3, vec2};
+use crate::optics::soil::at;
 use crate::sampling::{Purpose, Stream};
 use crate::texture::noise::Perlin;
 use std::path::Path;
@@ -219,6 +220,13 @@ impl Ground {
             stones_cover: super::stone::covers(&desc.stones, debris),
             litter: LitterRecord::draw(&desc.litter, litter),
         }
+    }
+
+    /// Mean reflectance of the dry soil, of the first layer as its colour was moved: what lies as dust on stones and straw.
+    pub fn mean_dry<L: LayerMaps>(&self, maps: &[L]) -> Spectrum {
+        let Some(first) = maps.first() else { return self.color.like };
+        let mean = mean(first);
+        at(std::array::from_fn(|k| mean[k] * self.color.gain[k]), self.color.like)
     }
 
     /// Vertices between the samples of noises that change slowly: 4 mm.

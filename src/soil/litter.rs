@@ -33,11 +33,12 @@ pub fn litter(desc: &LitterDesc, ground: &Ground, pile: &mut Pile, stream: &Stre
         (DebrisKind::Bit, drawn.bits_per_m2, 6),
     ] {
         for (at, mut s) in places(ground.area(), per_m2, &child(k)) {
-            all.push(match kind {
+            let thing = match kind {
                 DebrisKind::Stick => stick(desc, pile, at, &mut s),
                 DebrisKind::Straw => straw(desc, drawn.weathering, pile, at, &mut s),
                 _ => bit(desc, drawn.weathering, pile, at, &mut s),
-            });
+            };
+            all.push(Debris { dust: desc.dust.draw32(&mut s), ..thing });
         }
     }
     all
@@ -165,7 +166,7 @@ fn debris(kind: DebrisKind, mesh: Mesh, albedo: Spectrum, path: &[Vec3], s: &mut
     let centre = path[path.len() / 2];
     let radius = mesh.positions.iter().map(|p| p.truncate().distance(centre.truncate())).fold(0.0, f32::max);
     let tint = (0.22 * s.normal() as f32).exp();
-    Debris { kind, mesh, albedo, tint, hue: s.uniform32(), centre, radius }
+    Debris { kind, mesh, albedo, tint, dust: 0.0, hue: s.uniform32(), centre, radius }
 }
 
 fn straw(desc: &LitterDesc, weathering: f32, pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {

@@ -175,6 +175,8 @@ pub struct Debris {
     pub albedo: Spectrum,
     /// Brightness of this one beside its kind; 1 is the mean.
     pub tint: f32,
+    /// Share of what faces up that soil covers.
+    pub dust: f32,
     /// A number of its own in 0..1, to vary its hue or pick its texture by.
     pub hue: f32,
     /// Centre.

@@ -129,6 +129,7 @@ fn stone(desc: &StonesDesc, ground: &Ground, pile: &mut Pile, at: Vec2, mm: f32,
         albedo: desc.albedo,
         tint: (desc.tint_sigma.f32() * s.normal() as f32).exp(),
         hue: s.uniform32(),
+        dust: desc.dust.draw32(s),
         centre,
         radius: axes.x,
     }

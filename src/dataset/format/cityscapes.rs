@@ -125,6 +125,7 @@ mod tests {
     fn weeds(count: u16) -> Record {
         let weed = |number: u16| Plant {
             number,
+            id: None,
             class: Class::Weed,
             kind: 0,
             seen: Seen { pixels: u32::from(number), ..Seen::default() },

@@ -57,7 +57,7 @@ impl Look {
             Varies::Picture(w, h) | Varies::Raster(w, h) => (w, h),
             Varies::Nowhere | Varies::Place => (1, 1),
         };
-        let flat = patch(Vec3::ZERO);
+        let flat = patch(Vec3::ZERO, Vec3::Z);
         let mut kind = None;
         let mut texels = Vec::with_capacity((width * height) as usize);
         for y in 0..height {
@@ -94,24 +94,26 @@ impl Kind {
 
 /// Reflectances of a material that varies over the world, at each corner of a mesh.
 pub(super) fn colors(material: &Material, mesh: &Mesh) -> Vec<Spectrum> {
-    let corner = |p: &Vec3| at(material, &patch(*p), Vec2::ZERO).1.reflect[0];
-    mesh.positions.iter().map(corner).collect()
+    let corner = |(p, n): (&Vec3, &Vec3)| at(material, &patch(*p, *n), Vec2::ZERO).1.reflect[0];
+    mesh.positions.iter().zip(&mesh.normals).map(corner).collect()
 }
 
-/// A triangle at `p` whose barycentrics are the texture coordinates, on which an image is 1 m high.
-fn patch(p: Vec3) -> Mesh {
+/// A triangle at `p` with the unit normal `n` whose barycentrics are the texture coordinates, on which an image is 1 m high.
+fn patch(p: Vec3, n: Vec3) -> Mesh {
+    let (right, up) = if n == Vec3::Z { (Vec3::X, Vec3::Y) } else { n.any_orthonormal_pair() };
     Mesh {
-        positions: vec![p, p - Vec3::Y, p + Vec3::X],
-        normals: vec![Vec3::Z; 3],
+        positions: vec![p, p - up, p + right],
+        normals: vec![n; 3],
         uvs: vec![Vec2::ZERO, Vec2::Y, Vec2::X],
         triangles: vec![[0, 1, 2]],
     }
 }
 
-/// The scattering at one point of a patch, seen from above by a ray as wide as its image: what varies nowhere is what it is on the mean.
+/// The scattering at one point of a patch, seen along its normal by a ray as wide as its image: what varies nowhere is what it is on
+/// the mean.
 fn at(material: &Material, patch: &Mesh, uv: Vec2) -> (Kind, Texel) {
     let point = Interaction::new(patch, &Hit { part: 0, triangle: 0, u: uv.y, v: uv.x, t: 0.0 }, 1.0);
-    let (bsdf, frame) = material.scatter(&point, Vec3::Z);
+    let (bsdf, frame) = material.scatter(&point, patch.normals[0]);
     let opaque =
         |albedo: Spectrum, film: f32| Texel { reflect: [albedo; 2], transmit: Spectrum::ZERO, film, normal: frame.z };
     match bsdf {

@@ -131,8 +131,8 @@ struct Group {
 struct Key {
     class: &'static str,
     plant: u16,
-    /// The material on its level, or its roughness where the corners hold the colour.
-    look: Result<u32, [u32; 2]>,
+    /// The material on its level, or its roughness and film where the corners hold the colour.
+    look: Result<u32, [u32; 4]>,
     /// Address of the mask.
     mask: usize,
 }
@@ -157,7 +157,7 @@ pub fn write(folder: &Path, scene: &Scene, text: &str) -> Result<Export> {
         let factor = Surface::corner_factor(look.kind);
         let colors: Option<Vec<Spectrum>> = group.colors.as_ref().map(|c| c.iter().map(|s| *s * factor).collect());
         let surface = match colors {
-            Some(_) => Surface::of_corners(look.kind),
+            Some(_) => Surface::of_corners(&look, &group.name, &mut files)?,
             None => Surface::write(&look, &group.name, mask, &mut files)?,
         };
         surface.warnings(&group.name, &mut lost);
@@ -193,7 +193,7 @@ fn groups(scene: &Scene, leveled: &Leveled) -> Result<Vec<Group>> {
         let colors = (material.varies() == Varies::Place).then(|| look::colors(material, &part.mesh));
         let look = match &colors {
             None => Ok(index),
-            Some(_) => Err(surface::rough(Look::of(material).kind)?.map(f32::to_bits)),
+            Some(_) => Err(surface::rough(&Look::of(material))?),
         };
         let key = Key { class: part.tag.class.name(), plant: part.tag.plant, look, mask: address(part) };
         match groups.iter_mut().find(|g| g.key == key) {

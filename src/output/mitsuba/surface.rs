@@ -112,24 +112,30 @@ impl Surface {
         Ok(Self { kind: look.kind, reflect: [upper, lower], factor, transmit, through, film, normal, mask })
     }
 
-    /// A rough surface whose reflectance the mesh's corners hold, times [`Surface::corner_factor`].
-    pub(super) fn of_corners(kind: Kind) -> Self {
-        Self {
+    /// A rough surface whose reflectance the mesh's corners hold, times [`Surface::corner_factor`], and of one film of water everywhere.
+    pub(super) fn of_corners(look: &Look, stem: &str, files: &mut Files<'_>) -> Result<Self> {
+        let kind = look.kind;
+        let share = look.texels.first().map_or(0.0, |t| t.film);
+        let film = (share > 0.0).then(|| format!("textures/{stem}-film"));
+        if let Some(film) = &film {
+            files.numbers(&format!("{film}.exr"), 1, 1, &[("Y", vec![share / FILM])])?;
+        }
+        Ok(Self {
             kind,
             reflect: [Paint::Corners, Paint::Corners],
             factor: [Self::corner_factor(kind); 2],
             transmit: None,
             through: 0.0,
-            film: None,
+            film,
             normal: None,
             mask: None,
-        }
+        })
     }
 
     /// What reflectances at a mesh's corners are multiplied by.
     pub(super) fn corner_factor(kind: Kind) -> f32 {
         match kind {
-            Kind::Soil { shape: [a, _], .. } => a,
+            Kind::Soil { shape: [a, _], film } => a / film.map_or(1.0, |_| 1.0 - FILM),
             Kind::Sheet { .. } => 1.0,
         }
     }
@@ -305,10 +311,14 @@ fn picture(name: &str, path: &str, filter: &str) -> Element {
         .boolean("raw", true)
 }
 
-/// The kind of surfaces whose corners hold their colour, or an error where a material varies over the world in another way.
-pub(super) fn rough(kind: Kind) -> Result<[f32; 2]> {
-    match kind {
-        Kind::Soil { shape, film: None } => Ok(shape),
-        _ => Err(Error::input("a sheet whose colour varies over the world cannot be exported")),
+/// What tells surfaces apart whose corners hold their colour: roughness and the share and gloss of their film, as bits. An error where
+/// a material varies over the world in another way.
+pub(super) fn rough(look: &Look) -> Result<[u32; 4]> {
+    match look.kind {
+        Kind::Soil { shape: [a, b], film } => {
+            let share = look.texels.first().map_or(0.0, |t| t.film);
+            Ok([a, b, share, film.map_or(0.0, |coat| coat.alpha[0])].map(f32::to_bits))
+        }
+        Kind::Sheet { .. } => Err(Error::input("a sheet whose colour varies over the world cannot be exported")),
     }
 }

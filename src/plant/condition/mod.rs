@@ -66,8 +66,15 @@ pub struct ConditionDesc {
     pub spots: Vary<MarkCount>,
     /// Their radius.
     pub spot_mm: Vary<Positive>,
-    /// Width of the dead margin of the oldest leaf; a yellow one of twice the width lies within.
-    pub scorch_mm: Vary<NonNegative>,
+    /// Share of the oldest leaves whose margin is dead, as drought, salt or frost leave it; younger ones have it less often, by the
+    /// square of their age. 0 for none.
+    pub scorched: Vary<Fraction>,
+    /// Width of that margin where the leaf is the oldest, over the distance from its margin to its innermost place; a yellow one of
+    /// twice the width lies within.
+    pub scorch: Vary<Fraction>,
+    /// The old keyword, for one version: a dead margin of so many mm on every leaf, in place of `scorched` and `scorch`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scorch_mm: Option<Vary<NonNegative>>,
     /// Anthocyanin that veins, stalks and stem have more than the page's pigments say, µg/cm².
     pub reddening: Vary<NonNegative>,
     /// Share of a leaf at the soil that dust covers; 10 cm up it is a third.
@@ -103,7 +110,8 @@ impl Default for ConditionDesc {
             chlorosis: Vary::uniform(0.0, 0.3),
             blotches: Vary::uniform(0.0, 1.0),
             spots: Vary::uniform(0.0, 4.0),
-            scorch_mm: Vary::uniform(0.0, 0.8),
+            scorched: Vary::uniform(0.0, 0.06),
+            scorch: Vary::uniform(0.03, 0.12),
             reddening: Vary::uniform(0.0, 3.0),
             dust: Vary::uniform(0.0, 0.12),
             splash: Vary::uniform(0.0, 1.5),
@@ -143,7 +151,9 @@ impl ConditionDesc {
                 min: 0.4,
                 max: 3.0,
             }),
-            scorch_mm: none(),
+            scorched: none(),
+            scorch: Vary::uniform(0.03, 0.12),
+            scorch_mm: None,
             reddening: none(),
             dust: none(),
             splash: none(),
@@ -169,13 +179,23 @@ impl ConditionDesc {
             chlorosis: self.chlorosis.draw32(&mut of(5)),
             blotches: self.blotches.draw32(&mut of(6)),
             spots: self.spots.draw32(&mut of(7)),
-            scorch_mm: self.scorch_mm.draw32(&mut of(8)),
+            scorched: self.scorched.draw32(&mut of(14)),
+            scorch: self.scorch.draw32(&mut of(15)),
+            scorch_mm: self.scorch_mm.as_ref().map_or(0.0, |mm| mm.draw32(&mut of(8))),
             reddening: self.reddening.draw32(&mut of(9)),
             dust: self.dust.draw32(&mut of(10)),
             splash: self.splash.draw32(&mut of(11)),
             wilt: self.wilt.draw32(&mut of(12)),
             pale_young: self.pale_young.draw32(&mut of(13)),
         }
+    }
+
+    /// What the user should know of keywords that have been replaced.
+    pub fn outdated(&self) -> Option<&'static str> {
+        self.scorch_mm.is_some().then_some(
+            "`scorch_mm` of a condition is an old keyword and will be refused by the next version: write `scorched`, the share of leaves with \
+             a dead margin, and `scorch`, its width as a share of the blade; for none write `scorched: 0`",
+        )
     }
 
     /// How much more or less chlorophyll than its plant a leaf of age `age` (0 the youngest, 1 the oldest) has, as a factor.
@@ -190,6 +210,11 @@ impl ConditionDesc {
     pub fn gloss(&self, leaf: &Stream) -> f32 {
         (self.gloss_sd.f32() * leaf.child(Purpose::Condition, 21).normal() as f32).exp().clamp(0.5, 2.0)
     }
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference to the field")]
+fn is_none(width: &f32) -> bool {
+    *width == 0.0
 }
 
 /// The condition of one plant. Fields as in [`ConditionDesc`].
@@ -209,7 +234,14 @@ pub struct Condition {
     pub blotches: f32,
     /// Mean number of dead spots.
     pub spots: f32,
-    /// Width of the oldest leaf's dead margin, mm.
+    /// Share of the oldest leaves that have a dead margin.
+    #[serde(default)]
+    pub scorched: f32,
+    /// Its width over the distance from the margin to the innermost place.
+    #[serde(default)]
+    pub scorch: f32,
+    /// Width of the dead margin that all leaves have by the old keyword, mm.
+    #[serde(default, skip_serializing_if = "is_none")]
     pub scorch_mm: f32,
     /// Anthocyanin more in veins, stalks and stem, µg/cm².
     pub reddening: f32,

@@ -3,6 +3,7 @@
 use super::{Builder, Floor};
 use crate::Result;
 use crate::material::{Ground as GroundMaterial, GroundSkin, Material, Solid};
+use crate::math::Spectrum;
 use crate::ron_file::Step;
 use crate::sampling::Purpose;
 use crate::sampling::rng::mix;
@@ -15,6 +16,10 @@ use std::sync::Arc;
 const GROUND_MARGIN: f32 = 0.04;
 /// How far the coarse ground goes on.
 const GROUND_REACH: f32 = 2.5;
+/// How far it goes on where the camera sees ground beyond the planted area: to what is nearly the horizon.
+const OPEN_REACH: f32 = 200.0;
+/// About the most cells of the fine ground: a larger view has larger ones.
+const MOST_CELLS: f32 = 1.5e7;
 /// Addresses of what lies on the ground.
 const STONES: u64 = 0;
 const LITTER: u64 = 1;
@@ -23,6 +28,11 @@ const DEBRIS_SIGMA: f32 = 0.3;
 
 /// Largest patches of straw, wood and dead leaves, metres.
 const MOTTLE: f32 = 2e-3;
+
+/// Patches of soil on stones, straw and wood, metres.
+const DUST_PATCH: f32 = 3e-3;
+/// Steps of moisture from air-dry to saturated that pieces are told apart by.
+const MOISTURE_STEPS: f32 = 12.0;
 
 /// The ground while it is being covered.
 pub(super) struct Earth {
@@ -36,11 +46,13 @@ pub(super) struct Earth {
 pub(super) struct Skins {
     pub(super) ground: Arc<GroundSkin>,
     pub(super) clods: [Arc<GroundSkin>; 2],
+    /// Reflectance of the dry soil that lies on stones and straw.
+    pub(super) dust: Spectrum,
 }
 
 impl Builder<'_> {
     /// The ground and the stones in it: what must be known before plants can be placed.
-    pub(super) fn break_ground(&mut self, desc: &SoilDesc, view: Rect) -> Result<Earth> {
+    pub(super) fn break_ground(&mut self, desc: &SoilDesc, view: Rect, open: bool) -> Result<Earth> {
         let mut maps: Vec<Arc<Layer>> = Vec::new();
         for layer in &desc.layers {
             maps.push(self.library.layer(self.page, layer)?);
@@ -52,8 +64,8 @@ impl Builder<'_> {
         });
         let site = Site {
             area: view.grown(GROUND_MARGIN),
-            grid_m: (2.5 * pixel).clamp(8e-4, 4e-3),
-            margin_m: GROUND_REACH,
+            grid_m: (2.5 * pixel).clamp(8e-4, 4e-3).max((view.area() / MOST_CELLS).sqrt()),
+            margin_m: if open { OPEN_REACH } else { GROUND_REACH },
             rows,
         };
         let ground = Ground::new(desc, &maps, &site, &self.stream(Purpose::Soil, 0))
@@ -108,6 +120,10 @@ impl Builder<'_> {
             let patch = 0.5 * thing.radius.max(1e-3);
             let patch = if thing.kind == DebrisKind::Stone { patch } else { patch.min(MOTTLE) };
             let solid = solid.with_grain(mix(i as u64) as u32, patch, 0.35);
+            let solid = solid.with_dust(skins.dust, thing.dust, DUST_PATCH);
+            // In steps, so that pieces of the same film can be exported as one.
+            let moisture = floor.ground.moisture(thing.centre.x, thing.centre.y);
+            let solid = solid.moist((moisture * MOISTURE_STEPS).round() / MOISTURE_STEPS);
             let material = self.material(Material::Solid(solid));
             self.part(thing.mesh, material);
         }

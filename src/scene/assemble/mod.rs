@@ -1,12 +1,15 @@
 //! Page + seed + index → one field.
 
+mod census;
 mod field;
 mod ground;
 mod growing;
+mod identity;
 mod known;
 mod lighting;
 mod models;
 mod season;
+mod view;
 mod wear;
 
 use super::desc::{FieldDesc, Growth, SpeciesDesc};
@@ -26,6 +29,7 @@ use crate::sampling::{Purpose, Stream};
 use crate::scatter::{self, Disc, Spot};
 use crate::soil::{Ground, Rect};
 use crate::{Error, Result};
+use census::{Census, Population};
 pub use field::Field;
 use ground::{Earth, Skins};
 pub use growing::Growing;
@@ -36,6 +40,7 @@ use rayon::prelude::*;
 pub use season::Season;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
+use view::View;
 use wear::{Ailing, Bare};
 
 /// What the command line adds to a page.
@@ -59,8 +64,14 @@ const SHADOW: f32 = 2.75;
 const SEASON: u64 = 1 << 32;
 /// Address of the first of the streams from which lists of lights are drawn, one for each place among the page's lights.
 const LIGHTING: u64 = 2 << 32;
+/// The population of single plants in [`identity::of`]; crops and weeds have those of their streams.
+const PLACED: u64 = 2001;
+/// The population of the first model; each is one of its own.
+const MODELS: u64 = 3001;
 /// Most pixels of an image.
 const MOST_PIXELS: u64 = 1 << 28;
+/// About the most texels of the ground's skin: a larger view has larger ones.
+const MOST_TEXELS: f32 = 2.4e8;
 /// Most plants that a field can number.
 const MOST_PLANTS: usize = u16::MAX as usize;
 
@@ -130,6 +141,8 @@ struct Seedling {
     /// Factor on its sizes.
     vigour: Vary<Positive>,
     condition: Option<ConditionDesc>,
+    /// See [`identity::of`].
+    id: u32,
 }
 
 impl Seedling {
@@ -217,34 +230,6 @@ impl<'a> Builder<'a> {
         Stream::of(self.seed, self.index, purpose, index)
     }
 
-    /// The rectangle of the ground plane that the camera sees.
-    fn view(&self) -> Result<Rect> {
-        let camera = &self.scene.camera;
-        let (w, h) = (camera.width(), camera.height());
-        let mut corners = Vec::new();
-        // The corners and the middles of the sides: a barrel distortion bulges between corners.
-        for (x, y) in [(0, 0), (1, 0), (2, 0), (0, 1), (2, 1), (0, 2), (1, 2), (2, 2)] {
-            let at = vec2(w as f32 * x as f32 / 2.0, h as f32 * y as f32 / 2.0);
-            let (origin, direction) = camera.ray(at, [0.5; 2]);
-            if direction.z < -0.05 && origin.z > 0.0 {
-                corners.push((origin + direction * (origin.z / -direction.z)).truncate());
-            }
-        }
-        let (Some(lo), Some(hi)) =
-            (corners.iter().copied().reduce(Vec2::min), corners.iter().copied().reduce(Vec2::max))
-        else {
-            let fault = Error::input("the camera does not look at the ground")
-                .help("turn it down; its height is counted from the ground");
-            return Err(self.page.blame(&[Step::Field("camera")], fault));
-        };
-        // A camera that looks along the ground sees to the horizon; only what is near can be made of crumbs.
-        let below = camera.pose().position.truncate();
-        let reach = Vec2::splat(MOST_VIEW);
-        let (lo, hi) = (lo.max(below - reach), hi.min(below + reach));
-        // Rows' corners are seen in the middle of their exposures.
-        Ok(Rect::new(lo.x, lo.y, hi.x, hi.y).grown(camera.travel()))
-    }
-
     /// Side of a pixel on the ground in the image's middle, metres; 1 mm where the camera does not look down.
     fn ground_pixel(&self) -> f32 {
         let camera = &self.scene.camera;
@@ -264,7 +249,7 @@ impl<'a> Builder<'a> {
     /// The field, and the library with whatever was read for it.
     fn build(mut self) -> Result<(Field, Library)> {
         let wanted = self.desc.soil.is_some() || !self.desc.crops.is_empty() || !self.desc.weeds.is_empty();
-        let view = if wanted { self.view()? } else { Rect::new(-0.5, -0.5, 0.5, 0.5) };
+        let View { area: view, open } = if wanted { self.view()? } else { View::NONE };
         let (sown, shown) = (view.grown(PLANT_MARGIN), wanted.then_some(view));
         let mut known = None;
         let mut plants = match &self.desc.soil {
@@ -273,16 +258,17 @@ impl<'a> Builder<'a> {
                 self.populate(&seedlings, None, shown)?
             }
             Some(soil) => {
-                let Earth { ground, maps, mut pile, mut stones } = self.break_ground(soil, view)?;
+                let Earth { ground, maps, mut pile, mut stones } = self.break_ground(soil, view, open)?;
                 let floor = Floor { ground: &ground, flat: soil.flat };
                 known = Some(self.soil_record(soil, &ground));
-                let texel = (0.9 * self.ground_pixel()).clamp(2e-4, 2e-3);
+                let texel = (0.9 * self.ground_pixel()).clamp(2e-4, 2e-3).max((view.area() / MOST_TEXELS).sqrt());
                 // The skin takes as long as everything else, and neither needs the other.
                 let fabric = |wet| Arc::new(GroundSkin::bake(&ground.fabric(&maps, texel, wet)));
                 let (skins, rest) = rayon::join(
                     || Skins {
                         ground: Arc::new(GroundSkin::bake(&ground.skin(&maps, texel))),
                         clods: ground.clods_moisture().map(fabric),
+                        dust: ground.mean_dry(&maps),
                     },
                     || {
                         let taken: Vec<Disc> = stones.iter().map(|s| (s.centre.truncate(), s.radius)).collect();
@@ -335,6 +321,7 @@ impl<'a> Builder<'a> {
     ) -> Result<Vec<PlantRecord>> {
         let mut plants = self.plant(seedlings, floor, shown)?;
         plants.extend(self.models(seedlings.len(), floor)?);
+        identity::settle(&mut plants);
         Ok(plants)
     }
 
@@ -343,10 +330,11 @@ impl<'a> Builder<'a> {
         let mut all = Vec::new();
         let area = area.corners();
         let (desc, page) = (self.desc, self.page);
+        let mut census = Census::new(page);
         for (k, crop) in desc.crops.iter().enumerate() {
             let species = self.library.species(page, &crop.species)?;
             let places = scatter::rows_looked_at(&crop.rows, area, &self.stream(Purpose::Scatter, k as u64));
-            self.check_number(places, all.len(), ["crops", "rows"], k)?;
+            census.open(Population::Crop(k), places, all.len())?;
             for spot in scatter::rows(&crop.rows, area, stones, &self.stream(Purpose::Scatter, k as u64)) {
                 let seedling = self.seedling(&species, &crop.growth, spot, 1 + k as u64);
                 all.push(seedling.tended(&crop.vigour, crop.condition.as_ref()));
@@ -355,12 +343,13 @@ impl<'a> Builder<'a> {
         for (k, weed) in desc.weeds.iter().enumerate() {
             let species = self.library.species(page, &weed.species)?;
             let places = scatter::weeds_looked_at(&weed.spread, area, &self.stream(Purpose::Scatter, 1000 + k as u64));
-            self.check_number(places, all.len(), ["weeds", "spread"], k)?;
+            census.open(Population::Weed(k), places, all.len())?;
             for spot in scatter::weeds(&weed.spread, area, stones, &self.stream(Purpose::Scatter, 1000 + k as u64)) {
                 let seedling = self.seedling(&species, &weed.growth, spot, 1001 + k as u64);
                 all.push(seedling.tended(&weed.vigour, weed.condition.as_ref()));
             }
         }
+        census.open(Population::Placed, 0.0, all.len())?;
         for (k, placed) in desc.plants.iter().enumerate() {
             let species = self.library.species(page, &placed.species)?;
             let mut stream = self.stream(Purpose::Scatter, 2000 + k as u64);
@@ -376,24 +365,14 @@ impl<'a> Builder<'a> {
                 individual: self.individual(&species.desc),
                 vigour: placed.vigour.clone(),
                 condition: species.desc.condition.clone(),
+                id: identity::of(self.seed, self.index, PLACED, k as u64),
             };
             all.push(seedling.tended(&placed.vigour, placed.condition.as_ref()));
         }
-        self.check_number(0.0, all.len(), ["plants", ""], 0)?;
+        census.close(all.len())?;
+        let outdated = all.iter().find_map(|s| s.condition.as_ref().and_then(ConditionDesc::outdated));
+        self.warnings.extend(outdated.map(str::to_owned));
         Ok(all)
-    }
-
-    /// Refuses more plants than labels can number, before they take the memory: so many so far, and places for so many more.
-    fn check_number(&self, places: f64, known: usize, fields: [&str; 2], item: usize) -> Result<()> {
-        let plants = places.ceil() + known as f64;
-        // An expected number may be missed; one far beyond the limit may not.
-        if known <= MOST_PLANTS && places <= 2.0 * MOST_PLANTS as f64 {
-            return Ok(());
-        }
-        let words = format!("about {plants:.3e} plants or places for them: labels can number {MOST_PLANTS}");
-        let help = "lower the density here, widen the distances in the rows, or lower the camera";
-        let path = [Step::Field(fields[0]), Step::Item(item), Step::Field(fields[1])];
-        Err(self.page.blame(&path, Error::input(words).help(help)))
     }
 
     fn seedling(&self, species: &Arc<Species>, growth: &Growth, spot: Spot, population: u64) -> Seedling {
@@ -408,6 +387,7 @@ impl<'a> Builder<'a> {
             individual: self.individual(&species.desc),
             vigour: Vary::fixed(1.0),
             condition: species.desc.condition.clone(),
+            id: identity::of(self.seed, self.index, population, spot.key),
         }
     }
 
@@ -463,9 +443,6 @@ impl<'a> Builder<'a> {
         Ok(records)
     }
 }
-
-/// Most that a view may measure from the point below the camera, metres.
-const MOST_VIEW: f32 = 1.5;
 
 /// An organ that stands in the field.
 struct Grown {
@@ -545,6 +522,8 @@ fn grow(s: &Seedling, number: u16, floor: Option<Floor<'_>>, dust: Spectrum) -> 
     let organs: Vec<Grown> = organs.collect();
     let record = PlantRecord {
         number,
+        id: s.id,
+        leaf_ids: Vec::new(),
         species: desc.name.clone(),
         eppo: desc.eppo.clone(),
         kind: 0,

@@ -1,7 +1,7 @@
 //! Models from disk, stood on the ground and labelled.
 
 use super::known::model_name;
-use super::{Builder, Floor, MOST_PLANTS};
+use super::{Builder, Floor, MODELS, MOST_PLANTS, identity};
 use crate::geometry::Mesh;
 use crate::material::{Material, Painted, Repaint};
 use crate::math::{Mat3, Spectrum, Vec3};
@@ -81,11 +81,17 @@ impl Builder<'_> {
             let mask = model.surfaces[part.surface].mask.clone();
             self.scene.parts.push(Part { mesh, mask, material: materials[part.surface], tag });
         }
-        Ok(plants.into_iter().map(|(number, parts)| self.record(number, &parts, &desc.file, foot, &model)).collect())
+        let plants = plants.into_iter().map(|(number, parts)| {
+            // What of the model it is, whatever the number of plants before it.
+            let own = u64::from(number) - numbered as u64;
+            let id = identity::of(self.seed, self.index, MODELS + k as u64, own);
+            self.record((number, id), &parts, &desc.file, foot, &model)
+        });
+        Ok(plants.collect())
     }
 
     /// What is known of a plant that is a model, or a part of one.
-    fn record(&self, number: u16, parts: &[usize], file: &str, foot: Vec3, model: &Model) -> PlantRecord {
+    fn record(&self, (number, id): (u16, u32), parts: &[usize], file: &str, foot: Vec3, model: &Model) -> PlantRecord {
         let parts: Vec<&Part> = parts.iter().map(|i| &self.scene.parts[*i]).collect();
         let mut all = Mesh::default();
         for part in &parts {
@@ -97,6 +103,8 @@ impl Builder<'_> {
         let across = all.positions.iter().map(|p| (p - position).truncate().length()).fold(0.0, f32::max);
         PlantRecord {
             number,
+            id,
+            leaf_ids: Vec::new(),
             species: model_name(file),
             eppo: String::new(),
             kind: 0,

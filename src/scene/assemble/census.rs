@@ -1,0 +1,69 @@
+//! How many plants each part of a scene file has brought, and which part to name where they are too many.
+
+use super::MOST_PLANTS;
+use crate::ron_file::{RonFile, Step};
+use crate::{Error, Result};
+
+/// Where in a scene file plants come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Population {
+    /// `crops`, the item of this index.
+    Crop(usize),
+    /// `weeds`, the item of this index.
+    Weed(usize),
+    /// `plants`, all items.
+    Placed,
+}
+
+/// Counts plants population by population.
+pub(super) struct Census<'a> {
+    page: &'a RonFile,
+    /// Populations in order, each with the number of plants before it.
+    begun: Vec<(Population, usize)>,
+}
+
+impl<'a> Census<'a> {
+    pub(super) fn new(page: &'a RonFile) -> Self {
+        Self { page, begun: Vec::new() }
+    }
+
+    /// Begins the next population, with so many plants before it and about so many places for its own. Refuses what labels cannot
+    /// number before it takes the memory.
+    pub(super) fn open(&mut self, population: Population, places: f64, before: usize) -> Result<()> {
+        self.close(before)?;
+        self.begun.push((population, before));
+        // An expected number may be missed; one far beyond the limit may not.
+        if places <= 2.0 * MOST_PLANTS as f64 {
+            return Ok(());
+        }
+        Err(self.refusal(population, places.ceil() + before as f64))
+    }
+
+    /// Checks the plants of all populations so far; the largest population is named where they are too many.
+    pub(super) fn close(&self, plants: usize) -> Result<()> {
+        if plants <= MOST_PLANTS {
+            return Ok(());
+        }
+        let ends = self.begun.iter().skip(1).map(|(_, before)| *before).chain([plants]);
+        let sizes = self.begun.iter().zip(ends).map(|((population, before), end)| (end - before, *population));
+        // The first of several that are equally large.
+        let largest = sizes.reduce(|most, next| if next.0 > most.0 { next } else { most });
+        Err(self.refusal(largest.map_or(Population::Placed, |(_, population)| population), plants as f64))
+    }
+
+    fn refusal(&self, population: Population, plants: f64) -> Error {
+        let (path, advice) = match population {
+            Population::Crop(k) => (
+                vec![Step::Field("crops"), Step::Item(k), Step::Field("rows")],
+                "widen the distances or lower the jitter here",
+            ),
+            Population::Weed(k) => {
+                (vec![Step::Field("weeds"), Step::Item(k), Step::Field("spread")], "lower per_m2 here")
+            }
+            Population::Placed => (vec![Step::Field("plants")], "place fewer plants"),
+        };
+        let words = format!("about {plants:.3e} plants or places for them: labels can number {MOST_PLANTS}");
+        let error = Error::input(words).help(format!("{advice}, or lower the camera"));
+        self.page.blame(&path, error)
+    }
+}

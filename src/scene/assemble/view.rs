@@ -1,0 +1,110 @@
+//! How much of the ground a camera sees, and how much of that is planted.
+//!
+//! A camera that looks down sees a piece of ground with an end, all of which is planted up to [`REACH`] from the point below it.
+//! One that sees the horizon, or ground further away, gets bare ground there: its pixels are then labelled soil, so the field says
+//! so in its warnings, with the share of the ground in view that this is. Where it is more than half, the scene is refused.
+
+use super::Builder;
+use crate::math::{Vec2, Vec3, vec2};
+use crate::ron_file::Step;
+use crate::soil::Rect;
+use crate::{Error, Result};
+
+/// How far from the point below the camera fields are grown, along east and north, metres: 144 m² at most, some 1,500 beets. A
+/// camera 10 m up with a view of 60° sees as much.
+pub(super) const REACH: f32 = 6.0;
+/// Below this sine of the angle under the horizon a ray is said to see the horizon.
+const HORIZON: f32 = 0.05;
+/// Sides of the raster of rays by which the share of bare ground is estimated.
+const RAYS: usize = 24;
+/// Share of bare ground from which on a scene is refused.
+const TOO_BARE: f32 = 0.5;
+
+/// The ground that a camera sees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct View {
+    /// What of it is planted, about the plane z = 0, metres.
+    pub(super) area: Rect,
+    /// Whether the camera sees ground beyond it.
+    pub(super) open: bool,
+}
+
+impl View {
+    /// That of a scene in which nothing grows.
+    pub(super) const NONE: Self = Self { area: Rect::new(-0.5, -0.5, 0.5, 0.5), open: false };
+}
+
+/// Where a ray meets the plane z = 0: at a place, or where it says that it sees the horizon; `None` for a ray above it.
+fn meets(origin: Vec3, direction: Vec3) -> Option<Vec2> {
+    (direction.z < 0.0 && origin.z > 0.0).then(|| (origin + direction * (origin.z / -direction.z)).truncate())
+}
+
+impl Builder<'_> {
+    /// The ground that the camera sees, with a warning where some of it is not planted.
+    pub(super) fn view(&mut self) -> Result<View> {
+        let camera = &self.scene.camera;
+        let (w, h) = (camera.width() as f32, camera.height() as f32);
+        let below = camera.pose().position.truncate();
+        let mut seen: Vec<Vec2> = Vec::new();
+        let mut level: Vec<Vec2> = Vec::new();
+        // The corners and the middles of the sides: a barrel distortion bulges between corners.
+        for (x, y) in [(0, 0), (1, 0), (2, 0), (0, 1), (2, 1), (0, 2), (1, 2), (2, 2)] {
+            let (origin, direction) = camera.ray(vec2(w * x as f32 / 2.0, h * y as f32 / 2.0), [0.5; 2]);
+            if direction.z < -HORIZON && origin.z > 0.0 {
+                seen.extend(meets(origin, direction));
+            } else {
+                level.push(below + direction.truncate().normalize_or_zero() * REACH);
+            }
+        }
+        if seen.is_empty() {
+            let error = Error::input("the camera does not look at the ground")
+                .help("turn it down; its height is counted from the ground");
+            return Err(self.page.blame(&[Step::Field("camera")], error));
+        }
+        // Some of the view is of the horizon: the ground is seen as far as it is planted.
+        let hull = seen.iter().chain(&level).copied();
+        let all = [hull.clone().fold(Vec2::INFINITY, Vec2::min), hull.fold(Vec2::NEG_INFINITY, Vec2::max)];
+        let (lo, hi) = (all[0].max(below - Vec2::splat(REACH)), all[1].min(below + Vec2::splat(REACH)));
+        // Rows' corners are seen in the middle of their exposures.
+        let area = Rect::new(lo.x, lo.y, hi.x, hi.y).grown(camera.travel());
+        if level.is_empty() && [lo, hi] == all {
+            return Ok(View { area, open: false });
+        }
+        let (bare, farthest) = self.beyond(area, below);
+        if bare <= 0.0 {
+            return Ok(View { area, open: false });
+        }
+        let far = if level.is_empty() { format!("{farthest:.0} m away") } else { "to the horizon".into() };
+        let words = format!(
+            "the camera sees ground {far}, and plants are grown up to {REACH} m east, north, west and south of the point below it: \
+             {:.0} % of the ground in the image stays bare and its labels call it soil",
+            (100.0 * bare).ceil()
+        );
+        let help = "lower the camera, turn it down or narrow its angle of view";
+        if bare > TOO_BARE {
+            return Err(self.page.blame(&[Step::Field("camera")], Error::input(words).help(help)));
+        }
+        self.warnings.push(format!("{words}; {help}"));
+        Ok(View { area, open: true })
+    }
+
+    /// Share of the image's ground that lies beyond an area, and how far from `below` the farthest of it is, metres.
+    fn beyond(&self, area: Rect, below: Vec2) -> (f32, f32) {
+        let camera = &self.scene.camera;
+        let size = vec2(camera.width() as f32, camera.height() as f32);
+        let area = area.grown(1e-3);
+        let (mut ground, mut bare, mut farthest) = (0.0_f32, 0.0_f32, 0.0_f32);
+        for k in 0..=RAYS {
+            for i in 0..=RAYS {
+                let (origin, direction) = camera.ray(size * vec2(i as f32, k as f32) / RAYS as f32, [0.5; 2]);
+                let Some(at) = meets(origin, direction) else { continue };
+                ground += 1.0;
+                if !area.contains(at) {
+                    bare += 1.0;
+                    farthest = farthest.max(at.distance(below));
+                }
+            }
+        }
+        (bare / ground.max(1.0), farthest)
+    }
+}
