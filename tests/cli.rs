@@ -53,6 +53,40 @@ fn help_teaches() {
     }
 }
 
+/// Rationale: a script and a scheduler see nothing but the code. Expected: 2 where the command, a file or the machine must change, 1
+/// where the disk failed or a dataset is damaged; `tests/signals.rs` has 75.
+#[test]
+fn the_exit_code_tells_the_kind_of_failure() {
+    let small = ["--width", "16", "--spp", "1", "--quiet"];
+    let of = |what: &str, folder: &Path, args: &[&str], code: i32, words: &str| {
+        let done = Command::new(env!("CARGO_BIN_EXE_trace"))
+            .current_dir(folder)
+            .env("OIDN_DIR", folder)
+            .args(args)
+            .args(small)
+            .output()
+            .unwrap();
+        let said = text(&done.stderr);
+        assert_eq!(done.status.code(), Some(code), "{what}: {said}");
+        assert!(said.contains(words), "{what}: {said}");
+    };
+    let folder = folder();
+    let at = folder.path();
+    let page = ["--scene", "page.ron", "--out", "out"];
+    of("misuse", at, &[&page[..], &["--pixel", "99,99"]].concat(), 2, "lies outside the image");
+    std::fs::write(at.join("bad.ron"), "Field(").unwrap();
+    of("input", at, &["--scene", "bad.ron"], 2, "bad.ron:1:");
+    of("input that is not there", at, &["--scene", "none.ron"], 2, "there is no such");
+    of("missing", at, &[&page[..], &["--denoise"]].concat(), 2, "needs Open Image Denoise");
+    std::fs::create_dir_all(at.join("out/semantics.png/full")).unwrap();
+    of("io", at, &page, 1, "semantics.png: ");
+    of("a dataset", at, &["dataset", "--scene", "page.ron", "--out", "data", "--count", "1"], 0, "");
+    std::fs::write(at.join("data/images/000000/rgb.png"), "x").unwrap();
+    let verify = Command::new(env!("CARGO_BIN_EXE_trace")).current_dir(at).args(["dataset", "verify", "data"]).output();
+    let verify = verify.unwrap();
+    assert_eq!(verify.status.code(), Some(1), "damaged: {}", text(&verify.stderr));
+}
+
 #[test]
 fn without_arguments_the_help_is_shown() {
     let said = refused(&[]);

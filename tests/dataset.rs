@@ -278,6 +278,27 @@ fn bad_input_is_refused_and_changes_nothing() {
     assert!(said.contains("was changed since the dataset was begun"), "{said}");
 }
 
+/// A file lies where an image's folder must be: a cause that lasts. Expected: the run ends at once with exit code 1, the images
+/// before are kept, those after are not begun; without it the same command makes the rest.
+#[test]
+fn a_cause_that_lasts_ends_a_dataset_and_keeps_what_is_made() {
+    let (_keep, data) = scratch();
+    let (_keep, whole) = scratch();
+    succeed(make(&whole, 5, &[]));
+    let plan = ["dataset", "plan", "--scene", SMALL, "--count", "5", "--out", path(&data)];
+    succeed(trace(&[&plan[..], &common::dataset::SIZE].concat()));
+    let blocked = data.join("images/000002");
+    fs::create_dir_all(data.join("images")).unwrap();
+    fs::write(&blocked, "").unwrap();
+    let said = fail(verb("render", &data, &["--quiet", "--threads", "1", "--at-once", "1"]), 1);
+    assert!(said.starts_with(&format!("error: {}", path(&blocked))) && said.lines().count() == 1, "{said}");
+    assert_eq!(made(&data), [0, 1]);
+    fs::remove_file(&blocked).unwrap();
+    succeed(verb("render", &data, &["--quiet"]));
+    succeed(verb("finish", &data, &[]));
+    same(&tree(&data), &tree(&whole));
+}
+
 /// A sun that has set in some fields and not in others: a fault of single images, told when all others are made.
 #[test]
 fn fields_that_cannot_be_do_not_keep_others_from_being() {

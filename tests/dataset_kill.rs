@@ -8,6 +8,7 @@ mod common;
 
 use common::dataset::{made, make, path, same, succeed, tree};
 use common::program::{SMALL, scratch, trace};
+use std::io::Read;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -114,11 +115,16 @@ fn signals_stop_a_dataset_cleanly() {
         assert!(Command::new("kill").args([signal, &id]).status().expect("kill").success());
         let status = child.wait().expect("an end");
         assert_eq!(status.code(), Some(75), "{signal}");
+        let mut said = String::new();
+        child.stderr.take().expect("stderr").read_to_string(&mut said).expect("text");
         let files = tree(&data);
         assert!(files.keys().all(|name| !name.contains(".furrow-")), "{signal}");
         let sealed = files.keys().filter(|name| name.starts_with("seals/")).count();
         let images = files.keys().filter(|name| name.ends_with("/record.json")).count();
         assert!(sealed > 0 && sealed < 500, "{signal}: {sealed}");
+        let told =
+            format!("{}: stopped: {sealed} of 500 images are there\n help: the same command goes on", path(&data));
+        assert!(said.contains(&told) && !said.contains("nothing was written"), "{signal}: {said}");
         if signal == "-USR1" {
             assert_eq!(sealed, images, "images under way are finished");
         }

@@ -97,6 +97,22 @@ fn a_denoiser_that_fails_leaves_the_noisy_picture() {
     }
 }
 
+/// Expected: the error names the folder that could not be used, not one that the author had.
+#[cfg(unix)]
+#[test]
+fn a_folder_for_temporary_files_that_is_not_there_is_named() {
+    let (keep, out) = scratch();
+    let program = keep.path().join("bin/oidnDenoise");
+    std::fs::create_dir_all(program.parent().unwrap()).unwrap();
+    std::fs::write(&program, "").unwrap();
+    let gone = keep.path().join("gone");
+    let arguments = ["--scene", SMALL, "--width", "48", "--spp", "2", "--denoise", "--out", out.to_str().unwrap()];
+    let done = trace(&arguments).env("OIDN_DIR", keep.path()).env("TMPDIR", &gone).output().unwrap();
+    let said = String::from_utf8(done.stderr).unwrap();
+    assert_eq!(done.status.code(), Some(1), "{said}");
+    assert!(said.contains(&format!("error: {}: ", gone.display())), "{said}");
+}
+
 /// Peak signal-to-noise ratio of all bands as an eye sees them, decibels: each divided by what 99 % of the reference stay
 /// below, clipped, and raised to 1/2.2.
 fn psnr(film: &Film, reference: &Film) -> f64 {

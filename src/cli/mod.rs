@@ -2,15 +2,17 @@
 
 pub mod signal;
 
+use crate::error::Kind;
 use crate::geometry::Window;
 use crate::ron_file::nearest;
 use crate::{Error, Result};
 use std::path::Path;
 use std::process::ExitCode;
 
-/// Prints an error to stderr and returns its exit code: 1 failed, 2 misused, 75 stopped cleanly.
+/// Prints an error to stderr and returns its exit code: 1 failed, 2 misused, 75 stopped cleanly, which is called no error.
 pub fn fail(error: &Error) -> ExitCode {
-    eprintln!("error: {error}");
+    let title = if error.kind() == Kind::Interrupted { "" } else { "error: " };
+    eprintln!("{title}{error}");
     ExitCode::from(error.exit_code())
 }
 

@@ -15,6 +15,7 @@ use crate::render::Watch;
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -92,7 +93,9 @@ fn share(threads: usize, lanes: usize, lane: usize) -> usize {
     (threads / lanes + usize::from(lane < threads % lanes)).max(1)
 }
 
-/// Makes what is missing of a shard. Stopped, it returns [`Kind::Interrupted`], and the same call goes on later.
+/// Makes what is missing of a shard. Stopped, it returns [`Kind::Interrupted`] with the number of images that are there, and the same
+/// call goes on later. A fault of one field ([`Error::is_of_one_field`]) is told when all others are made; a cause that lasts ends the
+/// run at once. What is made is kept in any case.
 pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()> {
     let renderer = renderer(set)?;
     let all = Threads::new(work.threads)?;
@@ -101,6 +104,7 @@ pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()>
     let wanted: Vec<u64> = (0..set.recipe.count).filter(|k| k % shard.of == shard.number).collect();
     let tasks: Vec<(u64, Task)> =
         all.install(|| wanted.into_par_iter().map(|k| task(set, k).map(|t| (k, t))).collect::<Result<Vec<_>>>())?;
+    let wanted = tasks.len();
     let tasks: Vec<(u64, Task)> = tasks.into_iter().filter(|(_, t)| *t != Task::Done).collect();
     (callbacks.begin)(tasks.len());
     let at_once = if work.at_once == 0 { threads.min(MOST_AT_ONCE) } else { work.at_once }.min(tasks.len()).max(1);
@@ -119,6 +123,7 @@ pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()>
         ledger: Ledger::new(&set.folder, &format!("{}-of-{}", shard.number, shard.of)),
     };
     let next = AtomicUsize::new(0);
+    let made = AtomicUsize::new(0);
     let failures: Mutex<BTreeMap<u64, Error>> = Mutex::default();
     let failed = AtomicBool::new(false);
     let fail = |index: u64, error: Error| {
@@ -133,7 +138,11 @@ pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()>
                 while !stopped() && !failed.load(Ordering::Relaxed) {
                     let Some((index, task)) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
                     match lane.install(|| run.image(*index, *task, lane)) {
-                        Ok(()) => (callbacks.done)(*index),
+                        Ok(()) => {
+                            made.fetch_add(1, Ordering::Relaxed);
+                            (callbacks.done)(*index);
+                        }
+                        Err(e) if e.kind() == Kind::Interrupted => break,
                         Err(e) => fail(*index, e),
                     }
                 }
@@ -144,8 +153,16 @@ pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()>
     if !failures.is_empty() {
         return Err(together(failures));
     }
-    // Stopped after the last image is done.
-    if next.load(Ordering::Relaxed) < tasks.len() { Err(Error::interrupted()) } else { Ok(()) }
+    // It may have been stopped after the last image was done.
+    let lacking = tasks.len() - made.into_inner();
+    if lacking == 0 { Ok(()) } else { Err(interrupted(&set.folder, wanted - lacking, wanted)) }
+}
+
+/// Told to stop when so many of the images that were asked for were there.
+pub(super) fn interrupted(folder: &Path, there: usize, wanted: usize) -> Error {
+    Error::stopped(format!("stopped: {there} of {wanted} images are there"))
+        .help("the same command goes on with it")
+        .in_file(folder)
 }
 
 /// What went wrong in a run, by image: the whole run's failure alone, or those of single images in one.
@@ -153,14 +170,15 @@ fn together(failures: BTreeMap<u64, Error>) -> Error {
     let mut words = Vec::new();
     let mut input = true;
     for (index, error) in failures {
+        let image = format!("image {}", Set::name(index));
         if !error.is_of_one_field() {
-            return error;
+            return if error.place().is_none() { error.within(image) } else { error };
         }
         if error.kind() == Kind::Damaged {
             input = false;
             words.push(error.to_string());
         } else {
-            words.push(format!("image {}: {error}", Set::name(index)));
+            words.push(format!("{image}: {error}"));
         }
     }
     let words = words.join("\nerror: ");
@@ -285,6 +303,23 @@ mod tests {
             assert!(shares.iter().max().unwrap() - shares.iter().min().unwrap() <= 1);
         }
         assert_eq!(share(2, 3, 2), 1);
+    }
+
+    #[test]
+    fn a_cause_that_lasts_is_told_alone_and_faults_of_fields_together() {
+        let field = |index| (index, Error::input("no sun").help("wait"));
+        let all = together(BTreeMap::from([field(1), field(4)]));
+        assert_eq!(all.to_string(), "image 000001: no sun\n help: wait\nerror: image 000004: no sun\n help: wait");
+        assert_eq!(all.kind(), Kind::Input);
+        let with = |error: Error| together(BTreeMap::from([field(1), (3, error)]));
+        assert_eq!(with(Error::damaged("image 3: x")).kind(), Kind::Damaged);
+        for lasting in [Error::failed("cannot encode a PNG"), Error::missing("no denoiser")] {
+            let (kind, words) = (lasting.kind(), format!("image 000003: {lasting}"));
+            let told = with(lasting);
+            assert_eq!((told.kind(), told.to_string()), (kind, words));
+        }
+        let full = with(Error::io("a/b.png".as_ref())(std::io::ErrorKind::StorageFull.into()));
+        assert!(full.to_string().starts_with("a/b.png: "), "{full}");
     }
 
     #[test]

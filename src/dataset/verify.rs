@@ -55,7 +55,7 @@ pub fn verify(
     let count = set.recipe.count;
     let look_at = |index: u64| {
         if stop.load(std::sync::atomic::Ordering::Relaxed) {
-            return Err(Error::interrupted());
+            return Err(Error::stopped("stopped before all images were checked; nothing was changed"));
         }
         let looked = look(set, index)?;
         done(index);

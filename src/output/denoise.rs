@@ -42,8 +42,7 @@ impl Denoiser {
 
     /// The film's radiance without its noise, on `threads` threads (0: all). Variance is left out: it is not known any more.
     pub fn denoise(&self, film: &Film, threads: usize) -> Result<Film> {
-        let folder =
-            tempfile::Builder::new().prefix("furrow-denoise-").tempdir().map_err(Error::io(Path::new("/tmp")))?;
+        let folder = scratch(&std::env::temp_dir())?;
         let job = Job { program: &self.program, folder: folder.path(), film, threads };
         let one = |v: f32| v.clamp(0.0, 1.0);
         let normal = job.clean("normal", "--nrm", |p| p.normal.to_array())?;
@@ -58,6 +57,11 @@ impl Denoiser {
         });
         Ok(Film { window: film.window, pixels: pixels.collect() })
     }
+}
+
+/// A temporary folder of its own in `within`.
+fn scratch(within: &Path) -> Result<tempfile::TempDir> {
+    tempfile::Builder::new().prefix("furrow-denoise-").tempdir_in(within).map_err(Error::io(within))
 }
 
 fn first_three(s: Spectrum) -> [f32; 3] {

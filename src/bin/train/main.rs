@@ -76,10 +76,6 @@ fn main() -> ExitCode {
     };
     match done {
         Ok(paths) => print_paths(&paths),
-        Err(e) if e.kind() == furrow::error::Kind::Interrupted => {
-            eprintln!("stopped; the same command goes on with it");
-            ExitCode::from(e.exit_code())
-        }
         Err(e) => cli::fail(&e),
     }
 }

@@ -27,12 +27,12 @@ use super::seal::{Seal, write_files};
 use super::set::Set;
 use super::split::{Shares, Split};
 use super::{File, annotate, invariants, native};
-use crate::{Error, Result};
+use crate::Result;
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Images and labels that lie elsewhere.
 pub trait Source: Sync {
@@ -102,10 +102,11 @@ pub fn import(
     done: &(dyn Fn(u64) + Sync),
     stop: &AtomicBool,
 ) -> Result<Set> {
+    let there = AtomicUsize::new(0);
     let each = |what: &(dyn Fn(u64) -> Result<()> + Sync)| {
         (0..source.images().len() as u64).into_par_iter().try_for_each(|index| {
             if stop.load(Ordering::Relaxed) {
-                return Err(Error::interrupted());
+                return Err(generate::interrupted(folder, there.load(Ordering::Relaxed), source.images().len()));
             }
             what(index)
         })
@@ -118,6 +119,7 @@ pub fn import(
     let set = begin(folder, source, order)?;
     each(&|index| {
         bring(&set, source, index)?;
+        there.fetch_add(1, Ordering::Relaxed);
         done(index);
         Ok(())
     })?;

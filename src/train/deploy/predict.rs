@@ -108,7 +108,8 @@ pub fn predict(
         Ok(())
     })?;
     if how.stop.load(Ordering::Relaxed) {
-        return Err(Error::interrupted());
+        let words = format!("stopped: {} of {} pictures are predicted", answered.done, pictures.len());
+        return Err(Error::stopped(words).help("the same command ends with all of them").in_file(out));
     }
     if !unread.is_empty() {
         prediction.forget(out, &unread)?;

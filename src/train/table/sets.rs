@@ -286,7 +286,8 @@ fn lock(folder: &Path, name: &str, tell: &(dyn Fn(&str) + Sync), stop: &AtomicBo
             Err(TryLockError::WouldBlock) => {}
         }
         if stop.load(Ordering::Relaxed) {
-            return Err(Error::interrupted());
+            let words = format!("stopped before the set `{name}` was there");
+            return Err(Error::stopped(words).help("the same command goes on with it"));
         }
         if !std::mem::replace(&mut told, true) {
             tell(&format!("waiting for another process that makes the set `{name}`"));

@@ -308,7 +308,8 @@ impl Work<'_> {
                 Known::Missing => {}
             }
             if self.hands.stop.load(Ordering::Relaxed) {
-                return Err(Error::interrupted());
+                let words = "stopped before all rows of the table were there";
+                return Err(Error::stopped(words).help("the same command goes on with it"));
             }
             let answerer = match &of {
                 Judged::Baseline(baseline) => Answerer::Baseline(baseline, &bound.experiment.learn.shape),
