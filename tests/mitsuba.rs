@@ -22,7 +22,7 @@ use furrow::bsdf::{Bsdf, Leaf, OrenNayar};
 use furrow::film::{Film, Filter};
 use furrow::geometry::{AlphaMask, Hit, Interaction, Mesh, Window};
 use furrow::integrator::Path as PathTracer;
-use furrow::light::{Environment, Lamp, Light, Outline, daylight};
+use furrow::light::{Constant, Lamp, Light, Outline, daylight};
 use furrow::material::{LeafDesc, LeafMaterial, Material, Picture};
 use furrow::math::{Frame, Mat3, Spectrum, Vec3, vec2, vec3};
 use furrow::output;
@@ -282,7 +282,7 @@ fn large_and_small() -> Scene {
         Part { mesh, mask: None, material: 0, tag: Tag { class: Class::Crop, plant: 1, leaf } }
     };
     let parts = vec![part(0.1, vec3(-0.1, 0.0, 0.0), 1), part(0.025, vec3(0.1, 0.0, 0.0), 2)];
-    let lights = vec![Light::Environment(Environment::new(Spectrum::ONE))];
+    let lights = vec![Light::Constant(Constant::new(Spectrum::ONE))];
     let camera = camera((100, 80), vec3(0.0, -0.01, 1.0), Vec3::ZERO, 34.0);
     Scene { parts, materials: vec![Material::Leaf(leaf)], lights, camera, filter: Filter::Box.footprint() }
 }

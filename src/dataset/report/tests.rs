@@ -71,7 +71,8 @@ fn every_condition_that_the_report_shows_is_counted() {
     }
     assert!(light.irradiance.n() == 1 && light.irradiance.mean() > 0.1);
     assert_eq!((light.suns.len(), light.kinds["daylight"], soil.layers["dirt.png"]), (1, 1, 1.0));
-    let page = super::light(&found) + &super::soil(&found);
+    let charts = super::light(&found).into_iter().chain(super::soil(&found));
+    let page: String = charts.map(maud::PreEscaped::into_string).collect();
     for key in ["sun_elevation_deg", "irradiance", "cloud", "turbidity", "moisture", "roughness_mm", "clods", "straw"] {
         assert!(page.contains(&format!("data-key=\"{key}\"")), "{key}");
     }
