@@ -9,7 +9,8 @@ count because what is wrong with a large leaf and a small one may cancel over th
 Mitsuba renders BLOCKS images of independent seeds; plants cover little of an image, so the window that holds them is rendered a
 second time with more samples, by which plants and leaves are judged. Every pixel of it draws numbers of its own, so the variance of a
 region's mean is the sum of its pixels' variances. Ours is one image of Sobol points; the variance stated of it, that of
-independent samples, is larger than its spread over seeds (0.7 times the standard deviation over 16 seeds of a beet under lamps).
+independent samples, is no smaller than its spread: over 16 seeds that was half the stated error for a beet under lamps, and 0.5
+to 1.0 of it for its leaves.
 
 - Labels: the surface at each pixel's centre is of the same class and plant, but for one pixel in a thousand.
 - Regions: the difference stays below TOLERANCE of the mean (0 where the scene is exact) and so many standard errors that a
