@@ -8,7 +8,7 @@
 
 use furrow::train::data::{Selection, Shape};
 use furrow::train::engine::{Model, Precision, Where};
-use furrow::train::fit::{Plan, Watch};
+use furrow::train::fit::{Callbacks, Hyperparameters, Plan};
 use furrow::train::net::Network;
 use furrow::train::session::{self, Machine};
 use std::cell::RefCell;
@@ -62,9 +62,12 @@ fn main() {
             network: *network,
             shape: Shape { width, height, ..Plan::default().shape },
             train: vec![Selection::parse(&format!("{}@0..{}", asked.set.display(), asked.batch)).expect("a set")],
-            steps: asked.steps,
-            batch: asked.batch,
-            watch_every: u64::MAX,
+            hyper: Hyperparameters {
+                steps: asked.steps,
+                batch: asked.batch,
+                validate_every: u64::MAX,
+                ..Hyperparameters::default()
+            },
             precision: precision.name().into(),
             threads,
             ..Plan::default()
@@ -73,8 +76,8 @@ fn main() {
         let times = RefCell::new(vec![Instant::now()]);
         let step = |_, _| times.borrow_mut().push(Instant::now());
         let stop = AtomicBool::new(false);
-        let watch = Watch { step: &step, look: &|_, _| (), stop: &stop };
-        session::fit(&plan, None, &machine, folder.path(), &watch).expect("a training");
+        let callbacks = Callbacks { step: &step, validation: &|_, _| (), stop: &stop };
+        session::fit(&plan, None, &machine, folder.path(), &callbacks).expect("a training");
         let times = times.into_inner();
         let learning = asked.batch as f64 / median(times.windows(2).map(|t| (t[1] - t[0]).as_secs_f64()).collect());
         let model = Model::new(*network, 3, 3, 1, Where { device: Device::Cpu, precision });

@@ -55,7 +55,8 @@ const DOORS: &[(&str, &str)] = &[
     ("base64", "model/uri.rs report/page.rs"),
     // Numbers as bytes for the card, and waiting for it.
     ("bytemuck", "raster/"),
-    ("clap", "bin/"),
+    // Command lines; hyper-parameters are read from flags and from files alike.
+    ("clap", "bin/ train/fit/settings.rs"),
     ("embree3", "accel/embree.rs"),
     // Layers out, pictures of light in.
     ("exr", "output/exr/mod.rs texture/panorama.rs"),
@@ -108,7 +109,7 @@ const DOORS: &[(&str, &str)] = &[
     // How far a misspelt name is from those that are known.
     ("strsim", "ron_file/suggest.rs"),
     // libtorch: networks and how they learn.
-    ("tch", "train/engine/ train/fit/objective.rs train/fit/optimiser.rs train/fit/teach.rs train/deploy/"),
+    ("tch", "train/engine/ train/fit/loss.rs train/fit/optimiser.rs train/fit/trainer.rs train/deploy/"),
     // Files appear whole or not at all: images of fields, and drawn textures below them. The denoiser's go through a folder,
     // and so does a scene that is taken into a dataset.
     ("tempfile", "dataset/plan.rs output/mod.rs output/denoise.rs texture/draw/write.rs"),

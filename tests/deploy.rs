@@ -15,9 +15,9 @@ use furrow::output::{self, Picture};
 use furrow::train::deploy::pictures::Prediction;
 use furrow::train::deploy::{onnx, torchscript};
 use furrow::train::engine::{Model, Precision, Where, device};
-use furrow::train::fit::plan::Exposure;
+use furrow::train::fit::hyper::NormalizationMode;
 use furrow::train::net::Network;
-use furrow::train::run::{self, Learnt};
+use furrow::train::run::{self, TrainedModel};
 use furrow::train::weights::{self, Array};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -33,7 +33,7 @@ fn trained(name: &str, bands: &str) -> PathBuf {
     if folder.exists() {
         std::fs::remove_dir_all(&folder).unwrap();
     }
-    learn(Network::BasicSegnet, bands, Exposure::Image, &SET, &folder);
+    learn(Network::BasicSegnet, bands, NormalizationMode::Image, &SET, &folder);
     folder
 }
 
@@ -50,7 +50,7 @@ fn train(arguments: &[&str]) -> Command {
     command
 }
 
-fn model(learnt: &Learnt) -> Model {
+fn model(learnt: &TrainedModel) -> Model {
     device::set_threads(1);
     let place = Where { device: Device::Cpu, precision: Precision::Single };
     let card = &learnt.card;
@@ -64,7 +64,7 @@ fn cases(network: Network) -> [(usize, (u32, u32)); 4] {
 }
 
 /// Writes 8-bit pictures and what the network makes of them.
-fn record(learnt: &Learnt, file: &Path) {
+fn record(learnt: &TrainedModel, file: &Path) {
     let bands = learnt.card.input.bands.len();
     let model = model(learnt);
     let mut arrays = Vec::new();
@@ -84,11 +84,11 @@ fn record(learnt: &Learnt, file: &Path) {
 }
 
 /// Networks of all kinds, normalised in all ways.
-const KINDS: [(Network, &str, Exposure); 4] = [
-    (Network::BasicSegnet, "rgbn", Exposure::Band),
-    (Network::BasicSegnet, "rgb", Exposure::Image),
-    (Network::Segnet, "rgb", Exposure::Image),
-    (Network::Unet, "rgbn", Exposure::Fixed),
+const KINDS: [(Network, &str, NormalizationMode); 4] = [
+    (Network::BasicSegnet, "rgbn", NormalizationMode::Band),
+    (Network::BasicSegnet, "rgb", NormalizationMode::Image),
+    (Network::Segnet, "rgb", NormalizationMode::Image),
+    (Network::Unet, "rgbn", NormalizationMode::Fixed),
 ];
 
 #[test]
@@ -209,7 +209,7 @@ fn photographs_of_any_size_get_masks_of_their_size() {
     sorted.sort();
     assert_eq!(names(&out), sorted);
 
-    let learnt = Learnt::open(&RGB).unwrap();
+    let learnt = TrainedModel::open(&RGB).unwrap();
     for (name, size) in &sizes {
         let (w, h, map) = output::read_map(&out.join(format!("{name}.png"))).unwrap();
         let output::Map::Indexed(classes, palette) = map else { panic!("{name}: no indices") };
@@ -250,7 +250,7 @@ fn images_of_a_set_are_asked_about_by_name_and_bands_are_found() {
     let answers = ["000002.overlay.png", "000002.png", "000003.overlay.png", "000003.png", "prediction.json"];
     assert_eq!(names(&out), answers);
     // Di Cicco's evaluation sees the same picture: its answer is the same map.
-    let learnt = Learnt::open(&RGBN).unwrap();
+    let learnt = TrainedModel::open(&RGBN).unwrap();
     let image = SET.join("images/000002");
     let (w, h, rgb) = output::read_rgb(&image.join("rgb.png")).unwrap();
     let (_, _, nir) = output::read_gray(&image.join("nir.png")).unwrap();
@@ -333,7 +333,7 @@ fn what_cannot_be_answered_is_refused_and_nothing_is_written_over() {
     let out = at("others");
     let said = fail(train(&["predict", path(&RGB), path(&at("cut.png")), path(&photos), "--out", path(&out)]), 2);
     assert!(
-        said.contains("1 of 4 pictures could not be read, the others are answered:") && said.contains("cut.png: "),
+        said.contains("1 of 4 pictures could not be read, the others have predictions:") && said.contains("cut.png: "),
         "{said}"
     );
     assert_eq!(names(&out).len(), 7, "{:?}", names(&out));
@@ -343,16 +343,17 @@ fn what_cannot_be_answered_is_refused_and_nothing_is_written_over() {
     // Answers beside the photographs would be written over them.
     let said = fail(train(&["predict", path(&RGB), path(&photos), "--out", path(&photos)]), 2);
     assert!(
-        said.contains("small.png: this is no answer of ours") || said.contains("same.png: this is no answer of ours"),
+        said.contains("small.png: this is no prediction of ours")
+            || said.contains("same.png: this is no prediction of ours"),
         "{said}"
     );
     assert_eq!(std::fs::read(photos.join("small.png")).unwrap(), whole);
     // Answers to other photographs of the same name, or of another network.
     let before = std::fs::read(out.join("small.png")).unwrap();
     let said = fail(train(&["predict", path(&RGB), path(&at("more")), "--out", path(&out)]), 2);
-    assert!(said.contains("small.png: this is the answer to") && said.contains("photos/small.png"), "{said}");
+    assert!(said.contains("small.png: this is the prediction of") && said.contains("photos/small.png"), "{said}");
     let said = fail(train(&["predict", path(&RGBN), path(&photos), "--out", path(&out)]), 2);
-    assert!(said.contains("answers of another network lie in this folder"), "{said}");
+    assert!(said.contains("predictions of another network lie in this folder"), "{said}");
     assert_eq!(std::fs::read(out.join("small.png")).unwrap(), before);
 
     // Weights that are damaged, or not those of the card.

@@ -11,7 +11,7 @@ use common::program::scratch;
 use common::python::python;
 use furrow::report::chart::{Chart, Curve};
 use furrow::train::figure::{Page, Shot, sheet, spread};
-use furrow::train::measure::{Answer, Evaluation, Report};
+use furrow::train::measure::{Evaluation, Prediction, Report};
 use std::process::Command;
 
 const PALETTE: [[u8; 3]; 3] = [[0, 0, 0], [0, 255, 0], [255, 0, 0]];
@@ -148,7 +148,7 @@ fn report() -> Report {
     let mut evaluation = Evaluation::new(["soil", "crop", "weed"]);
     for name in ["a", "b"] {
         let s = shot(name);
-        let answer = Answer {
+        let answer = Prediction {
             name,
             width: s.width,
             height: s.height,

@@ -5,10 +5,14 @@
 //! with any number of loading threads; one clear error, exit code 2, for what cannot be gone on with. Source: what `train fit --help` says.
 
 use furrow::output::{Picture, write_png};
+use furrow::ron_file::RonFile;
 use furrow::sampling::{Purpose, Stream};
 use furrow::train::classes::Classes;
-use furrow::train::data::{Augment, Band, Loader, Normalisation, Order, Pick, Selection, Shape, Store};
-use furrow::train::run::{self, Learnt, Results};
+use furrow::train::data::{Augment, Band, Loader, Normalization, Order, Pick, Selection, Shape, Store};
+use furrow::train::fit::{Plan, settings};
+use furrow::train::run::{self, Results, TrainedModel};
+use furrow::train::table::Experiment;
+use std::borrow::Cow;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -20,6 +24,11 @@ const H: u32 = 48;
 
 /// Images of brown ground with large green discs, the crop, and small ones of nearly the same green, the weeds; a set of them.
 fn set(folder: &Path, images: u64) -> PathBuf {
+    set_with(folder, images, |_| true)
+}
+
+/// The same, where only some images have labels, by number.
+fn set_with(folder: &Path, images: u64, labelled: impl Fn(u64) -> bool) -> PathBuf {
     let (photos, masks, out) = (folder.join("images"), folder.join("masks"), folder.join("set"));
     for k in 0..images {
         let mut stream = Stream::of(5, k, Purpose::Test, 0);
@@ -35,6 +44,7 @@ fn set(folder: &Path, images: u64) -> PathBuf {
         let rgb: Vec<[u8; 3]> = labels.iter().map(|c| colors[usize::from(*c)].map(&mut noise)).collect();
         let name = format!("{k:03}.png");
         write_png(&photos.join(&name), W, H, &Picture::Rgb(&rgb), "").unwrap();
+        let labels = if labelled(k) { labels } else { vec![255; labels.len()] };
         write_png(&masks.join(&name), W, H, &Picture::Gray(&labels), "").unwrap();
     }
     let path = |p: &Path| p.to_str().unwrap().to_owned();
@@ -89,7 +99,7 @@ fn eight_images_are_learnt_by_every_network_and_judged_so() {
     for (network, steps, rate) in [("basic-segnet", 60, "0.003"), ("unet", 80, "0.003"), ("segnet", 40, "0.001")] {
         let out = folder.join(network);
         let more = format!(
-            "--network {network} --steps {steps} --rate {rate} --augment none --balance none --watch-every 1000"
+            "--network {network} --steps {steps} --rate {rate} --augment none --class-weights none --validate-every 1000"
         );
         succeed(&mut fit(&set, &out, &more));
         let losses = results(&out).history.losses;
@@ -112,11 +122,11 @@ fn a_training_that_is_stopped_or_killed_ends_with_the_same_bytes() {
     let folder = scratch.path();
     let set = set(folder, 8);
     for (method, more) in [
-        ("adam", " --window 40x32 --rare 0.5 --balance fading"),
-        ("sgd", " --normalise fixed --loss entropy --balance median"),
+        ("adam", " --crop-size 40x32 --rare-crops 0.5 --class-weights annealed"),
+        ("sgd", " --normalization fixed --loss entropy --class-weights median"),
     ] {
         let more = format!(
-            "--network unet --steps 40 --optimiser {method} --val {}@0..2 --watch-every 5 --patience 100{more}",
+            "--network unet --steps 40 --optimiser {method} --val {}@0..2 --validate-every 5 --patience 100{more}",
             set.display()
         );
         let whole = folder.join(format!("{method}-whole"));
@@ -172,7 +182,7 @@ fn what_cannot_be_gone_on_with_is_told() {
     let folder = scratch.path();
     let set = set(folder, 4);
     let out = folder.join("run");
-    let more = "--network unet --steps 200 --watch-every 2";
+    let more = "--network unet --steps 200 --validate-every 2";
     let mut child = fit(&set, &out, more).stderr(Stdio::null()).spawn().unwrap();
     let checkpoint = out.join("checkpoint.safetensors");
     let begin = Instant::now();
@@ -182,7 +192,7 @@ fn what_cannot_be_gone_on_with_is_told() {
     }
     child.kill().unwrap();
     child.wait().unwrap();
-    let error = refuse(&mut fit(&set, &out, "--network unet --steps 100 --watch-every 2"), 2);
+    let error = refuse(&mut fit(&set, &out, "--network unet --steps 100 --validate-every 2"), 2);
     assert!(
         error.contains("another training lies in this folder") && error.contains("steps is 200 there and 100 here"),
         "{error}"
@@ -212,10 +222,10 @@ fn what_cannot_be_gone_on_with_is_told() {
     assert!(error.contains("the set has 4 images"), "{error}");
     let error = refuse(&mut fit(&folder.join("nowhere"), &folder.join("d"), ""), 2);
     assert!(error.contains("this is no dataset"), "{error}");
-    let error = refuse(&mut fit(&set, &folder.join("e"), &format!("--window {}x{H}", W + 1)), 2);
-    assert!(error.contains("--window is larger than the images"), "{error}");
-    let error = refuse(&mut fit(&set, &folder.join("f"), "--window 32x32 --rare 2"), 2);
-    assert!(error.contains("--rare") && error.contains("write a share from 0 to 1"), "{error}");
+    let error = refuse(&mut fit(&set, &folder.join("e"), &format!("--crop-size {}x{H}", W + 1)), 2);
+    assert!(error.contains("--crop-size: a crop of 65 × 48 pixels is larger than the images"), "{error}");
+    let error = refuse(&mut fit(&set, &folder.join("f"), "--crop-size 32x32 --rare-crops 2"), 2);
+    assert!(error.contains("--rare-crops") && error.contains("write a share from 0 to 1"), "{error}");
     for name in ["a", "b", "c", "d", "e", "f"] {
         assert!(!folder.join(name).exists(), "{name} was begun");
     }
@@ -229,7 +239,7 @@ fn weights_of_other_classes_and_damaged_ones_are_refused() {
     let (three, two) = (folder.join("three"), folder.join("two"));
     succeed(&mut fit(&set, &three, "--network unet --steps 1"));
     succeed(fit(&set, &two, "--network unet --steps 1").args(["--classes", "soil; plant=crop,weed"]));
-    assert_eq!(Learnt::open(&two).unwrap().card.classes.names(), ["soil", "plant"]);
+    assert_eq!(TrainedModel::open(&two).unwrap().card.classes.names(), ["soil", "plant"]);
     fs::copy(two.join(run::WEIGHTS), three.join(run::WEIGHTS)).unwrap();
     let eval = |run: &Path| train(&format!("eval {} --set {} --threads 1", run.display(), set.display()));
     let error = refuse(&mut eval(&three), 2);
@@ -256,9 +266,9 @@ fn batches_do_not_depend_on_threads_or_on_where_a_training_goes_on() {
         let all = Selection { repeat: 2, ..Selection::of(&set) };
         Arc::new(Store::open(&[all], Pick::All, 1, &Classes::default(), &shape, false, memory).unwrap())
     };
-    let (seed, batch, window) = (3, 3, (32, 24));
+    let (seed, batch, crop_size) = (3, 3, (32, 24));
     let order =
-        Order { seed, batch, window, rare: 0.5, augment: Augment::default(), normalisation: Normalisation::Image };
+        Order { seed, batch, crop_size, rare: 0.5, augment: Augment::default(), normalization: Normalization::Image };
     let batches = |memory, from, threads| -> Vec<_> {
         Loader::start(&store(memory), &order, from, 12, threads).map(|b| b.unwrap()).collect()
     };
@@ -270,7 +280,116 @@ fn batches_do_not_depend_on_threads_or_on_where_a_training_goes_on() {
     assert_ne!(plain[0], plain[1]);
 }
 
-/// Rationale: what a network answers too readily it draws too wide. Expected: calibrated, the mean I/U of the images looked at is higher;
+/// Rationale: several threads load images, and the first epoch's are all missing. Expected: with a budget of exactly all images, all
+/// are kept, however many threads have read the same image at the same time. Source: the sizes of the images.
+#[test]
+fn threads_that_read_the_same_image_at_once_do_not_shrink_the_cache() {
+    let scratch = tempfile::tempdir().unwrap();
+    let set = set(scratch.path(), 6);
+    let shape = Shape { bands: Band::RGB.to_vec(), width: W, height: H };
+    let store =
+        |memory| Store::open(&[Selection::of(&set)], Pick::All, 1, &Classes::default(), &shape, false, memory).unwrap();
+    let all: u64 = (0..6).map(|place| store(0).get(place).unwrap().bytes()).sum();
+    let store = store(all);
+    let barrier = std::sync::Barrier::new(16);
+    std::thread::scope(|scope| {
+        for _ in 0..16 {
+            scope.spawn(|| {
+                for place in 0..3 {
+                    barrier.wait();
+                    drop(store.get(place).unwrap());
+                }
+            });
+        }
+    });
+    for _ in 0..2 {
+        (0..6).for_each(|place| drop(store.get(place).unwrap()));
+    }
+    let kept = (0..6).filter(|place| matches!(store.get(*place).unwrap(), Cow::Borrowed(_))).count();
+    assert_eq!(kept, 6, "images in memory");
+}
+
+/// Rationale: a crop may lie where nothing has a label. Expected: such a batch has no loss, so it enters the loss curve neither as
+/// 0 nor as anything else; the others do. Source: the cross-entropy of a network at its start, which is nowhere near 0.
+#[test]
+fn a_batch_without_labels_has_no_loss() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path();
+    let set = set_with(folder, 4, |k| k < 2);
+    let out = folder.join("run");
+    let set_all = set.display();
+    let out_path = out.display();
+    succeed(&mut train(&format!(
+        "fit --set {set_all}@all --out {out_path} --size {W}x{H} --threads 1 --precision f32 --batch 1 --steps 12 --network unet"
+    )));
+    let losses = results(&out).history.losses;
+    assert_eq!(losses.len(), 6, "{losses:?}");
+    assert!(losses.iter().all(|l| l.loss > 0.1), "{losses:?}");
+    assert!(out.join("report.html").is_file());
+}
+
+/// Rationale: a default that stands in several places differs sooner or later. Expected: every hyper-parameter is a flag, and `--help`
+/// shows the default that the code has; an experiment file that gives none has the same ones. Source: `Plan::default`.
+#[test]
+fn help_experiment_files_and_code_have_the_same_defaults() {
+    let help = String::from_utf8(succeed(&mut train("fit --help")).stdout).unwrap();
+    let all = settings::defaults();
+    assert!(all.len() >= 16);
+    for (field, default) in all {
+        let flag = format!("--{} <", field.replace('_', "-"));
+        let (_, about) = help.split_once(&flag).unwrap_or_else(|| panic!("no {flag} in\n{help}"));
+        let about = about.split("\n      --").next().unwrap().split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(about.contains(&format!("[default: {default}]")), "{field}: {about}");
+    }
+    let page = RonFile::of(
+        r#"Experiment(networks: ["unet"], sets: {"a": Real()}, train: [(name: "A", from: [(set: "a", images: "0..4")])],
+            test: [(name: "T", set: "a", images: "5..6")])"#,
+    );
+    let experiment = Experiment::of(&page, None).unwrap();
+    assert_eq!((experiment.plan, experiment.seeds), (Plan::default(), vec![Plan::default().seed]));
+}
+
+/// Rationale: a user looks for the words of the field. Expected: each is in the help of some subcommand, and no old name is.
+#[test]
+fn help_has_the_words_of_the_field() {
+    let verbs = ["", "fit", "eval", "predict", "calibrate", "export", "baseline", "table"];
+    let help: String = verbs
+        .iter()
+        .map(|verb| String::from_utf8(succeed(&mut train(&format!("{verb} --help"))).stdout).unwrap().to_lowercase())
+        .collect();
+    let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
+    for word in [
+        "loss",
+        "training set",
+        "validation set",
+        "test set",
+        "validation pass",
+        "input normalization",
+        "class weights",
+        "threshold",
+        "oversampling",
+        "predict",
+        "calibrate",
+        "learning rate",
+        "data augmentation",
+        "batch size",
+    ] {
+        assert!(help.contains(word), "{word}");
+    }
+    for old in
+        ["--window", "--rare ", "--balance", "--normalise", "--watch-every", "readily", "learn from", "watched by"]
+    {
+        assert!(!help.contains(old), "{old}");
+    }
+    let scratch = tempfile::tempdir().unwrap();
+    let set = set(scratch.path(), 2);
+    let done = succeed(&mut fit(&set, &scratch.path().join("old"), "--steps 1 --watch-every 1 --balance root"));
+    let said = String::from_utf8(done.stderr).unwrap();
+    assert!(said.contains("warning: --watch-every is called --validate-every now"), "{said}");
+    assert!(said.contains("warning: --balance is called --class-weights now") && said.contains("`sqrt`"), "{said}");
+}
+
+/// Rationale: what a network over-predicts it draws too wide. Expected: calibrated, the mean I/U of the images looked at is higher;
 /// by `calibrate` as by `fit --calibrate`, to the bit; a network that is there already is not written over. Source: the verb's words.
 #[test]
 fn calibrated_a_network_overlaps_better() {
@@ -278,7 +397,7 @@ fn calibrated_a_network_overlaps_better() {
     let folder = scratch.path();
     let set = set(folder, 6);
     let (plain, both, even) = (folder.join("plain"), folder.join("both"), folder.join("even"));
-    let more = "--network unet --steps 30 --balance median";
+    let more = "--network unet --steps 30 --class-weights median";
     succeed(&mut fit(&set, &plain, more));
     succeed(&mut fit(&set, &both, &format!("{more} --calibrate 6")));
     let calibrate = || {
@@ -286,8 +405,8 @@ fn calibrated_a_network_overlaps_better() {
         train(&format!("calibrate {run} --set {set}@all --images 6 --out {out} --threads 1 --precision f32"))
     };
     succeed(&mut calibrate());
-    assert_eq!(Learnt::open(&even).unwrap().values, Learnt::open(&both).unwrap().values);
-    assert_ne!(Learnt::open(&even).unwrap().values, Learnt::open(&plain).unwrap().values);
+    assert_eq!(TrainedModel::open(&even).unwrap().values, TrainedModel::open(&both).unwrap().values);
+    assert_ne!(TrainedModel::open(&even).unwrap().values, TrainedModel::open(&plain).unwrap().values);
     let scores = |run: &Path| {
         let out = folder.join("eval").join(run.file_name().unwrap());
         succeed(&mut train(&format!("eval {} --set {}@all --out {}", run.display(), set.display(), out.display())));
@@ -339,7 +458,7 @@ fn a_training_keeps_its_memory() {
     let set = set(scratch.path(), 4);
     let environment = |name: &str, own: &[(&str, &str)]| {
         let out = scratch.path().join(name);
-        let mut command = fit(&set, &out, "--network unet --steps 2000 --watch-every 1");
+        let mut command = fit(&set, &out, "--network unet --steps 2000 --validate-every 1");
         let mut child = command.envs(own.iter().copied()).stderr(Stdio::null()).spawn().unwrap();
         let begin = Instant::now();
         while !out.join("checkpoint.safetensors").exists() {

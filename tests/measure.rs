@@ -15,7 +15,7 @@ use furrow::train::measure::boundary::{Boundary, TOLERANCE};
 use furrow::train::measure::components::Components;
 use furrow::train::measure::report::Report;
 use furrow::train::measure::size::{SizeBin, Sizes};
-use furrow::train::measure::{Answer, Confusion, Evaluation, Scores};
+use furrow::train::measure::{Confusion, Evaluation, Prediction, Scores};
 use proptest::prelude::*;
 use std::path::Path;
 use std::process::Command;
@@ -32,9 +32,9 @@ fn map(rows: &[&str]) -> Vec<u8> {
     rows.concat().bytes().map(|c| if c == b'x' { 255 } else { c - b'0' }).collect()
 }
 
-fn answer<'a>(width: u32, truth: &'a [u8], predicted: &'a [u8]) -> Answer<'a> {
+fn answer<'a>(width: u32, truth: &'a [u8], predicted: &'a [u8]) -> Prediction<'a> {
     let height = truth.len() as u32 / width;
-    Answer { name: "a", width, height, truth, predicted, plants: None, seconds: None }
+    Prediction { name: "a", width, height, truth, predicted, plants: None, seconds: None }
 }
 
 /// A random map of three classes in blobs, some of it without a label.
@@ -113,7 +113,7 @@ fn faults_of_maps_are_told_and_nothing_is_counted() {
     assert!(Confusion::from_rows(&[vec![1, 2], vec![3]]).is_err());
     assert!(serde_json::from_str::<Confusion>("[[1,2],[3]]").is_err());
     let mut evaluation = Evaluation::new(NAMES);
-    let error = evaluation.add(&Answer { height: 2, ..answer(2, &[0, 1], &[0, 1]) }).unwrap_err().to_string();
+    let error = evaluation.add(&Prediction { height: 2, ..answer(2, &[0, 1], &[0, 1]) }).unwrap_err().to_string();
     assert!(error.contains("a: the truth has 2 pixels") && error.contains("2 × 2 has 4"), "{error}");
     assert!(evaluation.is_empty());
 }
@@ -337,7 +337,7 @@ fn evaluated(order: impl Iterator<Item = u64>) -> Report {
         let truth = random_map(&mut stream, w as usize, h as usize, true);
         let predicted = random_answer(&mut stream, &truth);
         let name = format!("{k:03}");
-        let answer = Answer { name: &name, seconds: Some(0.1 * (k + 1) as f64), ..answer(w, &truth, &predicted) };
+        let answer = Prediction { name: &name, seconds: Some(0.1 * (k + 1) as f64), ..answer(w, &truth, &predicted) };
         evaluation.add(&answer).unwrap();
     }
     evaluation.finish()

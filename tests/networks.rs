@@ -10,9 +10,9 @@ mod common;
 use common::python::{ask, python, torch};
 use common::training::{self, learn, normalised, pictures, stirred};
 use furrow::train::engine::{Model, Precision, Where, device};
-use furrow::train::fit::plan::Exposure;
+use furrow::train::fit::hyper::NormalizationMode;
 use furrow::train::net::Network;
-use furrow::train::run::Learnt;
+use furrow::train::run::TrainedModel;
 use furrow::train::weights::{self, Array};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -23,7 +23,7 @@ static SET: LazyLock<PathBuf> = LazyLock::new(|| training::set("networks-set"));
 const SINGLE: Where = Where { device: Device::Cpu, precision: Precision::Single };
 
 /// A network with what was learnt.
-fn model(learnt: &Learnt, place: Where) -> Model {
+fn model(learnt: &TrainedModel, place: Where) -> Model {
     device::set_threads(1);
     let card = &learnt.card;
     Model::with(card.network, card.input.bands.len(), card.classes.len(), &learnt.values, place).unwrap()
@@ -36,7 +36,7 @@ fn by_band(pixels: &[f32], bands: usize, area: usize) -> Vec<f32> {
 }
 
 /// Writes weights, card and what the network makes of some pictures.
-fn record(learnt: &Learnt, folder: &Path) {
+fn record(learnt: &TrainedModel, folder: &Path) {
     let (images, size) = (6, (47, 35));
     let bands = learnt.card.input.bands.len();
     let pixels = normalised(learnt, &pictures(images, size, bands, 5), size);
@@ -59,7 +59,7 @@ fn networks_compute_what_an_independent_program_does() {
     for network in Network::ALL {
         for bands in ["rgb", "rgbn"] {
             let folder = tempfile::tempdir().unwrap();
-            let trained = learn(*network, bands, Exposure::Image, &SET, &folder.path().join("trained"));
+            let trained = learn(*network, bands, NormalizationMode::Image, &SET, &folder.path().join("trained"));
             for (name, learnt) in [("stirred", &stirred(&trained, 3)), ("trained", &trained)] {
                 let folder = folder.path().join(name);
                 record(learnt, &folder);
@@ -82,10 +82,10 @@ fn apart(a: &[f32], b: &[f32]) -> (f64, f64) {
 }
 
 /// All networks, stirred, with four pictures at the size that they learnt at.
-fn examples() -> Vec<(Network, Learnt, Vec<f32>)> {
+fn examples() -> Vec<(Network, TrainedModel, Vec<f32>)> {
     let example = |network: &Network| {
         let folder = tempfile::tempdir().unwrap();
-        let learnt = stirred(&learn(*network, "rgb", Exposure::Image, &SET, folder.path()), 7);
+        let learnt = stirred(&learn(*network, "rgb", NormalizationMode::Image, &SET, folder.path()), 7);
         let pixels = normalised(&learnt, &pictures(4, training::SIZE, 3, 11), training::SIZE);
         (*network, learnt, pixels)
     };

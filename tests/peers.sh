@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
 # Installs what the build and the tests need, on Debian 12, as root or as a user who may sudo, and asks nothing: Embree and a C compiler; Mesa's
 # Vulkan for the rasterized engine; and the
-# programs that the tests ask for a second opinion (a browser, a batch system, Python clients in target/venv); libtorch for the feature `train`.
+# programs that the tests ask for a second opinion (a browser, a batch system, Python clients in target/venv, Debian's PyTorch for the CPU with
+# target/venv-torch, 151 MB to download); libtorch for the feature `train`.
 # What is there already is left alone.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-packages="libembree-dev build-essential mesa-vulkan-drivers libvulkan1 python3-venv libllvm19 chromium slurm-wlm munge iproute2 procps parallel"
+packages="libembree-dev build-essential mesa-vulkan-drivers libvulkan1 python3-venv libllvm19 chromium slurm-wlm munge iproute2 procps parallel python3-torch"
 # shellcheck disable=SC2086 # a list of packages
 if ! dpkg -s $packages >/dev/null 2>&1; then
   sudo=$([ "$(id -u)" = 0 ] || echo sudo)
@@ -16,5 +17,12 @@ if ! cmp -s tests/requirements.txt target/venv/installed; then
   [ -x target/venv/bin/pip ] || { mkdir -p target && python3 -m venv target/venv; }
   target/venv/bin/pip install -q -r tests/requirements.txt
   cp tests/requirements.txt target/venv/installed
+fi
+# PyPI's torch for Linux needs three gigabytes of CUDA. Debian's is for the CPU, and is found by Debian's Python only.
+safetensors=$(grep '^safetensors==' tests/requirements.txt)
+if [ "$(cat target/venv-torch/installed 2>/dev/null || true)" != "$safetensors" ]; then
+  /usr/bin/python3 -m venv --system-site-packages target/venv-torch
+  target/venv-torch/bin/pip install -q "$safetensors"
+  echo "$safetensors" > target/venv-torch/installed
 fi
 sh .libtorch/get.sh

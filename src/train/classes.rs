@@ -1,4 +1,4 @@
-//! What a network tells apart: classes, and which labels of a set mean which of them.
+//! The classes of a network, and which labels of a dataset belong to which of them.
 //!
 //! Written `soil; crop; weed`, or with labels, `soil; beet=crop; chamomile=Tripleurospermum inodorum; weed`. A label is a class of
 //! `semantics.png` (soil, crop, weed) or a species of the set's table; a species wins over the class that it belongs to. A pixel
@@ -8,6 +8,7 @@ use crate::dataset::Recipe;
 use crate::dataset::sample::IGNORE;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// The labels of `semantics.png` by their number.
 const SEMANTICS: [&str; 3] = ["soil", "crop", "weed"];
@@ -30,6 +31,20 @@ impl Default for Classes {
     /// Soil, crop, weed.
     fn default() -> Self {
         Self(SEMANTICS.map(|name| Class { name: name.into(), labels: vec![name.into()] }).to_vec())
+    }
+}
+
+impl fmt::Display for Classes {
+    /// As [`Classes::parse`] reads it.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, Class { name, labels }) in self.0.iter().enumerate() {
+            f.write_str(if i > 0 { "; " } else { "" })?;
+            f.write_str(name)?;
+            if labels.as_slice() != [name.as_str()] {
+                write!(f, "={}", labels.join(","))?;
+            }
+        }
+        Ok(())
     }
 }
 
@@ -162,6 +177,8 @@ mod tests {
         let classes = Classes::parse("soil; plant=crop, weed").unwrap();
         assert_eq!(classes.names(), ["soil", "plant"]);
         assert_eq!(classes.0[1].labels, ["crop", "weed"]);
+        assert_eq!(classes.to_string(), "soil; plant=crop,weed");
+        assert_eq!(Classes::default().to_string(), "soil; crop; weed");
         assert_eq!(Classes::parse("soil;crop;weed").unwrap(), Classes::default());
         for bad in ["", "soil", "soil; a=; b", "soil; a=crop; b=crop", "soil; soil=crop"] {
             assert!(Classes::parse(bad).is_err(), "{bad}");

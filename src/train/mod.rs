@@ -1,10 +1,20 @@
-//! Learning from datasets: networks trained on rendered or real images, judged on real ones.
+//! Training of segmentation networks on datasets, rendered or real, and their evaluation.
 //!
-//! `data` turns sets on disk into batches; `net` are the networks; `fit` trains one and keeps what it learns in a run's folder
-//! ([`run`]); `measure` turns truth and prediction into numbers, `figure` into pictures; `baseline` holds the colour rules that a
-//! network must beat; `deploy` takes what was learnt to robots and to pictures without labels. Sets are read only through files
-//! that a writer of datasets wrote, so rendered and imported ones are the same. What calls libtorch stands behind the cargo
-//! feature `train`.
+//! | module | idea |
+//! |---|---|
+//! | [`data`] | datasets to batches: crops, data augmentation, input normalization, oversampling |
+//! | [`net`] | the networks |
+//! | [`fit`] | hyper-parameters, class weights, loss, optimiser, checkpoints, the trainer, class-bias calibration |
+//! | [`run`] | the folder of a training run |
+//! | [`measure`] | ground truth and prediction to scores |
+//! | [`figure`] | charts and pages |
+//! | [`baseline`] | ExG threshold and component-size rules that a network must beat |
+//! | [`deploy`] | a trained model as ONNX or TorchScript; predictions for photographs without labels |
+//! | [`table`] | experiments: networks × training sets × seeds, evaluated on test sets |
+//!
+//! A dataset has a training set, a validation set (which decides when a training ends, and which weights are kept) and a test set.
+//! Datasets are read only through files that a writer of datasets wrote, so rendered and imported ones are the same. What calls
+//! libtorch needs the cargo feature `train`.
 
 pub mod baseline;
 pub mod classes;

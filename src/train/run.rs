@@ -1,15 +1,15 @@
 //! The folder of a training run.
 //!
 //! ```text
-//! plan.json                what is trained: the plan, and what decides the images
-//! checkpoint.safetensors   where it stands, until it is done
-//! weights.safetensors      what was learnt, for any trainer
+//! plan.json                the training: hyper-parameters, and checksums of the images
+//! checkpoint.safetensors   the training between two steps, until it is done
+//! weights.safetensors      the trained weights, for any trainer
 //! model.json               what the weights belong to: network, bands, size, classes, normalisation
-//! result.json              how it went: losses, looks at the validation images, time; written last
+//! result.json              loss curve, validation passes, time; written last
 //! ```
 
 use super::classes::Classes;
-use super::data::{Normalisation, Shape, Store};
+use super::data::{Normalization, Shape, Store};
 use super::fit::Plan;
 use super::fit::checkpoint::History;
 use super::net::Network;
@@ -20,21 +20,21 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::path::Path;
 
-/// What is trained.
+/// File of the plan.
 pub const PLAN: &str = "plan.json";
-/// What was learnt.
+/// File of the trained weights.
 pub const WEIGHTS: &str = "weights.safetensors";
-/// What the weights belong to.
+/// File of the model card.
 pub const MODEL: &str = "model.json";
-/// How it went.
+/// File of the results.
 pub const RESULT: &str = "result.json";
 
-/// A plan and what decides the images that it names.
+/// A plan with checksums of its images: two trainings with equal identities result in the same weights.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Identity {
     /// The plan.
     pub plan: Plan,
-    /// Fingerprint of each training set, and the numbers of its images.
+    /// Checksum of each training set, and the numbers of its images.
     pub train: Vec<(String, Vec<u64>)>,
     /// The same of the validation images.
     pub val: Vec<(String, Vec<u64>)>,
@@ -46,7 +46,7 @@ impl Identity {
         Ok(Self { plan: plan.clone(), train: train.fingerprints()?, val: val.fingerprints()? })
     }
 
-    /// SHA-256 of all that decides what is learnt: not where the sets lie, nor how long it may take.
+    /// Checksum (SHA-256) of all that decides the trained weights: not where the sets lie, nor how long it may take.
     pub fn hash(&self) -> Result<String> {
         let mut plan = Plan { seconds: None, ..self.plan.clone() };
         for selection in plan.train.iter_mut().chain(&mut plan.val) {
@@ -84,56 +84,57 @@ fn fields(identity: &Identity) -> Result<std::collections::BTreeMap<String, Stri
     Ok(value.as_object().into_iter().flatten().map(|(k, v)| (k.clone(), v.to_string())).collect())
 }
 
-/// What weights belong to: all that a robot must know to use them.
+/// Model card: all that a program must know to use the weights.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Card {
+pub struct ModelCard {
     /// The program's version.
     pub furrow: String,
     /// The network.
     pub network: Network,
-    /// Numbers that were learnt.
+    /// Trainable parameters.
     pub parameters: usize,
-    /// What it takes in.
+    /// Its input.
     pub input: Shape,
-    /// What is taken out of an image first; values from 0 to 1, 8 bits divided by 255.
-    pub normalisation: Normalisation,
-    /// What it tells apart, in the order of its outputs.
+    /// Input normalization, of values from 0 to 1, 8 bits divided by 255; `normalisation` in JSON.
+    #[serde(rename = "normalisation")]
+    pub normalization: Normalization,
+    /// Its classes, in the order of its outputs.
     pub classes: Classes,
     /// The file of the weights, beside this one.
     pub weights: String,
     /// SHA-256 over their names, shapes and values.
     pub weights_sha256: String,
-    /// Hash of the plan that made them.
+    /// Checksum of the plan that made them: [`Identity::hash`].
     pub plan_sha256: String,
 }
 
-/// How a training went.
+/// Results of a training.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Results {
     /// Steps done.
     pub steps: u64,
-    /// The step of the best look at the validation images.
+    /// The step of the best validation pass.
     pub best_step: Option<u64>,
     /// Why it ended: `steps`, `patience` or `time`.
     pub ended: String,
-    /// Losses and looks.
+    /// Loss curve and validation passes.
     pub history: History,
     /// Seconds of work, over all sittings.
     pub seconds: f64,
-    /// Images learnt from in a second.
+    /// Training images a second.
     pub images_per_second: f64,
 }
 
-/// What was learnt, from its folder.
+/// A trained model, from its folder.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Learnt {
-    /// What the weights belong to.
-    pub card: Card,
+pub struct TrainedModel {
+    /// The model card.
+    pub card: ModelCard,
     /// The weights.
     pub values: Vec<Array>,
 }
 
-impl Learnt {
+impl TrainedModel {
     /// Opens a run's folder.
     pub fn open(folder: &Path) -> Result<Self> {
         let path = folder.join(MODEL);
@@ -145,7 +146,7 @@ impl Learnt {
             };
             return Err(error.in_file(folder));
         }
-        let card: Card = read_json(&path)?;
+        let card: ModelCard = read_json(&path)?;
         let path = folder.join(&card.weights);
         let (values, _) = weights::read(&path)?;
         if weights::hash(&values) != card.weights_sha256 {
@@ -164,7 +165,7 @@ impl Learnt {
     }
 }
 
-/// How a training went, where it is done.
+/// Results of a training, where it is done.
 pub fn results(folder: &Path) -> Result<Option<Results>> {
     let path = folder.join(RESULT);
     if path.exists() { read_json(&path).map(Some) } else { Ok(None) }
@@ -188,4 +189,31 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
 
 fn failed(e: &serde_json::Error) -> Error {
     Error::failed(format!("cannot write JSON: {e}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rationale: a run that an earlier version began must go on, and its checkpoint and its weights name the checksum of its plan. Expected:
+    /// the plan as version 0.1 wrote it is read, has the checksum that version 0.1 computed, and is written as the same text.
+    /// Source: `plan.json` and `model.json` of a run by commit 3803143.
+    #[test]
+    fn runs_of_version_0_1_are_read_and_keep_their_checksum() {
+        let text = concat!(
+            r#"{"plan":{"network":"unet","classes":[{"name":"soil","labels":["soil"]},{"name":"crop","labels":["crop"]},"#,
+            r#"{"name":"weed","labels":["weed"]}],"shape":{"bands":["red","green","blue"],"width":64,"height":48},"#,
+            r#""train":[{"folder":"set","pick":"All","margin":1.4,"repeat":1}],"val":[{"folder":"set","pick":{"Range":[0,1]},"#,
+            r#""repeat":1}],"seed":1,"steps":4,"batch":2,"window":[40,32],"rare":0.5,"method":"adam","rate":0.001,"#,
+            r#""decay":0.0005,"schedule":"poly","loss":"dice","balance":"fading","calibrate":2,"augment":{"flip":true,"#,
+            r#""rotate":true,"scale":true,"crop":true,"colour":true,"blur":true,"noise":true},"exposure":"image","#,
+            r#""watch_every":2,"patience":1000,"precision":"f32","threads":1,"begin_with":null,"seconds":null},"#,
+            r#""train":[["5a02e49679d75b9e7051ae515fb4371077f7a303a2ccb61e2f2f528064e609be",[0,1,2,3]]],"#,
+            r#""val":[["5a02e49679d75b9e7051ae515fb4371077f7a303a2ccb61e2f2f528064e609be",[0]]]}"#
+        );
+        let identity: Identity = serde_json::from_str(text).unwrap();
+        assert_eq!(serde_json::to_string(&identity).unwrap(), text);
+        assert_eq!(identity.hash().unwrap(), "f1d0a304d9f74cce6867a24237cebc60846ba30fe7dc6f9d7920b7dd5f560dc6");
+        assert_eq!(identity.plan.hyper.crop_size, Some((40, 32)));
+    }
 }

@@ -1,13 +1,13 @@
-//! A training and an evaluation from files to files.
+//! Training, calibration and evaluation, from files to files.
 
 use super::data::{Pick, Selection, Store, augment};
 use super::engine::{Model, Precision, Where, device};
 use super::fit::calibrate::calibrate;
 use super::fit::checkpoint::Checkpoint;
-use super::fit::{self, Data, Plan, Watch};
-use super::measure::{Answer, Evaluation, Report};
+use super::fit::{self, Callbacks, Data, Plan};
+use super::measure::{Evaluation, Prediction, Report};
 use super::net::{Parameter, parameters};
-use super::run::{self, Card, Identity, Learnt, Results};
+use super::run::{self, Identity, ModelCard, Results, TrainedModel};
 use super::weights;
 use crate::dataset::split::Split;
 use crate::output::remove_unfinished;
@@ -17,14 +17,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-/// What a machine gives: decides no result but for the last bits.
+/// The machine: device, threads and memory. Results depend on it in the last bits only.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Machine {
     /// `cpu`, `cuda` or `cuda:1`.
     pub device: String,
     /// Threads that load images.
     pub loaders: usize,
-    /// Bytes of decoded images that are kept.
+    /// Bytes of decoded images that are cached.
     pub memory: u64,
 }
 
@@ -38,7 +38,14 @@ impl Machine {
 
 /// Trains a plan into a folder; goes on where it was left, and does nothing where it is done. `begin` is the folder of a run whose
 /// weights it begins with.
-pub fn fit(plan: &Plan, begin: Option<&Path>, machine: &Machine, folder: &Path, watch: &Watch<'_>) -> Result<Results> {
+pub fn fit(
+    plan: &Plan,
+    begin: Option<&Path>,
+    machine: &Machine,
+    folder: &Path,
+    callbacks: &Callbacks<'_>,
+) -> Result<Results> {
+    plan.hyper.check(&plan.shape).map_err(|invalid| invalid.of_flag())?;
     let place = machine.place(&plan.precision)?;
     device::set_threads(plan.threads);
     let open = |selections: &[Selection], otherwise| {
@@ -47,10 +54,10 @@ pub fn fit(plan: &Plan, begin: Option<&Path>, machine: &Machine, folder: &Path, 
     let train = open(&plan.train, Pick::Split(Split::Train))?;
     let val = open(&plan.val, Pick::Split(Split::Val))?;
     if train.is_empty() {
-        return Err(Error::misuse("there is no image to learn from")
+        return Err(Error::misuse("there is no training image")
             .help("name sets with --set DIR, or other images of them with DIR@all"));
     }
-    let begin = begin.map(Learnt::open).transpose()?.map(|l| l.values).unwrap_or_default();
+    let begin = begin.map(TrainedModel::open).transpose()?.map(|trained| trained.values).unwrap_or_default();
     let plan = Plan { begin_with: (!begin.is_empty()).then(|| weights::hash(&begin)), ..plan.clone() };
     let identity = Identity::of(&plan, &train, &val)?;
     // A set without the bands is told before a folder is taken for it.
@@ -65,29 +72,29 @@ pub fn fit(plan: &Plan, begin: Option<&Path>, machine: &Machine, folder: &Path, 
     }
     let hash = identity.hash()?;
     let data = Data { train: Arc::new(train), val, loaders: machine.loaders };
-    let mut outcome = fit::teach(&plan, &hash, &data, &begin, place, folder, watch)?;
-    if plan.calibrate > 0 {
+    let mut outcome = fit::train(&plan, &hash, &data, &begin, place, folder, callbacks)?;
+    if plan.hyper.calibrate > 0 {
         let model = Model::with(plan.network, plan.shape.bands.len(), plan.classes.len(), &outcome.values, place)?;
-        outcome.values = calibrate(&model, &data.train, &outcome.normalisation, plan.calibrate)?;
+        outcome.values = calibrate(&model, &data.train, &outcome.normalization, plan.hyper.calibrate)?;
     }
-    let learnt = parameters(plan.network, plan.shape.bands.len(), plan.classes.len());
-    let card = Card {
+    let list = parameters(plan.network, plan.shape.bands.len(), plan.classes.len());
+    let card = ModelCard {
         furrow: env!("CARGO_PKG_VERSION").into(),
         network: plan.network,
-        parameters: learnt.iter().filter(|p| p.role.is_learnt()).map(Parameter::len).sum(),
+        parameters: list.iter().filter(|p| p.role.is_trainable()).map(Parameter::len).sum(),
         input: plan.shape.clone(),
-        normalisation: outcome.normalisation,
+        normalization: outcome.normalization,
         classes: plan.classes.clone(),
         weights: run::WEIGHTS.into(),
         weights_sha256: weights::hash(&outcome.values),
         plan_sha256: hash,
     };
-    Learnt { card, values: outcome.values }.write(folder)?;
+    TrainedModel { card, values: outcome.values }.write(folder)?;
     let results = Results {
         steps: outcome.steps,
-        best_step: outcome.history.best().map(|look| look.step),
+        best_step: outcome.history.best().map(|pass| pass.step),
         ended: outcome.ended.into(),
-        images_per_second: outcome.steps as f64 * plan.batch as f64 / outcome.seconds.max(1e-9),
+        images_per_second: outcome.steps as f64 * plan.hyper.batch as f64 / outcome.seconds.max(1e-9),
         history: outcome.history,
         seconds: outcome.seconds,
     };
@@ -96,52 +103,52 @@ pub fn fit(plan: &Plan, begin: Option<&Path>, machine: &Machine, folder: &Path, 
     Ok(results)
 }
 
-/// What was learnt, each class answered as readily as overlaps best with the labels of `images` images of the selections.
+/// A trained model with its class biases calibrated, for the best overlap with the labels of `images` images of the selections.
 pub fn calibrated(
-    learnt: &Learnt,
+    trained: &TrainedModel,
     on: &[Selection],
     images: u64,
     precision: &str,
     threads: usize,
     machine: &Machine,
-) -> Result<Learnt> {
-    let card = &learnt.card;
+) -> Result<TrainedModel> {
+    let card = &trained.card;
     let place = machine.place(precision)?;
     device::set_threads(threads);
-    let model = Model::with(card.network, card.input.bands.len(), card.classes.len(), &learnt.values, place)?;
+    let model = Model::with(card.network, card.input.bands.len(), card.classes.len(), &trained.values, place)?;
     let store = Store::open(on, Pick::Split(Split::Train), 0, &card.classes, &card.input, false, 0)?;
     if store.is_empty() {
         return Err(Error::misuse("there is no image to calibrate on").help("name others of the set, such as DIR@all"));
     }
-    let values = calibrate(&model, &store, &card.normalisation, images)?;
-    let card = Card { weights_sha256: weights::hash(&values), ..card.clone() };
-    Ok(Learnt { card, values })
+    let values = calibrate(&model, &store, &card.normalization, images)?;
+    let card = ModelCard { weights_sha256: weights::hash(&values), ..card.clone() };
+    Ok(TrainedModel { card, values })
 }
 
-/// Which class each pixel of an image is, as [`evaluate`] shows it to whoever wants to keep it.
-pub struct Seen<'a> {
+/// An image and its prediction, as [`evaluate`] passes them on.
+pub struct Predicted<'a> {
     /// Its place in the selection.
     pub place: usize,
-    /// The image as the network sees it, before anything is taken out.
+    /// The image at the network's size, before normalization.
     pub example: &'a super::data::Example,
-    /// What the network says.
+    /// Predicted class of each pixel.
     pub predicted: &'a [u8],
 }
 
-/// Judges what was learnt on images of a set, one after the other; each is shown to `seen`.
+/// Evaluates a trained model on images of a dataset, one after the other; each is passed to `seen`.
 pub fn evaluate(
-    learnt: &Learnt,
+    trained: &TrainedModel,
     on: &Selection,
     precision: &str,
     threads: usize,
     machine: &Machine,
     stop: &AtomicBool,
-    seen: &mut dyn FnMut(&Seen<'_>) -> Result<()>,
+    seen: &mut dyn FnMut(&Predicted<'_>) -> Result<()>,
 ) -> Result<Report> {
-    let card = &learnt.card;
+    let card = &trained.card;
     let place = machine.place(precision)?;
     device::set_threads(threads);
-    let model = Model::with(card.network, card.input.bands.len(), card.classes.len(), &learnt.values, place)?;
+    let model = Model::with(card.network, card.input.bands.len(), card.classes.len(), &trained.values, place)?;
     let store = Store::open(std::slice::from_ref(on), Pick::All, 0, &card.classes, &card.input, true, 0)?;
     let (width, height) = (card.input.width, card.input.height);
     let mut evaluation = Evaluation::new(card.classes.names());
@@ -151,14 +158,14 @@ pub fn evaluate(
         }
         let example = store.get(place)?;
         let mut pixels = augment::interleave(&example, 1);
-        card.normalisation.apply(&mut pixels, card.input.bands.len());
+        card.normalization.apply(&mut pixels, card.input.bands.len());
         let begun = Instant::now();
         let predicted = model.predict(&pixels, (width, height))?;
         let seconds = Some(begun.elapsed().as_secs_f64());
         let plants = example.plants.iter().any(|p| *p > 0).then_some(example.plants.as_slice());
         let (name, truth) = (example.name.as_str(), example.labels.as_slice());
-        evaluation.add(&Answer { name, width, height, truth, predicted: &predicted, plants, seconds })?;
-        seen(&Seen { place, example: &example, predicted: &predicted })?;
+        evaluation.add(&Prediction { name, width, height, truth, predicted: &predicted, plants, seconds })?;
+        seen(&Predicted { place, example: &example, predicted: &predicted })?;
     }
     Ok(evaluation.finish())
 }

@@ -1,4 +1,4 @@
-//! Numbers in files that any trainer reads: safetensors, with one text of ours in the header and a hash over everything.
+//! Weights in files that any trainer reads: safetensors, with one text of ours in the header and a checksum over everything.
 
 use crate::output::write_atomically;
 use crate::{Error, Result};
@@ -30,7 +30,7 @@ pub fn write(path: &Path, arrays: &[Array], text: &str) -> Result<()> {
         let view = TensorView::new(Dtype::F32, array.shape.clone(), bytes).map_err(|e| fault(&e))?;
         views.push((array.name.as_str(), view));
     }
-    let header = HashMap::from([(KEY.to_owned(), format!("{}\n{text}", seal(arrays, text)))]);
+    let header = HashMap::from([(KEY.to_owned(), format!("{}\n{text}", checksum(arrays, text)))]);
     write_atomically(path, &safetensors::serialize(views, &Some(header)).map_err(|e| fault(&e))?)
 }
 
@@ -43,7 +43,7 @@ pub fn read(path: &Path) -> Result<(Vec<Array>, String)> {
     let (_, header) = SafeTensors::read_metadata(&bytes).map_err(|e| damaged(&e))?;
     let text =
         header.metadata().as_ref().and_then(|m| m.get(KEY)).ok_or_else(|| damaged(&"words of ours are missing"))?;
-    let (sum, text) = text.split_once('\n').ok_or_else(|| damaged(&"its hash is missing"))?;
+    let (sum, text) = text.split_once('\n').ok_or_else(|| damaged(&"its checksum is missing"))?;
     let mut arrays = Vec::new();
     for (name, view) in SafeTensors::deserialize(&bytes).map_err(|e| damaged(&e))?.tensors() {
         if view.dtype() != Dtype::F32 {
@@ -53,8 +53,8 @@ pub fn read(path: &Path) -> Result<(Vec<Array>, String)> {
         arrays.push(Array { name, shape: view.shape().to_vec(), values });
     }
     arrays.sort_by(|a, b| a.name.cmp(&b.name));
-    if sum != seal(&arrays, text) {
-        return Err(damaged(&"its numbers do not fit its hash"));
+    if sum != checksum(&arrays, text) {
+        return Err(damaged(&"its weights do not match their checksum"));
     }
     Ok((arrays, text.to_owned()))
 }
@@ -74,7 +74,7 @@ pub fn hash(arrays: &[Array]) -> String {
 }
 
 /// Over the arrays and the text beside them.
-fn seal(arrays: &[Array], text: &str) -> String {
+fn checksum(arrays: &[Array], text: &str) -> String {
     hex::encode(Sha256::new().chain_update(hash(arrays)).chain_update(text).finalize())
 }
 

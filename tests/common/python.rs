@@ -7,11 +7,16 @@ use std::process::Command;
 ///
 /// `None`, and a word about it, where there is none; with `FURROW_REQUIRE_PEERS=1` that is a failure instead.
 pub fn python(probe: &str) -> Option<PathBuf> {
+    first(std::iter::empty(), probe)
+}
+
+/// The first Python that runs `probe`, those of `before` first.
+fn first(before: impl Iterator<Item = PathBuf>, probe: &str) -> Option<PathBuf> {
     let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/venv/bin/python");
     let named = std::env::var_os("FURROW_PYTHON").map(PathBuf::from);
     let candidates = [Some(own), named, Some("python3".into())];
     let mut said = Vec::new();
-    for candidate in candidates.into_iter().flatten() {
+    for candidate in before.chain(candidates.into_iter().flatten()) {
         match Command::new(&candidate).args(["-c", probe]).output() {
             Ok(output) if output.status.success() => return Some(candidate),
             Ok(output) => {
@@ -28,20 +33,12 @@ pub fn python(probe: &str) -> Option<PathBuf> {
     None
 }
 
-/// A Python with PyTorch: `$FURROW_TORCH_PYTHON`, then `target/venv/bin/python`. `None`, and a word about it, where there is none: it is
-/// three gigabytes, so nothing installs it unasked.
+/// A Python with PyTorch: `$FURROW_TORCH_PYTHON`, then `target/venv-torch/bin/python`, which `tests/peers.sh` makes, then those of
+/// [`python`], to which it is equal otherwise.
 pub fn torch() -> Option<PathBuf> {
-    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/venv/bin/python");
+    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/venv-torch/bin/python");
     let named = std::env::var_os("FURROW_TORCH_PYTHON").map(PathBuf::from);
-    let runs = |p: &PathBuf| {
-        let probe = Command::new(p).args(["-c", "import torch, numpy, safetensors"]).output();
-        probe.is_ok_and(|output| output.status.success())
-    };
-    let found = [named, Some(own)].into_iter().flatten().find(runs);
-    if found.is_none() {
-        eprintln!("skipped: no Python has torch; FURROW_TORCH_PYTHON may name one");
-    }
-    found
+    first(named.into_iter().chain([own]), "import torch, numpy, safetensors")
 }
 
 /// Runs a script of `tests/` and expects it to be content; shows what it says.

@@ -5,10 +5,10 @@ use super::program::{SMALL, trace};
 use furrow::sampling::{Purpose, Stream};
 use furrow::train::classes::Classes;
 use furrow::train::data::{Band, Pick, Selection, Shape};
-use furrow::train::fit::plan::Exposure;
-use furrow::train::fit::{Plan, Watch};
+use furrow::train::fit::hyper::NormalizationMode;
+use furrow::train::fit::{Callbacks, Hyperparameters, Plan};
 use furrow::train::net::{Network, Role, parameters};
-use furrow::train::run::Learnt;
+use furrow::train::run::TrainedModel;
 use furrow::train::session::{self, Machine};
 use furrow::train::weights;
 use std::path::{Path, PathBuf};
@@ -36,7 +36,7 @@ pub fn set(name: &str) -> PathBuf {
 }
 
 /// Trains a network for six steps on a set.
-pub fn learn(network: Network, bands: &str, exposure: Exposure, set: &Path, out: &Path) -> Learnt {
+pub fn learn(network: Network, bands: &str, normalization: NormalizationMode, set: &Path, out: &Path) -> TrainedModel {
     let selection = Selection { pick: Some(Pick::All), ..Selection::of(set) };
     let shape = Shape { bands: Band::list(bands).expect("bands"), width: SIZE.0, height: SIZE.1 };
     let plan = Plan {
@@ -44,18 +44,16 @@ pub fn learn(network: Network, bands: &str, exposure: Exposure, set: &Path, out:
         shape,
         classes: Classes::default(),
         train: vec![selection],
-        steps: 6,
-        batch: 2,
-        exposure,
+        hyper: Hyperparameters { steps: 6, batch: 2, normalization, ..Hyperparameters::default() },
         ..Plan::default()
     };
-    let watch = Watch { step: &|_, _| (), look: &|_, _| (), stop: &AtomicBool::new(false) };
-    session::fit(&plan, None, &machine(), out, &watch).expect("a training");
-    Learnt::open(out).expect("what was learnt")
+    let callbacks = Callbacks { step: &|_, _| (), validation: &|_, _| (), stop: &AtomicBool::new(false) };
+    session::fit(&plan, None, &machine(), out, &callbacks).expect("a training");
+    TrainedModel::open(out).expect("what was learnt")
 }
 
 /// The same network as nobody trained it: first values, but biases, gains, shifts and statistics that are not the usual ones.
-pub fn stirred(learnt: &Learnt, seed: u64) -> Learnt {
+pub fn stirred(learnt: &TrainedModel, seed: u64) -> TrainedModel {
     let card = &learnt.card;
     let list = parameters(card.network, card.input.bands.len(), card.classes.len());
     let values: Vec<weights::Array> = list
@@ -73,7 +71,7 @@ pub fn stirred(learnt: &Learnt, seed: u64) -> Learnt {
         .collect();
     let mut card = card.clone();
     card.weights_sha256 = weights::hash(&values);
-    Learnt { card, values }
+    TrainedModel { card, values }
 }
 
 /// Pictures of 8-bit numbers, images × height × width × bands: waves and noise, no two alike.
@@ -104,11 +102,11 @@ pub fn pictures(images: usize, (width, height): (u32, u32), bands: usize, seed: 
 }
 
 /// What a network takes of such pictures: from 0 to 1 and normalised, lying as they did.
-pub fn normalised(learnt: &Learnt, pictures: &[u8], (width, height): (u32, u32)) -> Vec<f32> {
+pub fn normalised(learnt: &TrainedModel, pictures: &[u8], (width, height): (u32, u32)) -> Vec<f32> {
     let bands = learnt.card.input.bands.len();
     let mut pixels: Vec<f32> = pictures.iter().map(|v| f32::from(*v) / 255.0).collect();
     for image in pixels.chunks_exact_mut(width as usize * height as usize * bands) {
-        learnt.card.normalisation.apply(image, bands);
+        learnt.card.normalization.apply(image, bands);
     }
     pixels
 }

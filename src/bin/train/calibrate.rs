@@ -2,23 +2,23 @@
 
 use crate::machine::MachineArgs;
 use furrow::train::data::Selection;
-use furrow::train::run::{self, Learnt};
+use furrow::train::run::{self, TrainedModel};
 use furrow::train::session;
 use furrow::{Error, Result, cli};
 use std::path::PathBuf;
 
-/// Which network, by what.
+/// Which network, on which images.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Folder of the run.
     run: PathBuf,
-    /// Images with labels; its training images unless it says DIR@PICK. May be given several times.
+    /// Images with labels: the training set of a dataset unless it says DIR@PICK. May be given several times.
     #[arg(long = "set", value_name = "DIR[@PICK]", required = true, value_parser = Selection::parse)]
     sets: Vec<Selection>,
-    /// Images that are looked at, evenly picked.
+    /// Images that are used, evenly picked.
     #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u64).range(1..))]
     images: u64,
-    /// Folder for the network with its new head.
+    /// Folder for the calibrated network.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
@@ -27,17 +27,17 @@ pub(crate) struct Args {
 
 /// Calibrates.
 pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
-    let learnt = Learnt::open(&args.run)?;
+    let trained = TrainedModel::open(&args.run)?;
     cli::check_folder(&args.out)?;
     if [run::MODEL, run::PLAN].iter().any(|file| args.out.join(file).exists()) {
-        return Err(Error::misuse("there is a network in this folder already")
+        return Err(Error::misuse("there is a trained model in this folder already")
             .in_file(&args.out)
             .help("give another --out"));
     }
     let MachineArgs { precision, .. } = &args.machine;
     let machine = args.machine.machine();
     let calibrated =
-        session::calibrated(&learnt, &args.sets, args.images, precision, args.machine.threads(), &machine)?;
+        session::calibrated(&trained, &args.sets, args.images, precision, args.machine.threads(), &machine)?;
     calibrated.write(&args.out)?;
     Ok([run::WEIGHTS, run::MODEL].map(|file| args.out.join(file)).to_vec())
 }

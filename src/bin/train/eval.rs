@@ -4,7 +4,7 @@ use crate::machine::MachineArgs;
 use crate::report::{self, Shots};
 use furrow::cli::signal::Signals;
 use furrow::train::data::{Band, Pick, Selection};
-use furrow::train::run::Learnt;
+use furrow::train::run::TrainedModel;
 use furrow::train::session;
 use furrow::{Result, cli};
 use std::path::PathBuf;
@@ -14,34 +14,34 @@ use std::path::PathBuf;
 pub(crate) struct Args {
     /// Folder of the run.
     run: PathBuf,
-    /// Images with labels; all of the set unless it says DIR@PICK.
+    /// Test set: images with labels; all of the dataset unless it says DIR@PICK.
     #[arg(long = "set", value_name = "DIR[@PICK]", value_parser = Selection::parse)]
     set: Selection,
-    /// Folder for what comes out; `eval/NAME` in the run's, after the set, unless given.
+    /// Folder for the report; `eval/NAME` in the run's, after the set, unless given.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
     machine: MachineArgs,
 }
 
-/// Judges, and writes what came out.
+/// Evaluates, and writes the report.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
-    let learnt = Learnt::open(&args.run)?;
+    let trained = TrainedModel::open(&args.run)?;
     let set = args.set.folder.file_name().unwrap_or_default();
     let out = args.out.clone().unwrap_or_else(|| args.run.join("eval").join(set));
     cli::check_folder(&out)?;
     let (machine, threads) = (args.machine.machine(), args.machine.threads());
-    let card = &learnt.card;
+    let card = &trained.card;
     let bands: Vec<&str> = card.input.bands.iter().map(Band::name).collect();
     let (_, images) = args.set.open(Pick::All, 0)?;
     let mut shots = Shots::new(images.len(), &bands);
     let size = (card.input.width, card.input.height);
-    let mut see = |seen: &session::Seen<'_>| {
+    let mut see = |seen: &session::Predicted<'_>| {
         shots.see(seen.example, size, seen.predicted);
         Ok(())
     };
     let report =
-        session::evaluate(&learnt, &args.set, &args.machine.precision, threads, &machine, signals.heed(), &mut see)?;
+        session::evaluate(&trained, &args.set, &args.machine.precision, threads, &machine, signals.heed(), &mut see)?;
     let title = format!("{} on {}", args.run.display(), args.set.folder.display());
     let lead = format!(
         "{}, {} parameters, at {} × {} pixels.",

@@ -2,7 +2,8 @@
 
 use clap::ValueEnum;
 use furrow::train::deploy::{onnx, torchscript};
-use furrow::train::run::Learnt;
+use furrow::train::fit::settings::parse_size;
+use furrow::train::run::TrainedModel;
 use furrow::{Error, Result};
 use std::path::PathBuf;
 
@@ -18,7 +19,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Size of the pictures that a TorchScript is for; the network's own unless given. ONNX takes any.
-    #[arg(long, value_name = "WxH", value_parser = crate::fit::size)]
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<(u32, u32)>,
 }
 
@@ -33,7 +34,7 @@ enum Format {
 
 /// Writes the network.
 pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
-    let learnt = Learnt::open(&args.run)?;
+    let trained = TrainedModel::open(&args.run)?;
     let usual = match args.format {
         Format::Onnx => "network.onnx",
         Format::Torchscript => "network.pt",
@@ -49,12 +50,12 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
             Err(Error::misuse("an ONNX graph takes pictures of any size").help("leave --size out"))
         }
         (Format::Onnx, None) => {
-            onnx::write(&learnt, &out)?;
+            onnx::write(&trained, &out)?;
             Ok(vec![out])
         }
         (Format::Torchscript, size) => {
-            let input = &learnt.card.input;
-            torchscript::write(&learnt, size.unwrap_or((input.width, input.height)), &out)?;
+            let input = &trained.card.input;
+            torchscript::write(&trained, size.unwrap_or((input.width, input.height)), &out)?;
             let facts = torchscript::facts_path(&out);
             Ok(vec![out, facts])
         }

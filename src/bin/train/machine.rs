@@ -8,16 +8,16 @@ pub(crate) struct MachineArgs {
     /// Where the network is computed: cpu, cuda or cuda:1. CUDA needs LD_LIBRARY_PATH to name a torch 2.11.0 with it.
     #[arg(long, value_name = "DEVICE", default_value = "cpu")]
     device: String,
-    /// Numbers of the network: f32, bf16, or auto for bf16 where the device multiplies it.
+    /// Precision: f32, bf16, or auto for bf16 where the device multiplies it.
     #[arg(long, value_name = "NAME", default_value = "auto")]
     pub(crate) precision: String,
     /// Threads that compute, one for each core unless given. On a CPU they decide the last bits.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// Threads that read and vary images; 1 on a CPU unless given, half the cores beside a GPU.
+    /// Threads of the data loader, which read and augment images; 1 on a CPU unless given, half the cores beside a GPU.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     loaders: Option<u16>,
-    /// Decoded images that are kept in memory, GiB.
+    /// Cache of decoded images, GiB.
     #[arg(long, value_name = "GIB", default_value_t = 4)]
     cache: u64,
 }

@@ -1,4 +1,4 @@
-//! `train`: learns to tell crop from weed from datasets, and says how well.
+//! `train`: trains networks to tell crop from weed, evaluates them and predicts with them.
 
 mod baseline;
 mod calibrate;
@@ -7,6 +7,7 @@ mod export;
 mod fit;
 mod machine;
 mod predict;
+mod renamed;
 mod report;
 mod table;
 
@@ -16,11 +17,12 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Trains networks on datasets, rendered or real, and judges them on real images.
+/// Trains segmentation networks on datasets, rendered or real, and evaluates them on real images.
 ///
-/// A set is a folder that `trace dataset` made or imported. DIR@PICK chooses images of it: DIR@train, DIR@val, DIR@test, DIR@all,
-/// DIR@0..10, DIR@1/2 (every second from number 1 on), DIR@random:100; DIR@0..10*4 has them four times. DIR@all+1.4px takes
-/// outlines 1.4 pixels outside of the leaves, as people draw them (DIR@all-1px inside): rendered labels end where the leaf ends.
+/// A dataset is a folder that `trace dataset` made or imported. DIR@PICK chooses images of it: DIR@train (its training set), DIR@val
+/// (validation set), DIR@test, DIR@all, DIR@0..10, DIR@1/2 (every second from number 1 on), DIR@random:100. DIR@0..10*4 oversamples:
+/// each image four times an epoch. DIR@all+1.4px dilates label masks by 1.4 pixels (DIR@all-1px erodes them): manual masks are dilated
+/// by about 1 px, rendered ones end where the leaf ends.
 #[derive(Parser)]
 #[command(name = "train", version, arg_required_else_help = true, after_help = EXAMPLES)]
 struct Cli {
@@ -30,11 +32,11 @@ struct Cli {
 
 const EXAMPLES: &str = "\
 Examples:
-  train fit --set data/d --out runs/d                     Basic SegNet on the training images of a set
+  train fit --set data/d --out runs/d                     Basic SegNet on the training set of a dataset
   train fit --set data/d --set data/real@0..10*4 --network unet --size 240x180 --out runs/augmented
-  train eval runs/d --set data/real@12..20                how well it does on real images
-  train predict runs/d photos/ --out answers              masks of photographs, and masks over them
-  train calibrate runs/d --set data/d --out runs/d2   plants as wide as there
+  train eval runs/d --set data/real@12..20                scores on a test set of real images
+  train predict runs/d photos/ --out predictions          masks of photographs, and masks over them
+  train calibrate runs/d --set data/d --out runs/d2       class biases calibrated
   train export runs/d --format onnx                       the network for a robot
   train baseline exg-size --from data/real@0..10 --set data/real@12..20
   train table scenes/experiments/paper.ron --real jai=DIR the paper's tables, from scenes and real folders
@@ -47,22 +49,23 @@ Exit codes: 0 done, 1 failed, 2 wrong input, 75 stopped cleanly (Ctrl-C, TERM, H
 enum Verb {
     /// Train a network.
     Fit(Box<fit::Args>),
-    /// Judge a trained network on images with labels.
+    /// Evaluate a trained network on a test set: scores, confusion matrix, report.
     Eval(eval::Args),
-    /// Answer on pictures without labels: masks, and masks over the pictures.
+    /// Predict the classes of images without labels: masks, and masks over the images.
     Predict(predict::Args),
-    /// Set how readily a trained network answers each class, by images with labels.
+    /// Calibrate the class biases of a trained network against over- and under-prediction, on images with labels.
     Calibrate(calibrate::Args),
     /// Write a trained network for other programs.
     Export(export::Args),
-    /// Judge what colour alone can do: what a network must beat.
+    /// Fit and evaluate an ExG threshold, with component sizes or without: what a network must beat.
     Baseline(baseline::Args),
-    /// Run an experiment of a page: sets, trainings, evaluations, tables.
+    /// Run an experiment file: datasets, trainings, evaluations, tables.
     Table(Box<table::Args>),
 }
 
 fn main() -> ExitCode {
     let verb = Cli::parse().verb;
+    renamed::warn(std::env::args_os());
     furrow::train::memory::keep();
     let signals = signal::Signals::watch();
     let done = match verb {

@@ -4,13 +4,13 @@ use crate::machine::MachineArgs;
 use furrow::cli::signal::Signals;
 use furrow::train::data::Band;
 use furrow::train::deploy::pictures;
-use furrow::train::deploy::predict::{self, Answered, How};
-use furrow::train::run::Learnt;
+use furrow::train::deploy::predict::{self, Options, Predictions};
+use furrow::train::run::TrainedModel;
 use furrow::{Error, Result, cli};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
 
-/// Which network, about which pictures.
+/// Which network, on which images.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Folder of the run.
@@ -18,14 +18,14 @@ pub(crate) struct Args {
     /// PNG or JPEG files of any size, folders of them, or images of a set: DIR, DIR@PICK.
     #[arg(required = true, value_name = "IMAGES")]
     images: Vec<PathBuf>,
-    /// Folder for the answers: NAME.png, classes by number, NAME.overlay.png, and prediction.json, which tells what they are.
+    /// Folder for the predictions: NAME.png, classes by number, NAME.overlay.png, and prediction.json, which tells what they are.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Where another band than red, green and blue lies: gray pictures of the photographs' names. Without it, that of a.jpg is
     /// a.nir.png beside it, and that of rgb_1.png nir_1.png.
     #[arg(long = "band", value_name = "NAME=DIR", value_parser = band)]
     bands: Vec<(Band, PathBuf)>,
-    /// Pictures that are answered at once.
+    /// Batch size: images that are predicted at once.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=1024))]
     batch: u16,
     #[command(flatten)]
@@ -43,40 +43,40 @@ fn band(text: &str) -> Result<(Band, PathBuf), String> {
     }
 }
 
-/// Answers.
+/// Predicts.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
-    let learnt = Learnt::open(&args.run)?;
+    let trained = TrainedModel::open(&args.run)?;
     cli::check_folder(&args.out)?;
-    let pictures = pictures::find(&args.images, &learnt.card.input, &args.bands)?;
+    let pictures = pictures::find(&args.images, &trained.card.input, &args.bands)?;
     let bar = if args.quiet { ProgressBar::hidden() } else { ProgressBar::new(pictures.len() as u64) };
     let style = ProgressStyle::with_template("{bar:30} {pos} of {len} pictures, {eta} left");
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    let how = How {
+    let how = Options {
         precision: &args.machine.precision,
         threads: args.machine.threads(),
         batch: args.batch.into(),
         done: &|done| bar.set_position(done as u64),
         stop: signals.heed(),
     };
-    let answered = predict::predict(&learnt, &pictures, &args.out, &args.machine.machine(), &how);
+    let predicted = predict::predict(&trained, &pictures, &args.out, &args.machine.machine(), &how);
     bar.finish_and_clear();
-    let answered = answered?;
-    if !args.quiet && answered.done > 0 {
-        let each = answered.seconds / answered.done as f64;
-        eprintln!("{} pictures, {each:.3} s of the network for each", answered.done);
+    let predicted = predicted?;
+    if !args.quiet && predicted.done > 0 {
+        let each = predicted.seconds / predicted.done as f64;
+        eprintln!("{} pictures, {each:.3} s of the network for each", predicted.done);
     }
-    told(answered, pictures.len())
+    outcome(predicted, pictures.len())
 }
 
 /// The files, or what kept pictures from being read.
-fn told(mut answered: Answered, asked: usize) -> Result<Vec<PathBuf>> {
-    match answered.faults.len() {
-        0 => Ok(answered.paths),
-        1 if asked == 1 => Err(answered.faults.remove(0)),
+fn outcome(mut predicted: Predictions, asked: usize) -> Result<Vec<PathBuf>> {
+    match predicted.faults.len() {
+        0 => Ok(predicted.paths),
+        1 if asked == 1 => Err(predicted.faults.remove(0)),
         n => {
-            let faults: Vec<String> = answered.faults.iter().map(ToString::to_string).collect();
+            let faults: Vec<String> = predicted.faults.iter().map(ToString::to_string).collect();
             Err(Error::input(format!(
-                "{n} of {asked} pictures could not be read, the others are answered:\n{}",
+                "{n} of {asked} pictures could not be read, the others have predictions:\n{}",
                 faults.join("\n")
             )))
         }

@@ -1,4 +1,4 @@
-//! What an evaluation leaves for people and programs: tables, the figure, one page.
+//! Reports of evaluations and trainings: tables, figure, page.
 
 use furrow::Result;
 use furrow::output::write_atomically;
@@ -75,7 +75,7 @@ pub(crate) fn write(
     Ok(vec![html, figure, json, markdown])
 }
 
-/// The curves of a training: its loss, and what the looks at the validation images saw.
+/// The curves of a training: its loss, and its validation passes.
 pub(crate) fn curves(history: &History, classes: &[String]) -> Vec<Chart> {
     let chart = |title: &str, upwards: &str, curves: Vec<Curve>, logarithmic| Chart {
         title: title.into(),
@@ -87,19 +87,19 @@ pub(crate) fn curves(history: &History, classes: &[String]) -> Vec<Chart> {
     let losses = history.losses.iter().map(|l| (l.step as f64, l.loss)).collect();
     let mut charts =
         vec![chart("Loss", "cross entropy", vec![Curve { name: "training".into(), points: losses }], true)];
-    if !history.looks.is_empty() {
+    if !history.validation.is_empty() {
         let of = |name: &str, value: &dyn Fn(usize) -> Option<f64>| Curve {
             name: name.into(),
             points: history
-                .looks
+                .validation
                 .iter()
                 .enumerate()
                 .filter_map(|(i, l)| Some((l.step as f64, 100.0 * value(i)?)))
                 .collect(),
         };
-        let mut all = vec![of("mean", &|i| Some(history.looks[i].miou))];
-        all.extend(classes.iter().enumerate().map(|(c, name)| of(name, &|i| history.looks[i].iou[c])));
-        charts.push(chart("Validation images", "I/U, %", all, false));
+        let mut all = vec![of("mean", &|i| Some(history.validation[i].miou))];
+        all.extend(classes.iter().enumerate().map(|(c, name)| of(name, &|i| history.validation[i].iou[c])));
+        charts.push(chart("Validation set", "I/U, %", all, false));
     }
     charts
 }
@@ -124,8 +124,8 @@ pub(crate) fn write_training(
     write_atomically(&html, page.html()?.as_bytes())?;
     write_atomically(&svg, charts[0].svg().as_bytes())?;
     let rows = results.history.losses.iter().map(|loss| {
-        let look = results.history.looks.iter().find(|look| look.step == loss.step);
-        let miou = look.map_or(String::new(), |look| look.miou.to_string());
+        let pass = results.history.validation.iter().find(|pass| pass.step == loss.step);
+        let miou = pass.map_or(String::new(), |pass| pass.miou.to_string());
         vec![loss.step.to_string(), loss.loss.to_string(), loss.rate.to_string(), miou]
     });
     let lines = csv(&["step", "loss", "rate", "validation_mean_iou"], rows, Lines::Lf);

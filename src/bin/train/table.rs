@@ -15,7 +15,7 @@ use furrow::train::figure::sheet;
 use furrow::train::fit::Plan;
 use furrow::train::measure::Report;
 use furrow::train::session::{self, Machine};
-use furrow::train::table::{self, Answerer, Bound, Experiment, Hands, Only, Order, Real, State};
+use furrow::train::table::{self, Bound, Callbacks, Experiment, Only, Order, Predictor, Real, State};
 use furrow::{Error, Result, cli};
 use indicatif::HumanDuration;
 use std::path::{Path, PathBuf};
@@ -26,18 +26,18 @@ use std::time::Duration;
 #[derive(clap::Args)]
 #[command(after_help = AFTER)]
 pub(crate) struct Args {
-    /// The experiment's page.
+    /// The experiment file.
     page: PathBuf,
-    /// Folder of its sets, runs and tables; `out/` and the page's name, with that of the scale, unless given.
+    /// Folder of its sets, runs and tables; `out/` and the file's name, with that of the scale, unless given.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Where a real set of the page lies: a dataset, or a folder with images/ and labels/. May be given several times.
+    /// Where a real dataset of the experiment lies: a dataset, or a folder with images/ and labels/. May be given several times.
     #[arg(long, value_name = "NAME=DIR", value_parser = Real::parse)]
     real: Vec<Real>,
     /// Leave out what needs this set. May be given several times.
     #[arg(long, value_name = "NAME")]
     without: Vec<String>,
-    /// A scale of the page, which makes the same experiment larger or smaller.
+    /// A scale of the experiment file, which makes the same experiment larger or smaller.
     #[arg(long, value_name = "NAME")]
     scale: Option<String>,
     /// Only the rows whose number leaves k when divided by N.
@@ -71,7 +71,7 @@ Stopped or killed, the same command goes on and ends with the same tables. On se
 /// A part of the work.
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum Part {
-    /// Render and import the images.
+    /// Render and import the datasets.
     Sets,
     /// Write the tables of what is there.
     Tables,
@@ -80,7 +80,7 @@ enum Part {
 /// Does what is missing.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let page = RonFile::read(&args.page)?;
-    for warning in page.renamed() {
+    for warning in page.renamed().into_iter().chain(table::renamed(&page)) {
         eprintln!("warning: {warning}");
     }
     let experiment = Experiment::of(&page, args.scale.as_deref())?;
@@ -118,10 +118,10 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let stop = signals.heed();
     let paths = table::run(
         &order,
-        &Hands {
+        &Callbacks {
             fit: &|plan: &Plan, folder: &Path| fit::fit(plan, None, &args.machine, folder, args.quiet, signals),
             page: &|folder| fit::write_page(folder).map(drop),
-            judge: &|answerer, on, picture| judge(answerer, on, picture, &machine, stop),
+            evaluate: &|predictor, on, picture| evaluate(predictor, on, picture, &machine, stop),
             training: &|row: &str, state: &State| {
                 if !args.quiet {
                     eprintln!("training {} of {}: {row}{}", state.number, state.of, left(state.left));
@@ -145,32 +145,32 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// Judges a network or a baseline; some of the images go to a picture, beside truth, prediction and errors.
-fn judge(
-    answerer: &Answerer<'_>,
+/// Evaluates a network or a baseline; some of the images go to a figure, beside ground truth, prediction and errors.
+fn evaluate(
+    predictor: &Predictor<'_>,
     on: &Selection,
     picture: &Path,
     machine: &Machine,
     stop: &AtomicBool,
 ) -> Result<Report> {
     let (_, images) = on.open(Pick::All, 0)?;
-    let (report, shots, palette) = match answerer {
-        Answerer::Network(learnt, precision, threads) => {
-            let input = &learnt.card.input;
+    let (report, shots, palette) = match predictor {
+        Predictor::Network(trained, precision, threads) => {
+            let input = &trained.card.input;
             let bands: Vec<&str> = input.bands.iter().map(Band::name).collect();
             let mut shots = Shots::new(images.len(), &bands);
-            let mut see = |seen: &session::Seen<'_>| {
+            let mut see = |seen: &session::Predicted<'_>| {
                 shots.see(seen.example, (input.width, input.height), seen.predicted);
                 Ok(())
             };
-            let report = session::evaluate(learnt, on, precision, *threads, machine, stop, &mut see)?;
-            (report, shots, learnt.card.classes.colors())
+            let report = session::evaluate(trained, on, precision, *threads, machine, stop, &mut see)?;
+            (report, shots, trained.card.classes.colors())
         }
-        Answerer::Baseline(baseline, shape) => {
+        Predictor::Baseline(baseline, shape) => {
             let mut shots = Shots::new(images.len(), &["red", "green", "blue"]);
             let size = (shape.width, shape.height);
             let mut see = |example: &_, predicted: &[u8]| shots.see(example, size, predicted);
-            let report = files::judge(baseline, on, shape, stop, &mut see)?;
+            let report = files::evaluate(baseline, on, shape, stop, &mut see)?;
             (report, shots, Classes::default().colors())
         }
     };

@@ -1,14 +1,14 @@
-//! Colour baselines from files to scores: fitted to images of sets and judged on them, at the size at which networks see them.
+//! Baselines from files to scores: fitted to images of datasets and evaluated on them, at the size at which networks see them.
 
 use super::{Baseline, Cut, Example, Kind};
 use crate::train::classes::Classes;
 use crate::train::data::{self, Band, Pick, Selection, Shape, Store};
-use crate::train::measure::{Answer, Evaluation, Report};
+use crate::train::measure::{Evaluation, Prediction, Report};
 use crate::{Error, Result};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-/// The colours that a baseline sees, at a network's size.
+/// The input of a baseline, at a network's size.
 fn shape(like: &Shape) -> Shape {
     Shape { bands: Band::RGB.to_vec(), ..like.clone() }
 }
@@ -36,8 +36,8 @@ pub fn fit(kind: Kind, from: &[Selection], seed: u64, like: &Shape, stop: &Atomi
     Baseline::fit(kind, Cut::Fitted, || (0..store.len()).map(image))
 }
 
-/// Judges a baseline on images of a set; each is shown to `seen` with what the baseline says.
-pub fn judge(
+/// Evaluates a baseline on images of a dataset; each is passed to `seen` with its prediction.
+pub fn evaluate(
     baseline: &Baseline,
     on: &Selection,
     like: &Shape,
@@ -58,7 +58,7 @@ pub fn judge(
         let seconds = Some(begun.elapsed().as_secs_f64());
         let plants = example.plants.iter().any(|p| *p > 0).then_some(example.plants.as_slice());
         let (name, truth) = (example.name.as_str(), example.labels.as_slice());
-        evaluation.add(&Answer { name, width, height, truth, predicted: &predicted, plants, seconds })?;
+        evaluation.add(&Prediction { name, width, height, truth, predicted: &predicted, plants, seconds })?;
         seen(&example, &predicted);
     }
     Ok(evaluation.finish())

@@ -1,4 +1,4 @@
-//! How green a pixel is, and where green begins.
+//! Excess green index (ExG) and its threshold.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,6 +1,7 @@
-//! Colour baselines: what a network must beat to have learned more than "green is a plant, and a large one is the crop".
+//! ExG threshold and component-size baselines: what a network must beat to have learned more than "green is a plant, and a large one is
+//! the crop".
 //!
-//! A pixel is green where its excess green is not below a threshold.
+//! A pixel is vegetation where its excess green index (ExG) is not below a threshold.
 //!
 //! - `otsu`: of chromatic coordinates (Woebbecke et al. 1995), with the threshold that Otsu 1979 finds in each image by itself. Where there is
 //!   little green it finds two kinds of soil.
@@ -8,10 +9,10 @@
 //!   and of five blurs beforehand does best there. On dark images with artificial light chromatic coordinates do, for which noise must be
 //!   blurred; under a bright sun plain differences do.
 //!
-//! What green means is told by
+//! What vegetation is classified as depends on the kind of baseline:
 //!
 //! - `exg`: crop;
-//! - `exg-size`: crop in 8-connected regions from one share of the image's pixels on, weed from a smaller share on, soil below it; both
+//! - `exg-size`: crop in 8-connected components from one share of the image's pixels on, weed from a smaller share on, soil below it; both
 //!   are those of the largest mean I/U on the training images. Shares carry over to the same view at another resolution.
 //!
 //! Classes are soil 0, crop 1, weed 2, and 255 in the truth no label.
@@ -37,13 +38,13 @@ const CLASSES: usize = 3;
 /// Standard deviations of the blur that are tried, as shares of the image's diagonal: none to six pixels of 1296 × 966.
 const BLURS: [f64; 5] = [0.0, 0.0005, 0.001, 0.002, 0.004];
 
-/// What the baseline looks at.
+/// A kind of baseline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
-    /// Colour: all green is crop.
+    /// ExG threshold: all vegetation is crop.
     Exg,
-    /// Colour and size of green regions: crop is large, weed is small.
+    /// ExG threshold and component size: large components are crop, small ones weed.
     ExgSize,
 }
 
@@ -91,7 +92,7 @@ pub struct Example {
 /// A fitted baseline.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Baseline {
-    /// What it looks at.
+    /// Its kind.
     pub kind: Kind,
     /// What green is measured in.
     pub index: Index,
@@ -134,7 +135,7 @@ impl Baseline {
         levels.into_iter().map(|level| level >= first).collect()
     }
 
-    /// The index, blur and threshold that tell plants of the training images from soil best.
+    /// The index, blur and threshold that separate plants and soil of the training set best.
     fn fit_colour(kind: Kind, images: impl IntoIterator<Item = Result<Example>>) -> Result<Self> {
         let ways: Vec<(f64, Index)> = BLURS.iter().flat_map(|blur| Index::ALL.map(|index| (*blur, index))).collect();
         // Of each way, the levels of soil and of plants.

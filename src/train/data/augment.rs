@@ -1,16 +1,17 @@
-//! Chance between an image and the network: what a camera, a tractor's heading and the weather would have made otherwise.
+//! Data augmentation: random changes of an image that stand for other cameras, headings of the tractor and weather.
 //!
-//! Values are sRGB-coded in 0 to 1. Pictures are turned, mirrored, scaled and shifted in one bilinear reading, mirrored at their
-//! edges; labels by the nearest pixel. Every image at every step has a stream of its own, so neither threads nor restarts
+//! Values are sRGB-coded in 0 to 1. Images are rotated, flipped, scaled and shifted in one bilinear resampling, reflected at their
+//! edges; labels by the nearest pixel. Every image at every step has a random stream of its own, so neither threads nor restarts
 //! change what is drawn.
 
+use super::crop::{self, Crop, Moves, Placement};
 use super::example::Example;
-use super::normalise::{self, Normalisation};
-use super::window::{self, Placement, View};
+use super::normalise::{self, Normalization};
 use crate::sampling::Stream;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
-/// What is varied; each may be left out.
+/// Data augmentation; each part may be left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a switch of its own, none a state")]
@@ -38,10 +39,36 @@ impl Default for Augment {
     }
 }
 
+impl fmt::Display for Augment {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { flip, rotate, scale, crop, colour, blur, noise } = *self;
+        let parts = [
+            (flip, "flip"),
+            (rotate, "rotate"),
+            (scale, "scale"),
+            (crop, "crop"),
+            (colour, "colour"),
+            (blur, "blur"),
+            (noise, "noise"),
+        ];
+        let names: Vec<&str> = parts.iter().filter(|(on, _)| *on).map(|(_, name)| *name).collect();
+        match names.len() {
+            0 => f.write_str("none"),
+            n if n == parts.len() => f.write_str("all"),
+            _ => f.write_str(&names.join(",")),
+        }
+    }
+}
+
 impl Augment {
-    /// Nothing is varied.
+    /// No augmentation.
     pub const NONE: Self =
         Self { flip: false, rotate: false, scale: false, crop: false, colour: false, blur: false, noise: false };
+
+    /// The parts of it that move a crop.
+    fn moves(self) -> Moves {
+        Moves { flip: self.flip, rotate: self.rotate, scale: self.scale, shift: self.crop }
+    }
 
     /// Reads `all`, `none` or names with commas between.
     pub fn parse(text: &str) -> Result<Self, String> {
@@ -59,7 +86,7 @@ impl Augment {
                 "noise" => augment.noise = true,
                 _ => {
                     return Err(format!(
-                        "`{name}` is not varied: write all, none, or some of flip, rotate, scale, crop, colour, blur, noise"
+                        "there is no augmentation `{name}`: write all, none, or some of flip, rotate, scale, crop, colour, blur, noise"
                     ));
                 }
             }
@@ -67,23 +94,22 @@ impl Augment {
         Ok(augment)
     }
 
-    /// An image as the network will see it, or the window of it: `bands` values a pixel side by side, normalised, and its
-    /// labels. `colour[b]` says whether band b belongs to the photograph in colour. A window is normalised by the whole image,
-    /// as a network will see whole images later.
+    /// A crop of an image as the network's input: `bands` values a pixel side by side, normalized, and its labels. `colour[b]` says
+    /// whether band b belongs to the colour photograph. A crop is normalized by the whole image, as whole images will be later.
     pub fn apply(
         &self,
         example: &Example,
-        view: &View,
+        crop: &Crop,
         colour: &[bool],
-        normalisation: &Normalisation,
+        normalization: &Normalization,
         stream: &mut Stream,
     ) -> (Vec<f32>, Vec<u8>) {
-        let &View { size, window, rare } = view;
-        let anywhere = window == size || rare == 0.0 || !stream.chance(rare);
-        let about = if anywhere { None } else { window::rare_pixel(&example.labels, size, stream) };
-        let placement = Placement::draw(*self, view, about, stream);
+        let &Crop { image, size, rare } = crop;
+        let anywhere = size == image || rare == 0.0 || !stream.chance(rare);
+        let about = if anywhere { None } else { crop::rare_pixel(&example.labels, image, stream) };
+        let placement = Placement::draw(self.moves(), crop, about, stream);
         let (mut pixels, labels) = match &placement {
-            Some(placement) => placement.read(example, view),
+            Some(placement) => placement.read(example, crop),
             None => (interleave(example, 1), example.labels.clone()),
         };
         let light = self.colour.then(|| Light::draw(colour, stream));
@@ -92,31 +118,31 @@ impl Augment {
             [x as f32 + 0.5 - w as f32 / 2.0, y as f32 + 0.5 - h as f32 / 2.0]
         };
         if let Some(light) = &light {
-            let at = |i| placement.as_ref().map_or_else(|| centred(i, size), |p| p.map(centred(i, window)));
-            light.apply(&mut pixels, colour, size, at);
+            let at = |i| placement.as_ref().map_or_else(|| centred(i, image), |p| p.map(centred(i, size)));
+            light.apply(&mut pixels, colour, image, at);
         }
         if self.blur && stream.chance(0.5) {
-            blur(&mut pixels, colour.len(), window, stream.range32(0.3, 1.2));
+            blur(&mut pixels, colour.len(), size, stream.range32(0.3, 1.2));
         }
         if self.noise {
             let sd = stream.range32(0.0, 0.03);
             add_noise(&mut pixels, sd, stream);
         }
-        let scales = if window == size {
-            normalisation.scales(&pixels, colour.len())
+        let scales = if size == image {
+            normalization.scales(&pixels, colour.len())
         } else {
             let mut whole = interleave(example, THINNED);
             if let Some(light) = &light {
-                light.apply(&mut whole, colour, size, |i| centred(i * THINNED, size));
+                light.apply(&mut whole, colour, image, |i| centred(i * THINNED, image));
             }
-            normalisation.scales(&whole, colour.len())
+            normalization.scales(&whole, colour.len())
         };
         normalise::scale(&mut pixels, &scales);
         (pixels, labels)
     }
 }
 
-/// Of so many pixels one tells what a whole image has for mean and deviation: a prime, so that columns take turns.
+/// One of so many pixels is used for mean and standard deviation of a whole image: a prime, so that columns take turns.
 const THINNED: usize = 13;
 
 /// Bands side by side, in 0 to 1, of every `step`-th pixel.
@@ -226,12 +252,12 @@ mod tests {
     use super::*;
     use crate::sampling::Purpose;
 
-    fn as_it_is() -> Normalisation {
-        Normalisation::Fixed { mean: vec![0.0; 3], sd: vec![1.0; 3] }
+    fn as_it_is() -> Normalization {
+        Normalization::Fixed { mean: vec![0.0; 3], sd: vec![1.0; 3] }
     }
 
-    fn view(size: (u32, u32), window: (u32, u32)) -> View {
-        View { size, window, rare: 0.0 }
+    fn crop(image: (u32, u32), size: (u32, u32)) -> Crop {
+        Crop { image, size, rare: 0.0 }
     }
 
     fn example(w: u32, h: u32) -> Example {
@@ -249,7 +275,7 @@ mod tests {
             let mut stream = Stream::of(seed, 0, Purpose::Test, 0);
             for window in [(w, h), (17, 21)] {
                 let (pixels, labels) =
-                    augment.apply(&example(w, h), &view((w, h), window), &[true; 3], &as_it_is(), &mut stream);
+                    augment.apply(&example(w, h), &crop((w, h), window), &[true; 3], &as_it_is(), &mut stream);
                 assert_eq!(labels.len(), (window.0 * window.1) as usize);
                 let wrong =
                     pixels.chunks_exact(3).zip(&labels).filter(|(p, l)| (p[0] > 120.0 / 255.0) != (**l == 1)).count();
@@ -265,7 +291,7 @@ mod tests {
         for seed in 0..50 {
             let mut stream = Stream::of(seed, 0, Purpose::Test, 0);
             let (pixels, labels) =
-                augment.apply(&example(w, h), &view((w, h), (16, 13)), &[true; 3], &as_it_is(), &mut stream);
+                augment.apply(&example(w, h), &crop((w, h), (16, 13)), &[true; 3], &as_it_is(), &mut stream);
             let same =
                 |(pixel, label): (&[f32], &u8)| pixel.iter().all(|v| *v == [40.0, 200.0][usize::from(*label)] / 255.0);
             assert!(pixels.chunks_exact(3).zip(&labels).all(same), "{seed}");
@@ -277,22 +303,22 @@ mod tests {
         let picture = example(8, 6);
         let mut stream = Stream::of(1, 0, Purpose::Test, 0);
         let (pixels, labels) =
-            Augment::NONE.apply(&picture, &view((8, 6), (8, 6)), &[true; 3], &as_it_is(), &mut stream);
+            Augment::NONE.apply(&picture, &crop((8, 6), (8, 6)), &[true; 3], &as_it_is(), &mut stream);
         assert_eq!(labels, picture.labels);
         assert_eq!(pixels, interleave(&picture, 1));
     }
 
-    /// Rationale: a window of bare ground must not look like a whole image of it. Expected: bright is +1 and dark −1, as in the
-    /// whole image, of which each is a half, also in windows that hold one of them alone. Source: the picture.
+    /// Rationale: a crop of bare ground must not look like a whole image of it. Expected: bright is +1 and dark −1, as in the
+    /// whole image, of which each is a half, also in crops that hold one of them alone. Source: the picture.
     #[test]
-    fn a_window_lies_in_its_image_and_is_normalised_by_all_of_it() {
+    fn a_crop_lies_in_its_image_and_is_normalized_by_all_of_it() {
         let (w, h) = (41, 30);
         let picture = example(w, h);
         let mut pure = [0, 0];
         for seed in 0..60 {
             let mut stream = Stream::of(seed, 0, Purpose::Test, 0);
             let (pixels, labels) =
-                Augment::NONE.apply(&picture, &view((w, h), (8, 8)), &[true; 3], &Normalisation::Band, &mut stream);
+                Augment::NONE.apply(&picture, &crop((w, h), (8, 8)), &[true; 3], &Normalization::Band, &mut stream);
             let ones: usize = labels.iter().map(|l| usize::from(*l)).sum();
             for (side, all) in pure.iter_mut().zip([0, labels.len()]) {
                 *side += u32::from(ones == all);

@@ -1,13 +1,13 @@
-//! Batches, made ahead of the network by threads of their own.
+//! The data loader: batches, made ahead of the network by threads of their own.
 //!
 //! Step s takes images s·b to s·b + b − 1 of an endless list: all images in a random order, then all in another, and so on.
 //! The seed and the step alone decide a batch, so a run that goes on after a kill gets the same ones, whatever the threads.
 
 use super::augment::Augment;
 use super::bands::Band;
-use super::normalise::Normalisation;
+use super::crop::Crop;
+use super::normalise::Normalization;
 use super::store::Store;
-use super::window::View;
 use crate::Result;
 use crate::sampling::{Purpose, Stream};
 use std::sync::Arc;
@@ -20,14 +20,14 @@ pub struct Order {
     pub seed: u64,
     /// Images of a batch; ≥ 1.
     pub batch: usize,
-    /// Pixels of each image that are learnt from: width, height.
-    pub window: (u32, u32),
-    /// Share of the windows that hold a rare class; see [`View::rare`].
+    /// Width and height of the crop of each image, pixels.
+    pub crop_size: (u32, u32),
+    /// Share of the crops that are centred on rare-class pixels; see [`Crop::rare`].
     pub rare: f64,
-    /// What is varied.
+    /// Data augmentation.
     pub augment: Augment,
-    /// What is taken out after that.
-    pub normalisation: Normalisation,
+    /// Input normalization, after that.
+    pub normalization: Normalization,
 }
 
 /// Images in one piece of memory.
@@ -35,7 +35,7 @@ pub struct Order {
 pub struct Batch {
     /// How many.
     pub images: usize,
-    /// `images × height × width × bands`, normalised; of windows.
+    /// `images × height × width × bands`, normalized; of crops.
     pub pixels: Vec<f32>,
     /// `images × height × width` classes; 255 for none.
     pub labels: Vec<u8>,
@@ -110,13 +110,13 @@ impl Epochs {
 fn make(store: &Store, order: &Order, step: u64, epochs: &mut Epochs) -> Result<Batch> {
     let shape = store.shape();
     let colour: Vec<bool> = shape.bands.iter().map(Band::is_color).collect();
-    let view = View { size: (shape.width, shape.height), window: order.window, rare: order.rare };
+    let crop = Crop { image: (shape.width, shape.height), size: order.crop_size, rare: order.rare };
     let mut batch = Batch { images: order.batch, pixels: Vec::new(), labels: Vec::new() };
     for slot in 0..order.batch as u64 {
         let place = step * order.batch as u64 + slot;
         let example = store.get(epochs.at(place, store.len()))?;
         let mut stream = Stream::of(order.seed, place, Purpose::Training, 2);
-        let (pixels, labels) = order.augment.apply(&example, &view, &colour, &order.normalisation, &mut stream);
+        let (pixels, labels) = order.augment.apply(&example, &crop, &colour, &order.normalization, &mut stream);
         batch.pixels.extend(pixels);
         batch.labels.extend(labels);
     }

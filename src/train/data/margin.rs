@@ -1,18 +1,18 @@
-//! Outlines as people draw them: a little outside of the leaf, or inside.
+//! Label masks dilated (or eroded) by some pixels.
 //!
-//! Rendered labels end where the leaf ends. A person's outline keeps a distance from it, and whoever is judged by such outlines is
-//! judged by that distance as well: of a leaf of 40 pixels, one pixel all around is a tenth.
+//! Rendered masks end where the leaf ends. Manual masks are dilated by about 1 px: annotators draw outside of the leaf. A network that
+//! is evaluated on manual masks must learn from masks of the same kind: of a leaf 40 pixels across, one pixel all around is a tenth.
 
 use crate::math::disc;
 
-/// Farthest that an outline is moved, pixels.
+/// Most that a mask is dilated or eroded, pixels.
 pub const MOST: f32 = 16.0;
 
 /// Reads `+1.4` or `-2`.
 pub fn parse(text: &str) -> Result<f32, String> {
     let margin = text.parse().ok().filter(|margin: &f32| margin.abs() <= MOST);
     margin.ok_or_else(|| {
-        format!("outlines are not moved by `{text}` pixels: write +1.4px, or -2px for inside; {MOST} at most")
+        format!("masks are not dilated by `{text}` pixels: write +1.4px, or -2px to erode them; {MOST} at most")
     })
 }
 
@@ -61,7 +61,7 @@ mod tests {
         }
     }
 
-    /// Rationale: who is judged by outlines that lie outside of the leaf must learn from such. Expected: a disc of radius 12 gets
+    /// Rationale: a network that is evaluated on dilated masks must be trained on such masks. Expected: a disc of radius 12 gets
     /// the radius 12 plus the margin, as near as whole pixels come; nothing else changes class; and none moves nothing. Source:
     /// areas of discs.
     #[test]

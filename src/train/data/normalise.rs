@@ -1,18 +1,18 @@
-//! Exposure and white balance taken out of an image before a network sees it.
+//! Input normalization: exposure and white balance are removed from an image before a network sees it.
 
 use super::store::Store;
 use crate::Result;
 use serde::{Deserialize, Serialize};
 
-/// How bands are brought to mean 0 and deviation 1.
+/// How bands are brought to mean 0 and standard deviation 1.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Normalisation {
-    /// Each band of each image by its own mean and deviation: takes out exposure, white balance and contrast.
+pub enum Normalization {
+    /// Each band of each image by its own mean and standard deviation: removes exposure, white balance and contrast.
     Band,
-    /// All bands of an image by one mean and one deviation: takes out exposure and contrast, colours stay.
+    /// All bands of an image by one mean and one standard deviation: removes exposure and contrast, colours stay.
     Image,
-    /// By the training images' mean and deviation of each band (of values in 0 to 1): takes nothing out.
+    /// By the training set's mean and standard deviation of each band (of values in 0 to 1): all images alike.
     Fixed {
         /// Means.
         mean: Vec<f32>,
@@ -24,7 +24,7 @@ pub enum Normalisation {
 /// What a deviation is at least, in values from 0 to 1: a picture of one colour stays finite. A step of 8 bits.
 pub(crate) const LEAST: f32 = 1.0 / 255.0;
 
-impl Normalisation {
+impl Normalization {
     /// [`Self::Fixed`] to what the images of a store have.
     pub fn fixed(store: &Store) -> Result<Self> {
         let bands = store.shape().bands.len();
@@ -48,13 +48,13 @@ impl Normalisation {
         Ok(Self::Fixed { mean: mean.iter().map(|m| *m as f32).collect(), sd })
     }
 
-    /// Normalises an image in place: `pixels` holds `bands` values a pixel, side by side.
+    /// Normalizes an image in place: `pixels` holds `bands` values a pixel, side by side.
     pub fn apply(&self, pixels: &mut [f32], bands: usize) {
         let scales = self.scales(pixels, bands);
         scale(pixels, &scales);
     }
 
-    /// Mean and deviation that are taken out of each band of an image with these pixels, or with some of them.
+    /// Mean and standard deviation of each band of an image with these pixels, or with some of them.
     pub(super) fn scales(&self, pixels: &[f32], bands: usize) -> Vec<(f32, f32)> {
         match self {
             Self::Fixed { mean, sd } => mean.iter().copied().zip(sd.iter().copied()).collect(),
@@ -64,7 +64,7 @@ impl Normalisation {
     }
 }
 
-/// Takes mean and deviation out of each band.
+/// Subtracts the mean of each band and divides by its standard deviation.
 pub(super) fn scale(pixels: &mut [f32], scales: &[(f32, f32)]) {
     for pixel in pixels.chunks_exact_mut(scales.len()) {
         for (v, (mean, sd)) in pixel.iter_mut().zip(scales) {
@@ -94,18 +94,18 @@ mod tests {
         let picture: Vec<f32> = (0..60).map(|i| ((i * 37) % 23) as f32 / 30.0).collect();
         let brighter: Vec<f32> = picture.iter().map(|v| 1.2 * v + 0.05).collect();
         let tinted: Vec<f32> = picture.iter().enumerate().map(|(i, v)| v * [1.0, 0.7, 1.3][i % 3]).collect();
-        let apply = |n: &Normalisation, p: &[f32]| {
+        let apply = |n: &Normalization, p: &[f32]| {
             let mut p = p.to_vec();
             n.apply(&mut p, 3);
             p
         };
         let close = |a: &[f32], b: &[f32]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-4);
-        let plain = apply(&Normalisation::Band, &picture);
-        assert!(close(&plain, &apply(&Normalisation::Band, &brighter)));
-        assert!(close(&plain, &apply(&Normalisation::Band, &tinted)));
-        let plain = apply(&Normalisation::Image, &picture);
-        assert!(close(&plain, &apply(&Normalisation::Image, &brighter)));
-        assert!(!close(&plain, &apply(&Normalisation::Image, &tinted)));
-        assert!(apply(&Normalisation::Band, &[0.3; 6]).iter().all(|v| v.abs() < 1e-4));
+        let plain = apply(&Normalization::Band, &picture);
+        assert!(close(&plain, &apply(&Normalization::Band, &brighter)));
+        assert!(close(&plain, &apply(&Normalization::Band, &tinted)));
+        let plain = apply(&Normalization::Image, &picture);
+        assert!(close(&plain, &apply(&Normalization::Image, &brighter)));
+        assert!(!close(&plain, &apply(&Normalization::Image, &tinted)));
+        assert!(apply(&Normalization::Band, &[0.3; 6]).iter().all(|v| v.abs() < 1e-4));
     }
 }

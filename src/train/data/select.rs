@@ -1,5 +1,5 @@
-//! Which images of which set: `DIR`, `DIR@val`, `DIR@0..10`, `DIR@1/2`, `DIR@random:100`; `DIR@0..10+1.4px` has outlines so far outside
-//! of the leaves, and all may end with `*4` to have images four times.
+//! Which images of which set: `DIR`, `DIR@val`, `DIR@0..10`, `DIR@1/2`, `DIR@random:100`; `DIR@0..10+1.4px` dilates
+//! their label masks by 1.4 pixels, and all may end with `*4` to oversample: each image four times an epoch.
 
 use super::margin;
 use crate::dataset::Set;
@@ -21,7 +21,7 @@ pub enum Pick {
     Range(u64, u64),
     /// Those whose number leaves the first when divided by the second: every so many, from there on.
     Every(u64, u64),
-    /// So many by chance, the same under the same seed whatever the set's name.
+    /// So many at random, the same under the same seed whatever the set's name.
     Random(u64),
 }
 
@@ -32,11 +32,10 @@ pub struct Selection {
     pub folder: PathBuf,
     /// Which of its images; the verb's own choice unless given.
     pub pick: Option<Pick>,
-    /// How far outside of the leaves their outlines are taken to lie, pixels of the set's images, negative for inside; see
-    /// [`super::margin`].
+    /// By how much their label masks are dilated, pixels of the set's images, negative to erode; see [`super::margin`].
     #[serde(default, skip_serializing_if = "is_none")]
     pub margin: f32,
-    /// How often each stands in the list; ≥ 1.
+    /// Oversampling: how often each image is in an epoch; ≥ 1.
     pub repeat: u32,
 }
 
@@ -46,7 +45,7 @@ fn is_none(margin: &f32) -> bool {
 }
 
 impl Selection {
-    /// All images of a folder that a verb takes unless told otherwise.
+    /// The images of a folder that a subcommand takes by default.
     pub fn of(folder: impl Into<PathBuf>) -> Self {
         Self { folder: folder.into(), pick: None, margin: 0.0, repeat: 1 }
     }
@@ -134,7 +133,7 @@ impl Pick {
     }
 }
 
-/// `n` of `0..count` by chance, in the order of their numbers. Source: Fisher & Yates 1938, as far as needed.
+/// `n` of `0..count` at random, in the order of their numbers. Source: Fisher & Yates 1938, as far as needed.
 fn sample(count: u64, n: u64, seed: u64) -> Vec<u64> {
     let mut stream = Stream::of(seed, 0, Purpose::Training, 0);
     let mut all: Vec<u64> = (0..count).collect();
@@ -172,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn chance_picks_each_image_once_and_always_the_same() {
+    fn random_picks_take_each_image_once_and_always_the_same() {
         let some = sample(1000, 100, 3);
         assert_eq!(some, sample(1000, 100, 3));
         assert_ne!(some, sample(1000, 100, 4));

@@ -71,12 +71,21 @@ impl Store {
         let (set, number) = self.images[place];
         let (set, map, margin) = &self.sets[set];
         let example = Example::read(set, number, map, *margin, &self.shape, self.with_plants)?;
+        Ok(self.keep(place, example))
+    }
+
+    /// Keeps an image that was read, where the budget allows it.
+    fn keep(&self, place: usize, example: Example) -> Cow<'_, Example> {
         let bytes = example.bytes();
-        let takes = |free: u64| free.checked_sub(bytes);
-        if self.free.fetch_update(Ordering::Relaxed, Ordering::Relaxed, takes).is_ok() {
-            return Ok(Cow::Borrowed(self.kept[place].get_or_init(|| example)));
+        let take = |free: u64| free.checked_sub(bytes);
+        if self.free.fetch_update(Ordering::Relaxed, Ordering::Relaxed, take).is_err() {
+            return Cow::Owned(example);
         }
-        Ok(Cow::Owned(example))
+        if self.kept[place].set(example).is_err() {
+            // Another thread has kept the same image meanwhile: it takes memory once.
+            self.free.fetch_add(bytes, Ordering::Relaxed);
+        }
+        Cow::Borrowed(self.kept[place].get().expect("an image that was just kept"))
     }
 
     /// What decides the images of a place: the set's fingerprint and the image's number.

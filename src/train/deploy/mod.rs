@@ -1,12 +1,12 @@
-//! What was learnt, taken out of here: into files that other programs run, and onto pictures that nobody has labelled.
+//! Trained models in use: exported to files that other programs run, and predictions for pictures without labels.
 //!
 //! | file | idea |
 //! |---|---|
 //! | `onnx` | the network as an ONNX graph, normalisation inside |
 //! | `torchscript` | the same for libtorch and PyTorch |
-//! | `pictures` | which pictures are asked about, where their bands lie, and what their answers are called |
+//! | `pictures` | which pictures are predicted, where their bands lie, and what the files of their predictions are called |
 //! | `enlarge` | a network's values at the picture's own size |
-//! | `overlay` | the answer over the picture, for people |
+//! | `overlay` | a prediction over its picture, for people |
 //! | `predict` | from pictures to masks |
 //!
 //! Exported networks begin where a camera ends, so that nobody who runs them can divide by another number or take out another mean:
@@ -15,7 +15,7 @@
 //! [`crate::output::resize_gray`] does here and `PIL.Image.resize(size, PIL.Image.BILINEAR)` in Python.
 
 use super::data::Band;
-use super::run::Card;
+use super::run::ModelCard;
 use serde::Serialize;
 
 pub mod enlarge;
@@ -34,7 +34,7 @@ pub struct Facts {
     pub bands: Vec<String>,
     /// Its classes, in the order of their numbers.
     pub classes: Vec<String>,
-    /// Pixels down, at which it learnt or for which it was frozen.
+    /// Pixels down, at which it was trained or for which it was frozen.
     pub height: u32,
     /// The network's name.
     pub network: String,
@@ -48,7 +48,7 @@ pub struct Facts {
 
 impl Facts {
     /// Of a network at a size.
-    pub fn of(card: &Card, (width, height): (u32, u32)) -> Self {
+    pub fn of(card: &ModelCard, (width, height): (u32, u32)) -> Self {
         Self {
             bands: card.input.bands.iter().map(Band::name).map(str::to_owned).collect(),
             classes: card.classes.names(),

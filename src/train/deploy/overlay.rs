@@ -1,4 +1,4 @@
-//! The answer over the picture, for people: pixels of a class tinted with its colour, outlines in the colour itself.
+//! A prediction over its picture, for people: pixels of a class tinted with its colour, outlines in the colour itself.
 
 /// Share of the colour over the picture.
 const TINT: f32 = 0.35;

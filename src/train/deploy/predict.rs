@@ -1,13 +1,13 @@
 //! From pictures to masks.
 //!
 //! Threads of their own read ahead of the network and write behind it, so that it waits for neither. A picture that cannot be read
-//! keeps no other from its answer.
+//! keeps no other from its prediction.
 
-use super::pictures::{PREDICTION, Picture, Prediction, answers};
+use super::pictures::{PREDICTION, Picture, Prediction, files};
 use super::{enlarge, overlay};
 use crate::output::{self, Picture as Png};
 use crate::train::engine::{Model, device};
-use crate::train::run::{Card, Learnt};
+use crate::train::run::{ModelCard, TrainedModel};
 use crate::train::session::Machine;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -16,13 +16,13 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{Scope, ScopedJoinHandle};
 use std::time::Instant;
 
-/// How pictures are answered.
-pub struct How<'a> {
+/// Options of a prediction.
+pub struct Options<'a> {
     /// `auto`, `f32` or `bf16`.
     pub precision: &'a str,
     /// Threads that compute.
     pub threads: usize,
-    /// Pictures that the network answers at once; ≥ 1.
+    /// Batch size; ≥ 1.
     pub batch: usize,
     /// Called with the number of pictures that are done with.
     pub done: &'a (dyn Fn(usize) + Sync),
@@ -30,12 +30,12 @@ pub struct How<'a> {
     pub stop: &'a AtomicBool,
 }
 
-/// What came out.
+/// Predictions that were made.
 #[derive(Debug, Default)]
-pub struct Answered {
+pub struct Predictions {
     /// The files, two a picture, in the pictures' order; last the one that tells what they are.
     pub paths: Vec<PathBuf>,
-    /// Pictures with an answer.
+    /// Pictures with a prediction.
     pub done: usize,
     /// What kept the others from being read.
     pub faults: Vec<Error>,
@@ -56,24 +56,24 @@ struct Ready<'a> {
 /// Pictures that each thread may be ahead, or behind.
 const AHEAD: usize = 2;
 
-/// Answers pictures: for each, an indexed PNG of its classes and one of them over it, both at its own size.
-/// An error where files would be written over that are not answers to the same pictures.
+/// Predicts the classes of pictures: for each, an indexed PNG of its classes and one of them over it, both at its own size.
+/// An error where files would be written over that are not predictions of the same pictures.
 pub fn predict(
-    learnt: &Learnt,
+    trained: &TrainedModel,
     pictures: &[Picture],
     out: &Path,
     machine: &Machine,
-    how: &How<'_>,
-) -> Result<Answered> {
-    let card = &learnt.card;
-    let place = machine.place(how.precision)?;
-    device::set_threads(how.threads);
+    options: &Options<'_>,
+) -> Result<Predictions> {
+    let card = &trained.card;
+    let place = machine.place(options.precision)?;
+    device::set_threads(options.threads);
     let (bands, classes) = (card.input.bands.len(), card.classes.len());
-    let model = Model::with(card.network, bands, classes, &learnt.values, place)?;
+    let model = Model::with(card.network, bands, classes, &trained.values, place)?;
     let prediction = Prediction::claim(out, card, pictures)?;
     let workers = machine.loaders.max(1);
     let failed = AtomicBool::new(false);
-    let mut answered = Answered::default();
+    let mut made = Predictions::default();
     let mut unread = Vec::new();
     std::thread::scope(|scope| -> Result<()> {
         let readers: Vec<_> =
@@ -81,20 +81,20 @@ pub fn predict(
         let (writers, handles): (Vec<_>, Vec<_>) = (0..workers).map(|_| write(scope, card, out, &failed)).unzip();
         let mut batch = Vec::new();
         for number in 0..pictures.len() {
-            if how.stop.load(Ordering::Relaxed) || failed.load(Ordering::Relaxed) {
+            if options.stop.load(Ordering::Relaxed) || failed.load(Ordering::Relaxed) {
                 break;
             }
             match readers[number % workers].recv() {
                 Ok(Ok(ready)) => batch.push((number, ready)),
                 Ok(Err(fault)) => {
                     unread.push(pictures[number].name.as_str());
-                    answered.faults.push(fault);
+                    made.faults.push(fault);
                 }
                 Err(_) => break,
             }
-            if batch.len() == how.batch || number + 1 == pictures.len() {
-                answered.seconds += answer(&model, card, std::mem::take(&mut batch), &writers)?;
-                (how.done)(number + 1);
+            if batch.len() == options.batch || number + 1 == pictures.len() {
+                made.seconds += infer(&model, card, std::mem::take(&mut batch), &writers)?;
+                (options.done)(number + 1);
             }
         }
         drop((readers, writers));
@@ -103,25 +103,25 @@ pub fn predict(
             written.extend(handle.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?);
         }
         written.sort();
-        answered.done = written.len();
-        answered.paths = written.into_iter().flat_map(|(_, paths)| paths).collect();
+        made.done = written.len();
+        made.paths = written.into_iter().flat_map(|(_, paths)| paths).collect();
         Ok(())
     })?;
-    if how.stop.load(Ordering::Relaxed) {
-        let words = format!("stopped: {} of {} pictures are predicted", answered.done, pictures.len());
+    if options.stop.load(Ordering::Relaxed) {
+        let words = format!("stopped: {} of {} pictures are predicted", made.done, pictures.len());
         return Err(Error::stopped(words).help("the same command ends with all of them").in_file(out));
     }
     if !unread.is_empty() {
         prediction.forget(out, &unread)?;
     }
-    answered.paths.push(out.join(PREDICTION));
-    Ok(answered)
+    made.paths.push(out.join(PREDICTION));
+    Ok(made)
 }
 
 /// Begins to read pictures.
 fn read<'s, 'a: 's>(
     scope: &'s Scope<'s, '_>,
-    card: &'a Card,
+    card: &'a ModelCard,
     pictures: impl Iterator<Item = &'a Picture> + Send + 's,
 ) -> Receiver<Result<Ready<'a>>> {
     let (sender, receiver) = sync_channel(AHEAD);
@@ -129,7 +129,7 @@ fn read<'s, 'a: 's>(
         for picture in pictures {
             let ready = picture.read().map(|found| {
                 let mut pixels = found.at((card.input.width, card.input.height));
-                card.normalisation.apply(&mut pixels, card.input.bands.len());
+                card.normalization.apply(&mut pixels, card.input.bands.len());
                 Ready { picture, width: found.width, height: found.height, rgb: found.rgb, pixels }
             });
             // Nobody listens any more: it was stopped.
@@ -146,10 +146,10 @@ type Scored<'a> = (usize, Ready<'a>, Vec<f32>);
 /// Number and files of each picture.
 type Written = Result<Vec<(usize, [PathBuf; 2])>>;
 
-/// Begins to wait for answers to write; raises `failed` where that cannot be done.
+/// Begins to wait for predictions to write; raises `failed` where that cannot be done.
 fn write<'s, 'a: 's>(
     scope: &'s Scope<'s, '_>,
-    card: &'a Card,
+    card: &'a ModelCard,
     out: &'a Path,
     failed: &'s AtomicBool,
 ) -> (SyncSender<Scored<'a>>, ScopedJoinHandle<'s, Written>) {
@@ -170,10 +170,10 @@ fn write<'s, 'a: 's>(
     (sender, handle)
 }
 
-/// Has the network answer a batch and hands the answers on; seconds of the network.
-fn answer<'a>(
+/// Runs the network on a batch and hands the scores on; seconds of the network.
+fn infer<'a>(
     model: &Model,
-    card: &Card,
+    card: &ModelCard,
     batch: Vec<(usize, Ready<'a>)>,
     writers: &[SyncSender<Scored<'a>>],
 ) -> Result<f64> {
@@ -192,8 +192,8 @@ fn answer<'a>(
     Ok(seconds)
 }
 
-/// Writes the answer to one picture.
-fn draw(card: &Card, out: &Path, ready: &Ready<'_>, scores: &[f32]) -> Result<[PathBuf; 2]> {
+/// Writes the prediction of one picture.
+fn draw(card: &ModelCard, out: &Path, ready: &Ready<'_>, scores: &[f32]) -> Result<[PathBuf; 2]> {
     let (width, height) = (ready.width, ready.height);
     let colors = card.classes.colors();
     let classes = enlarge::classes_at(scores, (card.input.width, card.input.height), (width, height));
@@ -205,7 +205,7 @@ fn draw(card: &Card, out: &Path, ready: &Ready<'_>, scores: &[f32]) -> Result<[P
         card.weights_sha256,
         card.classes.names().join("; ")
     );
-    let paths = answers(&ready.picture.name).map(|file| out.join(file));
+    let paths = files(&ready.picture.name).map(|file| out.join(file));
     output::write_png(&paths[0], width, height, &Png::Indexed(&classes, &colors), &text)?;
     output::write_png(&paths[1], width, height, &Png::Rgb(&over), &text)?;
     Ok(paths)

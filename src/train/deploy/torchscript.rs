@@ -6,10 +6,10 @@
 
 use super::Facts;
 use crate::output::place_atomically;
-use crate::train::data::Normalisation;
+use crate::train::data::Normalization;
 use crate::train::data::normalise::LEAST;
 use crate::train::engine::{Model, Precision, Where, failed};
-use crate::train::run::{Learnt, write_json};
+use crate::train::run::{TrainedModel, write_json};
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 use tch::{CModule, Device, Kind, Tensor};
@@ -22,8 +22,8 @@ pub fn facts_path(path: &Path) -> PathBuf {
 }
 
 /// Writes the network for pictures of so many pixels across and down, atomically, and the words about it.
-pub fn write(learnt: &Learnt, (width, height): (u32, u32), path: &Path) -> Result<()> {
-    let card = &learnt.card;
+pub fn write(trained: &TrainedModel, (width, height): (u32, u32), path: &Path) -> Result<()> {
+    let card = &trained.card;
     let bands = card.input.bands.len();
     let least = card.network.least_side();
     if width.min(height) < least {
@@ -33,10 +33,10 @@ pub fn write(learnt: &Learnt, (width, height): (u32, u32), path: &Path) -> Resul
         )));
     }
     let place = Where { device: Device::Cpu, precision: Precision::Single };
-    let mut model = Model::with(card.network, bands, card.classes.len(), &learnt.values, place)?;
+    let mut model = Model::with(card.network, bands, card.classes.len(), &trained.values, place)?;
     model.freeze();
     let example = Tensor::zeros([1, i64::from(height), i64::from(width), bands as i64], (Kind::Uint8, Device::Cpu));
-    let taken_out = TakenOut::of(&card.normalisation);
+    let taken_out = TakenOut::of(&card.normalization);
     let mut forward = |x: &[Tensor]| vec![model.walk(&taken_out.from(&x[0]), false)];
     let module = tch::no_grad(|| CModule::create_by_tracing("furrow", "forward", &[example], &mut forward));
     let module = module.map_err(|e| failed(&e))?;
@@ -44,7 +44,7 @@ pub fn write(learnt: &Learnt, (width, height): (u32, u32), path: &Path) -> Resul
     write_json(&facts_path(path), &Facts::of(card, (width, height)))
 }
 
-/// What is taken out of a picture. Constants are tensors before the tracing begins: of one that is made meanwhile the trace keeps
+/// Mean and standard deviation of the input normalization. Constants are tensors before the tracing begins: of one that is made meanwhile the trace keeps
 /// the shape, not the values.
 enum TakenOut<'a> {
     /// Means and deviations of the bands.
@@ -54,18 +54,18 @@ enum TakenOut<'a> {
 }
 
 impl TakenOut<'_> {
-    fn of(how: &Normalisation) -> Self {
+    fn of(how: &Normalization) -> Self {
         match how {
-            Normalisation::Fixed { mean, sd } => {
+            Normalization::Fixed { mean, sd } => {
                 let [mean, sd] = [mean, sd].map(|v| Tensor::from_slice(v).view([1, v.len() as i64, 1, 1]));
                 Self::Fixed(mean, sd)
             }
-            Normalisation::Band => Self::Own(&[2, 3]),
-            Normalisation::Image => Self::Own(&[1, 2, 3]),
+            Normalization::Band => Self::Own(&[2, 3]),
+            Normalization::Image => Self::Own(&[1, 2, 3]),
         }
     }
 
-    /// From 8-bit pixels, images × height × width × bands, to what the network takes; as [`Normalisation::apply`]. Dividing makes
+    /// From 8-bit pixels, images × height × width × bands, to what the network takes; as [`Normalization::apply`]. Dividing makes
     /// single precision of them; asking for it would write the device into the trace.
     fn from(&self, image: &Tensor) -> Tensor {
         let x = image.permute([0, 3, 1, 2]) / 255.0;

@@ -63,9 +63,9 @@ impl Model {
             .collect()
     }
 
-    /// The parameters that gradients change, by name.
-    pub fn learnt(&self) -> impl Iterator<Item = (&Parameter, &Tensor)> {
-        self.list.iter().filter(|p| p.role.is_learnt()).map(|p| (p, &self.tensors[&p.name]))
+    /// The trainable parameters, by name.
+    pub fn trainable(&self) -> impl Iterator<Item = (&Parameter, &Tensor)> {
+        self.list.iter().filter(|p| p.role.is_trainable()).map(|p| (p, &self.tensors[&p.name]))
     }
 
     /// From images × bands × height × width to images × classes × height × width. `training` uses and moves the statistics of
@@ -122,7 +122,7 @@ pub(super) fn failed(e: &tch::TchError) -> Error {
 }
 
 fn tensor(parameter: &Parameter, values: &[f32], device: Device) -> Tensor {
-    laid(&parameter.shape, values, device).detach().set_requires_grad(parameter.role.is_learnt())
+    laid(&parameter.shape, values, device).detach().set_requires_grad(parameter.role.is_trainable())
 }
 
 /// Values on a device, laid out as weights are.

@@ -1,34 +1,34 @@
-//! How readily each class is answered.
+//! Class-bias calibration: the biases of the last convolution, set anew after training.
 //!
-//! Losses that serve small plants, and windows laid about them, teach a network to answer plants too readily: outlines lie outside of those
-//! that it has learnt from. What its last convolution adds to each class says how readily, so this is set anew when all else is learnt,
-//! such that what is answered overlaps best with what is there. The rest stays, and so does the file's form.
+//! Losses that serve small plants, and crops centred on rare-class pixels, make a network over-predict plants: their predicted outlines
+//! lie outside of the labels'. So the bias of each class is set again on some labelled images, for the best mean intersection over
+//! union. All other weights stay, and so does the file's form.
 
 use crate::dataset::sample::IGNORE;
-use crate::train::data::{Normalisation, Store, augment};
+use crate::train::data::{Normalization, Store, augment};
 use crate::train::engine::Model;
 use crate::train::weights::Array;
 use crate::{Error, Result};
 
-/// The numbers that are set.
+/// The biases that are set.
 const HEAD: &str = "head.conv.bias";
-/// Of so many pixels one is looked at: a prime, so that columns take turns.
+/// One of so many pixels is used: a prime, so that columns take turns.
 const THINNED: usize = 5;
-/// Most that is added to a class, either way: odds of fifty to one.
+/// Most that a bias changes, either way: odds of fifty to one.
 const MOST: f32 = 4.0;
-/// Each class moves what the others have; so many rounds settle that.
+/// The biases depend on each other; so many rounds of coordinate ascent settle that.
 const ROUNDS: usize = 3;
 
-/// The values of a model with another head: that of the best mean I/U over the classes that are there, on `images` images of the store,
-/// evenly picked. The first class stays as it is, and so do classes that none of the images has.
-pub fn calibrate(model: &Model, store: &Store, normalisation: &Normalisation, images: u64) -> Result<Vec<Array>> {
+/// The weights of a model with calibrated class biases: those of the best mean I/U over the classes that occur, on `images` images of
+/// the store, evenly picked. The bias of the first class stays as it is, and so do those of classes that none of the images has.
+pub fn calibrate(model: &Model, store: &Store, normalization: &Normalization, images: u64) -> Result<Vec<Array>> {
     let shape = store.shape();
     let (mut values, mut labels) = (Vec::new(), Vec::new());
     let images = (images as usize).min(store.len());
     for k in 0..images {
         let example = store.get(k * store.len() / images)?;
         let mut pixels = augment::interleave(&example, 1);
-        normalisation.apply(&mut pixels, shape.bands.len());
+        normalization.apply(&mut pixels, shape.bands.len());
         let scores = model.scores(&pixels, (shape.width, shape.height))?;
         for at in (0..shape.pixels()).step_by(THINNED).filter(|at| example.labels[*at] != IGNORE) {
             labels.push(example.labels[at]);
@@ -42,9 +42,9 @@ pub fn calibrate(model: &Model, store: &Store, normalisation: &Normalisation, im
     Ok(arrays)
 }
 
-/// What is added to the classes' values, which lie side by side for each pixel, for the best overlap with the labels; at most [`MOST`]
-/// either way. Class by class: in the order of how far it leads, pixels change to it from the class that they have without it, and the best
-/// of all these states is kept.
+/// What is added to the classes' biases for the best overlap with the labels, at most [`MOST`] either way. `values` are the scores of
+/// all classes of a pixel, pixel after pixel. Class by class: in the order of its margin over the others, pixels change to it from the
+/// class that they are predicted to be without it, and the best of all these states is kept.
 fn offsets(values: &[f32], labels: &[u8], classes: usize) -> Vec<f32> {
     let mut offsets = vec![0.0f32; classes];
     let mut counts = vec![0; classes];
@@ -53,7 +53,7 @@ fn offsets(values: &[f32], labels: &[u8], classes: usize) -> Vec<f32> {
     }
     for _ in 0..ROUNDS {
         for class in (1..classes).filter(|class| counts[*class] > 0) {
-            let mut overlap = Overlap { there: &counts, answered: vec![0; classes], right: vec![0; classes] };
+            let mut overlap = Overlap { labelled: &counts, predicted: vec![0; classes], correct: vec![0; classes] };
             // How far the class leads over the highest other, that one, and the label.
             let mut leads: Vec<(f32, u8, u8)> = Vec::with_capacity(labels.len());
             for (pixel, label) in values.chunks_exact(classes).zip(labels) {
@@ -69,7 +69,7 @@ fn offsets(values: &[f32], labels: &[u8], classes: usize) -> Vec<f32> {
             for (k, (lead, other, label)) in leads.iter().enumerate() {
                 overlap.count(usize::from(*other), usize::from(*label), false);
                 overlap.count(class, usize::from(*label), true);
-                // Half way to the next, so that rounding changes no answer.
+                // Half way to the next, so that rounding changes no prediction.
                 let next = leads.get(k + 1).map_or(-MOST, |next| next.0);
                 let offset = -0.5 * (lead + next);
                 if next < *lead && offset.abs() <= MOST && overlap.mean() > best.0 {
@@ -82,27 +82,28 @@ fn offsets(values: &[f32], labels: &[u8], classes: usize) -> Vec<f32> {
     offsets
 }
 
-/// Pixels of each class: there, answered, and both.
+/// Pixels of each class: labelled, predicted, and both.
 struct Overlap<'a> {
-    there: &'a [u64],
-    answered: Vec<u64>,
-    right: Vec<u64>,
+    labelled: &'a [u64],
+    predicted: Vec<u64>,
+    correct: Vec<u64>,
 }
 
 impl Overlap<'_> {
-    /// Takes an answer in, or out again.
-    fn count(&mut self, answer: usize, label: usize, more: bool) {
+    /// Counts a prediction, or takes it out again.
+    fn count(&mut self, prediction: usize, label: usize, more: bool) {
         let change = |n: &mut u64| if more { *n += 1 } else { *n -= 1 };
-        change(&mut self.answered[answer]);
-        if answer == label {
-            change(&mut self.right[answer]);
+        change(&mut self.predicted[prediction]);
+        if prediction == label {
+            change(&mut self.correct[prediction]);
         }
     }
 
-    /// Mean I/U of the classes that are there.
+    /// Mean I/U of the classes that have labels.
     fn mean(&self) -> f64 {
-        let held = (0..self.there.len()).filter(|class| self.there[*class] > 0);
-        let each = held.map(|c| self.right[c] as f64 / (self.there[c] + self.answered[c] - self.right[c]) as f64);
+        let held = (0..self.labelled.len()).filter(|class| self.labelled[*class] > 0);
+        let each =
+            held.map(|c| self.correct[c] as f64 / (self.labelled[c] + self.predicted[c] - self.correct[c]) as f64);
         let (sum, n) = each.fold((0.0, 0.0f64), |(sum, n), value| (sum + value, n + 1.0));
         sum / n.max(1.0)
     }
@@ -113,10 +114,10 @@ mod tests {
     use super::*;
     use crate::sampling::{Purpose, Stream};
 
-    /// Rationale: a network that answers a class too readily draws it too wide. Expected: values of three classes, each two above the others
-    /// where it is there, blurred by noise, to two of which something was added: what is found undoes it, to a quarter. Without the third class its offset stays. Source: the values' construction.
+    /// Rationale: a network that over-predicts a class draws it too wide. Expected: scores of three classes with noise, to two of which
+    /// a bias was added: calibration undoes it, to a quarter. Without the third class its bias stays. Source: the scores' construction.
     #[test]
-    fn what_was_added_is_taken_off_again() {
+    fn calibration_undoes_a_class_bias() {
         let mut stream = Stream::of(7, 0, Purpose::Test, 0);
         let labels: Vec<u8> = (0..40_000).map(|k| if k % 10 == 0 { 1 } else { 2 * u8::from(k % 25 == 3) }).collect();
         let draw = |added: [f32; 3], stream: &mut Stream| -> Vec<f32> {

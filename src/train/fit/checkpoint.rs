@@ -1,4 +1,4 @@
-//! A training between two steps, in one file: values, the optimiser's memory, the best values so far, and what was seen.
+//! Checkpoints: a training between two steps in one file. Weights, the optimiser's state, the best weights so far, and the history.
 
 use crate::error::Kind;
 use crate::train::weights::{self, Array};
@@ -9,9 +9,9 @@ use std::path::Path;
 /// Its file, below the run's folder.
 pub const FILE: &str = "checkpoint.safetensors";
 
-/// Loss at a step.
+/// A point of the loss curve.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Loss {
+pub struct LossPoint {
     /// The last of the steps that it is the mean of.
     pub step: u64,
     /// Mean loss.
@@ -20,9 +20,9 @@ pub struct Loss {
     pub rate: f64,
 }
 
-/// A look at the validation images.
+/// A validation pass: how well the network does on the validation set.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Look {
+pub struct ValidationPass {
     /// After which step.
     pub step: u64,
     /// Global accuracy, 0 to 1.
@@ -33,25 +33,26 @@ pub struct Look {
     pub iou: Vec<Option<f64>>,
 }
 
-/// What a training has seen of itself.
+/// Loss curve and validation passes of a training.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct History {
-    /// Losses, one for every so many steps.
-    pub losses: Vec<Loss>,
-    /// Looks at the validation images.
-    pub looks: Vec<Look>,
+    /// Training loss, one point for every so many steps.
+    pub losses: Vec<LossPoint>,
+    /// Validation passes; `looks` in JSON, as version 0.1 wrote them.
+    #[serde(rename = "looks")]
+    pub validation: Vec<ValidationPass>,
 }
 
 impl History {
-    /// The best look; the first of equals.
-    pub fn best(&self) -> Option<&Look> {
-        self.looks.iter().reduce(|best, look| if look.miou > best.miou { look } else { best })
+    /// The best validation pass by mean intersection over union; the first of equals.
+    pub fn best(&self) -> Option<&ValidationPass> {
+        self.validation.iter().reduce(|best, pass| if pass.miou > best.miou { pass } else { best })
     }
 
-    /// Looks since the best one.
+    /// Validation passes since the best one.
     pub fn since_best(&self) -> u64 {
         let best = self.best().map_or(0, |b| b.step);
-        self.looks.iter().filter(|look| look.step > best).count() as u64
+        self.validation.iter().filter(|pass| pass.step > best).count() as u64
     }
 }
 
@@ -64,13 +65,13 @@ pub struct Checkpoint {
     pub pending: (f64, u64),
     /// Seconds of work so far.
     pub seconds: f64,
-    /// What was seen.
+    /// Loss curve and validation passes.
     pub history: History,
-    /// The network's values.
+    /// The network's weights.
     pub values: Vec<Array>,
-    /// The optimiser's memory.
+    /// The optimiser's state.
     pub memory: Vec<Array>,
-    /// The values at the best look.
+    /// The weights at the best validation pass.
     pub best: Vec<Array>,
 }
 
@@ -141,13 +142,15 @@ mod tests {
     fn checkpoints_come_back_and_belong_to_their_plan() {
         let folder = tempfile::tempdir().unwrap();
         let array = |name: &str, v: f32| Array { name: name.into(), shape: vec![2], values: vec![v, -v] };
-        let looks = [0.3, 0.5, 0.5, 0.4].iter().enumerate();
-        let looks = looks.map(|(i, m)| Look { step: i as u64, ga: 0.9, miou: *m, iou: vec![Some(*m), None] }).collect();
+        let passes = [0.3, 0.5, 0.5, 0.4].iter().enumerate();
+        let validation = passes
+            .map(|(i, m)| ValidationPass { step: i as u64, ga: 0.9, miou: *m, iou: vec![Some(*m), None] })
+            .collect();
         let checkpoint = Checkpoint {
             step: 7,
             pending: (0.1 + 0.2, 3),
             seconds: 12.5,
-            history: History { losses: vec![Loss { step: 5, loss: 1.0 / 3.0, rate: 0.01 }], looks },
+            history: History { losses: vec![LossPoint { step: 5, loss: 1.0 / 3.0, rate: 0.01 }], validation },
             values: vec![array("a", 1.0), array("b", 2.0)],
             memory: vec![array("a", 3.0)],
             best: vec![array("a", 4.0)],

@@ -1,32 +1,38 @@
-//! Training one network.
+//! Training a network.
 //!
 //! | file | idea |
 //! |---|---|
-//! | `plan` | everything that decides what is learnt |
-//! | `balance` | rare classes weigh more |
-//! | `objective` | what is made small |
-//! | `schedule` | how fast it learns, step by step |
-//! | `optimiser` | gradients to steps, with a memory that can be saved |
+//! | `hyper` | hyper-parameters, their defaults and ranges |
+//! | `settings` | hyper-parameters as a user gives them |
+//! | `plan` | everything that decides what a training results in |
+//! | `class_weights` | class weights of the loss |
+//! | `loss` | the loss that is minimised |
+//! | `schedule` | the learning rate, step by step |
+//! | `optimiser` | from gradients to weights, with a state that can be saved |
 //! | `checkpoint` | a training on disk, between two steps |
-//! | `teach` | the steps themselves |
-//! | `calibrate` | in the end, how readily each class is answered |
+//! | `trainer` | the training loop, with validation passes |
+//! | `calibrate` | class-bias calibration of a trained network |
 //!
-//! Only `objective`, `optimiser`, `teach` and `calibrate` need libtorch. On a CPU the same plan on the same number of threads gives the same bits, stopped
-//! and gone on with or not.
+//! Only `loss`, `optimiser`, `trainer` and `calibrate` need libtorch. On a CPU the same plan on the same number of threads gives
+//! the same bits, stopped and gone on with or not.
 
-pub mod balance;
 #[cfg(feature = "train")]
 pub mod calibrate;
 pub mod checkpoint;
+pub mod class_weights;
+pub mod hyper;
 #[cfg(feature = "train")]
-mod objective;
+mod loss;
 #[cfg(feature = "train")]
 pub mod optimiser;
 pub mod plan;
 pub mod schedule;
+pub mod settings;
 #[cfg(feature = "train")]
-pub mod teach;
+pub mod trainer;
 
+pub use hyper::Hyperparameters;
 pub use plan::Plan;
+pub use settings::Settings;
 #[cfg(feature = "train")]
-pub use teach::{Data, Outcome, Watch, teach};
+pub use trainer::{Callbacks, Data, Outcome, train};

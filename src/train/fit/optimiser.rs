@@ -1,6 +1,6 @@
-//! Gradients to steps. libtorch's own optimisers cannot be saved, and a training that goes on must have their memory.
+//! Optimisers. libtorch's own cannot be saved, and a training that goes on must have their state.
 
-use super::plan::Method;
+use super::hyper::OptimiserKind;
 use crate::Result;
 use crate::train::engine::{Model, laid, values};
 use crate::train::weights::Array;
@@ -9,7 +9,7 @@ use tch::Tensor;
 
 /// An optimiser with its memory.
 pub struct Optimiser {
-    method: Method,
+    kind: OptimiserKind,
     decay: f64,
     /// Steps done, for Adam's correction of its first means.
     steps: i32,
@@ -23,15 +23,16 @@ const EPSILON: f64 = 1e-8;
 
 impl Optimiser {
     /// With an empty memory, or with that of a checkpoint after so many steps.
-    pub fn new(method: Method, decay: f64, steps: u64, memory: &[Array], model: &Model) -> Self {
+    pub fn new(kind: OptimiserKind, decay: f64, steps: u64, memory: &[Array], model: &Model) -> Self {
         let laid = |array: &Array| (array.name.clone(), laid(&array.shape, &array.values, model.place.device));
         let all = memory.iter().map(laid).collect();
-        Self { method, decay, steps: steps as i32, memory: all }
+        Self { kind, decay, steps: steps as i32, memory: all }
     }
 
     /// One step of this learning rate along the gradients of a loss.
     pub fn step(&mut self, model: &Model, loss: &Tensor, rate: f64) {
-        let (parameters, mut tensors): (Vec<_>, Vec<_>) = model.learnt().map(|(p, t)| (p, t.shallow_clone())).unzip();
+        let (parameters, mut tensors): (Vec<_>, Vec<_>) =
+            model.trainable().map(|(p, t)| (p, t.shallow_clone())).unzip();
         let gradients = Tensor::run_backward(&[loss], &tensors, false, false);
         self.steps += 1;
         tch::no_grad(|| {
@@ -49,15 +50,15 @@ impl Optimiser {
 
     /// Memory is read and written once a line, and it is the memory that takes the time.
     fn update(&mut self, name: &str, weight: &mut Tensor, gradient: &Tensor, rate: f64) {
-        match self.method {
-            Method::Sgd => {
+        match self.kind {
+            OptimiserKind::Sgd => {
                 let mut velocity = self.remembered("velocity", name, weight);
                 let _ = velocity.g_mul_scalar_(MOMENTUM);
                 let _ = velocity.g_add_(gradient);
                 let _ = velocity.g_add_(&(&*weight * self.decay));
                 let _ = weight.g_sub_(&(velocity * rate));
             }
-            Method::Adam => {
+            OptimiserKind::Adam => {
                 let mut first = self.remembered("first", name, weight);
                 // Σ SECOND^age · gradient²: the second mean but for its factor 1 − SECOND.
                 let mut squares = self.remembered("squares", name, weight);

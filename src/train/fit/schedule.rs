@@ -1,4 +1,4 @@
-//! How large steps are while a training goes on.
+//! Learning-rate schedules.
 
 use serde::{Deserialize, Serialize};
 
@@ -25,7 +25,16 @@ impl Schedule {
         }
     }
 
-    /// The share at `done` in 0 to 1. The first thirtieth climbs from almost nothing, so that batch norms can settle.
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Poly => "poly",
+            Self::Cosine => "cosine",
+            Self::Constant => "constant",
+        }
+    }
+
+    /// The share at `done` in 0 to 1. The first thirtieth is a linear warm-up, so that batch norms can settle.
     pub fn share(self, done: f64) -> f64 {
         let done = done.clamp(0.0, 1.0);
         let climb = (done * 30.0 + 0.02).min(1.0);

@@ -1,15 +1,20 @@
-//! A set of images, judged one by one: of each only its sums are kept.
+//! An evaluation over a set of images, one by one: of each only its sums are kept.
 
-use super::boundary::Boundary;
+use super::bootstrap;
+use super::boundary::{Boundary, TOLERANCE};
 use super::confusion::Confusion;
-use super::report::{self, Report};
+use super::report::{BoundaryScores, ClassBoundary, ClassSizes, ImageScores, Report, Seconds};
+use super::scores::{Measures, Scores, mean};
 use super::size::Sizes;
 use crate::dataset::sample::IGNORE;
 use crate::{Error, Result};
 
-/// What was answered on one image, and what is true.
+/// Seed of the bootstrap: reports of equal images are equal.
+const SEED: u64 = 0;
+
+/// Prediction and ground truth of one image.
 #[derive(Clone, Copy, Debug)]
-pub struct Answer<'a> {
+pub struct Prediction<'a> {
     /// Name of the image.
     pub name: &'a str,
     /// Width, pixels.
@@ -22,13 +27,13 @@ pub struct Answer<'a> {
     pub predicted: &'a [u8],
     /// Number of each pixel's plant, 0 of none, where the set tells plants apart.
     pub plants: Option<&'a [u16]>,
-    /// How long the answer took, seconds.
+    /// How long the prediction took, seconds.
     pub seconds: Option<f64>,
 }
 
-/// One image, judged.
+/// Counts of one image.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Judged {
+pub struct EvaluatedImage {
     pub(super) name: String,
     pub(super) width: u32,
     pub(super) height: u32,
@@ -39,12 +44,12 @@ pub struct Judged {
     sizes: Sizes,
 }
 
-/// Adds up how well a set of images was answered.
+/// Adds up how well a set of images was predicted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Evaluation {
     pub(super) classes: Vec<String>,
     pub(super) plants: Vec<bool>,
-    pub(super) images: Vec<Judged>,
+    pub(super) images: Vec<EvaluatedImage>,
     pub(super) boundaries: Vec<Boundary>,
     pub(super) sizes: Sizes,
 }
@@ -61,20 +66,20 @@ impl Evaluation {
     /// The same where other classes than the first are no plants: `plants` tells for each whether it is one.
     pub fn with_plants(classes: Vec<String>, plants: Vec<bool>) -> Self {
         let n = classes.len();
-        assert!((1..=usize::from(IGNORE)).contains(&n) && plants.len() == n, "{n} classes, {} told", plants.len());
+        assert!((1..=usize::from(IGNORE)).contains(&n) && plants.len() == n, "{n} classes, {} given", plants.len());
         Self { classes, plants, images: Vec::new(), boundaries: vec![Boundary::default(); n], sizes: Sizes::new(n) }
     }
 
-    /// Judges an image and counts it.
-    pub fn add(&mut self, answer: &Answer<'_>) -> Result<()> {
-        let judged = self.judge(answer)?;
-        self.push(judged);
+    /// Evaluates an image and counts it.
+    pub fn add(&mut self, prediction: &Prediction<'_>) -> Result<()> {
+        let image = self.evaluate(prediction)?;
+        self.push(image);
         Ok(())
     }
 
-    /// Judges an image without counting it, so that several threads can: [`Self::push`] counts it. Images may come in any order.
-    pub fn judge(&self, answer: &Answer<'_>) -> Result<Judged> {
-        let Answer { name, width, height, truth, predicted, plants, seconds } = *answer;
+    /// Evaluates an image without counting it, so that several threads can: [`Self::push`] counts it. Images may come in any order.
+    pub fn evaluate(&self, prediction: &Prediction<'_>) -> Result<EvaluatedImage> {
+        let Prediction { name, width, height, truth, predicted, plants, seconds } = *prediction;
         let wrong = |what: String| Error::input(format!("{name}: {what}"));
         let (w, h) = (width as usize, height as usize);
         let maps = [
@@ -87,7 +92,7 @@ impl Evaluation {
         }
         let mut confusion = Confusion::new(self.classes.len());
         confusion.add(truth, predicted).map_err(|e| wrong(e.to_string()))?;
-        Ok(Judged {
+        Ok(EvaluatedImage {
             name: name.to_owned(),
             width,
             height,
@@ -99,8 +104,8 @@ impl Evaluation {
         })
     }
 
-    /// Counts an image that was judged here.
-    pub fn push(&mut self, image: Judged) {
+    /// Counts an image that was evaluated here.
+    pub fn push(&mut self, image: EvaluatedImage) {
         self.boundaries.iter_mut().zip(&image.boundaries).for_each(|(sum, one)| sum.merge(one));
         self.sizes.merge(&image.sizes);
         self.images.push(image);
@@ -119,6 +124,69 @@ impl Evaluation {
     /// What came out, images sorted by name: the same whatever the order in which they came.
     pub fn finish(mut self) -> Report {
         self.images.sort_by(|a, b| a.name.cmp(&b.name));
-        report::of(&self)
+        report(&self)
+    }
+}
+
+/// The report of what was counted.
+fn report(found: &Evaluation) -> Report {
+    let n = found.classes.len();
+    let matrices: Vec<Confusion> = found.images.iter().map(|image| image.confusion.clone()).collect();
+    let mut confusion = Confusion::new(n);
+    for matrix in &matrices {
+        confusion.merge(matrix);
+    }
+    let scores = Scores::of(&confusion, &found.plants);
+    let flat = |matrix: &Confusion| Scores::of(matrix, &found.plants).values().copied().collect::<Vec<_>>();
+    let mut drawn = bootstrap::intervals(&matrices, SEED, flat);
+    drawn.resize(scores.values().count(), None);
+    let intervals = Measures::from_values(n, drawn).expect("as many intervals as scores");
+    let boundaries: Vec<ClassBoundary> = found.boundaries.iter().map(class_boundary).collect();
+    Report {
+        classes: found.classes.clone(),
+        pixels: confusion.total(),
+        ignored: found.images.iter().map(|image| image.ignored).sum(),
+        confusion,
+        scores,
+        intervals,
+        boundary: BoundaryScores {
+            tolerance: TOLERANCE,
+            mean_f_score: mean(boundaries.iter().map(|b| b.f_score)),
+            classes: boundaries,
+        },
+        sizes: (0..n)
+            .filter(|class| found.plants[*class])
+            .map(|class| ClassSizes { class: found.classes[class].clone(), bins: found.sizes.bins(class) })
+            .collect(),
+        seconds: seconds(found.images.iter().filter_map(|image| image.seconds).collect()),
+        images: found.images.iter().map(|image| image_scores(image, &found.plants)).collect(),
+    }
+}
+
+fn class_boundary(pixels: &Boundary) -> ClassBoundary {
+    ClassBoundary { f_score: pixels.f_score(), precision: pixels.precision(), recall: pixels.recall(), pixels: *pixels }
+}
+
+fn seconds(mut all: Vec<f64>) -> Option<Seconds> {
+    all.sort_by(f64::total_cmp);
+    let n = all.len();
+    (n > 0).then(|| Seconds {
+        images: n as u64,
+        mean: all.iter().sum::<f64>() / n as f64,
+        median: f64::midpoint(all[(n - 1) / 2], all[n / 2]),
+    })
+}
+
+fn image_scores(image: &EvaluatedImage, plants: &[bool]) -> ImageScores {
+    let scores = Scores::of(&image.confusion, plants);
+    ImageScores {
+        name: image.name.clone(),
+        width: image.width,
+        height: image.height,
+        ignored: image.ignored,
+        ious: scores.classes.iter().map(|c| c.iou).collect(),
+        mean_iou: scores.mean_iou,
+        vegetation_iou: scores.vegetation.iou,
+        seconds: image.seconds,
     }
 }

@@ -5,12 +5,12 @@
 //!
 //! | file | idea |
 //! |---|---|
-//! | `confusion` | who was taken for whom: the sums that most scores follow from |
+//! | `confusion` | the confusion matrix: the sums that most scores follow from |
 //! | `scores` | GA, CA, I/U, P, R, F1 |
 //! | `boundary` | how well outlines agree |
 //! | `components`, `size` | pixels that hang together; what is found of small and of large plants |
-//! | `bootstrap` | how far scores would stray on other images of the kind |
-//! | `evaluation`, `report` | all of it over a set of images; what came out |
+//! | `bootstrap` | confidence intervals of the scores over images |
+//! | `report`, `evaluation` | scores and tables of an evaluation; all of it over a set of images |
 
 pub mod bootstrap;
 pub mod boundary;
@@ -23,6 +23,6 @@ pub mod size;
 
 pub use bootstrap::Interval;
 pub use confusion::Confusion;
-pub use evaluation::{Answer, Evaluation};
+pub use evaluation::{Evaluation, Prediction};
 pub use report::Report;
 pub use scores::{ClassMeasures, Measures, Scores};

@@ -1,16 +1,12 @@
-//! What an evaluation came to.
+//! An evaluation report: scores and tables.
 
-use super::bootstrap::{self, Interval};
-use super::boundary::{Boundary, TOLERANCE};
+use super::bootstrap::Interval;
+use super::boundary::Boundary;
 use super::confusion::Confusion;
-use super::evaluation::{Evaluation, Judged};
-use super::scores::{Measures, Scores, mean};
+use super::scores::{Measures, Scores};
 use super::size::SizeBin;
 use crate::report::{Cell, Table};
 use serde::{Deserialize, Serialize};
-
-/// Seed of the resamples: reports of equal images are equal.
-const SEED: u64 = 0;
 
 /// Scores over a set of images. Shares are 0 to 1; lists of classes are in the order of `classes`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -21,7 +17,7 @@ pub struct Report {
     pub pixels: u64,
     /// Pixels without a label.
     pub ignored: u64,
-    /// Who was taken for whom.
+    /// Confusion matrix.
     pub confusion: Confusion,
     /// Of all pixels of all images.
     pub scores: Scores,
@@ -31,7 +27,7 @@ pub struct Report {
     pub boundary: BoundaryScores,
     /// Plants by size, of each class that is a plant.
     pub sizes: Vec<ClassSizes>,
-    /// How long an answer took, where that is known.
+    /// How long a prediction took, where that is known.
     pub seconds: Option<Seconds>,
     /// Each image, by name.
     pub images: Vec<ImageScores>,
@@ -70,7 +66,7 @@ pub struct ClassSizes {
     pub bins: Vec<SizeBin>,
 }
 
-/// Seconds that an answer took.
+/// Seconds that a prediction took.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Seconds {
     /// Images that it is known of.
@@ -98,77 +94,8 @@ pub struct ImageScores {
     pub mean_iou: Option<f64>,
     /// I/U of all plants as one class.
     pub vegetation_iou: Option<f64>,
-    /// How long the answer took.
+    /// How long the prediction took.
     pub seconds: Option<f64>,
-}
-
-/// The report of what was counted.
-pub(super) fn of(found: &Evaluation) -> Report {
-    let n = found.classes.len();
-    let matrices: Vec<Confusion> = found.images.iter().map(|image| image.confusion.clone()).collect();
-    let mut confusion = Confusion::new(n);
-    for matrix in &matrices {
-        confusion.merge(matrix);
-    }
-    let scores = Scores::of(&confusion, &found.plants);
-    let flat = |matrix: &Confusion| Scores::of(matrix, &found.plants).values().copied().collect::<Vec<_>>();
-    let mut drawn = bootstrap::intervals(&matrices, SEED, flat);
-    drawn.resize(scores.values().count(), None);
-    let intervals = Measures::from_values(n, drawn).expect("as many intervals as scores");
-    let boundaries: Vec<ClassBoundary> = found.boundaries.iter().map(ClassBoundary::of).collect();
-    Report {
-        classes: found.classes.clone(),
-        pixels: confusion.total(),
-        ignored: found.images.iter().map(|image| image.ignored).sum(),
-        confusion,
-        scores,
-        intervals,
-        boundary: BoundaryScores {
-            tolerance: TOLERANCE,
-            mean_f_score: mean(boundaries.iter().map(|b| b.f_score)),
-            classes: boundaries,
-        },
-        sizes: (0..n)
-            .filter(|class| found.plants[*class])
-            .map(|class| ClassSizes { class: found.classes[class].clone(), bins: found.sizes.bins(class) })
-            .collect(),
-        seconds: Seconds::of(found.images.iter().filter_map(|image| image.seconds).collect()),
-        images: found.images.iter().map(|image| ImageScores::of(image, &found.plants)).collect(),
-    }
-}
-
-impl ClassBoundary {
-    fn of(pixels: &Boundary) -> Self {
-        Self { f_score: pixels.f_score(), precision: pixels.precision(), recall: pixels.recall(), pixels: *pixels }
-    }
-}
-
-impl Seconds {
-    fn of(mut all: Vec<f64>) -> Option<Self> {
-        all.sort_by(f64::total_cmp);
-        let n = all.len();
-        (n > 0).then(|| Self {
-            images: n as u64,
-            mean: all.iter().sum::<f64>() / n as f64,
-            median: f64::midpoint(all[(n - 1) / 2], all[n / 2]),
-        })
-    }
-}
-
-impl ImageScores {
-    fn of(image: &Judged, plants: &[bool]) -> Self {
-        let scores = Scores::of(&image.confusion, plants);
-        Self {
-            name: image.name.clone(),
-            width: image.width,
-            height: image.height,
-            ignored: image.ignored,
-            ious: scores.classes.iter().map(|c| c.iou).collect(),
-            mean_iou: scores.mean_iou,
-            vegetation_iou: scores.vegetation.iou,
-            seconds: image.seconds,
-        }
-    }
 }
 
 /// Decimals of a percentage.

@@ -109,16 +109,16 @@ impl Sizes {
             }
         }
         covers.sort_unstable();
-        let mut judged: Vec<u32> = regions.areas.clone();
+        let mut matched: Vec<u32> = regions.areas.clone();
         for of_region in covers.chunk_by(|a, b| a.0 == b.0) {
             let most = of_region.chunk_by(|a, b| a.1 == b.1).reduce(|a, b| if b.len() > a.len() { b } else { a });
             if let Some((region, plant)) = most.and_then(|pairs| pairs.first()) {
-                judged[*region as usize] = plants[*plant as usize].pixels;
+                matched[*region as usize] = plants[*plant as usize].pixels;
             }
         }
         let mut out = Self::new(plant_classes.len());
-        for ((wrong, judged), class) in wrong.iter().zip(&judged).zip(&class_of) {
-            out.tallies[usize::from(*class)][bin(*judged)].false_positives += u64::from(*wrong);
+        for ((wrong, matched), class) in wrong.iter().zip(&matched).zip(&class_of) {
+            out.tallies[usize::from(*class)][bin(*matched)].false_positives += u64::from(*wrong);
         }
         for plant in &plants {
             let tally = &mut out.tallies[usize::from(plant.class)][bin(plant.pixels)];

@@ -1,7 +1,7 @@
 //! Basic SegNet: the "smaller version" of Di Cicco et al. 2017, 4 + 4 convolutions.
 //!
 //! Source: Kendall, Badrinarayanan & Cipolla 2015, `segnet_basic` (7 × 7 kernels, 64 channels, decoders without ReLU). The local
-//! response normalisation before its first layer is left to [`crate::train::data::Normalisation`].
+//! response normalisation before its first layer is left to [`crate::train::data::Normalization`].
 
 use super::{Conv, Operations, unit};
 

@@ -80,7 +80,7 @@ macro_rules! networks {
                 match self { $(Self::$variant => $doc,)* }
             }
 
-            /// From images of `bands` channels to one value a class and pixel, the highest of which is the network's answer.
+            /// From images of `bands` channels to one value a class and pixel, the highest of which is the network's prediction.
             pub fn walk<O: Operations>(self, o: &mut O, x: &O::Value, bands: usize, classes: usize) -> O::Value {
                 match self { $(Self::$variant => $module::walk(o, x, bands, classes),)* }
             }

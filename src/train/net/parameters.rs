@@ -16,15 +16,15 @@ pub enum Role {
     Gain,
     /// What a batch norm adds.
     Shift,
-    /// A batch norm's running mean; not learnt by gradients.
+    /// A batch norm's running mean; not trained by gradients.
     Mean,
-    /// Its running variance; not learnt by gradients.
+    /// Its running variance; not trained by gradients.
     Variance,
 }
 
 impl Role {
     /// Whether gradients change it.
-    pub fn is_learnt(self) -> bool {
+    pub fn is_trainable(self) -> bool {
         !matches!(self, Self::Mean | Self::Variance)
     }
 }
@@ -140,8 +140,8 @@ impl Operations for List {
 mod tests {
     use super::*;
 
-    fn learnt(network: Network) -> usize {
-        parameters(network, 3, 3).iter().filter(|p| p.role.is_learnt()).map(Parameter::len).sum()
+    fn trainable(network: Network) -> usize {
+        parameters(network, 3, 3).iter().filter(|p| p.role.is_trainable()).map(Parameter::len).sum()
     }
 
     #[test]
@@ -159,11 +159,11 @@ mod tests {
             .sum();
         assert_eq!(vgg, 14_714_688);
         // 3·64·49 + 64 and seven times 64·64·49 + 64, eight batch norms, and the head.
-        assert_eq!(learnt(Network::BasicSegnet), 9472 + 7 * 200_768 + 8 * 128 + 195);
+        assert_eq!(trainable(Network::BasicSegnet), 9472 + 7 * 200_768 + 8 * 128 + 195);
         // ResNet-18 without its classifier holds 11 176 512.
         let resnet: usize = parameters(Network::Unet, 3, 3)
             .iter()
-            .filter(|p| p.role.is_learnt() && (p.name.starts_with("enc") || p.name.starts_with("stem")))
+            .filter(|p| p.role.is_trainable() && (p.name.starts_with("enc") || p.name.starts_with("stem")))
             .map(Parameter::len)
             .sum();
         assert_eq!(resnet, 11_176_512);

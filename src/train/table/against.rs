@@ -1,12 +1,12 @@
 //! What changes do: every training set against one of them, seed by seed.
 //!
-//! Two trainings of one network with one seed begin with the same weights and meet images in the same order, so the difference of
-//! their scores is of what they learnt from, and of chance. The table tells its mean over seeds, its standard deviation (n − 1), and
+//! Two trainings of one network with one seed begin with the same weights and take images in the same order, so the difference of
+//! their scores is that of their training sets, and of chance. The table has its mean over seeds, its standard deviation (n − 1), and
 //! whether the mean is beyond that: a change that is not may be chance. Beside it stand what rendering took, and how far the images
 //! are from the unchanged ones, measured once and kept in `distance/`.
 
 use super::experiment::{Experiment, TrainSet};
-use super::print::{PERCENT, Seen, mean, scale, spread};
+use super::seen::{PERCENT, Seen, mean, scale, spread};
 use super::sets::Bound;
 use crate::Result;
 use crate::compare::{Band, Comparison, Options, Pairs, Region};
@@ -46,7 +46,7 @@ fn others(experiment: &Experiment) -> Option<(usize, Vec<usize>)> {
 pub(super) fn table(bound: &Bound, seen: &[Seen], out: &Path) -> Result<Option<Table>> {
     let experiment = &bound.experiment;
     let Some((base, others)) = others(experiment) else { return Ok(None) };
-    let classes = experiment.learn.classes.names();
+    let classes = experiment.plan.classes.names();
     let scores: Vec<(&str, Option<usize>)> = classes
         .iter()
         .enumerate()
@@ -76,7 +76,7 @@ pub(super) fn table(bound: &Bound, seen: &[Seen], out: &Path) -> Result<Option<T
                 .filter_map(|s| Some((s, seen.iter().find(|o| o.row.train == base && o.row.learner == s.row.learner)?)))
                 .collect();
             let ratio = costs[train].zip(costs[base]).map(|(cost, base)| cost / base);
-            let judged = |(a, b): &&(&Seen, &Seen)| a.reports.iter().chain(&b.reports).all(Option::is_some);
+            let evaluated = |(a, b): &&(&Seen, &Seen)| a.reports.iter().chain(&b.reports).all(Option::is_some);
             let begin = [
                 Cell::text(name),
                 Cell::text(&experiment.train[train].name),
@@ -84,7 +84,7 @@ pub(super) fn table(bound: &Bound, seen: &[Seen], out: &Path) -> Result<Option<T
                 Cell::number(ratio, 2),
                 Cell::number(distances[train].as_ref().map(|d| d.flip), 3),
                 Cell::number(distances[train].as_ref().map(|d| d.ciede2000), 2),
-                Cell::Count(pairs.iter().filter(judged).count() as u64),
+                Cell::Count(pairs.iter().filter(evaluated).count() as u64),
             ];
             let cells = (0..experiment.test.len()).flat_map(|test| {
                 let pairs = &pairs;
@@ -111,7 +111,7 @@ fn change(pairs: &[(&Seen, &Seen)], test: usize, class: Option<usize>) -> [Cell;
     [Cell::percent(mean, PERCENT), Cell::percent(spread, PERCENT), Cell::text(beyond)]
 }
 
-/// Core seconds that the program took for an image of a rendered training set, by its ledger: wall time of the image, times the
+/// Core seconds that the program took for an image of a rendered training set, by its timing log: wall time of the image, times the
 /// threads that it had.
 fn cost(bound: &Bound, train: &TrainSet) -> Result<Option<f64>> {
     let Some(part) = train.from.first() else { return Ok(None) };

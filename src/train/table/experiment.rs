@@ -1,19 +1,17 @@
-//! An experiment whose page was found right: names are what they name, numbers are in range.
+//! An experiment whose file was checked: names are known, numbers are in range.
 
-use super::desc::{ExperimentDesc, LearnDesc, Named, PartDesc, ScaleDesc, SetDesc};
+use super::desc::{ExperimentDesc, Named, PartDesc, ScaleDesc, SetDesc};
 use super::names::{slug, unknown};
+use super::renamed::old_name;
 use crate::dataset::recipe::{self, Recipe};
 use crate::dataset::split::Shares;
-use crate::ron_file::{RonFile, Step, choose};
+use crate::ron_file::{RonFile, Step, choose, place};
 use crate::sampling::Sampler;
 use crate::train::baseline::Kind;
 use crate::train::classes::Classes;
 use crate::train::data::margin::MOST;
-use crate::train::data::{Augment, Band, Pick};
-use crate::train::fit::Plan;
-use crate::train::fit::balance::Balance;
-use crate::train::fit::plan::{Exposure, Method, Objective};
-use crate::train::fit::schedule::Schedule;
+use crate::train::data::{Band, Pick};
+use crate::train::fit::{Plan, Settings};
 use crate::train::net::Network;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -27,13 +25,13 @@ pub struct Experiment {
     pub baselines: Vec<Kind>,
     /// Seeds, each once; at least one.
     pub seeds: Vec<u64>,
-    /// How networks learn; network, images, seed and machine are the rows' own.
-    pub learn: Plan,
+    /// Hyper-parameters, classes and input; network, images, seed and machine are those of each row.
+    pub plan: Plan,
     /// Sets by name.
     pub sets: Vec<(String, Source)>,
-    /// What is learnt from, at least one.
+    /// Training sets, at least one.
     pub train: Vec<TrainSet>,
-    /// What is judged on, at least one.
+    /// Test sets, at least one.
     pub test: Vec<TestSet>,
     /// Name of the training set that the others are compared with.
     pub against: Option<String>,
@@ -80,26 +78,26 @@ pub struct Part {
     pub set: usize,
     /// Which of its images.
     pub pick: Pick,
-    /// How far outside of the leaves their outlines lie, pixels of the set's images.
+    /// By how much label masks are dilated, pixels of the set's images.
     pub margin: f32,
-    /// How often each.
+    /// Oversampling: how often each image is in an epoch.
     pub repeat: u32,
 }
 
-/// What is learnt from.
+/// A training set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainSet {
     /// Name in the tables.
     pub name: String,
     /// Name of its folder.
     pub slug: String,
-    /// Images to learn from.
+    /// Training images.
     pub from: Vec<Part>,
-    /// Images to be watched by.
-    pub watch: Vec<Part>,
+    /// Validation images.
+    pub validation: Vec<Part>,
 }
 
-/// What is judged on.
+/// A test set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TestSet {
     /// Name in the tables.
@@ -124,14 +122,12 @@ impl Experiment {
 
     /// Which sets a training set needs, by place, each once.
     pub fn sets_of(&self, train: &TrainSet) -> Vec<usize> {
-        let mut all: Vec<usize> = train.from.iter().chain(&train.watch).map(|p| p.set).collect();
+        let mut all: Vec<usize> = train.from.iter().chain(&train.validation).map(|p| p.set).collect();
         all.sort_unstable();
         all.dedup();
         all
     }
 }
-
-type Words = Result<(), (&'static str, String, String)>;
 
 struct Checker<'a> {
     page: &'a RonFile,
@@ -144,7 +140,26 @@ type At<'a> = &'a [Step<'a>];
 impl Checker<'_> {
     /// What is wrong with the value at a place, and what to do.
     fn fault(&self, at: At<'_>, what: impl AsRef<str>, help: impl AsRef<str>) -> Error {
-        self.page.blame(at, Error::input(what.as_ref()).help(help.as_ref()))
+        self.page.blame(&self.as_written(at), Error::input(what.as_ref()).help(help.as_ref()))
+    }
+
+    /// The same place with the names that the file uses: some fields are read by an old name, too.
+    fn as_written<'a>(&self, at: At<'a>) -> Vec<Step<'a>> {
+        let mut written = Vec::new();
+        for step in at {
+            let old = match step {
+                Step::Field(field) => old_name(field).map(Step::Field),
+                Step::Item(_) => None,
+            };
+            let with = |step: Step<'a>| [written.as_slice(), &[step]].concat();
+            let found = |path: &[Step<'_>]| place(&self.page.text, path) != place(&self.page.text, &written);
+            let next = match old.map(&with) {
+                Some(path) if !found(&with(*step)) && found(&path) => path,
+                _ => with(*step),
+            };
+            written = next;
+        }
+        written
     }
 
     fn experiment(&self, scale: Option<&str>) -> Result<Experiment> {
@@ -154,12 +169,12 @@ impl Checker<'_> {
         let chosen = scale.map(|name| self.scale(name)).transpose()?;
         let other = chosen.map(|(_, s)| s);
         let mut learn = Plan::default();
-        self.learn(&desc.learn, &[Step::Field("learn")], &mut learn)?;
+        self.settings(&desc.hyperparameters, &[Step::Field("hyperparameters")], &mut learn)?;
         for (i, (_, scale)) in desc.scales.0.iter().enumerate() {
             // Scales that are not asked for are checked as well: their turn comes when hours have gone by.
             let at = [Step::Field("scales"), Step::Item(i)];
             let mut plan = learn.clone();
-            self.learn(&scale.learn, &[at[0], at[1], Step::Field("learn")], &mut plan)?;
+            self.settings(&scale.hyperparameters, &[at[0], at[1], Step::Field("hyperparameters")], &mut plan)?;
             self.at_scale(scale, &at)?;
             if chosen.is_some_and(|(k, _)| k == i) {
                 learn = plan;
@@ -182,7 +197,7 @@ impl Checker<'_> {
             networks,
             baselines: self.baselines(&learn)?,
             seeds: seeds.clone(),
-            learn,
+            plan: learn,
             against: self.against(&train)?,
             train,
             test: self.test(&sets)?,
@@ -195,11 +210,9 @@ impl Checker<'_> {
         let scales = &self.desc.scales;
         match scales.find(name) {
             Some(i) => Ok((i, &scales.0[i].1)),
-            None => Err(Error::input(format!("the page has no scale `{name}`")).in_file(&self.page.path).help(choose(
-                "its scales",
-                &scales.names(),
-                name,
-            ))),
+            None => Err(Error::input(format!("the experiment has no scale `{name}`"))
+                .in_file(&self.page.path)
+                .help(choose("its scales", &scales.names(), name))),
         }
     }
 
@@ -277,9 +290,11 @@ impl Checker<'_> {
         }
     }
 
-    /// Puts what the page says into a plan.
-    fn learn(&self, desc: &LearnDesc, at: At<'_>, plan: &mut Plan) -> Result<()> {
-        set(desc, plan).map_err(|(field, what, help)| self.fault(&[at, &[Step::Field(field)]].concat(), what, help))
+    /// Puts hyper-parameters of the file into a plan.
+    fn settings(&self, settings: &Settings, at: At<'_>, plan: &mut Plan) -> Result<()> {
+        settings
+            .apply(plan)
+            .map_err(|invalid| self.fault(&[at, &[Step::Field(invalid.field)]].concat(), invalid.message, invalid.help))
     }
 
     fn sets(&self, scale: Option<&ScaleDesc>, seen: (u32, u32)) -> Result<Vec<(String, Source)>> {
@@ -351,12 +366,16 @@ impl Checker<'_> {
     fn part(&self, desc: &PartDesc, otherwise: Pick, at: At<'_>, sets: &[(String, Source)]) -> Result<Part> {
         let step = |field| [at, &[Step::Field(field)]].concat();
         if desc.repeat == 0 {
-            return Err(self.fault(&step("repeat"), "images that are there 0 times teach nothing", "write 1 or more"));
+            return Err(self.fault(
+                &step("repeat"),
+                "an image that is in an epoch 0 times is not trained on",
+                "write 1 or more",
+            ));
         }
-        let margin = desc.margin_px.unwrap_or(0.0);
+        let margin = desc.dilate_px.unwrap_or(0.0);
         if margin.is_nan() || margin.abs() > MOST {
-            let what = format!("outlines are not moved by {margin} pixels");
-            return Err(self.fault(&step("margin_px"), what, format!("write a number from -{MOST} to {MOST}")));
+            let what = format!("masks are not dilated by {margin} pixels");
+            return Err(self.fault(&step("dilate_px"), what, format!("write a number from -{MOST} to {MOST}")));
         }
         let (set, pick) = self.images(&desc.set, desc.images.as_deref(), otherwise, at, sets)?;
         Ok(Part { set, pick, margin, repeat: desc.repeat })
@@ -397,7 +416,11 @@ impl Checker<'_> {
             let step = |field| [at[0], at[1], Step::Field(field)];
             let slug = self.title(&desc.name, all.iter().map(|t| t.slug.as_str()), &step("name"))?;
             if desc.from.is_empty() {
-                return Err(self.fault(&step("from"), "nothing is learnt from", "name a set: [(set: \"NAME\")]"));
+                return Err(self.fault(
+                    &step("from"),
+                    "the training set has no images",
+                    "name a dataset: [(set: \"NAME\")]",
+                ));
             }
             let parts = |parts: &[PartDesc], field: &'static str, otherwise| -> Result<Vec<Part>> {
                 let one = |(k, part): (usize, &PartDesc)| {
@@ -407,13 +430,13 @@ impl Checker<'_> {
                 parts.iter().enumerate().map(one).collect()
             };
             let from = parts(&desc.from, "from", Pick::Split(Train))?;
-            let watch = if let Some(watch) = &desc.watch {
-                parts(watch, "watch", Pick::Split(Val))?
+            let validation = if let Some(validation) = &desc.validation {
+                parts(validation, "validation", Pick::Split(Val))?
             } else {
                 let open = desc.from.iter().zip(&from).filter(|(desc, _)| desc.images.is_none());
                 open.map(|(_, part)| Part { pick: Pick::Split(Val), repeat: 1, ..part.clone() }).collect()
             };
-            all.push(TrainSet { name: desc.name.clone(), slug, from, watch });
+            all.push(TrainSet { name: desc.name.clone(), slug, from, validation });
         }
         if all.is_empty() {
             let help = "name one at least: [(name: \"Real\", from: [(set: \"NAME\")])]";
@@ -466,73 +489,4 @@ impl Checker<'_> {
         let (message, help) = unknown(what, known, found);
         self.fault(at, message, help)
     }
-}
-
-/// Puts what the page says into a plan, or tells field, fault and help.
-fn set(desc: &LearnDesc, plan: &mut Plan) -> Words {
-    fn word<T>(
-        field: &'static str,
-        text: Option<&String>,
-        to: &mut T,
-        parse: impl Fn(&str) -> Result<T, String>,
-    ) -> Words {
-        if let Some(text) = text {
-            *to = parse(text).map_err(|words| match words.split_once(": ") {
-                Some((what, help)) => (field, what.to_owned(), help.to_owned()),
-                None => (field, format!("`{text}` cannot stand here"), words),
-            })?;
-        }
-        Ok(())
-    }
-    fn number<T: Copy + std::fmt::Display, U>(
-        field: &'static str,
-        value: Option<T>,
-        to: &mut U,
-        good: impl Fn(T) -> bool,
-        help: &str,
-        into: impl Fn(T) -> U,
-    ) -> Words {
-        match value {
-            Some(v) if !good(v) => Err((field, format!("{v} is out of range"), help.into())),
-            Some(v) => {
-                *to = into(v);
-                Ok(())
-            }
-            None => Ok(()),
-        }
-    }
-    let pixels = |field, (width, height): (u32, u32)| {
-        if [width, height].iter().all(|n| (32..=8192).contains(n)) {
-            return Ok((width, height));
-        }
-        let what = format!("networks do not see {width} × {height} pixels");
-        Err((field, what, "write sides from 32 to 8192".to_owned()))
-    };
-    if let Some(size) = desc.size {
-        (plan.shape.width, plan.shape.height) = pixels("size", size)?;
-    }
-    if let Some(window) = desc.window {
-        plan.window = Some(pixels("window", window)?);
-    }
-    word("optimiser", desc.optimiser.as_ref(), &mut plan.method, Method::parse)?;
-    if desc.optimiser.is_some() {
-        plan.rate = plan.method.usual_rate();
-    }
-    word("schedule", desc.schedule.as_ref(), &mut plan.schedule, Schedule::parse)?;
-    word("loss", desc.loss.as_ref(), &mut plan.loss, Objective::parse)?;
-    word("balance", desc.balance.as_ref(), &mut plan.balance, Balance::parse)?;
-    word("augment", desc.augment.as_ref(), &mut plan.augment, Augment::parse)?;
-    word("normalise", desc.normalise.as_ref(), &mut plan.exposure, Exposure::parse)?;
-    word("classes", desc.classes.as_ref(), &mut plan.classes, Classes::parse)?;
-    word("bands", desc.bands.as_ref(), &mut plan.shape.bands, Band::list)?;
-    let whole = "write a whole number above 0";
-    number("steps", desc.steps, &mut plan.steps, |n| (1..=100_000_000).contains(&n), whole, |n| n)?;
-    number("batch", desc.batch, &mut plan.batch, |n| (1..=1024).contains(&n), "write a number from 1 to 1024", |n| n)?;
-    number("rate", desc.rate, &mut plan.rate, |r| r > 0.0 && r < 100.0, "write a number above 0 such as 0.001", |r| r)?;
-    number("rare", desc.rare, &mut plan.rare, |r| (0.0..=1.0).contains(&r), "write a share from 0 to 1", |r| r)?;
-    number("calibrate", desc.calibrate, &mut plan.calibrate, |_| true, "write a number of images", |n| n)?;
-    let help = "write a share from 0 to below 1";
-    number("decay", desc.decay, &mut plan.decay, |r| (0.0..1.0).contains(&r), help, |r| r)?;
-    number("watch_every", desc.watch_every, &mut plan.watch_every, |n| n > 0, whole, |n| n)?;
-    number("patience", desc.patience, &mut plan.patience, |n| n > 0, whole, |n| n)
 }

@@ -1,9 +1,10 @@
 //! The paper's tables, with the numbers that are there.
 
 use super::against;
-use super::experiment::{Experiment, TestSet};
-use super::judgement::{self, Judgement, Known};
+use super::evaluation;
+use super::experiment::Experiment;
 use super::rows::{self, Learner, Row};
+use super::seen::{PERCENT, Seen, mean, median, scale, see, spread};
 use super::sets::Bound;
 use crate::Result;
 use crate::output::write_atomically;
@@ -13,9 +14,6 @@ use crate::train::figure;
 use crate::train::measure::Report;
 use crate::train::run::{self, Results};
 use std::path::{Path, PathBuf};
-
-/// Decimals of a percentage.
-pub(super) const PERCENT: usize = 1;
 
 /// Name of the table of every run by itself.
 pub const RUNS: &str = "runs";
@@ -43,16 +41,6 @@ impl Tables {
         }
         Ok(paths)
     }
-}
-
-/// A row of the experiment, as far as it is.
-pub(super) struct Seen {
-    pub(super) row: Row,
-    results: Option<Results>,
-    /// One a test set.
-    pub(super) reports: Vec<Option<Report>>,
-    /// Median seconds an image, one a test set.
-    seconds: Vec<Option<f64>>,
 }
 
 /// A line of the tables: all seeds of a learner and a training set.
@@ -84,25 +72,6 @@ pub fn tables(bound: &Bound, out: &Path) -> Result<(Tables, Vec<String>)> {
     Ok((Tables(all), told))
 }
 
-fn see(experiment: &Experiment, row: Row, out: &Path, told: &mut Vec<String>) -> Result<Seen> {
-    let folder = row.folder(experiment, out);
-    let who = judgement::who(&folder)?;
-    let mut report = |test: &TestSet| {
-        let who = who.as_ref()?;
-        match Judgement::find(&judgement::path(&folder, &test.slug), who, test.part.pick, None) {
-            Known::Here(found) => Some(found.report),
-            Known::Missing => None,
-            Known::Wrong(why) => {
-                told.push(format!("{why}; the tables leave it out"));
-                None
-            }
-        }
-    };
-    let reports = experiment.test.iter().map(&mut report).collect();
-    let seconds = experiment.test.iter().map(|t| judgement::seconds(&folder, &t.slug).map(|s| s.median)).collect();
-    Ok(Seen { row, results: run::results(&folder)?, reports, seconds })
-}
-
 /// Networks, then baselines, as the page names them; each with the training sets in their order.
 fn lines<'a>(experiment: &'a Experiment, seen: &'a [Seen]) -> Vec<Line<'a>> {
     let networks = experiment.networks.iter().map(|n| n.name());
@@ -123,25 +92,15 @@ impl Line<'_> {
         self.seen.iter().filter_map(|s| of(s.reports[test].as_ref()?)).collect()
     }
 
-    /// Runs that were judged, on the test set on which they are the fewest.
+    /// Runs that were evaluated, on the test set on which they are the fewest.
     fn done(&self, tests: usize) -> u64 {
-        let judged = |test: usize| self.seen.iter().filter(|s| s.reports[test].is_some()).count() as u64;
-        (0..tests).map(judged).min().unwrap_or(0)
+        let evaluated = |test: usize| self.seen.iter().filter(|s| s.reports[test].is_some()).count() as u64;
+        (0..tests).map(evaluated).min().unwrap_or(0)
     }
 
     fn begin(&self) -> [Cell; 2] {
         [Cell::text(self.name), Cell::text(self.train)]
     }
-}
-
-pub(super) fn mean(values: &[f64]) -> Option<f64> {
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-}
-
-/// Standard deviation with n − 1; none of fewer than two.
-pub(super) fn spread(values: &[f64]) -> Option<f64> {
-    let middle = mean(values).filter(|_| values.len() > 1)?;
-    Some((values.iter().map(|v| (v - middle).powi(2)).sum::<f64>() / (values.len() - 1) as f64).sqrt())
 }
 
 /// A share of a report.
@@ -161,19 +120,6 @@ fn means(title: String, experiment: &Experiment, lines: &[Line<'_>], scores: &[S
     table
 }
 
-/// What tables are of, in words.
-pub(super) fn scale(experiment: &Experiment) -> String {
-    let learn = &experiment.learn;
-    let scale = experiment.scale.as_ref().map(|s| format!("scale {s}, ")).unwrap_or_default();
-    format!(
-        "%, {scale}{} × {}, at most {} steps of {}",
-        learn.shape.width,
-        learn.shape.height,
-        learn.steps,
-        learn.batch_told()
-    )
-}
-
 /// Table I: GA, CA and mean I/U.
 fn segmentation(experiment: &Experiment, lines: &[Line<'_>]) -> Table {
     let scores: [Score; 3] =
@@ -187,9 +133,9 @@ fn vegetation(experiment: &Experiment, lines: &[Line<'_>]) -> Table {
     means(format!("Vegetation detection ({})", scale(experiment)), experiment, lines, &scores)
 }
 
-/// I/U of every class but the first, and of vegetation: means over seeds, and how far seeds stray.
+/// I/U of every class but the first, and of vegetation: means and standard deviations over seeds.
 fn classes(experiment: &Experiment, lines: &[Line<'_>]) -> Table {
-    let names = experiment.learn.classes.names();
+    let names = experiment.plan.classes.names();
     let iou = |report: &Report, class: Option<usize>| match class {
         Some(class) => report.scores.classes.get(class)?.iou,
         None => report.scores.vegetation.iou,
@@ -220,16 +166,16 @@ fn classes(experiment: &Experiment, lines: &[Line<'_>]) -> Table {
 /// Writes all but times on one page for people, `results.html`; returns its path.
 pub(super) fn page(bound: &Bound, tables: &Tables, out: &Path) -> Result<PathBuf> {
     let experiment = &bound.experiment;
-    let learn = &experiment.learn;
+    let plan = &experiment.plan;
     let fact = |name: &str, value: String| (name.to_owned(), value);
     let names = |all: Vec<&str>| all.join(", ");
     let facts = [
         fact("networks", names(experiment.networks.iter().map(|n| n.about()).collect())),
         fact("seeds", experiment.seeds.iter().map(u64::to_string).collect::<Vec<_>>().join(", ")),
-        fact("images", format!("{} × {} pixels", learn.shape.width, learn.shape.height)),
-        fact("steps", format!("at most {} of {} images", learn.steps, learn.batch)),
-        fact("classes", learn.classes.names().join(", ")),
-        fact("scale", experiment.scale.clone().unwrap_or_else(|| "that of the page".into())),
+        fact("images", format!("{} × {} pixels", plan.shape.width, plan.shape.height)),
+        fact("steps", format!("at most {} of {}", plan.hyper.steps, plan.batch_in_words())),
+        fact("classes", plan.classes.names().join(", ")),
+        fact("scale", experiment.scale.clone().unwrap_or_else(|| "that of the file".into())),
         fact("sets", names(experiment.sets.iter().map(|(name, _)| name.as_str()).collect())),
     ];
     let effects = tables.0.iter().find(|(name, _)| *name == AGAINST).map(|(_, table)| table);
@@ -239,7 +185,7 @@ pub(super) fn page(bound: &Bound, tables: &Tables, out: &Path) -> Result<PathBuf
         Some(_) => ("Effect of each change on a trained network", against::LEAD),
         None => (
             "Trained on rendered and real images, evaluated on real ones",
-            "Means over seeds; a network that scores below the colour baselines has learned nothing about shape.",
+            "Means over seeds; a network that scores below the ExG baselines has learned nothing about shape.",
         ),
     };
     let shots = against::shots(bound)?;
@@ -269,19 +215,19 @@ pub fn listing(bound: &Bound, out: &Path) -> Result<Table> {
     for (i, row) in rows::rows(experiment).into_iter().enumerate() {
         let folder = row.folder(experiment, out);
         let s = see(experiment, row, out, &mut Vec::new())?;
-        let state = match (judgement::who(&folder)?.is_some(), folder.join(run::PLAN).exists()) {
+        let state = match (evaluation::who(&folder)?.is_some(), folder.join(run::PLAN).exists()) {
             (true, _) => "done",
             (false, true) => "begun",
             (false, false) => "missing",
         };
-        let judged = s.reports.iter().flatten().count();
+        let evaluated = s.reports.iter().flatten().count();
         table.push([
             Cell::Count(i as u64),
             Cell::text(row.learner.name()),
             Cell::text(&experiment.train[row.train].name),
             seed(&row),
             Cell::text(state),
-            Cell::text(format!("{judged} of {}", s.reports.len())),
+            Cell::text(format!("{evaluated} of {}", s.reports.len())),
         ]);
     }
     Ok(table)
@@ -296,7 +242,7 @@ fn seed(row: &Row) -> Cell {
 
 /// Every run on every test set, by itself.
 fn runs(experiment: &Experiment, seen: &[Seen]) -> Table {
-    let names = experiment.learn.classes.names();
+    let names = experiment.plan.classes.names();
     let fixed =
         ["network", "trained on", "seed", "steps", "best step", "tested on", "GA", "CA", "I/U"].map(str::to_owned);
     let classes = names.iter().map(|n| format!("{n} I/U"));
@@ -331,47 +277,27 @@ fn runs(experiment: &Experiment, seen: &[Seen]) -> Table {
     table
 }
 
-/// Table III: how long an answer takes, the median of the images of each test set and of all runs; and how long a training takes.
+/// Table III: how long a prediction takes, the median of the images of each test set and of all runs; and how long a training takes.
 fn times(experiment: &Experiment, seen: &[Seen]) -> Table {
     let tests = experiment.test.iter().map(|t| format!("{}: seconds an image", t.name));
     let columns = ["network".to_owned()].into_iter().chain(tests);
     let columns = columns.chain(["training images a second", "minutes of a training"].map(str::to_owned));
-    let learn = &experiment.learn;
-    let title = format!("Times ({} × {})", learn.shape.width, learn.shape.height);
+    let plan = &experiment.plan;
+    let title = format!("Times ({} × {})", plan.shape.width, plan.shape.height);
     let mut table = Table::new(title, columns);
     let networks = experiment.networks.iter().map(|n| n.name());
     for name in networks.chain(experiment.baselines.iter().map(|b| b.name())) {
         let of: Vec<&Seen> = seen.iter().filter(|s| s.row.learner.name() == name).collect();
         let results: Vec<&Results> = of.iter().filter_map(|s| s.results.as_ref()).collect();
-        let answers = (0..experiment.test.len()).map(|test| {
+        let predictions = (0..experiment.test.len()).map(|test| {
             let all: Vec<f64> = of.iter().filter_map(|s| s.seconds[test]).collect();
             Cell::number(median(all), 3)
         });
         let rate = mean(&results.iter().map(|r| r.images_per_second).collect::<Vec<_>>());
         let minutes = mean(&results.iter().map(|r| r.seconds / 60.0).collect::<Vec<_>>());
         table.push(
-            [Cell::text(name)].into_iter().chain(answers).chain([Cell::number(rate, 2), Cell::number(minutes, 1)]),
+            [Cell::text(name)].into_iter().chain(predictions).chain([Cell::number(rate, 2), Cell::number(minutes, 1)]),
         );
     }
     table
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let n = values.len();
-    (n > 0).then(|| f64::midpoint(values[(n - 1) / 2], values[n / 2]))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn seeds_have_a_mean_and_a_spread() {
-        assert_eq!(mean(&[]), None);
-        assert_eq!(spread(&[0.5]), None);
-        assert_eq!((mean(&[1.0, 2.0, 6.0]), spread(&[1.0, 2.0, 6.0])), (Some(3.0), Some(7.0_f64.sqrt())));
-        assert_eq!(median(vec![3.0, 1.0, 2.0, 9.0]), Some(2.5));
-        assert_eq!(median(Vec::new()), None);
-    }
 }

@@ -6,10 +6,10 @@ use crate::train::baseline::Kind;
 use crate::train::net::Network;
 use std::path::{Path, PathBuf};
 
-/// Who learns.
+/// What is trained or fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Learner {
-    /// A colour baseline: it has no chance in it, so no seed.
+    /// A baseline: nothing in it is random, so it has no seed.
     Baseline(Kind),
     /// A network, with a seed.
     Network(Network, u64),
@@ -25,10 +25,10 @@ impl Learner {
     }
 }
 
-/// One who learns from one training set, to be judged on all test sets.
+/// One training (or fit) on one training set, to be evaluated on all test sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Row {
-    /// Who.
+    /// What is trained.
     pub learner: Learner,
     /// The training set's place in [`Experiment::train`].
     pub train: usize,
@@ -45,7 +45,7 @@ impl Row {
     }
 
     /// What it is, in words.
-    pub fn told(&self, experiment: &Experiment) -> String {
+    pub fn in_words(&self, experiment: &Experiment) -> String {
         let train = &experiment.train[self.train].name;
         match self.learner {
             Learner::Baseline(kind) => format!("{} on {train}", kind.name()),

@@ -95,7 +95,7 @@ impl Bound {
         let out = |part: &Part| without.contains(&experiment.sets[part.set].0);
         let mut left_out = Vec::new();
         experiment.train =
-            split(&experiment.train, &mut left_out, |t| t.from.iter().chain(&t.watch).any(out), |t| &t.name);
+            split(&experiment.train, &mut left_out, |t| t.from.iter().chain(&t.validation).any(out), |t| &t.name);
         experiment.test = split(&experiment.test, &mut left_out, |t| out(&t.part), |t| &t.name);
         if experiment.train.is_empty() || experiment.test.is_empty() {
             let what = if experiment.train.is_empty() { "training" } else { "test" };

@@ -1,4 +1,4 @@
-//! The page of an experiment that learns from each of several datasets beside it and compares them with the first: what `trace ablate`
+//! The file of an experiment that trains on each of several datasets beside it and compares them with the first: what `trace ablate`
 //! writes.
 
 use crate::dataset::Set;
@@ -12,27 +12,27 @@ const SEEDS: [u64; 3] = [1, 2, 3];
 const STEPS: u64 = 600;
 /// Images a step.
 const BATCH: u64 = 4;
-/// Part of an image that a step learns from.
-const WINDOW: (u32, u32) = (240, 180);
-/// Share of these windows that are laid about rare classes: seedlings of some pixels are in hardly any other.
-const RARE: f64 = 0.25;
-/// Windows of that size that two cores of 2 GHz learn in a second, in bf16 (`cargo bench --bench learn`).
+/// Size of the crops that a step is trained on.
+const CROP: (u32, u32) = (240, 180);
+/// Share of these crops that are centred on rare-class pixels: seedlings of some pixels are in hardly any other.
+const RARE_CROPS: f64 = 0.25;
+/// Crops of that size that two cores of 2 GHz are trained on in a second, in bf16 (`cargo bench --bench learn`).
 const RATE: f64 = 17.0;
 /// Smallest side that networks see.
 const LEAST: u32 = 32;
 
-/// The text of the page for datasets that lie beside it in folders of their names, with what each is; `reals` are the names of the sets of
+/// The text of the experiment file for datasets that lie beside it in folders of their names, with what each is; `reals` are the names of the sets of
 /// real images that it asks for.
 pub fn variants(sets: &[(Set, &str)], reals: &[String]) -> Result<String> {
     let Some((full, _)) = sets.first() else {
-        return Err(Error::misuse("there is no dataset to learn from").help("make one first"));
+        return Err(Error::misuse("there is no dataset to train on").help("make one first"));
     };
     let rendering = full.recipe.rendering()?;
     let size = (rendering.width.max(LEAST), rendering.height.max(LEAST));
-    let window = (size.0 > WINDOW.0 && size.1 > WINDOW.1).then_some(WINDOW);
-    let seen = window.unwrap_or(size);
+    let crop = (size.0 > CROP.0 && size.1 > CROP.1).then_some(CROP);
+    let seen = crop.unwrap_or(size);
     let trainings = (sets.len() * SEEDS.len()) as u64;
-    let pixels = f64::from(seen.0) * f64::from(seen.1) / (f64::from(WINDOW.0) * f64::from(WINDOW.1));
+    let pixels = f64::from(seen.0) * f64::from(seen.1) / (f64::from(CROP.0) * f64::from(CROP.1));
     let hours = (trainings * STEPS * BATCH) as f64 * pixels / RATE / 3600.0;
     let name = |set: &Set| set.folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let base = name(full);
@@ -48,11 +48,11 @@ Experiment(
     networks: [\"unet\"],
     baselines: [],
     seeds: {SEEDS:?},
-    learn: (size: {size:?}, {}balance: \"fading\", steps: {STEPS}, batch: {BATCH}),
+    hyperparameters: (size: {size:?}, {}class_weights: \"annealed\", steps: {STEPS}, batch: {BATCH}),
     sets: {{
 ",
         reals.iter().fold(String::new(), |words, real| words + " --real " + real + "=DIR"),
-        window.map(|window| format!("window: {window:?}, rare: {RARE:?}, ")).unwrap_or_default(),
+        crop.map(|crop| format!("crop_size: {crop:?}, rare_crops: {RARE_CROPS:?}, ")).unwrap_or_default(),
     );
     for (set, about) in sets {
         let _ = writeln!(text, "        // {about}\n        {0:?}: Dataset(path: {0:?}),", name(set));
@@ -76,8 +76,8 @@ Experiment(
         "    ],
     against: {base:?},
     scales: {{
-        \"glance\": (seeds: [1, 2], learn: (steps: 20)),
-        \"long\": (seeds: [1, 2, 3, 4, 5], learn: (steps: 5000)),
+        \"glance\": (seeds: [1, 2], hyperparameters: (steps: 20)),
+        \"long\": (seeds: [1, 2, 3, 4, 5], hyperparameters: (steps: 5000)),
     }},
 )
 "

@@ -1,8 +1,8 @@
 //! All of an experiment, as far as it is missing: sets, then row after row training and evaluations, then tables.
 
 use super::against;
-use super::experiment::TrainSet;
-use super::judgement::{self, BASELINE, Judged, Judgement, Known};
+use super::evaluation::{self, BASELINE, Evaluated, Known, StoredEvaluation};
+use super::experiment::{Part, TrainSet};
 use super::print;
 use super::rows::{self, Learner, Row};
 use super::sets::Bound;
@@ -13,7 +13,7 @@ use crate::train::data::{Pick, Selection, Shape, Store};
 use crate::train::fit::Plan;
 use crate::train::measure::Report;
 use crate::train::net::Network;
-use crate::train::run::{self, Identity, Learnt, Results};
+use crate::train::run::{self, Identity, Results, TrainedModel};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -21,7 +21,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What people look at of a training, below its folder.
+/// Report of a training, below its folder.
 pub const PAGE: &str = "report.html";
 
 /// A part of the work.
@@ -40,7 +40,7 @@ pub struct Order<'a> {
     pub bound: &'a Bound,
     /// Its folder.
     pub out: &'a Path,
-    /// The page's text, to be kept beside the tables.
+    /// The experiment file's text, to be kept beside the tables.
     pub page: &'a str,
     /// Every so many-th row.
     pub shard: Shard,
@@ -54,29 +54,29 @@ pub struct Order<'a> {
     pub precision: &'a str,
 }
 
-/// Who does what needs libtorch, and who is told.
-pub struct Hands<'a> {
+/// What the work calls: trainings and evaluations, which need libtorch, and messages.
+pub struct Callbacks<'a> {
     /// Trains a plan into a folder, or goes on with it.
     pub fit: &'a dyn Fn(&Plan, &Path) -> Result<Results>,
-    /// Writes what people look at of a training, from what lies in its folder.
+    /// Writes the report of a training, from what lies in its folder.
     pub page: &'a dyn Fn(&Path) -> Result<()>,
-    /// Judges one who has learnt on images, and leaves a picture of some of them.
-    pub judge: &'a dyn Fn(&Answerer<'_>, &Selection, &Path) -> Result<Report>,
-    /// Told before each training what it is, and how far the experiment is.
+    /// Evaluates a predictor on images, and leaves a figure of some of them.
+    pub evaluate: &'a dyn Fn(&Predictor<'_>, &Selection, &Path) -> Result<Report>,
+    /// Called before each training: what it is, and how far the experiment is.
     pub training: &'a dyn Fn(&str, &State),
-    /// Told what is done else, in words.
+    /// Called with a message about other work.
     pub tell: &'a (dyn Fn(&str) + Sync),
-    /// Told what was not as it should be, in words.
+    /// Called with a warning.
     pub warn: &'a (dyn Fn(&str) + Sync),
     /// Raised by whoever wants it to stop.
     pub stop: &'a AtomicBool,
 }
 
-/// One who has learnt.
-pub enum Answerer<'a> {
-    /// A network, to be computed with a precision and so many threads.
-    Network(&'a Learnt, &'a str, usize),
-    /// A colour baseline, on images of this shape.
+/// What predicts.
+pub enum Predictor<'a> {
+    /// A trained model, to be computed with a precision and so many threads.
+    Network(&'a TrainedModel, &'a str, usize),
+    /// A baseline, on images of this shape.
     Baseline(&'a Baseline, &'a Shape),
 }
 
@@ -92,15 +92,15 @@ pub struct State {
 }
 
 /// Does what is missing; returns the paths of the tables.
-pub fn run(order: &Order<'_>, hands: &Hands<'_>) -> Result<Vec<PathBuf>> {
+pub fn run(order: &Order<'_>, callbacks: &Callbacks<'_>) -> Result<Vec<PathBuf>> {
     let Order { bound, out, .. } = *order;
     if order.only == Some(Only::Tables) {
-        return tables(order, hands);
+        return tables(order, callbacks);
     }
     bound.check()?;
     alone(out, || write_atomically(&out.join("experiment.ron"), order.page.as_bytes()))?;
     for set in bound.used() {
-        bound.make(set, hands.tell, hands.warn, hands.stop)?;
+        bound.make(set, callbacks.tell, callbacks.warn, callbacks.stop)?;
     }
     if order.only == Some(Only::Sets) {
         return Ok(bound.used().into_iter().map(|set| bound.folder(set).join(crate::dataset::recipe::FILE)).collect());
@@ -109,7 +109,7 @@ pub fn run(order: &Order<'_>, hands: &Hands<'_>) -> Result<Vec<PathBuf>> {
     // Before hours are spent on the first row, the last one is checked.
     let mut todo = Vec::new();
     for (_, row) in &rows {
-        let work = Work { order, hands, row: *row, folder: row.folder(&bound.experiment, out) };
+        let work = Work { order, callbacks, row: *row, folder: row.folder(&bound.experiment, out) };
         work.check()?;
         todo.push(work);
     }
@@ -122,21 +122,21 @@ pub fn run(order: &Order<'_>, hands: &Hands<'_>) -> Result<Vec<PathBuf>> {
         if work.folder.exists() {
             remove_unfinished(&work.folder)?;
         }
-        let made = work.train(number, &trainings)? | work.judge()?;
+        let made = work.train(number, &trainings)? | work.evaluate()?;
         if made {
-            // What is left out of them is told once, at the end.
-            tables(order, &Hands { warn: &|_| (), ..*hands })?;
+            // What is left out of them is reported once, at the end.
+            tables(order, &Callbacks { warn: &|_| (), ..*callbacks })?;
         }
     }
-    tables(order, hands)
+    tables(order, callbacks)
 }
 
 /// Writes the tables of what is there.
-fn tables(order: &Order<'_>, hands: &Hands<'_>) -> Result<Vec<PathBuf>> {
+fn tables(order: &Order<'_>, callbacks: &Callbacks<'_>) -> Result<Vec<PathBuf>> {
     against::measure(order.bound, order.out)?;
     let (tables, told) = print::tables(order.bound, order.out)?;
     for words in told {
-        (hands.warn)(&words);
+        (callbacks.warn)(&words);
     }
     alone(order.out, || {
         let mut paths = tables.write(order.out)?;
@@ -160,7 +160,7 @@ fn alone<T>(out: &Path, write: impl FnOnce() -> Result<T>) -> Result<T> {
 /// One row's work.
 struct Work<'a> {
     order: &'a Order<'a>,
-    hands: &'a Hands<'a>,
+    callbacks: &'a Callbacks<'a>,
     row: Row,
     folder: PathBuf,
 }
@@ -184,7 +184,7 @@ impl Work<'_> {
         }
     }
 
-    /// Seed of what is picked by chance.
+    /// Seed of random picks.
     fn seed(&self) -> u64 {
         self.network().map_or(self.order.bound.experiment.seeds[0], |(_, seed)| seed)
     }
@@ -194,13 +194,13 @@ impl Work<'_> {
     }
 
     fn told(&self) -> String {
-        self.row.told(&self.order.bound.experiment)
+        self.row.in_words(&self.order.bound.experiment)
     }
 
     fn selections(&self) -> (Vec<Selection>, Vec<Selection>) {
         let bound = self.order.bound;
-        let of = |parts: &[super::Part]| parts.iter().map(|p| bound.selection(p)).collect();
-        (of(&self.set().from), of(&self.set().watch))
+        let of = |parts: &[Part]| parts.iter().map(|p| bound.selection(p)).collect();
+        (of(&self.set().from), of(&self.set().validation))
     }
 
     /// The training of a network; one that was begun keeps what the machine gave it, which decides the last bits.
@@ -213,16 +213,16 @@ impl Work<'_> {
             Some(Identity { plan, .. }) => (plan.threads, plan.precision),
             None => (threads, precision.to_owned()),
         };
-        let learn = self.order.bound.experiment.learn.clone();
-        Ok(Plan { network, train, val, seed: self.seed(), threads, precision, seconds, ..learn })
+        let plan = self.order.bound.experiment.plan.clone();
+        Ok(Plan { network, train, val, seed: self.seed(), threads, precision, seconds, ..plan })
     }
 
     /// Whether all that is needed is there, test images are no training images, and nothing else lies in the folder.
     fn check(&self) -> Result<()> {
         let bound = self.order.bound;
-        let (train, watch) = self.selections();
+        let (train, validation) = self.selections();
         let mut seen = BTreeSet::new();
-        for selection in train.iter().chain(&watch) {
+        for selection in train.iter().chain(&validation) {
             let (set, numbers) = selection.open(Pick::All, self.seed())?;
             seen.extend(numbers.into_iter().map(|n| (set.folder.clone(), n)));
         }
@@ -230,12 +230,12 @@ impl Work<'_> {
             let (set, numbers) = bound.selection(&test.part).open(Pick::All, 0)?;
             if let Some(n) = numbers.into_iter().find(|n| seen.contains(&(set.folder.clone(), *n))) {
                 return Err(Error::input(format!(
-                    "`{}` is judged on image {n} of `{}`, which `{}` learns from or is watched by",
+                    "image {n} of `{1}` is in the test set `{0}` and in the training or validation set of `{2}`",
                     test.name,
                     bound.experiment.sets[test.part.set].0,
                     self.set().name
                 ))
-                .help("what was seen proves nothing; give them other images of the page"));
+                .help("a test set must be unseen; give them other images of the file"));
             }
         }
         let Some((network, _)) = self.network() else { return Ok(()) };
@@ -246,7 +246,7 @@ impl Work<'_> {
         let open = |selections: &[Selection]| {
             Store::open(selections, Pick::All, plan.seed, &plan.classes, &plan.shape, false, 0)
         };
-        Identity::of(&plan, &open(&train)?, &open(&watch)?)?.claim(&self.folder)
+        Identity::of(&plan, &open(&train)?, &open(&validation)?)?.claim(&self.folder)
     }
 
     /// Trains the row where it is not done; says whether it was not.
@@ -258,11 +258,11 @@ impl Work<'_> {
         let missing = !self.is_done();
         if missing {
             let state = State { number, of: all.len(), left: left(all, self.order)? };
-            (self.hands.training)(&self.told(), &state);
-            (self.hands.fit)(&self.plan(network)?, &self.folder)?;
+            (self.callbacks.training)(&self.told(), &state);
+            (self.callbacks.fit)(&self.plan(network)?, &self.folder)?;
         }
         if missing || !self.folder.join(PAGE).exists() {
-            (self.hands.page)(&self.folder)?;
+            (self.callbacks.page)(&self.folder)?;
         }
         Ok(missing)
     }
@@ -272,7 +272,7 @@ impl Work<'_> {
     }
 
     fn fit_baseline(&self, kind: Kind) -> Result<bool> {
-        let like = &self.order.bound.experiment.learn.shape;
+        let like = &self.order.bound.experiment.plan.shape;
         let (from, _) = self.selections();
         let path = self.folder.join(BASELINE);
         let size = (like.width, like.height);
@@ -286,53 +286,53 @@ impl Work<'_> {
                 Err(e) => self.again(&short(&e)),
             }
         }
-        let baseline = files::fit(kind, &from, self.seed(), like, self.hands.stop)?;
+        let baseline = files::fit(kind, &from, self.seed(), like, self.callbacks.stop)?;
         run::write_json(&path, &Fitted { from: prints, size, baseline })?;
         Ok(true)
     }
 
-    /// Judges the row on the test sets where that is missing; says whether it was.
-    fn judge(&self) -> Result<bool> {
+    /// Evaluates the row on the test sets where that is missing; says whether it was.
+    fn evaluate(&self) -> Result<bool> {
         let Order { bound, .. } = *self.order;
-        let Some(of) = judgement::who(&self.folder)? else {
-            return Err(judgement::foreign(&self.folder, "there is no trained network in this folder"));
+        let Some(of) = evaluation::who(&self.folder)? else {
+            return Err(evaluation::foreign(&self.folder, "there is no trained model in this folder"));
         };
-        let mut learnt = None;
+        let mut trained = None;
         let mut made = false;
         for test in &bound.experiment.test {
             let selection = bound.selection(&test.part);
             let on = selection.identity(Pick::All, 0)?;
-            match Judgement::find(&judgement::path(&self.folder, &test.slug), &of, test.part.pick, Some(&on)) {
+            match StoredEvaluation::find(&evaluation::path(&self.folder, &test.slug), &of, test.part.pick, Some(&on)) {
                 Known::Here(_) => continue,
                 Known::Wrong(why) => self.again(&why),
                 Known::Missing => {}
             }
-            if self.hands.stop.load(Ordering::Relaxed) {
+            if self.callbacks.stop.load(Ordering::Relaxed) {
                 let words = "stopped before all rows of the table were there";
                 return Err(Error::stopped(words).help("the same command goes on with it"));
             }
-            let answerer = match &of {
-                Judged::Baseline(baseline) => Answerer::Baseline(baseline, &bound.experiment.learn.shape),
-                Judged::Network { .. } => {
-                    if learnt.is_none() {
+            let predictor = match &of {
+                Evaluated::Baseline(baseline) => Predictor::Baseline(baseline, &bound.experiment.plan.shape),
+                Evaluated::Network { .. } => {
+                    if trained.is_none() {
                         let Identity { plan, .. } = run::read_json(&self.folder.join(run::PLAN))?;
-                        learnt = Some((Learnt::open(&self.folder)?, plan));
+                        trained = Some((TrainedModel::open(&self.folder)?, plan));
                     }
-                    let Some((learnt, plan)) = &learnt else { continue };
-                    Answerer::Network(learnt, &plan.precision, plan.threads)
+                    let Some((trained, plan)) = &trained else { continue };
+                    Predictor::Network(trained, &plan.precision, plan.threads)
                 }
             };
-            let picture = judgement::path(&self.folder, &test.slug).with_extension("png");
-            let report = (self.hands.judge)(&answerer, &selection, &picture)?;
-            let judgement = Judgement { of: of.clone(), images: test.part.pick, on, report };
-            Judgement::keep(&self.folder, &test.slug, judgement)?;
+            let picture = evaluation::path(&self.folder, &test.slug).with_extension("png");
+            let report = (self.callbacks.evaluate)(&predictor, &selection, &picture)?;
+            let stored = StoredEvaluation { of: of.clone(), images: test.part.pick, on, report };
+            StoredEvaluation::keep(&self.folder, &test.slug, stored)?;
             made = true;
         }
         Ok(made)
     }
 
     fn again(&self, why: &str) {
-        (self.hands.warn)(&format!("{why}; it is made again"));
+        (self.callbacks.warn)(&format!("{why}; it is made again"));
     }
 }
 

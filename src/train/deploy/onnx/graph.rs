@@ -1,7 +1,7 @@
 //! A walk over a network that writes it down as an ONNX graph; see [`super`].
 
 use super::proto::{Attribute, AttributeKind, DataType, Graph, Node, Tensor};
-use crate::train::data::Normalisation;
+use crate::train::data::Normalization;
 use crate::train::data::normalise::LEAST;
 use crate::train::net::{Conv, Operations};
 use crate::train::weights::Array;
@@ -45,8 +45,8 @@ impl Recorder {
         name.into()
     }
 
-    /// Learnt values as constants under their names.
-    pub(super) fn learnt<'a>(&mut self, arrays: impl IntoIterator<Item = &'a Array>) {
+    /// Trained weights as constants under their names.
+    pub(super) fn weights<'a>(&mut self, arrays: impl IntoIterator<Item = &'a Array>) {
         for array in arrays {
             self.constant(&array.name, &array.shape, &array.values);
         }
@@ -54,20 +54,20 @@ impl Recorder {
 
     /// From 8-bit pixels that lie as height × width × bands to what the network takes: values from 0 to 1, the mean taken out, by
     /// the deviation: √(mean of (x − mean)²), a step of 8 bits at least.
-    pub(super) fn normalise(&mut self, image: &str, how: &Normalisation) -> String {
+    pub(super) fn normalise(&mut self, image: &str, how: &Normalization) -> String {
         let x = self.op("Cast", &[image], vec![whole("to", DataType::Float as i64)]);
         let x = self.op("Transpose", &[&x], vec![several("perm", &[0, 3, 1, 2])]);
         let white = self.constant("white", &[], &[255.0]);
         let x = self.op("Div", &[&x, &white], vec![]);
         let axes: &[i64] = match how {
-            Normalisation::Fixed { mean, sd } => {
+            Normalization::Fixed { mean, sd } => {
                 let mean = self.constant("mean", &[1, mean.len(), 1, 1], mean);
                 let sd = self.constant("deviation", &[1, sd.len(), 1, 1], sd);
                 let less = self.op("Sub", &[&x, &mean], vec![]);
                 return self.op("Div", &[&less, &sd], vec![]);
             }
-            Normalisation::Band => &[2, 3],
-            Normalisation::Image => &[1, 2, 3],
+            Normalization::Band => &[2, 3],
+            Normalization::Image => &[1, 2, 3],
         };
         let over = || vec![several("axes", axes), whole("keepdims", 1)];
         let mean = self.op("ReduceMean", &[&x], over());

@@ -1,7 +1,7 @@
 //! A network as an ONNX file: what ONNX Runtime and other programs run without libtorch and without us.
 //!
 //! Source: the ONNX specification 1.12, operators of version 17. Input `image`: 8-bit numbers, images × height × width × bands.
-//! Outputs `scores`: images × classes × height × width, the highest is the answer; `classes`: its number, 8 bit, images × height ×
+//! Outputs `scores`: images × classes × height × width, the highest is the prediction; `classes`: its number, 8 bit, images × height ×
 //! width. Whoever runs it chooses the number of images, height and width; SegNet takes 32 pixels at least, Basic SegNet 16. The metadata hold `network`, `bands`, `classes` (JSON lists), `width`, `height` (what the network learnt at),
 //! `weights_sha256` and `version`.
 //!
@@ -16,7 +16,7 @@ use crate::output::write_atomically;
 use crate::train::data::Band;
 use crate::train::deploy::Facts;
 use crate::train::net::fitting;
-use crate::train::run::Learnt;
+use crate::train::run::TrainedModel;
 use crate::{Error, Result};
 use graph::Recorder;
 use prost::Message;
@@ -31,12 +31,12 @@ const OPERATORS: i64 = 17;
 const FORMAT: i64 = 8;
 
 /// The network as an ONNX file's message.
-pub fn model(learnt: &Learnt) -> Result<Model> {
-    let card = &learnt.card;
+pub fn model(trained: &TrainedModel) -> Result<Model> {
+    let card = &trained.card;
     let (bands, classes) = (card.input.bands.len(), card.classes.len());
     let mut recorder = Recorder::default();
-    recorder.learnt(fitting(card.network, bands, classes, &learnt.values)?);
-    let x = recorder.normalise("image", &card.normalisation);
+    recorder.weights(fitting(card.network, bands, classes, &trained.values)?);
+    let x = recorder.normalise("image", &card.normalization);
     let y = card.network.walk(&mut recorder, &x, bands, classes);
     recorder.end(&y);
     let mut graph = recorder.graph;
@@ -53,7 +53,7 @@ pub fn model(learnt: &Learnt) -> Result<Model> {
     graph.output = vec![
         value(
             "scores",
-            "one value a class and pixel; the highest is the answer",
+            "one score a class and pixel; the highest is the prediction",
             DataType::Float,
             [any("images"), known(classes), any("height"), any("width")],
         ),
@@ -82,8 +82,8 @@ pub fn model(learnt: &Learnt) -> Result<Model> {
 }
 
 /// Writes the network as an ONNX file, atomically; equal networks give equal bytes.
-pub fn write(learnt: &Learnt, path: &Path) -> Result<()> {
-    write_atomically(path, &model(learnt)?.encode_to_vec())
+pub fn write(trained: &TrainedModel, path: &Path) -> Result<()> {
+    write_atomically(path, &model(trained)?.encode_to_vec())
 }
 
 fn value<const N: usize>(name: &str, about: &str, numbers: DataType, size: [DimensionValue; N]) -> ValueInfo {

@@ -1,44 +1,44 @@
-//! How well a row does on a test set, kept in a file that tells what it is of.
+//! Evaluations of a row on the test sets, stored in files that tell what they are of.
 
 use crate::train::data::Pick;
 use crate::train::measure::Report;
 use crate::train::measure::report::Seconds;
-use crate::train::run::{self, Card};
+use crate::train::run::{self, ModelCard};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// An evaluation and what it is of. It holds no clock times: equal weights and images make equal files.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Judgement {
-    /// Who was judged.
-    pub of: Judged,
+pub struct StoredEvaluation {
+    /// What was evaluated.
+    pub of: Evaluated,
     /// Which images were asked for.
     pub images: Pick,
-    /// Fingerprint of the set, and the numbers of the images.
+    /// Checksum of the set, and the numbers of the images.
     pub on: (String, Vec<u64>),
-    /// What came out.
+    /// Its scores.
     pub report: Report,
 }
 
-/// Who was judged: a trained network by what decides its answers, or a fitted baseline.
+/// What was evaluated: a trained model, by what decides its predictions, or a fitted baseline.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Judged {
-    /// A network.
+pub enum Evaluated {
+    /// A trained model.
     Network {
         /// SHA-256 of its weights.
         weights: String,
-        /// SHA-256 of what it learnt from and how.
+        /// SHA-256 of its plan and training set.
         plan: String,
     },
-    /// A colour baseline.
+    /// A baseline: ExG threshold, with or without component sizes.
     Baseline(crate::train::baseline::Baseline),
 }
 
-impl Judged {
-    /// The network of a card.
-    pub fn network(card: &Card) -> Self {
+impl Evaluated {
+    /// The trained model of a card.
+    pub fn network(card: &ModelCard) -> Self {
         Self::Network { weights: card.weights_sha256.clone(), plan: card.plan_sha256.clone() }
     }
 }
@@ -46,14 +46,14 @@ impl Judged {
 /// The fitted baseline's file, below its row's folder.
 pub(super) const BASELINE: &str = "baseline.json";
 
-/// Who lies in a row's folder; none where it is not done.
-pub(super) fn who(folder: &Path) -> Result<Option<Judged>> {
+/// What lies in a row's folder; none where it is not done.
+pub(super) fn who(folder: &Path) -> Result<Option<Evaluated>> {
     let [model, baseline] = [folder.join(run::MODEL), folder.join(BASELINE)];
     if model.exists() && folder.join(run::RESULT).exists() {
-        return Ok(Some(Judged::network(&run::read_json(&model)?)));
+        return Ok(Some(Evaluated::network(&run::read_json(&model)?)));
     }
     if baseline.exists() {
-        return Ok(Some(Judged::Baseline(run::read_json(&baseline)?)));
+        return Ok(Some(Evaluated::Baseline(run::read_json(&baseline)?)));
     }
     Ok(None)
 }
@@ -67,16 +67,16 @@ pub(super) fn path(folder: &Path, test: &str) -> PathBuf {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Known {
     /// It is there.
-    Here(Box<Judgement>),
+    Here(Box<StoredEvaluation>),
     /// It is not there.
     Missing,
-    /// Something is there that cannot be believed, and why.
+    /// Something else is there, and why it cannot be used.
     Wrong(String),
 }
 
-impl Judgement {
+impl StoredEvaluation {
     /// Reads the evaluation of `of` on `images`, and, where they are known, on those of a set with these fingerprint and numbers.
-    pub(super) fn find(path: &Path, of: &Judged, images: Pick, on: Option<&(String, Vec<u64>)>) -> Known {
+    pub(super) fn find(path: &Path, of: &Evaluated, images: Pick, on: Option<&(String, Vec<u64>)>) -> Known {
         if !path.exists() {
             return Known::Missing;
         }
@@ -86,10 +86,10 @@ impl Judgement {
         };
         let wrong = |what: &str| Known::Wrong(format!("{}: this is {what}", path.display()));
         if found.of != *of {
-            return wrong("how well other weights do");
+            return wrong("an evaluation of other weights");
         }
         if found.images != images || on.is_some_and(|on| found.on != *on) {
-            return wrong("how well they do on other images");
+            return wrong("an evaluation on other images");
         }
         Known::Here(Box::new(found))
     }
@@ -107,7 +107,7 @@ fn time_path(folder: &Path, test: &str) -> PathBuf {
     folder.join("time").join(format!("{test}.json"))
 }
 
-/// How long a row's answers took on a test set, where that is known.
+/// How long a row's predictions took on a test set, where that is known.
 pub(super) fn seconds(folder: &Path, test: &str) -> Option<Seconds> {
     run::read_json::<Option<Seconds>>(&time_path(folder, test)).ok().flatten()
 }

@@ -1,16 +1,16 @@
-//! What a training makes small.
+//! The loss that a training minimises.
 
-use super::plan::Objective;
+use super::hyper::LossFunction;
 use crate::dataset::sample::IGNORE;
 use tch::{Kind, Reduction, Tensor};
 
 /// The loss of a batch: `logits` images × classes × height × width, `labels` images × height × width of whole numbers, `weights` one
 /// for each class. At least one pixel must have a label.
-pub(super) fn loss(of: Objective, logits: &Tensor, labels: &Tensor, weights: &Tensor) -> Tensor {
+pub(super) fn loss(of: LossFunction, logits: &Tensor, labels: &Tensor, weights: &Tensor) -> Tensor {
     let entropy = logits.cross_entropy_loss(labels, Some(weights), Reduction::Mean, i64::from(IGNORE), 0.0);
     match of {
-        Objective::Entropy => entropy,
-        Objective::Dice => entropy + (1.0 - dice(logits, labels)),
+        LossFunction::Entropy => entropy,
+        LossFunction::Dice => entropy + (1.0 - dice(logits, labels)),
     }
 }
 
@@ -42,7 +42,7 @@ mod tests {
         let entropy = (2.0 * 2.0f64.ln() + 3.0 * 4.0f64.ln()) / 5.0;
         let weights = Tensor::from_slice(&[1.0f32, 3.0, 1.0]);
         let value = |of| loss(of, &logits, &labels, &weights).double_value(&[]);
-        assert!((value(Objective::Entropy) - entropy).abs() < 1e-6);
-        assert!((value(Objective::Dice) - (entropy + 1.0 - overlap)).abs() < 1e-6);
+        assert!((value(LossFunction::Entropy) - entropy).abs() < 1e-6);
+        assert!((value(LossFunction::Dice) - (entropy + 1.0 - overlap)).abs() < 1e-6);
     }
 }

@@ -1,25 +1,34 @@
-//! Which part of an image a step sees.
+//! Random crops: which part of an image a step is trained on.
 
-use super::augment::Augment;
 use super::example::Example;
 use crate::dataset::sample::IGNORE;
 use crate::sampling::Stream;
 
-/// What a step sees of an image.
+/// What a step is trained on of an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct View {
-    /// Pixels of the image: width, height.
+pub struct Crop {
+    /// Width and height of the image, pixels.
+    pub image: (u32, u32),
+    /// Width and height of the crop, pixels; not larger than the image.
     pub size: (u32, u32),
-    /// Pixels of the part that is seen, nowhere larger than the image.
-    pub window: (u32, u32),
-    /// Share of the windows that are laid about a pixel of a rare class, 0 to 1: the class by chances that are inverse to its pixels
-    /// in the image, the pixel anywhere in the window. The rest lie anywhere. After the patches of Isensee et al. 2021 (nnU-Net), of
-    /// which a third hold what is looked for.
+    /// Share of the crops that are centred on rare-class pixels, 0 to 1: the class is drawn with probabilities inverse to its pixels
+    /// in the image, and its pixel lies anywhere in the crop. The rest lie anywhere. After the patches of Isensee et al. 2021
+    /// (nnU-Net), a third of which hold foreground.
     pub rare: f64,
 }
 
-/// A pixel of a class that is drawn by chances inverse to the classes' pixels; from the image's centre. None where no pixel has a
-/// label.
+/// How a crop may be moved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of its own, none a state")]
+pub(super) struct Moves {
+    pub(super) flip: bool,
+    pub(super) rotate: bool,
+    pub(super) scale: bool,
+    pub(super) shift: bool,
+}
+
+/// A pixel of a class that is drawn with probabilities inverse to the classes' pixels; from the image's centre. None where no pixel
+/// has a label.
 pub(super) fn rare_pixel(labels: &[u8], (w, h): (u32, u32), stream: &mut Stream) -> Option<[f32; 2]> {
     let mut counts = [0usize; IGNORE as usize];
     labels.iter().filter(|l| **l != IGNORE).for_each(|l| counts[usize::from(*l)] += 1);
@@ -35,61 +44,63 @@ pub(super) fn rare_pixel(labels: &[u8], (w, h): (u32, u32), stream: &mut Stream)
     Some([x as f32 + 0.5 - w as f32 / 2.0, y as f32 + 0.5 - h as f32 / 2.0])
 }
 
-/// Where each pixel of the window lies in the picture: a linear map about the centres, then a shift.
+/// Where each pixel of the crop lies in the image: a linear map about the centres, then a shift.
 pub(super) struct Placement {
     matrix: [f32; 4],
     shift: [f32; 2],
 }
 
 impl Placement {
-    /// A place of the window; with the point `about` of the picture, from its centre, one that holds it.
+    /// A random place of the crop; with the point `about` of the image, from its centre, one that holds it. None where the crop is
+    /// the image as it is.
     pub(super) fn draw(
-        augment: Augment,
-        &View { size, window, .. }: &View,
+        moves: Moves,
+        &Crop { image, size, .. }: &Crop,
         about: Option<[f32; 2]>,
         stream: &mut Stream,
     ) -> Option<Self> {
-        if window == size && !(augment.flip || augment.rotate || augment.scale || augment.crop) {
+        if size == image && !(moves.flip || moves.rotate || moves.scale || moves.shift) {
             return None;
         }
-        let mirror = if augment.flip && stream.chance(0.5) { -1.0 } else { 1.0 };
-        let angle = if augment.rotate { stream.range32(0.0, std::f32::consts::TAU) } else { 0.0 };
-        let zoom = if augment.scale { 1.5f32.powf(stream.range32(-1.0, 1.0)) } else { 1.0 };
-        let reach = if augment.crop { 0.1 + (0.5 - 0.5 / zoom).max(0.0) } else { 0.0 };
+        let mirror = if moves.flip && stream.chance(0.5) { -1.0 } else { 1.0 };
+        let angle = if moves.rotate { stream.range32(0.0, std::f32::consts::TAU) } else { 0.0 };
+        let zoom = if moves.scale { 1.5f32.powf(stream.range32(-1.0, 1.0)) } else { 1.0 };
+        let reach = if moves.shift { 0.1 + (0.5 - 0.5 / zoom).max(0.0) } else { 0.0 };
         let (sin, cos) = angle.sin_cos();
         let matrix = [mirror * cos / zoom, -sin / zoom, mirror * sin / zoom, cos / zoom];
-        // The shift brings the point to a pixel of the window by an even chance.
+        // The shift brings the point to a pixel of the crop with equal probabilities.
         let about = about.map(|[x, y]| {
-            let [u, v] = [window.0, window.1].map(|n| stream.index(n as usize) as f32 + 0.5 - 0.5 * n as f32);
+            let [u, v] = [size.0, size.1].map(|n| stream.index(n as usize) as f32 + 0.5 - 0.5 * n as f32);
             [x - matrix[0] * u - matrix[1] * v, y - matrix[2] * u - matrix[3] * v]
         });
         let shift = [0, 1].map(|axis| {
-            let (n, part) = [(size.0, window.0), (size.1, window.1)][axis];
+            let (n, part) = [(image.0, size.0), (image.1, size.1)][axis];
             let rest = 0.5 * (n - part) as f32;
             let reach = reach * n as f32 + rest;
             let shift = about.map_or_else(|| stream.range32(-reach, reach), |shift| shift[axis].clamp(-reach, reach));
-            // Neither turned nor scaled, pixels fall on pixels, so that the picture stays as sharp as it is.
-            if augment.rotate || augment.scale { shift } else { (shift + rest).round() - rest }
+            // Neither rotated nor scaled, pixels fall on pixels, so that the image stays as sharp as it is.
+            if moves.rotate || moves.scale { shift } else { (shift + rest).round() - rest }
         });
         Some(Self { matrix, shift })
     }
 
-    /// A point of the window in the picture; both from their centres.
+    /// A point of the crop in the image; both from their centres.
     pub(super) fn map(&self, [x, y]: [f32; 2]) -> [f32; 2] {
         let [a, b, c, d] = self.matrix;
         [a * x + b * y + self.shift[0], c * x + d * y + self.shift[1]]
     }
 
-    pub(super) fn read(&self, example: &Example, view: &View) -> (Vec<f32>, Vec<u8>) {
-        let &View { size: (w, h), window, .. } = view;
+    /// Bands, side by side in 0 to 1, and labels of the crop.
+    pub(super) fn read(&self, example: &Example, crop: &Crop) -> (Vec<f32>, Vec<u8>) {
+        let &Crop { image: (w, h), size, .. } = crop;
         let bands = example.planes.len();
         let (cx, cy) = (w as f32 / 2.0, h as f32 / 2.0);
-        let (wx, wy) = (window.0 as f32 / 2.0, window.1 as f32 / 2.0);
-        let count = window.0 as usize * window.1 as usize;
+        let (wx, wy) = (size.0 as f32 / 2.0, size.1 as f32 / 2.0);
+        let count = size.0 as usize * size.1 as usize;
         let mut pixels = Vec::with_capacity(count * bands);
         let mut labels = Vec::with_capacity(count);
-        for y in 0..window.1 {
-            for x in 0..window.0 {
+        for y in 0..size.1 {
+            for x in 0..size.0 {
                 let [sx, sy] = self.map([x as f32 + 0.5 - wx, y as f32 + 0.5 - wy]);
                 let (sx, sy) = (mirrored(sx + cx, w), mirrored(sy + cy, h));
                 labels.push(
@@ -127,28 +138,28 @@ fn between(x: f32, n: u32) -> (usize, usize, f32) {
 mod tests {
     use super::*;
     use crate::sampling::Purpose;
-    use crate::train::data::Normalisation;
+    use crate::train::data::{Augment, Normalization};
 
-    /// Rationale: a class of a few pixels is in hardly any window, and a network never learns it. Expected: asked for, as many
-    /// windows hold it as its rarity says (one pixel beside 18 of another class: 18 of 19), it lies anywhere in them, and labels
+    /// Rationale: a class of a few pixels is in hardly any crop, and a network never learns it. Expected: asked for, as many
+    /// crops hold it as its rarity says (one pixel beside 18 of another class: 18 of 19), it lies anywhere in them, and labels
     /// still fit the picture; not asked for, next to none do. Source: the drawing's rule.
     #[test]
-    fn windows_about_rare_classes_hold_them_anywhere() {
-        let size = (200, 150);
+    fn crops_centred_on_rare_classes_hold_them_anywhere() {
+        let image = (200, 150);
         let at = |x: usize, y: usize| y * 200 + x;
         let mut labels = vec![0; 200 * 150];
         (0..3).for_each(|y| labels[at(0, y)..at(6, y)].fill(1));
         labels[at(140, 100)] = 2;
         labels[at(1, 149)] = IGNORE;
         let picture = Example { name: String::new(), planes: vec![labels.clone()], labels, plants: Vec::new() };
-        let as_it_is = Normalisation::Fixed { mean: vec![0.0], sd: vec![1.0] };
+        let as_it_is = Normalization::Fixed { mean: vec![0.0], sd: vec![1.0] };
         for augment in [Augment::NONE, Augment { flip: true, crop: true, ..Augment::NONE }] {
-            let windows = |rare: f64| {
+            let crops = |rare: f64| {
                 let (mut holding, mut columns) = ([0; 3], [0; 4]);
                 for seed in 0..400 {
                     let mut stream = Stream::of(seed, 0, Purpose::Test, 0);
-                    let view = View { size, window: (20, 16), rare };
-                    let (pixels, labels) = augment.apply(&picture, &view, &[true], &as_it_is, &mut stream);
+                    let crop = Crop { image, size: (20, 16), rare };
+                    let (pixels, labels) = augment.apply(&picture, &crop, &[true], &as_it_is, &mut stream);
                     assert!(pixels.iter().zip(&labels).all(|(v, l)| (v * 255.0 - f32::from(*l)).abs() < 1e-3));
                     (0..3).for_each(|class| holding[class] += u32::from(labels.contains(&(class as u8))));
                     if let Some(i) = labels.iter().position(|l| *l == 2) {
@@ -157,8 +168,8 @@ mod tests {
                 }
                 (holding, columns)
             };
-            let ([_, _, seldom], _) = windows(0.0);
-            let ([_, crop, weed], columns) = windows(1.0);
+            let ([_, _, seldom], _) = crops(0.0);
+            let ([_, crop, weed], columns) = crops(1.0);
             assert!(seldom < 16, "{seldom}");
             assert!((365..393).contains(&weed) && (7..36).contains(&crop), "{crop} {weed}");
             assert!(columns.iter().all(|n| (65..130).contains(n)), "{columns:?}");

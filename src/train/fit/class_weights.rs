@@ -1,43 +1,60 @@
-//! What a pixel of each class weighs in the loss.
+//! Class weights: what a pixel of each class weighs in the loss.
 
 use crate::Result;
 use crate::train::data::Store;
 use serde::{Deserialize, Serialize};
 
-/// How rare classes are made up for.
+/// Class weights of the loss.
+///
+/// In JSON they keep the names that runs of version 0.1 recorded: `median`, `root`, `fading`, `none`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Balance {
-    /// By median frequency: the median of the classes' frequencies over that of the class, a frequency being the class's share
+pub enum ClassWeights {
+    /// Median-frequency weights: the median of the classes' frequencies over that of the class, a frequency being the class's share
     /// of the pixels of the images that hold it. Source: Eigen & Fergus 2015, as used by Badrinarayanan et al. 2017.
     Median,
-    /// The root of that: a compromise between rare classes and few false alarms.
-    Root,
-    /// That root at first, falling to none until half of the steps are done. Classes of a few pixels must be heard early: once a
-    /// network never answers them, overlaps have no slope that leads back. Later, weights would only widen their outlines.
-    Fading,
-    /// All pixels weigh the same.
+    /// The square root of that: a compromise between recall of rare classes and false positives.
+    #[serde(rename = "root")]
+    Sqrt,
+    /// That square root at first, annealed to 1 until half of the steps are done. Classes of a few pixels need weights early: once a
+    /// network never predicts them, the Dice loss has no gradient that leads back. Later, weights would only widen their outlines.
+    #[serde(rename = "fading")]
+    Annealed,
+    /// All weights are 1.
     None,
 }
 
-impl Balance {
-    /// Reads `median`, `root`, `fading` or `none`.
+impl ClassWeights {
+    /// Values that had another name, in version 0.1: old, then new. Both are read.
+    pub const RENAMED: [(&str, &str); 2] = [("root", "sqrt"), ("fading", "annealed")];
+
+    /// Reads `median`, `sqrt`, `annealed` or `none`.
     pub fn parse(text: &str) -> Result<Self, String> {
         match text {
             "median" => Ok(Self::Median),
-            "root" => Ok(Self::Root),
-            "fading" => Ok(Self::Fading),
+            "sqrt" | "root" => Ok(Self::Sqrt),
+            "annealed" | "fading" => Ok(Self::Annealed),
             "none" => Ok(Self::None),
-            _ => Err(format!("classes are not weighed by `{text}`: write median, root, fading or none")),
+            _ => Err(format!("there are no class weights `{text}`: write median, sqrt, annealed or none")),
         }
     }
 
-    /// The weights of classes of these rarities when a training is `done`, in 0 to 1; 0 for a class that no image holds.
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Median => "median",
+            Self::Sqrt => "sqrt",
+            Self::Annealed => "annealed",
+            Self::None => "none",
+        }
+    }
+
+    /// The weights of classes of these rarities when the share `done` of a training is done, 0 to 1; 0 for a class that no image holds.
     pub fn weights(self, rarities: &[Option<f64>], done: f64) -> Vec<f32> {
         let power = match self {
             Self::Median => 1.0,
-            Self::Root => 0.5,
-            Self::Fading => (0.5 - done).max(0.0),
+            Self::Sqrt => 0.5,
+            Self::Annealed => (0.5 - done).max(0.0),
             Self::None => 0.0,
         };
         rarities.iter().map(|rarity| rarity.map_or(0.0, |r| r.powf(power) as f32)).collect()
@@ -81,23 +98,23 @@ mod tests {
         // Class 2 is only in the first image: 10 of 100 pixels there. Class 1: 30 of 200. Class 0: 160 of 200.
         let images = vec![vec![70, 20, 10], vec![90, 10, 0]];
         let rarities = rarities_of(&images, 3);
-        let weights = Balance::Median.weights(&rarities, 0.7);
+        let weights = ClassWeights::Median.weights(&rarities, 0.7);
         let expected = [0.15 / 0.8, 1.0, 1.5];
         assert!(weights.iter().zip(expected).all(|(w, e)| (w - e).abs() < 1e-6), "{weights:?}");
-        let roots = Balance::Root.weights(&rarities, 0.7);
+        let roots = ClassWeights::Sqrt.weights(&rarities, 0.7);
         assert!(roots.iter().zip(expected).all(|(w, e)| (w * w - e).abs() < 1e-6));
-        assert_eq!(Balance::Median.weights(&rarities_of(&[vec![50, 50, 0]], 3), 0.0), [1.0, 1.0, 0.0]);
-        assert_eq!(Balance::None.weights(&rarities, 0.0), [1.0; 3]);
-        assert_eq!(Balance::None.weights(&rarities_of(&[vec![50, 50, 0]], 3), 0.0), [1.0, 1.0, 0.0]);
+        assert_eq!(ClassWeights::Median.weights(&rarities_of(&[vec![50, 50, 0]], 3), 0.0), [1.0, 1.0, 0.0]);
+        assert_eq!(ClassWeights::None.weights(&rarities, 0.0), [1.0; 3]);
+        assert_eq!(ClassWeights::None.weights(&rarities_of(&[vec![50, 50, 0]], 3), 0.0), [1.0, 1.0, 0.0]);
     }
 
     #[test]
-    fn weights_fade_from_the_root_to_none_within_half_of_the_steps() {
+    fn weights_are_annealed_from_the_square_root_to_1_within_half_of_the_steps() {
         let rarities = [Some(0.04), Some(1.0), None, Some(81.0)];
-        let fading = |done| Balance::Fading.weights(&rarities, done);
-        assert_eq!(fading(0.0), Balance::Root.weights(&rarities, 0.0));
-        assert!((fading(0.25)[3] - 3.0).abs() < 1e-5 && (fading(0.25)[0] - 0.04f32.sqrt().sqrt()).abs() < 1e-5);
-        assert_eq!(fading(0.5), [1.0, 1.0, 0.0, 1.0]);
-        assert_eq!(fading(1.0), fading(0.5));
+        let annealed = |done| ClassWeights::Annealed.weights(&rarities, done);
+        assert_eq!(annealed(0.0), ClassWeights::Sqrt.weights(&rarities, 0.0));
+        assert!((annealed(0.25)[3] - 3.0).abs() < 1e-5 && (annealed(0.25)[0] - 0.04f32.sqrt().sqrt()).abs() < 1e-5);
+        assert_eq!(annealed(0.5), [1.0, 1.0, 0.0, 1.0]);
+        assert_eq!(annealed(1.0), annealed(0.5));
     }
 }

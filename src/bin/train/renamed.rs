@@ -1,0 +1,53 @@
+//! Flags that have another name since version 0.1: the old ones are read, with a warning, for one more version.
+
+use furrow::train::fit::class_weights::ClassWeights;
+use furrow::train::fit::settings::RENAMED;
+use std::ffi::OsString;
+
+/// Warns about each old name in a command line.
+pub(crate) fn warn(arguments: impl Iterator<Item = OsString>) {
+    for warning in warnings(arguments.filter_map(|argument| argument.into_string().ok())) {
+        eprintln!("warning: {warning}");
+    }
+}
+
+fn warnings(arguments: impl Iterator<Item = String>) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let words = |old: &str, new: &str| format!("{old} is called {new} now; the next version reads only that");
+    let mut flag = String::new();
+    for argument in arguments {
+        let (name, value) = match (argument.strip_prefix("--"), argument.split_once('=')) {
+            (Some(_), Some((name, value))) => (Some(name), Some(value)),
+            (Some(_), None) => (Some(argument.as_str()), None),
+            (None, _) => (None, Some(argument.as_str())),
+        };
+        if let Some(name) = name {
+            let field = name.trim_start_matches('-').replace('-', "_");
+            if let Some((_, new)) = RENAMED.iter().find(|(old, _)| *old == field) {
+                warnings.push(words(name, &format!("--{}", new.replace('_', "-"))));
+            }
+            flag = field;
+        }
+        if ["balance", "class_weights"].contains(&flag.as_str())
+            && let Some((old, new)) = ClassWeights::RENAMED.iter().find(|(old, _)| Some(*old) == value)
+        {
+            warnings.push(words(&format!("class weights `{old}`"), &format!("`{new}`")));
+        }
+    }
+    warnings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn old_flags_and_values_are_told_with_their_new_names() {
+        let told = |line: &str| warnings(line.split(' ').map(str::to_owned));
+        let old = told("fit --set d --watch-every 5 --balance fading --window=64x48");
+        assert_eq!(old.len(), 4, "{old:?}");
+        assert!(old[0].starts_with("--watch-every is called --validate-every now"), "{old:?}");
+        assert!(old[2].contains("class weights `fading` is called `annealed` now"), "{old:?}");
+        assert_eq!(told("fit --validate-every 5 --class-weights annealed --out root"), Vec::<String>::new());
+    }
+}

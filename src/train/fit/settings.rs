@@ -1,0 +1,266 @@
+//! Hyper-parameters as a user gives them: flags of `train fit`, and `hyperparameters` of an experiment file.
+//!
+//! Both are this one struct, and both give what they give to [`Settings::apply`]. What is left out keeps the value that it had:
+//! at first that of [`Plan::default`].
+
+use super::class_weights::ClassWeights;
+use super::hyper::{Invalid, LossFunction, NormalizationMode, OptimiserKind, SIDES, check_size};
+use super::plan::Plan;
+use super::schedule::Schedule;
+use crate::train::classes::Classes;
+use crate::train::data::{Augment, Band};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::sync::LazyLock;
+
+/// Hyper-parameters of a training; what is left out keeps its default.
+///
+/// ```
+/// use furrow::train::fit::{Plan, Settings};
+/// let text = r#"(optimiser: Some("sgd"), class_weights: Some("sqrt"), augment: Some("flip,rotate"))"#;
+/// let settings: Settings = ron::from_str(text).unwrap();
+/// let mut plan = Plan::default();
+/// settings.apply(&mut plan).unwrap();
+/// assert_eq!((plan.hyper.rate, plan.hyper.steps), (0.05, 2000));
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, clap::Args)]
+#[serde(deny_unknown_fields, default, rename = "Hyperparameters")]
+pub struct Settings {
+    /// Classes to tell apart, with a semicolon between, each with its labels: "soil; beet=crop; other=weed".
+    #[arg(long, value_name = "CLASSES", default_value = default_of("classes"))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub classes: Option<String>,
+    /// Input bands: rgb, rgbn, or names with commas between.
+    #[arg(long, value_name = "BANDS", default_value = default_of("bands"))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bands: Option<String>,
+    /// Size that images are resized to, pixels: width and height, each from 32 to 8192.
+    #[arg(long, value_name = "WxH", default_value = default_of("size"), value_parser = parse_size)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size: Option<(u32, u32)>,
+    /// Size of the random crop of each image that a step is trained on, at most that of the images; whole images unless given.
+    /// Small crops make steps cheap and keep small plants as large as they are.
+    #[arg(long, alias = "window", value_name = "WxH", value_parser = parse_size)]
+    #[serde(alias = "window", skip_serializing_if = "Option::is_none")]
+    pub crop_size: Option<(u32, u32)>,
+    /// Share of the crops that are centred on rare-class pixels, the rarer the class the more often (oversampling): small plants
+    /// are in hardly any other crop. Of no effect without a crop size.
+    #[arg(long, alias = "rare", value_name = "SHARE", default_value = default_of("rare_crops"))]
+    #[serde(alias = "rare", skip_serializing_if = "Option::is_none")]
+    pub rare_crops: Option<f64>,
+    /// Most training steps.
+    #[arg(long, value_name = "N", default_value = default_of("steps"))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub steps: Option<u64>,
+    /// Batch size: images a step, 1 to 1024.
+    #[arg(long, value_name = "N", default_value = default_of("batch"))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub batch: Option<usize>,
+    /// Optimiser: sgd or adam.
+    #[arg(long, alias = "optimizer", value_name = "NAME", default_value = default_of("optimiser"))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub optimiser: Option<String>,
+    /// Learning rate at the start; one that suits the optimiser unless given.
+    #[arg(long, value_name = "RATE", help = rate_help())]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rate: Option<f64>,
+    /// Weight decay, from 0 to below 1.
+    #[arg(long, value_name = "SHARE", default_value = default_of("decay"))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub decay: Option<f64>,
+    /// Learning-rate schedule: poly, cosine or constant.
+    #[arg(long, value_name = "NAME", default_value = default_of("schedule"))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub schedule: Option<String>,
+    /// Loss: entropy (cross-entropy), or dice (cross-entropy plus soft Dice loss, which serves rare classes).
+    #[arg(long, value_name = "NAME", default_value = default_of("loss"))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub loss: Option<String>,
+    /// Class weights of the loss: median (median-frequency weights), sqrt (their square root), annealed (the square root, annealed
+    /// to 1 until half of the steps are done), or none.
+    #[arg(long, alias = "balance", value_name = "NAME", default_value = default_of("class_weights"))]
+    #[serde(alias = "balance", skip_serializing_if = "Option::is_none")]
+    pub class_weights: Option<String>,
+    /// Training images on which class biases are calibrated after the last step, for the best overlap: losses that serve small plants
+    /// make a network over-predict them. 0 for none.
+    #[arg(long, value_name = "N", default_value = default_of("calibrate"))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calibrate: Option<u64>,
+    /// Data augmentation: all, none, or some of flip, rotate, scale, crop, colour, blur, noise with commas between.
+    #[arg(long, value_name = "NAMES", default_value = default_of("augment"))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub augment: Option<String>,
+    /// Input normalization: band (each band of an image by its mean and standard deviation, which removes exposure and white balance),
+    /// image (all bands of an image alike, which removes exposure), or fixed (by those of the training set).
+    #[arg(long, alias = "normalise", value_name = "NAME", default_value = default_of("normalization"))]
+    #[serde(alias = "normalise", skip_serializing_if = "Option::is_none")]
+    pub normalization: Option<String>,
+    /// Steps between two validation passes, each with a checkpoint.
+    #[arg(long, alias = "watch-every", value_name = "N", default_value = default_of("validate_every"))]
+    #[serde(alias = "watch_every", skip_serializing_if = "Option::is_none")]
+    pub validate_every: Option<u64>,
+    /// Validation passes without a better result after which a training ends early.
+    #[arg(long, value_name = "N", default_value = default_of("patience"))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub patience: Option<u64>,
+}
+
+/// Fields that had another name, in version 0.1: old, then new. Flags have `-` for `_`.
+pub const RENAMED: [(&str, &str); 5] = [
+    ("window", "crop_size"),
+    ("rare", "rare_crops"),
+    ("balance", "class_weights"),
+    ("normalise", "normalization"),
+    ("watch_every", "validate_every"),
+];
+
+/// The default of a field as a user would write it; empty for what has none.
+pub fn default_of(field: &str) -> &'static str {
+    static DEFAULTS: LazyLock<BTreeMap<&'static str, String>> = LazyLock::new(|| defaults().into_iter().collect());
+    DEFAULTS.get(field).map_or("", String::as_str)
+}
+
+/// Every field that has a default, with the default as a user would write it.
+pub fn defaults() -> Vec<(&'static str, String)> {
+    let Plan { classes, shape, hyper, .. } = Plan::default();
+    let bands: Vec<&str> = shape.bands.iter().map(Band::name).collect();
+    let bands = if shape.bands == Band::RGB { "rgb".to_owned() } else { bands.join(",") };
+    vec![
+        ("classes", classes.to_string()),
+        ("bands", bands),
+        ("size", format!("{}x{}", shape.width, shape.height)),
+        ("rare_crops", hyper.rare_crops.to_string()),
+        ("steps", hyper.steps.to_string()),
+        ("batch", hyper.batch.to_string()),
+        ("optimiser", hyper.optimiser.name().into()),
+        ("decay", hyper.decay.to_string()),
+        ("schedule", hyper.schedule.name().into()),
+        ("loss", hyper.loss.name().into()),
+        ("class_weights", hyper.class_weights.name().into()),
+        ("calibrate", hyper.calibrate.to_string()),
+        ("augment", hyper.augment.to_string()),
+        ("normalization", hyper.normalization.name().into()),
+        ("validate_every", hyper.validate_every.to_string()),
+        ("patience", hyper.patience.to_string()),
+    ]
+}
+
+fn rate_help() -> String {
+    let each = OptimiserKind::ALL.map(|kind| format!("{} with {}", kind.default_rate(), kind.name()));
+    format!("Learning rate at the start [default: {}]", each.join(", "))
+}
+
+/// Reads `480x360`.
+pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
+    let sides = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    sides
+        .filter(|(w, h)| SIDES.contains(w) && SIDES.contains(h))
+        .ok_or_else(|| format!("write it as 480x360; sides from {} to {}", SIDES.start(), SIDES.end()))
+}
+
+/// Replaces a value by what a text says, where there is one.
+fn word<T>(
+    field: &'static str,
+    text: Option<&String>,
+    to: &mut T,
+    parse: impl Fn(&str) -> Result<T, String>,
+) -> Result<(), Invalid> {
+    if let Some(text) = text {
+        *to = parse(text).map_err(|words| match words.split_once(": ") {
+            Some((message, help)) => Invalid { field, message: message.into(), help: help.into() },
+            None => Invalid { field, message: format!("`{text}` cannot stand here"), help: words },
+        })?;
+    }
+    Ok(())
+}
+
+fn number<T: Copy>(value: Option<T>, to: &mut T) {
+    if let Some(value) = value {
+        *to = value;
+    }
+}
+
+impl Settings {
+    /// Puts what is given into a plan, and checks the plan. Another optimiser brings its own learning rate.
+    pub fn apply(&self, plan: &mut Plan) -> Result<(), Invalid> {
+        word("classes", self.classes.as_ref(), &mut plan.classes, Classes::parse)?;
+        word("bands", self.bands.as_ref(), &mut plan.shape.bands, Band::list)?;
+        if let Some(size) = self.size {
+            check_size("size", size)?;
+            (plan.shape.width, plan.shape.height) = size;
+        }
+        let hyper = &mut plan.hyper;
+        if self.crop_size.is_some() {
+            hyper.crop_size = self.crop_size;
+        }
+        word("optimiser", self.optimiser.as_ref(), &mut hyper.optimiser, OptimiserKind::parse)?;
+        if self.optimiser.is_some() {
+            hyper.rate = hyper.optimiser.default_rate();
+        }
+        word("schedule", self.schedule.as_ref(), &mut hyper.schedule, Schedule::parse)?;
+        word("loss", self.loss.as_ref(), &mut hyper.loss, LossFunction::parse)?;
+        word("class_weights", self.class_weights.as_ref(), &mut hyper.class_weights, ClassWeights::parse)?;
+        word("augment", self.augment.as_ref(), &mut hyper.augment, Augment::parse)?;
+        word("normalization", self.normalization.as_ref(), &mut hyper.normalization, NormalizationMode::parse)?;
+        number(self.rare_crops, &mut hyper.rare_crops);
+        number(self.steps, &mut hyper.steps);
+        number(self.batch, &mut hyper.batch);
+        number(self.rate, &mut hyper.rate);
+        number(self.decay, &mut hyper.decay);
+        number(self.calibrate, &mut hyper.calibrate);
+        number(self.validate_every, &mut hyper.validate_every);
+        number(self.patience, &mut hyper.patience);
+        plan.hyper.check(&plan.shape).map_err(|invalid| Invalid {
+            // Of a crop that was given before, the size is what no longer fits.
+            field: if invalid.field == "crop_size" && self.crop_size.is_none() { "size" } else { invalid.field },
+            ..invalid
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rationale: defaults that stand twice drift apart. Expected: what `--help` shows as defaults, given as text, is the default plan; and
+    /// no field but those without a default is left out. Source: [`Plan::default`].
+    #[test]
+    fn defaults_of_the_command_line_are_those_of_the_code() {
+        #[derive(clap::Parser)]
+        struct Line {
+            #[command(flatten)]
+            settings: Settings,
+        }
+        let Line { settings } = clap::Parser::parse_from(["train"]);
+        let mut plan =
+            Plan { hyper: super::super::Hyperparameters { steps: 7, ..Default::default() }, ..Plan::default() };
+        plan.shape.width = 99;
+        settings.apply(&mut plan).unwrap();
+        assert_eq!(plan, Plan::default());
+        assert_eq!((settings.crop_size, settings.rate), (None, None));
+        let given = serde_json::to_value(&settings).unwrap();
+        let given: Vec<&str> = given.as_object().unwrap().keys().map(String::as_str).collect();
+        let mut known: Vec<&str> = defaults().into_iter().map(|(field, _)| field).collect();
+        known.sort_unstable();
+        assert_eq!(given, known);
+    }
+
+    /// Rationale: a crop larger than the image was an error on the command line and cut without a word in an experiment. Expected: an error
+    /// wherever settings come from, about the crop, or about the size where only that was given; whoever leaves both is let through.
+    #[test]
+    fn a_crop_that_is_larger_than_the_image_is_an_error() {
+        let large = Settings { crop_size: Some((500, 300)), ..Settings::default() };
+        let invalid = large.apply(&mut Plan::default()).unwrap_err();
+        assert_eq!(invalid.field, "crop_size");
+        assert!(invalid.message.contains("500 × 300") && invalid.message.contains("480 × 360"), "{invalid:?}");
+        let error = invalid.of_flag();
+        assert!(error.to_string().starts_with("--crop-size: a crop of 500 × 300"), "{error}");
+        assert_eq!(error.exit_code(), 2);
+        let mut plan = Plan::default();
+        Settings { crop_size: Some((480, 360)), ..Settings::default() }.apply(&mut plan).unwrap();
+        let smaller = Settings { size: Some((240, 180)), ..Settings::default() };
+        assert_eq!(smaller.apply(&mut plan.clone()).unwrap_err().field, "size");
+        let both = Settings { crop_size: Some((240, 180)), ..smaller };
+        both.apply(&mut plan).unwrap();
+    }
+}

@@ -1,0 +1,193 @@
+//! The training loop: a batch, its loss, its gradients, a step of the optimiser; now and then a validation pass.
+
+use super::checkpoint::{Checkpoint, History, LossPoint, ValidationPass};
+use super::class_weights;
+use super::hyper::NormalizationMode;
+use super::loss;
+use super::optimiser::Optimiser;
+use super::plan::Plan;
+use crate::dataset::sample::IGNORE;
+use crate::train::data::{Batch, Loader, Normalization, Order, Store, augment};
+use crate::train::engine::{Model, Where, failed};
+use crate::train::measure::{Confusion, Scores};
+use crate::train::weights::Array;
+use crate::{Error, Result};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+use tch::{Kind, Tensor};
+
+/// What a training reads.
+pub struct Data {
+    /// Training set; at least one image.
+    pub train: Arc<Store>,
+    /// Validation set; may be empty.
+    pub val: Store,
+    /// Threads that load.
+    pub loaders: usize,
+}
+
+/// What a training calls while it goes on, and what stops it.
+pub struct Callbacks<'a> {
+    /// After every step: steps done, and its loss, where the batch had a labelled pixel.
+    pub step: &'a dyn Fn(u64, Option<f64>),
+    /// After every validation pass, and whether it is the best so far.
+    pub validation: &'a dyn Fn(&ValidationPass, bool),
+    /// Raised by whoever wants it to stop.
+    pub stop: &'a AtomicBool,
+}
+
+/// What a training results in.
+pub struct Outcome {
+    /// The weights at the best validation pass, or the last where there was none.
+    pub values: Vec<Array>,
+    /// Input normalization.
+    pub normalization: Normalization,
+    /// Loss curve and validation passes.
+    pub history: History,
+    /// Steps done.
+    pub steps: u64,
+    /// Why it ended: `steps`, `patience` or `time`.
+    pub ended: &'static str,
+    /// Seconds of work, over all sittings.
+    pub seconds: f64,
+}
+
+/// Points of the loss curve.
+const POINTS: u64 = 200;
+
+/// Trains a plan, from its checkpoint in `folder` where there is one. `hash` is the plan's checksum; `begin` the weights to begin with
+/// where they are another run's. Told to stop, it leaves a checkpoint and ends with
+/// [`Kind::Interrupted`](crate::error::Kind::Interrupted).
+pub fn train(
+    plan: &Plan,
+    hash: &str,
+    data: &Data,
+    begin: &[Array],
+    place: Where,
+    folder: &Path,
+    callbacks: &Callbacks<'_>,
+) -> Result<Outcome> {
+    let (classes, hyper) = (plan.classes.len(), &plan.hyper);
+    let normalization = match hyper.normalization {
+        NormalizationMode::Band => Normalization::Band,
+        NormalizationMode::Image => Normalization::Image,
+        NormalizationMode::Fixed => Normalization::fixed(&data.train)?,
+    };
+    let mut at = Checkpoint::read(folder, hash)?.unwrap_or_default();
+    let mut model = Model::new(plan.network, plan.shape.bands.len(), classes, plan.seed, place);
+    if at.step > 0 {
+        model.load(&at.values)?;
+    } else if !begin.is_empty() {
+        model.load(begin)?;
+    }
+    let mut optimiser = Optimiser::new(hyper.optimiser, hyper.decay, at.step, &at.memory, &model);
+    let rarities = class_weights::rarities(&data.train, classes)?;
+    let order = Order {
+        seed: plan.seed,
+        batch: hyper.batch,
+        crop_size: plan.crop_size(),
+        rare: hyper.rare_crops,
+        augment: hyper.augment,
+        normalization: normalization.clone(),
+    };
+    let mut loader = Loader::start(&data.train, &order, at.step, hyper.steps, data.loaders);
+    let (begun, before) = (Instant::now(), at.seconds);
+    let every = (hyper.steps / POINTS).max(1);
+    let out_of_patience = |at: &Checkpoint| at.history.since_best() >= hyper.patience && !data.val.is_empty();
+    let ended = loop {
+        at.seconds = before + begun.elapsed().as_secs_f64();
+        if at.step >= hyper.steps {
+            break "steps";
+        }
+        if out_of_patience(&at) {
+            break "patience";
+        }
+        if plan.seconds.is_some_and(|most| at.seconds >= most as f64) {
+            break "time";
+        }
+        if callbacks.stop.load(Ordering::Relaxed) {
+            save(&mut at, &model, &optimiser, folder, hash)?;
+            return Err(Error::interrupted());
+        }
+        let batch = loader.next().unwrap_or_else(|| Err(Error::failed("the loading threads have ended")))?;
+        let in_time = plan.seconds.map_or(0.0, |most| at.seconds / most as f64);
+        let done = in_time.max(at.step as f64 / hyper.steps as f64);
+        let rate = hyper.rate * hyper.schedule.share(done);
+        let weights = Tensor::from_slice(&hyper.class_weights.weights(&rarities, done)).to_device(place.device);
+        let loss = step(&model, &mut optimiser, &batch, plan, &weights, rate)?;
+        if loss.is_some_and(|loss| !loss.is_finite()) {
+            let help = format!("a smaller --rate than {} (this training lies in {})", hyper.rate, folder.display());
+            return Err(Error::input(format!("the loss of step {} is no number any more", at.step + 1)).help(help));
+        }
+        at.step += 1;
+        if let Some(loss) = loss {
+            at.pending = (at.pending.0 + loss, at.pending.1 + 1);
+        }
+        if at.step % every == 0 && at.pending.1 > 0 {
+            let (sum, n) = std::mem::take(&mut at.pending);
+            at.history.losses.push(LossPoint { step: at.step, loss: sum / n as f64, rate });
+        }
+        (callbacks.step)(at.step, loss);
+        if at.step % hyper.validate_every == 0 || at.step == hyper.steps {
+            if !data.val.is_empty() {
+                let pass = validate(&model, &data.val, &normalization, at.step)?;
+                at.history.validation.push(pass.clone());
+                let best = at.history.since_best() == 0;
+                if best {
+                    at.best = model.arrays()?;
+                }
+                (callbacks.validation)(&pass, best);
+            }
+            at.seconds = before + begun.elapsed().as_secs_f64();
+            save(&mut at, &model, &optimiser, folder, hash)?;
+        }
+    };
+    let values = if at.best.is_empty() { model.arrays()? } else { at.best };
+    Ok(Outcome { values, normalization, history: at.history, steps: at.step, ended, seconds: at.seconds })
+}
+
+fn save(at: &mut Checkpoint, model: &Model, optimiser: &Optimiser, folder: &Path, hash: &str) -> Result<()> {
+    at.values = model.arrays()?;
+    at.memory = optimiser.arrays()?;
+    at.write(folder, hash)
+}
+
+/// One step; its loss. A batch without a labelled pixel has none and changes nothing.
+fn step(
+    model: &Model,
+    optimiser: &mut Optimiser,
+    batch: &Batch,
+    plan: &Plan,
+    weights: &Tensor,
+    rate: f64,
+) -> Result<Option<f64>> {
+    if batch.labels.iter().all(|l| *l == IGNORE) {
+        return Ok(None);
+    }
+    let size = plan.crop_size();
+    let x = model.images(&batch.pixels, size);
+    let y = Tensor::from_slice(&batch.labels).to_device(model.place.device).to_kind(Kind::Int64);
+    let y = y.view([batch.images as i64, i64::from(size.1), i64::from(size.0)]);
+    let loss = loss::loss(plan.hyper.loss, &model.forward(&x, true), &y, weights);
+    optimiser.step(model, &loss, rate);
+    f64::try_from(loss).map(Some).map_err(|e| failed(&e))
+}
+
+/// A validation pass: scores of the network on all validation images together.
+fn validate(model: &Model, val: &Store, normalization: &Normalization, step: u64) -> Result<ValidationPass> {
+    let shape = val.shape();
+    let mut confusion = Confusion::new(model.classes);
+    for place in 0..val.len() {
+        let example = val.get(place)?;
+        let mut pixels = augment::interleave(&example, 1);
+        normalization.apply(&mut pixels, shape.bands.len());
+        confusion.add(&example.labels, &model.predict(&pixels, (shape.width, shape.height))?)?;
+    }
+    let plants: Vec<bool> = (0..model.classes).map(|c| c > 0).collect();
+    let scores = Scores::of(&confusion, &plants);
+    let number = |v: Option<f64>| v.unwrap_or(0.0);
+    let (ga, miou) = (number(scores.global_accuracy), number(scores.mean_iou));
+    Ok(ValidationPass { step, ga, miou, iou: scores.classes.iter().map(|c| c.iou).collect() })
+}
