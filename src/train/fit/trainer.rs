@@ -109,7 +109,8 @@ pub fn train(
         }
         if callbacks.stop.load(Ordering::Relaxed) {
             save(&mut at, &model, &optimiser, folder, hash)?;
-            return Err(Error::interrupted());
+            let words = format!("stopped after step {} of {}, where it goes on", at.step, hyper.steps);
+            return Err(Error::stopped(words).help("the same command goes on with it").in_file(folder));
         }
         let batch = loader.next().unwrap_or_else(|| Err(Error::failed("the loading threads have ended")))?;
         let in_time = plan.seconds.map_or(0.0, |most| at.seconds / most as f64);
