@@ -1,10 +1,10 @@
 //! Sharpening, as phones do it: the picture's luminance less its blur is added to the picture (unsharp mask).
 
-use super::given::{Given, layered};
-use super::psf::Psf;
 use crate::math::Spectrum;
 use crate::ron_file::{NonNegative, Vary};
 use crate::sampling::rng::Stream;
+use crate::sensor::given::{Given, layered};
+use crate::sensor::lens::Psf;
 use serde::Serialize;
 
 layered! {

@@ -85,20 +85,20 @@ const DIAGONAL: [Kernel; 2] =
     [[[0.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 0.0]], [[6.0, 0.0, -1.5], [0.0, 2.0, 0.0], [-1.5, 0.0, 0.0]]];
 
 /// A window of a mosaic: one value a pixel, row by row.
-pub(super) struct Mosaic<'a> {
+pub(in crate::sensor) struct Mosaic<'a> {
     /// Its values.
-    pub(super) values: &'a [f32],
+    pub(in crate::sensor) values: &'a [f32],
     /// Pixels in a row.
-    pub(super) width: u32,
+    pub(in crate::sensor) width: u32,
     /// The window's first column and row in the camera's image.
-    pub(super) corner: (u32, u32),
+    pub(in crate::sensor) corner: (u32, u32),
     /// Where the colours lie.
-    pub(super) pattern: Pattern,
+    pub(in crate::sensor) pattern: Pattern,
 }
 
 impl Mosaic<'_> {
     /// R, G, B of every pixel.
-    pub(super) fn interpolate(&self, method: Demosaic) -> Vec<[f32; 3]> {
+    pub(in crate::sensor) fn interpolate(&self, method: Demosaic) -> Vec<[f32; 3]> {
         let which = usize::from(method == Demosaic::MalvarHeCutler);
         let (row, cross, diagonal) = (&ROW[which], &CROSS[which], &DIAGONAL[which]);
         let column = transposed(row);

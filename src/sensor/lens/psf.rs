@@ -3,10 +3,10 @@
 //! It works on the image, so it costs nothing a sample, and it comes on top of the page's `filter`, with which the samples are drawn:
 //! their variances add up. Labels know nothing of it. Beyond the window's edge the outermost pixels go on.
 
-use super::given::{Given, layered};
 use crate::math::Spectrum;
 use crate::ron_file::{Finite, NonNegative, Vary};
 use crate::sampling::rng::Stream;
+use crate::sensor::given::{Given, layered};
 use serde::Serialize;
 
 layered! {

@@ -12,23 +12,12 @@
 //! Noise and mosaic belong to the image's pixels, so a window has those of the whole image; blur, interpolation and sharpening look around,
 //! so a few pixels along a window's edge differ from the whole image's, and JPEG's blocks begin at its corner.
 
-use super::Camera;
-use super::adc::Adc;
-use super::balance::WhiteBalance;
-use super::bayer::{Mosaic, MosaicDesc};
-use super::exposure::Exposure;
-use super::jpeg::Jpeg;
-use super::matrix;
-use super::noise::Noise;
-use super::psf::Psf;
-use super::sharpen::Sharpen;
-use super::tone::{CLIP, Tone};
+use super::chip::{Adc, CLIP, Exposure, Mosaic, MosaicDesc, Noise, RESPONSE};
+use super::develop::{Jpeg, Sharpen, Tone, WhiteBalance, apply_matrix};
+use super::lens::{Camera, Psf};
 use crate::math::Spectrum;
 use crate::sampling::rng::Stream;
 use std::f32::consts::FRAC_1_PI;
-
-/// Electrons per radiance, relative to G.
-pub(super) const RESPONSE: Spectrum = Spectrum::new(0.94, 1.0, 0.77, 0.93);
 
 /// A sensor with its settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -149,7 +138,7 @@ impl Sensor {
         if let Some(rows) = &self.matrix {
             for value in &mut values {
                 let [r, g, b, nir] = value.to_array();
-                let [r, g, b] = matrix::apply(rows, [r, g, b]);
+                let [r, g, b] = apply_matrix(rows, [r, g, b]);
                 *value = Spectrum::new(r, g, b, nir);
             }
         }
