@@ -4,6 +4,7 @@
 //! pixel is that of its own colour; noise is already in it, and interpolation spreads it over neighbours, as in any camera with one
 //! chip. Beyond the window's edge the mosaic goes on as its mirror image about the outermost pixels, which keeps its colours.
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// A mosaic of colours, as it is written.
@@ -105,13 +106,13 @@ impl Mosaic<'_> {
         let (width, (left, top)) = (self.width as usize, self.corner);
         let height = self.values.len() / width.max(1);
         let around_columns: Vec<[usize; 5]> = (0..width).map(|x| around(x, width)).collect();
-        let mut seen = Vec::with_capacity(self.values.len());
-        for y in 0..height {
+        let mut seen = vec![[0.0; 3]; width * height];
+        seen.par_chunks_mut(width.max(1)).enumerate().for_each(|(y, row_of)| {
             let rows = around(y, height).map(|y| &self.values[y * width..][..width]);
-            for (x, columns) in around_columns.iter().enumerate() {
+            for (x, (columns, seen)) in around_columns.iter().zip(row_of).enumerate() {
                 let (own, weigh) = (rows[2][x], |kernel| weigh(kernel, &rows, columns));
                 let at = (left + x as u32, top + y as u32);
-                seen.push(match self.pattern.color(at.0, at.1) {
+                *seen = match self.pattern.color(at.0, at.1) {
                     0 => [own, weigh(cross), weigh(diagonal)],
                     2 => [weigh(diagonal), weigh(cross), own],
                     _ => {
@@ -119,9 +120,9 @@ impl Mosaic<'_> {
                         let (beside, above) = (weigh(row), weigh(&column));
                         if red_beside { [beside, own, above] } else { [above, own, beside] }
                     }
-                });
+                };
             }
-        }
+        });
         seen
     }
 }
