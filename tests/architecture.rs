@@ -83,10 +83,10 @@ const DOORS: &[(&str, &str)] = &[
     ("rand", "sampling/rng.rs"),
     ("rand_pcg", "sampling/rng.rs"),
     // Parallel at the top only.
-    // Images, plants, and the soil's skin: loops over what is many.
+    // Images, plants, the soil's skin and the sensor's pixels: loops over what is many.
     (
         "rayon",
-        "render/ job/threads.rs dataset/ compare/ scene/assemble/mod.rs soil/skin.rs material/ground.rs raster/sheets.rs",
+        "render/ sensor/ job/threads.rs dataset/ compare/ scene/assemble/mod.rs soil/skin.rs material/ground.rs raster/sheets.rs",
     ),
     // One reader for all RON files; faults inside a value are found where they lie.
     ("ron", "ron_file/"),

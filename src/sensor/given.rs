@@ -4,7 +4,7 @@ use serde::{Deserialize, Deserializer};
 
 /// A value that a page may leave to its preset.
 #[derive(Clone, Debug)]
-pub(super) struct Given<T>(Option<T>);
+pub(in crate::sensor) struct Given<T>(Option<T>);
 
 impl<T> Default for Given<T> {
     fn default() -> Self {
@@ -42,13 +42,13 @@ macro_rules! layered {
         #[derive(Clone, Debug, Default, serde::Deserialize)]
         #[serde(deny_unknown_fields, default, rename = $word)]
         #[allow(clippy::struct_field_names, reason = "a page's fields carry their units")]
-        pub(super) struct $written {
+        pub(in crate::sensor) struct $written {
             $($field: $given,)*
         }
 
         impl $written {
             /// What is given, and the rest from a preset.
-            pub(super) fn over(self, preset: $name) -> $name {
+            pub(in crate::sensor) fn over(self, preset: $name) -> $name {
                 $name { $($field: self.$field.over(preset.$field),)* }
             }
         }

@@ -2,302 +2,37 @@
 //!
 //! | file | idea |
 //! |---|---|
-//! | `desc`, `lens`, `pose`, `motion` | a camera: what it is, how it bends rays, where it stands, how it drives |
-//! | `settings`, `preset` | a sensor as a page writes it, and sensors by their names |
-//! | `response` | the sensor: its steps in their order |
-//! | `psf`, `exposure`, `noise`, `adc`, `balance`, `bayer`, `matrix`, `tone`, `sharpen`, `jpeg` | its steps, each by itself |
+//! | `lens` | a camera: what it is, how it bends rays, where it stands, how it moves, what it blurs |
+//! | `chip` | exposure, noise, mosaic, whole numbers |
+//! | `develop` | white balance, colour matrix, tone curve, sharpening, JPEG |
+//! | `chain` | the sensor: its steps in their order |
+//! | `settings`, `preset`, `given` | a sensor as a scene file writes it, sensors by their names, and values left to them |
+//! | `record` | a sensor as it was drawn |
 //!
 //! OpenCV's conventions throughout: camera x right, y down, z forward; pixel (0, 0) covers 0 to 1 and has its centre at 0.5;
 //! intrinsics in pixels. Intrinsics are f64, rays f32.
 
-mod adc;
-mod balance;
-mod bayer;
-mod bounds;
-mod desc;
-mod exposure;
+mod chain;
+mod chip;
+mod develop;
 mod given;
-mod intrinsics;
-mod jpeg;
 mod lens;
-mod matrix;
-mod motion;
-mod noise;
-mod pose;
 mod preset;
-mod psf;
 mod record;
-mod response;
 mod settings;
-mod sharpen;
 #[cfg(test)]
 mod tests;
-mod tone;
 
-pub use adc::{Adc, AdcDesc, Black, Depth};
-pub use balance::{WhiteBalance, WhiteBalanceDesc};
-pub use bayer::{Demosaic, MosaicDesc, Pattern};
-pub use bounds::PixelBox;
-pub use desc::CameraDesc;
-pub use exposure::{Exposure, ExposureDesc, Percent};
-pub use intrinsics::{ApertureDesc, IntrinsicsDesc};
-pub use jpeg::{Jpeg, JpegDesc, Quality};
-pub use lens::{Distortion, DistortionDesc};
-pub use matrix::{MatrixDesc, Row};
-pub use motion::{Motion, MotionDesc};
-pub use noise::{Noise, NoiseDesc};
-pub use pose::{Pose, PoseDesc};
-pub use psf::{Psf, PsfDesc};
-pub use record::{ApertureRecord, CameraRecord, MotionRecord, SensorRecord};
-pub use response::{Deep, Linear, Photograph, Sensor};
+pub use chain::{Deep, Linear, Photograph, Sensor};
+pub use chip::{
+    Adc, AdcDesc, Black, Demosaic, Depth, Exposure, ExposureDesc, MosaicDesc, Noise, NoiseDesc, Pattern, Percent,
+};
+pub use develop::{
+    Jpeg, JpegDesc, MatrixDesc, Quality, Row, Sharpen, SharpenDesc, Tone, WhiteBalance, WhiteBalanceDesc,
+};
+pub use lens::{
+    Aperture, ApertureDesc, ApertureRecord, Camera, CameraDesc, CameraRecord, Distortion, DistortionDesc,
+    IntrinsicsDesc, Motion, MotionDesc, MotionRecord, PixelBox, Pose, PoseDesc, Psf, PsfDesc,
+};
+pub use record::SensorRecord;
 pub use settings::SensorDesc;
-pub use sharpen::{Sharpen, SharpenDesc};
-pub use tone::Tone;
-
-use crate::math::{Vec2, Vec3, vec2, vec3};
-use crate::sampling::warp;
-use crate::{Error, Result};
-
-/// A thin lens.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Aperture {
-    /// Radius of the pupil, metres.
-    pub radius: f32,
-    /// Distance along the optical axis of the plane in focus, metres.
-    pub focus: f32,
-}
-
-/// A camera at its place.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Camera {
-    width: u32,
-    height: u32,
-    /// Pixels across, of those that the sensor has: below 1 the image is binned.
-    scale: f32,
-    /// fx, fy: pixels per unit of x/z, y/z.
-    focal: [f64; 2],
-    /// cx, cy: the optical axis, pixels.
-    centre: [f64; 2],
-    distortion: Distortion,
-    /// Beyond this r² of the pinhole image nothing is projected: the polynomial may fold back into the image.
-    horizon: f64,
-    aperture: Option<Aperture>,
-    pose: Pose,
-    motion: Motion,
-}
-
-impl Camera {
-    /// A camera of `size` pixels with intrinsics in pixels. A [`Kind::Input`](crate::error::Kind::Input) where the size or focal length is not above
-    /// zero, or the distortion folds the image over within its corners.
-    pub fn new(
-        size: (u32, u32),
-        focal: [f64; 2],
-        centre: [f64; 2],
-        distortion: Distortion,
-        pose: Pose,
-    ) -> Result<Self> {
-        let (width, height) = size;
-        if width == 0 || height == 0 || focal.iter().any(|f| !(f.is_finite() && *f > 0.0)) {
-            return Err(Error::input(format!(
-                "a camera of {width} × {height} pixels and focal lengths {focal:?} sees nothing"
-            ))
-            .help("all of them must be above 0"));
-        }
-        let (horizon, aperture, motion) = (f64::INFINITY, None, Motion::default());
-        let mut camera = Self { width, height, scale: 1.0, focal, centre, distortion, horizon, aperture, pose, motion };
-        if !distortion.is_none() {
-            camera.horizon = camera.check_distortion()?;
-        }
-        Ok(camera)
-    }
-
-    /// The same camera with a thin lens instead of a pinhole.
-    #[must_use]
-    pub fn with_aperture(mut self, aperture: Option<Aperture>) -> Self {
-        self.aperture = aperture;
-        self
-    }
-
-    /// The same field of view in another number of pixels.
-    #[must_use]
-    pub fn with_size(mut self, width: u32, height: u32) -> Self {
-        let scale = [f64::from(width) / f64::from(self.width), f64::from(height) / f64::from(self.height)];
-        for (axis, scale) in scale.into_iter().enumerate() {
-            self.focal[axis] *= scale;
-            self.centre[axis] *= scale;
-        }
-        self.scale *= width as f32 / self.width as f32;
-        self.width = width;
-        self.height = height;
-        self
-    }
-
-    /// Pixels across, of those that the sensor has: 1, but for an image in another size than the camera's own.
-    pub fn scale(&self) -> f32 {
-        self.scale
-    }
-
-    /// Pixels across.
-    pub fn width(&self) -> u32 {
-        self.width
-    }
-
-    /// Pixels down.
-    pub fn height(&self) -> u32 {
-        self.height
-    }
-
-    /// fx, fy, cx, cy, pixels.
-    pub fn intrinsics(&self) -> [f64; 4] {
-        [self.focal[0], self.focal[1], self.centre[0], self.centre[1]]
-    }
-
-    /// The lens's distortion.
-    pub fn distortion(&self) -> Distortion {
-        self.distortion
-    }
-
-    /// Position and orientation; while it drives, those in the middle of the image's readout.
-    pub fn pose(&self) -> &Pose {
-        &self.pose
-    }
-
-    /// The thin lens; `None` for a pinhole.
-    pub fn aperture(&self) -> Option<Aperture> {
-        self.aperture
-    }
-
-    /// Origin and unit direction, world, of the ray through continuous pixel coordinates `px` (0.5, 0.5 is the first pixel's
-    /// centre) and the lens point that two numbers in [0, 1) choose; a pinhole does not look at them. In the middle of the exposure.
-    #[inline]
-    pub fn ray(&self, px: Vec2, lens_u: [f32; 2]) -> (Vec3, Vec3) {
-        self.ray_during(px, lens_u, 0.5)
-    }
-
-    /// The same at a moment of the exposure, from 0 to 1; a camera at rest does not look at it.
-    #[inline]
-    pub fn ray_during(&self, px: Vec2, lens_u: [f32; 2], shutter_u: f32) -> (Vec3, Vec3) {
-        let [x, y] = self.unproject([f64::from(px.x), f64::from(px.y)]);
-        let position = self.position(f64::from(px.y), (shutter_u - 0.5) * self.motion.exposure);
-        let through = vec3(x as f32, y as f32, 1.0);
-        let Some(Aperture { radius, focus }) = self.aperture else {
-            return (position, self.pose.to_world(through).normalize());
-        };
-        let pupil = warp::disc(lens_u) * radius;
-        let start = vec3(pupil.x, pupil.y, 0.0);
-        (position + self.pose.to_world(start), self.pose.to_world(through * focus - start).normalize())
-    }
-
-    /// The one ray through the centre of pixel (x, y) and the lens's centre: what labels are cast with.
-    #[inline]
-    pub fn centre_ray(&self, x: u32, y: u32) -> (Vec3, Vec3) {
-        let px = [f64::from(x) + 0.5, f64::from(y) + 0.5];
-        self.through(self.unproject(px), px[1])
-    }
-
-    /// The ray through the lens's centre and a point of the plane at unit distance, for row coordinate `row`.
-    #[inline]
-    fn through(&self, [x, y]: [f64; 2], row: f64) -> (Vec3, Vec3) {
-        (self.position(row, 0.0), self.pose.to_world(vec3(x as f32, y as f32, 1.0)).normalize())
-    }
-
-    /// The point at unit distance along the optical axis, camera frame (x/z, y/z), that a pixel sees.
-    #[inline]
-    pub fn unproject(&self, px: [f64; 2]) -> [f64; 2] {
-        self.distortion.undistort([(px[0] - self.centre[0]) / self.focal[0], (px[1] - self.centre[1]) / self.focal[1]])
-    }
-
-    /// The pixel that sees the point (x, y, z) of the camera frame; `None` behind the lens and, for a distorted image, far
-    /// outside it.
-    pub fn project_camera(&self, p: [f64; 3]) -> Option<[f64; 2]> {
-        if self.rolls() { self.project_rolling(p) } else { self.project_still(p) }
-    }
-
-    /// The same of a camera at rest.
-    fn project_still(&self, [x, y, z]: [f64; 3]) -> Option<[f64; 2]> {
-        if z <= 0.0 {
-            return None;
-        }
-        let at = [x / z, y / z];
-        if at[0] * at[0] + at[1] * at[1] > self.horizon {
-            return None;
-        }
-        Some(self.image(at))
-    }
-
-    /// The pixel at which the lens puts the point (x/z, y/z).
-    fn image(&self, at: [f64; 2]) -> [f64; 2] {
-        let [x, y] = self.distortion.distort(at);
-        [x * self.focal[0] + self.centre[0], y * self.focal[1] + self.centre[1]]
-    }
-
-    /// Continuous pixel coordinates of a world point, inside the image or not; `None` behind the lens and, for a distorted
-    /// image, far outside it.
-    pub fn project(&self, p: Vec3) -> Option<Vec2> {
-        let [x, y] = self.project_camera(self.pose.point_to_camera(p))?;
-        Some(vec2(x as f32, y as f32))
-    }
-
-    /// Whether pixel coordinates lie in the image.
-    pub fn contains(&self, px: Vec2) -> bool {
-        px.x >= 0.0 && px.y >= 0.0 && px.x < self.width as f32 && px.y < self.height as f32
-    }
-
-    /// Angle that a pixel covers at the optical axis, radians: times the distance, the footprint of a pixel.
-    pub fn pixel_angle(&self) -> f32 {
-        (1.0 / (self.focal[0] * self.focal[1]).sqrt()) as f32
-    }
-
-    /// The points of the plane z = `ground` (metres) seen by the image's corners, clockwise from the top left; `None` where a
-    /// corner sees no ground.
-    pub fn footprint(&self, ground: f32) -> Option<[Vec2; 4]> {
-        let (w, h) = (self.width as f32, self.height as f32);
-        let mut seen = [Vec2::ZERO; 4];
-        for (seen, corner) in seen.iter_mut().zip([vec2(0.0, 0.0), vec2(w, 0.0), vec2(w, h), vec2(0.0, h)]) {
-            let [x, y] = self.unproject([f64::from(corner.x), f64::from(corner.y)]);
-            let dir = self.pose.to_world(vec3(x as f32, y as f32, 1.0));
-            let position = self.position(f64::from(corner.y), 0.0);
-            let t = (ground - position.z) / dir.z;
-            if !(t.is_finite() && t > 0.0) {
-                return None;
-            }
-            let at = position + dir * t;
-            *seen = vec2(at.x, at.y);
-        }
-        Some(seen)
-    }
-
-    /// Cosine of the angle between the optical axis and what a pixel sees.
-    pub fn axis_cosine(&self, px: [f64; 2]) -> f32 {
-        let [x, y] = self.unproject(px);
-        (1.0 / (1.0 + x * x + y * y).sqrt()) as f32
-    }
-
-    /// Walks the image's border and the way to it: the lens must be one to one there. Returns the r² up to which it is used.
-    fn check_distortion(&self) -> Result<f64> {
-        const STEPS: u32 = 32;
-        let (w, h) = (f64::from(self.width), f64::from(self.height));
-        let mut horizon = 0.0_f64;
-        for k in 0..=STEPS {
-            let t = f64::from(k) / f64::from(STEPS);
-            for px in [[t * w, 0.0], [t * w, h], [0.0, t * h], [w, t * h]] {
-                let at = self.unproject(px);
-                let back = self.project_still([at[0], at[1], 1.0]).unwrap_or([f64::NAN; 2]);
-                let error = (back[0] - px[0]).abs().max((back[1] - px[1]).abs());
-                let folds = (0..=STEPS).any(|j| {
-                    let s = f64::from(j) / f64::from(STEPS);
-                    self.distortion.stretch([at[0] * s, at[1] * s]) <= 0.0
-                });
-                if error.is_nan() || error > 1e-6 || folds {
-                    return Err(Error::input("the lens distortion folds the image over before its corners").help(
-                        "check the coefficients' signs and \
-                         that they belong to this focal length",
-                    ));
-                }
-                horizon = horizon.max(at[0] * at[0] + at[1] * at[1]);
-            }
-        }
-        // A margin of a tenth of the radius for things that stick out of the image.
-        Ok(horizon * 1.21)
-    }
-}

@@ -1,27 +1,48 @@
 //! Sensors by their names. Each has a camera of the same name, with its pixels, lens and shutter.
 
-use super::adc::AdcDesc;
-use super::balance::WhiteBalanceDesc;
-use super::bayer::{Demosaic, MosaicDesc, Pattern};
-use super::jpeg::JpegDesc;
-use super::matrix::MatrixDesc;
-use super::noise::NoiseDesc;
-use super::psf::PsfDesc;
-use super::settings::SensorDesc;
-use super::sharpen::SharpenDesc;
-use super::tone::Tone;
-use crate::ron_file::{Num, Vary};
+use super::chip::{AdcDesc, Demosaic, MosaicDesc, NoiseDesc, Pattern};
+use super::develop::{JpegDesc, MatrixDesc, SharpenDesc, Tone, WhiteBalanceDesc};
+use super::lens::PsfDesc;
+use super::settings::{SensorDesc, SensorWritten};
+use crate::ron_file::{self, Num, Vary};
+use serde::{Deserialize, Deserializer};
 
 /// What [`sensor`] knows.
-pub(super) const NAMES: [&str; 3] = ["JaiAd130", "Phone", "MachineVision"];
+const NAMES: [&str; 3] = ["JaiAd130", "Phone", "MachineVision"];
 
 /// A sensor by its name.
-pub(super) fn sensor(name: &str) -> Option<SensorDesc> {
+fn sensor(name: &str) -> Option<SensorDesc> {
     match name {
         "JaiAd130" => Some(jai_ad130()),
         "Phone" => Some(phone()),
         "MachineVision" => Some(machine_vision()),
         _ => None,
+    }
+}
+
+/// `(…)` with every field as its default says, or a sensor's name, whose values any field replaces.
+impl<'de> Deserialize<'de> for SensorDesc {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        ron_file::from_raw(deserializer, |raw| {
+            let start = raw.len() - raw.trim_start().len();
+            let len = raw[start..].find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(raw.len() - start);
+            let name = &raw[start..start + len];
+            if name.is_empty() || name == "SensorDesc" {
+                return ron_file::parse_in(raw).map(|written: SensorWritten| written.over(Self::default()));
+            }
+            let Some(preset) = sensor(name) else {
+                let help = ron_file::choose("sensors", &NAMES, name);
+                return Err(ron_file::Fault {
+                    end: start + len,
+                    ..ron_file::whole(raw, format!("unknown sensor `{name}`"), help)
+                });
+            };
+            // Spaces for the name keep the places of what follows.
+            let fields = [" ".repeat(start + len).as_str(), &raw[start + len..]].concat();
+            let written =
+                if fields.trim().is_empty() { SensorWritten::default() } else { ron_file::parse_in(&fields)? };
+            Ok(written.over(preset))
+        })
     }
 }
 
@@ -108,5 +129,51 @@ fn machine_vision() -> SensorDesc {
         tone: Tone::Srgb,
         bits: Num::new(12.0),
         ..SensorDesc::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::{Purpose, Stream};
+
+    fn read(page: &str) -> Result<SensorDesc, String> {
+        ron::from_str(page)
+            .map_err(|e| ron_file::Fault::parse(&e.code.to_string()).map_or_else(|| e.to_string(), |f| f.message))
+    }
+
+    /// Expected: a name alone, with nothing or with something in brackets; what is given replaces that value and no other, also
+    /// within a step; what is printed reads as the same.
+    #[test]
+    fn a_sensor_has_a_name_and_what_differs_from_it() {
+        for name in NAMES {
+            let plain = read(name).unwrap();
+            assert_eq!(read(&format!("{name}()")).unwrap(), plain);
+            assert_eq!(
+                read(&format!(" {name} ( tone: Linear, )")).unwrap(),
+                SensorDesc { tone: Tone::Linear, ..plain.clone() }
+            );
+            let louder = read(&format!("{name}(noise: (read: 99))")).unwrap();
+            let noise = NoiseDesc { read: Num::new(99.0), ..plain.noise.clone() };
+            assert_eq!(louder, SensorDesc { noise, ..plain.clone() });
+            assert_eq!(read(&ron::to_string(&plain).unwrap()).unwrap(), plain);
+            assert_ne!(plain, SensorDesc::default());
+        }
+        let wrong = |page: &str| read(page).unwrap_err();
+        assert!(wrong("Fone()").contains("unknown sensor `Fone`"), "{}", wrong("Fone()"));
+        assert!(wrong("Phone(jpg: Off)").contains("unknown field `jpg`"));
+        assert!(wrong("(noise: (red: 3))").contains("unknown field `red`"));
+        assert!(wrong("(jpeg: On(quality: 101))").contains("101"));
+    }
+
+    #[test]
+    fn later_steps_draw_numbers_of_their_own() {
+        let page = "exposure: Auto(level: Uniform(0.1, 0.2)), corner_shading: Uniform(0, 1)";
+        let sensor =
+            |more: &str| read(&format!("({page}{more})")).unwrap().build(&mut Stream::of(1, 0, Purpose::Sensor, 0));
+        let (few, many) =
+            (sensor(""), sensor(", psf: (color_px: Uniform(0.3, 0.9)), matrix: Saturation(Uniform(1, 2))"));
+        assert_eq!((few.exposure, few.corner_shading), (many.exposure, many.corner_shading));
+        assert!(many.psf.color > 0.3 && many.matrix.is_some());
     }
 }

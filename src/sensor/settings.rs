@@ -1,21 +1,13 @@
 //! A sensor as a page writes it: each step of the camera chain with its switch, and cameras by their names.
 
-use super::adc::{AdcDesc, Depth};
-use super::balance::WhiteBalanceDesc;
-use super::bayer::MosaicDesc;
-use super::exposure::ExposureDesc;
+use super::chain::Sensor;
+use super::chip::{AdcDesc, Depth, ExposureDesc, MosaicDesc, NoiseDesc, NoiseWritten};
+use super::develop::{JpegDesc, MatrixDesc, SharpenDesc, SharpenWritten, Tone, WhiteBalanceDesc};
 use super::given::{Given, layered};
-use super::jpeg::JpegDesc;
-use super::matrix::MatrixDesc;
-use super::noise::{NoiseDesc, NoiseWritten};
-use super::preset;
-use super::psf::{PsfDesc, PsfWritten};
-use super::response::Sensor;
-use super::sharpen::{SharpenDesc, SharpenWritten};
-use super::tone::Tone;
-use crate::ron_file::{self, Fraction, Num, Vary};
+use super::lens::{PsfDesc, PsfWritten};
+use crate::ron_file::{Fraction, Num, Vary};
 use crate::sampling::rng::{Purpose, Stream};
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::Serialize;
 
 layered! {
     /// A sensor, as it is written: `(…)` with every field as its default says, or a camera's name, whose values any field replaces.
@@ -56,7 +48,7 @@ layered! {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[derive(Clone, Debug, PartialEq, Serialize)]
-    pub struct SensorDesc, Written = "SensorDesc" {
+    pub struct SensorDesc, SensorWritten = "SensorDesc" {
         /// Exposure of the colour image; default `Auto(level: 0.18)`.
         pub exposure: ExposureDesc = Given<ExposureDesc>,
         /// Exposure of the NIR image; default `Auto(level: 0.25)`.
@@ -86,30 +78,6 @@ layered! {
         pub bits: Num<Depth> = Given<Num<Depth>>,
         /// Compression of the 8-bit colour image; default `Off`.
         pub jpeg: JpegDesc = Given<JpegDesc>,
-    }
-}
-
-impl<'de> Deserialize<'de> for SensorDesc {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        ron_file::from_raw(deserializer, |raw| {
-            let start = raw.len() - raw.trim_start().len();
-            let len = raw[start..].find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(raw.len() - start);
-            let name = &raw[start..start + len];
-            if name.is_empty() || name == "SensorDesc" {
-                return ron_file::parse_in(raw).map(|written: Written| written.over(Self::default()));
-            }
-            let Some(preset) = preset::sensor(name) else {
-                let help = ron_file::choose("sensors", &preset::NAMES, name);
-                return Err(ron_file::Fault {
-                    end: start + len,
-                    ..ron_file::whole(raw, format!("unknown sensor `{name}`"), help)
-                });
-            };
-            // Spaces for the name keep the places of what follows.
-            let fields = [" ".repeat(start + len).as_str(), &raw[start + len..]].concat();
-            let written = if fields.trim().is_empty() { Written::default() } else { ron_file::parse_in(&fields)? };
-            Ok(written.over(preset))
-        })
     }
 }
 
@@ -154,50 +122,5 @@ impl SensorDesc {
             bits: self.bits.get() as u32,
             jpeg: self.jpeg.draw(&mut later),
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn read(page: &str) -> Result<SensorDesc, String> {
-        ron::from_str(page)
-            .map_err(|e| ron_file::Fault::parse(&e.code.to_string()).map_or_else(|| e.to_string(), |f| f.message))
-    }
-
-    /// Expected: a name alone, with nothing or with something in brackets; what is given replaces that value and no other, also
-    /// within a step; what is printed reads as the same.
-    #[test]
-    fn a_sensor_has_a_name_and_what_differs_from_it() {
-        for name in preset::NAMES {
-            let plain = read(name).unwrap();
-            assert_eq!(read(&format!("{name}()")).unwrap(), plain);
-            assert_eq!(
-                read(&format!(" {name} ( tone: Linear, )")).unwrap(),
-                SensorDesc { tone: Tone::Linear, ..plain.clone() }
-            );
-            let louder = read(&format!("{name}(noise: (read: 99))")).unwrap();
-            let noise = NoiseDesc { read: Num::new(99.0), ..plain.noise.clone() };
-            assert_eq!(louder, SensorDesc { noise, ..plain.clone() });
-            assert_eq!(read(&ron::to_string(&plain).unwrap()).unwrap(), plain);
-            assert_ne!(plain, SensorDesc::default());
-        }
-        let wrong = |page: &str| read(page).unwrap_err();
-        assert!(wrong("Fone()").contains("unknown sensor `Fone`"), "{}", wrong("Fone()"));
-        assert!(wrong("Phone(jpg: Off)").contains("unknown field `jpg`"));
-        assert!(wrong("(noise: (red: 3))").contains("unknown field `red`"));
-        assert!(wrong("(jpeg: On(quality: 101))").contains("101"));
-    }
-
-    #[test]
-    fn later_steps_draw_numbers_of_their_own() {
-        let page = "exposure: Auto(level: Uniform(0.1, 0.2)), corner_shading: Uniform(0, 1)";
-        let sensor =
-            |more: &str| read(&format!("({page}{more})")).unwrap().build(&mut Stream::of(1, 0, Purpose::Sensor, 0));
-        let (few, many) =
-            (sensor(""), sensor(", psf: (color_px: Uniform(0.3, 0.9)), matrix: Saturation(Uniform(1, 2))"));
-        assert_eq!((few.exposure, few.corner_shading), (many.exposure, many.corner_shading));
-        assert!(many.psf.color > 0.3 && many.matrix.is_some());
     }
 }

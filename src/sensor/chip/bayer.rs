@@ -4,6 +4,7 @@
 //! pixel is that of its own colour; noise is already in it, and interpolation spreads it over neighbours, as in any camera with one
 //! chip. Beyond the window's edge the mosaic goes on as its mirror image about the outermost pixels, which keeps its colours.
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// A mosaic of colours, as it is written.
@@ -85,33 +86,33 @@ const DIAGONAL: [Kernel; 2] =
     [[[0.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 0.0]], [[6.0, 0.0, -1.5], [0.0, 2.0, 0.0], [-1.5, 0.0, 0.0]]];
 
 /// A window of a mosaic: one value a pixel, row by row.
-pub(super) struct Mosaic<'a> {
+pub(in crate::sensor) struct Mosaic<'a> {
     /// Its values.
-    pub(super) values: &'a [f32],
+    pub(in crate::sensor) values: &'a [f32],
     /// Pixels in a row.
-    pub(super) width: u32,
+    pub(in crate::sensor) width: u32,
     /// The window's first column and row in the camera's image.
-    pub(super) corner: (u32, u32),
+    pub(in crate::sensor) corner: (u32, u32),
     /// Where the colours lie.
-    pub(super) pattern: Pattern,
+    pub(in crate::sensor) pattern: Pattern,
 }
 
 impl Mosaic<'_> {
     /// R, G, B of every pixel.
-    pub(super) fn interpolate(&self, method: Demosaic) -> Vec<[f32; 3]> {
+    pub(in crate::sensor) fn interpolate(&self, method: Demosaic) -> Vec<[f32; 3]> {
         let which = usize::from(method == Demosaic::MalvarHeCutler);
         let (row, cross, diagonal) = (&ROW[which], &CROSS[which], &DIAGONAL[which]);
         let column = transposed(row);
         let (width, (left, top)) = (self.width as usize, self.corner);
         let height = self.values.len() / width.max(1);
         let around_columns: Vec<[usize; 5]> = (0..width).map(|x| around(x, width)).collect();
-        let mut seen = Vec::with_capacity(self.values.len());
-        for y in 0..height {
+        let mut seen = vec![[0.0; 3]; width * height];
+        seen.par_chunks_mut(width.max(1)).enumerate().for_each(|(y, row_of)| {
             let rows = around(y, height).map(|y| &self.values[y * width..][..width]);
-            for (x, columns) in around_columns.iter().enumerate() {
+            for (x, (columns, seen)) in around_columns.iter().zip(row_of).enumerate() {
                 let (own, weigh) = (rows[2][x], |kernel| weigh(kernel, &rows, columns));
                 let at = (left + x as u32, top + y as u32);
-                seen.push(match self.pattern.color(at.0, at.1) {
+                *seen = match self.pattern.color(at.0, at.1) {
                     0 => [own, weigh(cross), weigh(diagonal)],
                     2 => [weigh(diagonal), weigh(cross), own],
                     _ => {
@@ -119,9 +120,9 @@ impl Mosaic<'_> {
                         let (beside, above) = (weigh(row), weigh(&column));
                         if red_beside { [beside, own, above] } else { [above, own, beside] }
                     }
-                });
+                };
             }
-        }
+        });
         seen
     }
 }

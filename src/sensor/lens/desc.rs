@@ -1,10 +1,12 @@
 //! A camera as a page writes it.
 
-use super::intrinsics::{ApertureDesc, IntrinsicsDesc, middle};
-use super::lens::DistortionDesc;
+use super::aperture::{Aperture, ApertureDesc};
+use super::bare;
+use super::camera::Camera;
+use super::distortion::DistortionDesc;
+use super::intrinsics::{IntrinsicsDesc, middle};
 use super::motion::MotionDesc;
 use super::pose::{PoseDesc, nadir, origin, zero};
-use super::{Aperture, Camera};
 use crate::Result;
 use crate::ron_file::{Finite, Num, Positive, PositiveCount, Vary};
 use crate::sampling::rng::Stream;
@@ -182,25 +184,6 @@ cameras! {
             #[serde(default, skip_serializing_if = "MotionDesc::is_default")]
             motion: MotionDesc,
         },
-    }
-}
-
-/// An option written without `Some`: the field is there or it is not.
-pub(super) mod bare {
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-    pub(in crate::sensor) fn deserialize<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
-        d: D,
-    ) -> Result<Option<T>, D::Error> {
-        T::deserialize(d).map(Some)
-    }
-
-    #[expect(clippy::ref_option, reason = "serde calls it with a reference to the field")]
-    pub(in crate::sensor) fn serialize<S: Serializer, T: Serialize>(of: &Option<T>, s: S) -> Result<S::Ok, S::Error> {
-        match of {
-            Some(of) => of.serialize(s),
-            None => s.serialize_unit(),
-        }
     }
 }
 

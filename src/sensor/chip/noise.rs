@@ -4,11 +4,11 @@
 //! Poisson number, up to its full well; reading adds a normal error and the pixel's own offset (DSNU). Both non-uniformities are normal
 //! and belong to the camera's body: they are drawn from its number and a pixel's place, so all images and all pages of one body share them.
 
-use super::given::{Given, layered};
-use super::tone::CLIP;
+use super::level::CLIP;
 use crate::math::Spectrum;
 use crate::ron_file::{Count, Fraction, NonNegative, Num, Positive};
 use crate::sampling::rng::{Purpose, Stream};
+use crate::sensor::given::{Given, layered};
 use serde::Serialize;
 use std::f32::consts::TAU;
 
@@ -88,7 +88,7 @@ pub struct Noise {
 impl Noise {
     /// Levels (1 is white: 90 % of the full well) as a pixel of the image counts them in `exposure` seconds, down to `least`. Each pixel
     /// has a part of `stream` of its own.
-    pub(super) fn count(
+    pub(in crate::sensor) fn count(
         &self,
         level: Spectrum,
         (x, y): (u32, u32),

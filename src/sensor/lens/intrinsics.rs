@@ -1,6 +1,5 @@
 //! Focal length, centre and aperture of a camera, as a page writes them.
 
-use super::Aperture;
 use crate::ron_file::{Finite, Positive, Vary};
 use crate::sampling::rng::Stream;
 use crate::{Error, Result};
@@ -59,30 +58,6 @@ impl IntrinsicsDesc {
                 ([middle[0] / (angle / 2.0).to_radians().tan(); 2], middle, None)
             }
         })
-    }
-}
-
-/// A thin lens, as it is written.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ApertureDesc {
-    /// Focal length over the pupil's diameter.
-    pub f_number: Vary<Positive>,
-    /// Distance of the plane in focus.
-    pub focus_m: Vary<Positive>,
-}
-
-impl ApertureDesc {
-    /// Draws the aperture of a lens of a focal length.
-    pub(super) fn draw(&self, focal_mm: Option<f64>, stream: &mut Stream) -> Result<Aperture> {
-        let Some(focal) = focal_mm else {
-            return Err(Error::input("an f_number needs a focal length in millimetres").help(
-                "write intrinsics: Millimetres(focal_mm: …, \
-                 pixel_um: …)",
-            ));
-        };
-        let radius = (focal * 1e-3 / (2.0 * self.f_number.draw(stream))) as f32;
-        Ok(Aperture { radius, focus: self.focus_m.draw32(stream) })
     }
 }
 

@@ -1,6 +1,7 @@
 //! From linear values to stored ones: a soft shoulder for the highlights, then the curve that screens expect.
 
 use crate::ron_file::{Num, Positive};
+use crate::sensor::chip::CLIP;
 use serde::{Deserialize, Serialize};
 
 /// The curve from linear sensor values (1 is white) to what is stored.
@@ -21,9 +22,6 @@ pub enum Tone {
 
 /// Where the shoulder begins.
 const KNEE: f32 = 0.6;
-
-/// The largest linear value a sensor gives: a tenth above white.
-pub(super) const CLIP: f32 = 1.0 / 0.9;
 
 impl Tone {
     /// The stored value, 0 to 1, of a linear one. Never falls as the value rises.

@@ -3,10 +3,11 @@
 //! It works on the image, so it costs nothing a sample, and it comes on top of the page's `filter`, with which the samples are drawn:
 //! their variances add up. Labels know nothing of it. Beyond the window's edge the outermost pixels go on.
 
-use super::given::{Given, layered};
 use crate::math::Spectrum;
 use crate::ron_file::{Finite, NonNegative, Vary};
 use crate::sampling::rng::Stream;
+use crate::sensor::given::{Given, layered};
+use rayon::prelude::*;
 use serde::Serialize;
 
 layered! {
@@ -111,7 +112,7 @@ impl Psf {
             let [_, g, _, nir] = pixels[i].to_array();
             Spectrum::new(seen(self.shift[0])[0], g, seen(self.shift[1])[2], nir)
         };
-        (0..pixels.len()).map(moved).collect()
+        (0..pixels.len()).into_par_iter().map(moved).collect()
     }
 }
 
@@ -151,7 +152,7 @@ fn along(pixels: &[Spectrum], width: u32, weights: &[Spectrum], dx: i64, dy: i64
         }
         sum
     };
-    (0..pixels.len()).map(summed).collect()
+    (0..pixels.len()).into_par_iter().map(summed).collect()
 }
 
 #[cfg(test)]

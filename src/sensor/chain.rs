@@ -9,26 +9,19 @@
 //! 0.94, 1, 0.77, 0.93 in R, G, B, NIR, from its quantum efficiencies; so red and blue, amplified by the white balance, carry
 //! more noise than green.
 //!
+//! Each step works on all threads of the current pool, pixel by pixel or row by row; what sums over the image (white balance, metering) runs in
+//! one order, so the bits are the same at any number of threads.
+//!
 //! Noise and mosaic belong to the image's pixels, so a window has those of the whole image; blur, interpolation and sharpening look around,
 //! so a few pixels along a window's edge differ from the whole image's, and JPEG's blocks begin at its corner.
 
-use super::Camera;
-use super::adc::Adc;
-use super::balance::WhiteBalance;
-use super::bayer::{Mosaic, MosaicDesc};
-use super::exposure::Exposure;
-use super::jpeg::Jpeg;
-use super::matrix;
-use super::noise::Noise;
-use super::psf::Psf;
-use super::sharpen::Sharpen;
-use super::tone::{CLIP, Tone};
+use super::chip::{Adc, CLIP, Exposure, Mosaic, MosaicDesc, Noise, RESPONSE};
+use super::develop::{Jpeg, Sharpen, Tone, WhiteBalance, apply_matrix};
+use super::lens::{Camera, Psf};
 use crate::math::Spectrum;
 use crate::sampling::rng::Stream;
+use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
-
-/// Electrons per radiance, relative to G.
-pub(super) const RESPONSE: Spectrum = Spectrum::new(0.94, 1.0, 0.77, 0.93);
 
 /// A sensor with its settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -115,56 +108,50 @@ impl Sensor {
         let place = |i: usize| (film.left + i as u32 % width, film.top + i as u32 / width);
         // Electrons per exposure, before any clipping.
         let known = |r: &Spectrum| if r.is_finite() { r.clamp(0.0, f32::MAX) } else { Spectrum::ZERO };
-        let mut signals: Vec<Spectrum> = film.pixels.iter().map(known).collect();
+        let mut signals: Vec<Spectrum> = film.pixels.par_iter().map(known).collect();
         self.psf.scaled(camera.scale()).spread(
             &mut signals,
             width,
             (film.left, film.top),
             (camera.width(), camera.height()),
         );
-        for (i, signal) in signals.iter_mut().enumerate() {
+        signals.par_iter_mut().enumerate().for_each(|(i, signal)| {
             *signal = *signal * RESPONSE * self.vignetting(camera, place(i));
-        }
+        });
 
         let balance = self.white_balance.gains(illuminant, &signals);
         let [r, g, b] = balance;
         let balanced = Spectrum::new(r, g, b, 1.0);
         let white = illuminant * RESPONSE * FRAC_1_PI;
-        let mut metered: Vec<f32> = signals.iter().map(|&s| (s * balanced).luminance()).collect();
-        let gain = self.exposure.gain(&mut metered, (white * balanced).luminance());
-        for (metered, signal) in metered.iter_mut().zip(&signals) {
-            *metered = signal.to_array()[3];
-        }
-        let nir_gain = self.nir_exposure.gain(&mut metered, white.to_array()[3]);
+        let metered = |of: &(dyn Fn(Spectrum) -> f32 + Sync)| signals.par_iter().map(|s| of(*s)).collect::<Vec<f32>>();
+        let (gain, nir_gain) = rayon::join(
+            || self.exposure.gain(&mut metered(&|s| (s * balanced).luminance()), (white * balanced).luminance()),
+            || self.nir_exposure.gain(&mut metered(&|s| s.to_array()[3]), white.to_array()[3]),
+        );
 
         let gains = Spectrum::new(gain, gain, gain, nir_gain);
         let mut values = signals;
-        for (i, value) in values.iter_mut().enumerate() {
+        values.par_iter_mut().enumerate().for_each(|(i, value)| {
             *value = self.read_out(*value * gains, camera, place(i), stream) * balanced;
-        }
+        });
         // Where each pixel is of two by two or more, it has seen all colours.
         if camera.scale() > 0.5 {
             self.interpolate(&mut values, width, (film.left, film.top));
         }
         if let Some(rows) = &self.matrix {
-            for value in &mut values {
+            values.par_iter_mut().for_each(|value| {
                 let [r, g, b, nir] = value.to_array();
-                let [r, g, b] = matrix::apply(rows, [r, g, b]);
+                let [r, g, b] = apply_matrix(rows, [r, g, b]);
                 *value = Spectrum::new(r, g, b, nir);
-            }
+            });
         }
-        for value in &mut values {
+        values.par_iter_mut().for_each(|value| {
             *value = value.map(|level| self.tone.apply(self.adc.map_or(level, |adc| adc.shown(level))));
-        }
+        });
         self.sharpen.apply(&mut values, width);
 
-        let (mut rgb, mut nir) = (Vec::with_capacity(values.len() * 3), Vec::with_capacity(values.len()));
-        for value in &values {
-            // What is below 0 or above 255 ends there.
-            let [r, g, b, n] = value.to_array().map(|v| (v * 255.0 + 0.5) as u8);
-            rgb.extend([r, g, b]);
-            nir.push(n);
-        }
+        // What is below 0 or above 255 ends there.
+        let (mut rgb, nir) = split(&values, |v| (v * 255.0 + 0.5) as u8);
         if let Some(jpeg) = self.jpeg {
             jpeg.pass(&mut rgb, width);
         }
@@ -203,11 +190,11 @@ impl Sensor {
         let seen = |(i, level): (usize, &Spectrum)| {
             level.to_array()[pattern.color(corner.0 + i as u32 % width, corner.1 + i as u32 / width)]
         };
-        let values: Vec<f32> = levels.iter().enumerate().map(seen).collect();
+        let values: Vec<f32> = levels.par_iter().enumerate().map(seen).collect();
         let colors = Mosaic { values: &values, width, corner, pattern }.interpolate(demosaic);
-        for (level, [r, g, b]) in levels.iter_mut().zip(colors) {
+        levels.par_iter_mut().zip(colors).for_each(|(level, [r, g, b])| {
             *level = Spectrum::new(r, g, b, level.to_array()[3]);
-        }
+        });
     }
 }
 
@@ -216,12 +203,17 @@ impl Deep {
     fn of(values: &[Spectrum], bits: u32) -> Self {
         let top = ((1_u32 << bits.min(16)) - 1) as f32;
         let step = |v: f32| ((v * top + 0.5).floor().clamp(0.0, top) * (65535.0 / top) + 0.5) as u16;
-        let steps = values.iter().map(|value| value.to_array().map(step));
-        let (mut rgb, mut nir) = (Vec::with_capacity(values.len() * 3), Vec::with_capacity(values.len()));
-        for [r, g, b, n] in steps {
-            rgb.extend([r, g, b]);
-            nir.push(n);
-        }
+        let (rgb, nir) = split(values, step);
         Self { rgb, nir }
     }
+}
+
+/// Colour and near infrared of stored values, each as `code` writes it.
+fn split<T: Send>(values: &[Spectrum], code: impl Fn(f32) -> T + Sync) -> (Vec<T>, Vec<T>) {
+    let coded = |value: &Spectrum| {
+        let [r, g, b, nir] = value.to_array().map(&code);
+        ([r, g, b], nir)
+    };
+    let (rgb, nir): (Vec<[T; 3]>, Vec<T>) = values.par_iter().map(coded).unzip();
+    (rgb.into_flattened(), nir)
 }

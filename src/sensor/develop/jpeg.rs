@@ -8,6 +8,7 @@
 
 use crate::ron_file::{Bound, Vary};
 use crate::sampling::rng::Stream;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::f32::consts::{FRAC_1_SQRT_2, PI};
 
@@ -81,7 +82,7 @@ impl Jpeg {
         let pixels = rgb.as_chunks_mut::<3>().0;
         let plane = |weights: [f32; 3], zero: f32| {
             let of = |p: &[u8; 3]| (0..3).map(|c| weights[c] * f32::from(p[c])).sum::<f32>() + zero;
-            Plane { width, values: pixels.iter().map(|p| of(p).round()).collect() }
+            Plane { width, values: pixels.par_iter().map(|p| of(p).round()).collect() }
         };
         let luminance = plane([0.299, 0.587, 0.114], 0.0);
         let colors = [plane([-0.168_736, -0.331_264, 0.5], 128.0), plane([0.5, -0.418_688, -0.081_312], 128.0)];
@@ -95,11 +96,11 @@ impl Jpeg {
                 plane.halved().coded(&of_color).doubled(width, height)
             }
         });
-        for (i, pixel) in pixels.iter_mut().enumerate() {
+        pixels.par_iter_mut().enumerate().for_each(|(i, pixel)| {
             let (y, b, r) = (luminance.values[i], blue.values[i] - 128.0, red.values[i] - 128.0);
             let color = [y + 1.402 * r, y - 0.344_136 * b - 0.714_136 * r, y + 1.772 * b];
             *pixel = color.map(|v| v.round().clamp(0.0, 255.0) as u8);
-        }
+        });
     }
 
     /// A table at this quality.
@@ -131,8 +132,8 @@ impl Plane {
         let (width, height) = (self.width.div_ceil(2), self.height().div_ceil(2));
         let mean =
             |x: usize, y: usize| (self.at(x, y) + self.at(x + 1, y) + self.at(x, y + 1) + self.at(x + 1, y + 1)) / 4.0;
-        let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
-        Self { width, values: places.map(|(x, y)| mean(2 * x, 2 * y).round()).collect() }
+        let value = |i: usize| mean(2 * (i % width), 2 * (i / width)).round();
+        Self { width, values: (0..width * height).into_par_iter().map(value).collect() }
     }
 
     /// Twice as fine, three quarters from the nearest and a quarter from the next, in both directions.
@@ -142,32 +143,34 @@ impl Plane {
             let row = |y: usize| 0.75 * self.at(x / 2, y) + 0.25 * self.at(next(x), y);
             0.75 * row(y / 2) + 0.25 * row(next(y))
         };
-        let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
-        Self { width, values: places.map(|(x, y)| value(x, y).round()).collect() }
+        let value = |i: usize| value(i % width, i / width).round();
+        Self { width, values: (0..width * height).into_par_iter().map(value).collect() }
     }
 
     /// Each block in steps of its cosines.
     fn coded(&self, steps: &Block) -> Self {
         let cosines = cosines();
+        let back = transposed(&cosines);
         let mut coded = Self { width: self.width, values: vec![0.0; self.values.len()] };
-        for top in (0..self.height()).step_by(SIDE) {
+        coded.values.par_chunks_mut(self.width * SIDE).enumerate().for_each(|(k, coded)| {
+            let top = k * SIDE;
             for left in (0..self.width).step_by(SIDE) {
                 let block: Block = std::array::from_fn(|y| std::array::from_fn(|x| self.at(left + x, top + y) - 128.0));
                 // On columns, then on rows, and back.
-                let mut seen = product(&product(&cosines, &block), &transposed(&cosines));
+                let mut seen = product(&product(&cosines, &block), &back);
                 for (row, steps) in seen.iter_mut().zip(steps) {
                     for (value, step) in row.iter_mut().zip(steps) {
                         *value = (*value / step).round() * step;
                     }
                 }
-                let block = product(&product(&transposed(&cosines), &seen), &cosines);
-                for (y, row) in (top..self.height()).zip(&block) {
-                    for (x, value) in (left..self.width).zip(row) {
-                        coded.values[y * self.width + x] = (value + 128.0).round().clamp(0.0, 255.0);
+                let block = product(&product(&back, &seen), &cosines);
+                for (coded, row) in coded.chunks_mut(self.width).zip(&block) {
+                    for (coded, value) in coded[left..].iter_mut().zip(row) {
+                        *coded = (value + 128.0).round().clamp(0.0, 255.0);
                     }
                 }
             }
-        }
+        });
         coded
     }
 }

@@ -43,7 +43,7 @@ impl MatrixDesc {
 }
 
 /// A colour by a matrix.
-pub(super) fn apply(matrix: &[[f32; 3]; 3], color: [f32; 3]) -> [f32; 3] {
+pub(in crate::sensor) fn apply(matrix: &[[f32; 3]; 3], color: [f32; 3]) -> [f32; 3] {
     matrix.map(|row| row.iter().zip(color).map(|(weight, value)| weight * value).sum())
 }
 

@@ -1,9 +1,9 @@
 //! White balance: gains under which white is white.
 
-use super::response::RESPONSE;
 use crate::math::Spectrum;
 use crate::ron_file::{Fraction, Positive, Vary};
 use crate::sampling::rng::Stream;
+use crate::sensor::chip::RESPONSE;
 use serde::{Deserialize, Serialize};
 
 /// ASTM G173 global irradiance: what "daylight" balances for.

@@ -1,10 +1,11 @@
 //! Sharpening, as phones do it: the picture's luminance less its blur is added to the picture (unsharp mask).
 
-use super::given::{Given, layered};
-use super::psf::Psf;
 use crate::math::Spectrum;
 use crate::ron_file::{NonNegative, Vary};
 use crate::sampling::rng::Stream;
+use crate::sensor::given::{Given, layered};
+use crate::sensor::lens::Psf;
+use rayon::prelude::*;
 use serde::Serialize;
 
 layered! {
@@ -48,10 +49,10 @@ impl Sharpen {
         }
         let mut blurred = values.to_vec();
         Psf { color: self.radius, ..Psf::default() }.spread(&mut blurred, width, (0, 0), (width, 0));
-        for (value, blurred) in values.iter_mut().zip(blurred) {
+        values.par_iter_mut().zip(blurred).for_each(|(value, blurred)| {
             let more = self.amount * (value.luminance() - blurred.luminance());
             *value += Spectrum::new(more, more, more, 0.0);
-        }
+        });
     }
 }
 

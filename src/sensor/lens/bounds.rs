@@ -1,6 +1,6 @@
 //! The camera beyond its image: rays of pixels outside of it, and where a triangle lies among them.
 
-use super::Camera;
+use super::camera::Camera;
 use crate::math::Vec3;
 
 /// Continuous pixel coordinates of a box: its least and its greatest corner.

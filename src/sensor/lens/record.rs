@@ -1,0 +1,95 @@
+//! A camera as it was drawn, for those who measure in its images.
+
+use super::camera::Camera;
+use serde::{Deserialize, Serialize};
+
+/// A camera in OpenCV's terms: x right, y down, z forward. A world point X (metres; x east, y north, z up) lies at
+/// R (X − position) in the camera's frame.
+///
+/// Pixel centres are at +0.5; programs that put the first pixel's centre at 0 subtract 0.5 from `cx_px` and `cy_px`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CameraRecord {
+    /// Pixels across.
+    pub width_px: u32,
+    /// Pixels down.
+    pub height_px: u32,
+    /// Focal length along x.
+    pub fx_px: f64,
+    /// Focal length along y.
+    pub fy_px: f64,
+    /// Optical axis, from the left edge.
+    pub cx_px: f64,
+    /// Optical axis, from the top edge.
+    pub cy_px: f64,
+    /// Distortion, radial, r².
+    pub k1: f64,
+    /// Distortion, radial, r⁴.
+    pub k2: f64,
+    /// Distortion, tangential, along y.
+    pub p1: f64,
+    /// Distortion, tangential, along x.
+    pub p2: f64,
+    /// Distortion, radial, r⁶.
+    pub k3: f64,
+    /// The lens's centre in the world.
+    pub position_m: [f64; 3],
+    /// R, row by row: the camera's axes right, down, forward in the world.
+    pub world_to_camera: [[f64; 3]; 3],
+    /// The thin lens; none for a pinhole.
+    pub aperture: Option<ApertureRecord>,
+    /// How it drives; none at rest. The position is that in the middle of the readout.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<MotionRecord>,
+}
+
+/// A driving camera as it was drawn: row y of h is in the middle of its exposure at (y/h − ½) · readout.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MotionRecord {
+    /// Velocity in the world.
+    pub velocity_m_s: [f64; 3],
+    /// How long a row gathers light.
+    pub exposure_s: f32,
+    /// From the first row's exposure to the last one's; 0 for a global shutter.
+    pub readout_s: f32,
+}
+
+/// A thin lens as it was drawn.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ApertureRecord {
+    /// Radius of the pupil.
+    pub radius_m: f32,
+    /// Distance along the optical axis of the plane in focus.
+    pub focus_m: f32,
+}
+
+impl Camera {
+    /// Everything that is known of it.
+    pub fn record(&self) -> CameraRecord {
+        let [fx_px, fy_px, cx_px, cy_px] = self.intrinsics();
+        let lens = self.distortion();
+        let pose = self.pose();
+        let motion = self.motion();
+        let moves = self.blurs() || self.rolls();
+        CameraRecord {
+            width_px: self.width(),
+            height_px: self.height(),
+            fx_px,
+            fy_px,
+            cx_px,
+            cy_px,
+            k1: lens.k1,
+            k2: lens.k2,
+            p1: lens.p1,
+            p2: lens.p2,
+            k3: lens.k3,
+            position_m: pose.position.to_array().map(f64::from),
+            world_to_camera: pose.axes.to_cols_array_2d().map(|axis| axis.map(f64::from)),
+            aperture: self.aperture().map(|a| ApertureRecord { radius_m: a.radius, focus_m: a.focus }),
+            motion: moves.then(|| MotionRecord {
+                velocity_m_s: motion.velocity.to_array().map(f64::from),
+                exposure_s: motion.exposure,
+                readout_s: motion.readout,
+            }),
+        }
+    }
+}
