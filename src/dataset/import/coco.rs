@@ -338,40 +338,54 @@ fn pixels(image: &Annotated, thing: &Thing) -> Result<Vec<u32>> {
     Ok(all)
 }
 
-/// The pixels whose centres lie in an odd number of the polygons' windings.
+/// The pixels whose centres lie in an odd number of the polygons' windings, in the order of their places. The work grows with the rows that
+/// edges cross, not with the image.
 fn inside(w: u32, h: u32, polygons: &[Vec<f64>]) -> Vec<u32> {
+    let mut crossings: Vec<Crossing> = polygons.iter().enumerate().flat_map(|(k, p)| crossings(h, k, p)).collect();
+    crossings.sort_by(|a, b| (a.row, a.polygon).cmp(&(b.row, b.polygon)).then(a.x.total_cmp(&b.x)));
     let mut all = Vec::new();
-    for row in 0..h {
-        let y = f64::from(row) + 0.5;
-        let mut spans: Vec<u32> = Vec::new();
-        for polygon in polygons {
-            for (from, to) in crossings(polygon, y).as_chunks::<2>().0.iter().map(|[a, b]| (a, b)) {
-                // Pixels with a centre from one crossing to the next.
-                let first = (from - 0.5).ceil().clamp(0.0, f64::from(w)) as u32;
-                let end = (to - 0.5).ceil().clamp(0.0, f64::from(w)) as u32;
-                spans.extend((first..end).map(|x| row * w + x));
+    for line in crossings.chunk_by(|a, b| (a.row, a.polygon) == (b.row, b.polygon)) {
+        for [from, to] in line.as_chunks::<2>().0 {
+            // Pixels with a centre from one crossing to the next.
+            let first = (from.x - 0.5).ceil().clamp(0.0, f64::from(w)) as u32;
+            let end = (to.x - 0.5).ceil().clamp(0.0, f64::from(w)) as u32;
+            all.extend((first..end).map(|x| from.row * w + x));
+        }
+    }
+    // Parts of one thing may lie on each other.
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+/// Where a polygon crosses the middle of a row.
+struct Crossing {
+    row: u32,
+    /// Which of the polygons.
+    polygon: usize,
+    x: f64,
+}
+
+/// Where polygon number `polygon` crosses the rows of an image of `h` rows, edge by edge.
+fn crossings(h: u32, polygon: usize, corners: &[f64]) -> Vec<Crossing> {
+    let points = corners.as_chunks::<2>().0;
+    let mut all = Vec::new();
+    for (k, [x0, y0]) in points.iter().enumerate() {
+        let [x1, y1] = points[(k + 1) % points.len()];
+        for row in rows(h, *y0, y1) {
+            let y = f64::from(row) + 0.5;
+            if (*y0 <= y) != (y1 <= y) {
+                all.push(Crossing { row, polygon, x: x0 + (y - y0) / (y1 - y0) * (x1 - x0) });
             }
         }
-        // Parts of one thing may lie on each other.
-        spans.sort_unstable();
-        spans.dedup();
-        all.append(&mut spans);
     }
     all
 }
 
-/// Where a polygon crosses a row, from the left.
-fn crossings(polygon: &[f64], y: f64) -> Vec<f64> {
-    let points = polygon.as_chunks::<2>().0;
-    let mut all = Vec::new();
-    for (k, [x0, y0]) in points.iter().enumerate() {
-        let [x1, y1] = points[(k + 1) % points.len()];
-        if (*y0 <= y) != (y1 <= y) {
-            all.push(x0 + (y - y0) / (y1 - y0) * (x1 - x0));
-        }
-    }
-    all.sort_by(f64::total_cmp);
-    all
+/// The rows that an edge from height `y0` to `y1` may cross: those between, and one beyond each end against rounding.
+fn rows(h: u32, y0: f64, y1: f64) -> std::ops::Range<u32> {
+    let held = |y: f64| y.clamp(0.0, f64::from(h)) as u32;
+    held((y0.min(y1) - 1.5).floor())..held((y0.max(y1) + 0.5).ceil())
 }
 
 #[cfg(test)]
@@ -390,5 +404,61 @@ mod tests {
         let triangle = vec![0.0, 0.0, 4.0, 0.0, 0.0, 4.0];
         assert_eq!(inside(4, 4, &[triangle]).len(), 6);
         assert_eq!(inside(4, 4, &[vec![]]), Vec::<u32>::new());
+    }
+
+    /// As it was: every row asks every edge.
+    fn row_by_row(w: u32, h: u32, polygons: &[Vec<f64>]) -> Vec<u32> {
+        let mut all = Vec::new();
+        for row in 0..h {
+            let y = f64::from(row) + 0.5;
+            for polygon in polygons {
+                let points = polygon.as_chunks::<2>().0;
+                let mut crossings = Vec::new();
+                for (k, [x0, y0]) in points.iter().enumerate() {
+                    let [x1, y1] = points[(k + 1) % points.len()];
+                    if (*y0 <= y) != (y1 <= y) {
+                        crossings.push(x0 + (y - y0) / (y1 - y0) * (x1 - x0));
+                    }
+                }
+                crossings.sort_by(f64::total_cmp);
+                for [from, to] in crossings.as_chunks::<2>().0 {
+                    let column = |x: f64| (x - 0.5).ceil().clamp(0.0, f64::from(w)) as u32;
+                    all.extend((column(*from)..column(*to)).map(|x| row * w + x));
+                }
+            }
+        }
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+
+    /// Expected: the pixels of a plain scan, for polygons that cross themselves, lie on each other, reach out of the image and have corners on
+    /// centres of rows.
+    #[test]
+    fn edges_cross_the_rows_that_a_plain_scan_finds() {
+        let mut s = crate::sampling::Stream::of(5, 0, crate::sampling::Purpose::Test, 0);
+        for round in 0..300 {
+            let (w, h) = (1 + s.index(30) as u32, 1 + s.index(30) as u32);
+            let mut polygon = |n: usize| -> Vec<f64> {
+                let mut value = || {
+                    let v = s.range(-6.0, 36.0);
+                    if round % 2 == 0 { v } else { (2.0 * v).round() / 2.0 }
+                };
+                (0..2 * n).map(|_| value()).collect()
+            };
+            let polygons = [polygon(3), polygon(9), polygon(1), polygon(0)];
+            assert_eq!(inside(w, h, &polygons), row_by_row(w, h, &polygons), "{w} × {h}: {polygons:?}");
+        }
+    }
+
+    /// Rationale: every row of the image used to ask every edge, for each annotation. Expected: an edge looks at the rows that it crosses and at
+    /// most four more, however large the image.
+    #[test]
+    fn an_edge_looks_at_its_own_rows() {
+        for h in [100, 10_000, 1_000_000] {
+            assert!(rows(h, 40.2, 41.7).len() <= 2 + 4 && rows(h, 41.7, 40.2) == rows(h, 40.2, 41.7));
+            assert!(rows(h, -1e9, -1.0).is_empty() && rows(h, 3e9, 4e9).is_empty());
+            assert_eq!(rows(h, -1e9, 1e9), 0..h);
+        }
     }
 }
