@@ -35,7 +35,7 @@ use crate::film::Filter;
 use crate::geometry::{AlphaMask, Mesh};
 use crate::integrator::Path as PathTracer;
 use crate::material::Varies;
-use crate::math::Spectrum;
+use crate::math::{Spectrum, Vec3};
 use crate::scene::{Part, Scene};
 use level::Leveled;
 pub use level::fix_levels;
