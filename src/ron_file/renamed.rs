@@ -67,12 +67,16 @@ mod tests {
         );
     }
 
-    /// Every alias of the sources is in the table and warns, and every row of the table has its alias.
+    /// Every alias of the sources is in the table and warns, and every row of the table has its alias. Experiment files have a table of
+    /// their own, since some of their words are fields of other files: [`crate::train::table::renamed`].
     #[test]
     fn the_table_and_the_aliases_are_the_same() {
         fn read(folder: &Path, found: &mut Vec<String>) {
             for entry in std::fs::read_dir(folder).unwrap() {
                 let path = entry.unwrap().path();
+                if path.ends_with("src/train") {
+                    continue;
+                }
                 if path.is_dir() {
                     read(&path, found);
                 } else if path.extension().is_some_and(|e| e == "rs") {
