@@ -73,7 +73,7 @@ fn the_exit_code_tells_the_kind_of_failure() {
     let folder = folder();
     let at = folder.path();
     let page = ["--scene", "page.ron", "--out", "out"];
-    of("misuse", at, &[&page[..], &["--pixel", "99,99"]].concat(), 2, "lies outside the image");
+    of("misuse", at, &["--scene", "page.ron", "--pixel", "99,99"], 2, "lies outside the image");
     std::fs::write(at.join("bad.ron"), "Field(").unwrap();
     of("input", at, &["--scene", "bad.ron"], 2, "bad.ron:1:");
     of("input that is not there", at, &["--scene", "none.ron"], 2, "there is no such");
