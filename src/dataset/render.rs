@@ -89,6 +89,7 @@ pub fn render(
     field.geometry()?;
     let (grow, build) = field.times();
     let image = renderer.render(&field, &Request { watch, ..Request::default() })?;
+    image.check_denoised()?;
     let begin = Instant::now();
     let (draw, label) = (image.times.draw, image.times.label);
     let text = image.provenance.photograph_text(image.denoised.is_some());

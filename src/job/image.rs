@@ -1,12 +1,13 @@
 //! What was rendered of a field, and how it is written.
 
 use super::field::Field;
-use crate::Result;
 use crate::film::Film;
 use crate::output::{self, Provenance};
 use crate::render::LabelMap;
 use crate::sensor::Photograph;
+use crate::{Error, Result};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 /// Where an image's time went.
@@ -25,8 +26,10 @@ pub struct Image<'f> {
     field: &'f Field,
     /// Radiance, its variance, and attributes of the first surface, by pixel.
     pub film: Film,
-    /// The same without noise, where that was asked for.
+    /// The same without noise, where that was asked for and worked.
     pub denoised: Option<Film>,
+    /// Why it did not work, until somebody was told.
+    failure: Mutex<Option<Error>>,
     /// Class, plant and leaf at each pixel's centre.
     pub labels: LabelMap,
     /// What its files say of where they came from.
@@ -39,18 +42,31 @@ impl<'f> Image<'f> {
     pub(super) fn new(
         field: &'f Field,
         film: Film,
-        denoised: Option<Film>,
+        denoised: Option<Result<Film>>,
         labels: LabelMap,
         provenance: Provenance,
         times: Times,
     ) -> Self {
         let labels = field.edit().labels(labels, &film, &field.grown().scene.tags());
-        Self { field, film, denoised, labels, provenance, times }
+        let (denoised, failure) = match denoised {
+            Some(Ok(film)) => (Some(film), None),
+            Some(Err(error)) => (None, Some(error)),
+            None => (None, None),
+        };
+        Self { field, film, denoised, failure: Mutex::new(failure), labels, provenance, times }
     }
 
     /// The field.
     pub fn field(&self) -> &'f Field {
         self.field
+    }
+
+    /// The error of a denoiser that failed, told once: the noisy image is there all the same.
+    pub fn check_denoised(&self) -> Result<()> {
+        match self.failure.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            Some(error) => Err(error),
+            None => Ok(()),
+        }
     }
 
     /// The photograph that the field's sensor takes; of the denoised film where there is one.
@@ -61,7 +77,8 @@ impl<'f> Image<'f> {
     /// Writes all files into a folder, which is made where it is missing, and returns their paths. Each appears whole or not at all.
     ///
     /// `rgb.png`, `nir.png` (and `rgb16.png`, `nir16.png` of a sensor with more than 8 bits), `radiance.exr`, `semantics.png`,
-    /// `plants.png`, `leaves.png`, `overlay.png`; with denoising `rgb_denoised.png`, `nir_denoised.png` and `denoised.exr` beside them.
+    /// `plants.png`, `leaves.png`, `overlay.png`; with denoising `rgb_denoised.png`, `nir_denoised.png` and `denoised.exr` beside them. Where the
+    /// denoiser failed, its error is returned after all other files are there.
     pub fn write(&self, folder: impl AsRef<Path>) -> Result<Vec<PathBuf>> {
         let Self { film, labels, provenance, .. } = self;
         let folder = folder.as_ref();
@@ -70,6 +87,7 @@ impl<'f> Image<'f> {
             if let Some(clean) = &self.denoised {
                 paths.extend(output::write_denoised(folder, clean, &self.expose(clean), provenance)?);
             }
+            self.check_denoised()?;
             Ok(paths)
         })
     }

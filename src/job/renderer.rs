@@ -107,7 +107,7 @@ impl Renderer {
         let deadline = deadline(quality, begin, window);
         let film = sample(quality, &world, integrator.as_ref(), &settings, deadline, &request.watch)?;
         let sampled = start.elapsed();
-        let denoised = denoiser.map(|d| d.denoise(&film, field.threads().count())).transpose()?;
+        let denoised = denoiser.map(|d| d.denoise(&film, field.threads().count()));
         let spp = match quality.target_error {
             Some(target) => Spp::Adaptive { samples: film.samples(), target },
             None => Spp::Uniform(film.samples().2),
