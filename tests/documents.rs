@@ -24,7 +24,7 @@ fn paragraphs(text: &str) -> Vec<String> {
     let prose: String = text.split("```").step_by(2).collect::<Vec<_>>().join("\n\n");
     let mut all = vec![String::new()];
     for line in prose.lines() {
-        let skip = line.is_empty() || ["|", "#", "!"].iter().any(|start| line.starts_with(start));
+        let skip = line.is_empty() || line == ">" || ["|", "#", "!"].iter().any(|start| line.starts_with(start));
         if skip || line.starts_with("- ") {
             all.push(String::new());
         }

@@ -231,7 +231,7 @@ fn what_it_cannot_do_is_said() {
     let (_keep, out) = scratch();
     let out = out.to_str().expect("a path");
     for (flags, words) in [
-        (&["--engine", "raster", "--denoise"][..], "--denoise say nothing with --engine raster"),
+        (&["--engine", "raster", "--denoise"][..], "--denoise says nothing with --engine raster"),
         (&["--engine", "raster", "--time", "5s"], "--time and --target-error say nothing"),
         (&["--engine", "raster", "--without", "mis"], "--without mis says nothing with --engine raster"),
         (&["--engine", "raster", "--max-depth", "3"], "--max-depth and --clamp say nothing with --engine raster"),

@@ -151,7 +151,7 @@ impl TrainedModel {
         let (values, _) = weights::read(&path)?;
         if weights::hash(&values) != card.weights_sha256 {
             return Err(
-                Error::damaged(format!("these are not the weights that {MODEL} beside them is about")).in_file(path)
+                Error::input(format!("these are not the weights that {MODEL} beside them is about")).in_file(path)
             );
         }
         Ok(Self { card, values })

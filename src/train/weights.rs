@@ -79,7 +79,7 @@ fn checksum(arrays: &[Array], text: &str) -> String {
 }
 
 fn unusable(path: &Path, what: &str) -> Error {
-    Error::damaged(what).in_file(path)
+    Error::input(what).in_file(path)
 }
 
 #[cfg(test)]

@@ -104,9 +104,8 @@ impl Checkpoint {
         if !path.exists() {
             return Ok(None);
         }
-        let unusable = |what: &str| {
-            Error::damaged(what).help("delete the file to begin this training again").in_file(path.clone())
-        };
+        let unusable =
+            |what: &str| Error::input(what).help("delete the file to begin this training again").in_file(path.clone());
         let (arrays, text) = match weights::read(&path) {
             Err(e) if e.kind() == Kind::Damaged => return Err(unusable(e.message())),
             other => other?,
