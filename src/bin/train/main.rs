@@ -65,8 +65,9 @@ enum Verb {
 
 fn main() -> ExitCode {
     let verb = Cli::parse().verb;
-    renamed::warn(std::env::args_os());
     furrow::train::memory::keep();
+    // After that: a process that has replaced itself would warn twice.
+    renamed::warn(std::env::args_os());
     let signals = signal::Signals::watch();
     let done = match verb {
         Verb::Fit(args) => fit::run(&args, &signals),
