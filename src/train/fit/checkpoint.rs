@@ -107,7 +107,7 @@ impl Checkpoint {
         let unusable =
             |what: &str| Error::input(what).help("delete the file to begin this training again").in_file(path.clone());
         let (arrays, text) = match weights::read(&path) {
-            Err(e) if e.kind() == Kind::Damaged => return Err(unusable(e.message())),
+            Err(e) if e.kind() == Kind::Input => return Err(unusable(e.message())),
             other => other?,
         };
         let words: Words = serde_json::from_str(&text).map_err(|e| unusable(&format!("this is no checkpoint: {e}")))?;
