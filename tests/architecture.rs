@@ -1,19 +1,23 @@
-//! Method 13: architecture. Floors, nevers and doors, read from the sources' `use` lines and paths.
+//! Method 13: architecture. Layers, forbidden imports and allowed places, read from the sources' `use` lines and paths.
 //!
-//! Rationale: rooms that import only what lies below them can be understood, tested and replaced one at a time; a label that
-//! cannot name a light cannot be lit. Expected: no violation. Source: the table in `src/lib.rs` for floors; the rules here.
+//! Rationale: modules that import only what lies below them can be understood, tested and replaced one at a time; a label that
+//! cannot name a light cannot be lit. Expected: no violation. Source: the table in `src/lib.rs` for layers; the rules here.
 //!
-//! What counts: `crate::room`, `use crate::{…}`, `super::` chains that leave their room, `furrow::room` in programs, and the
+//! What counts: `crate::module`, `use crate::{…}`, `super::` chains that leave their module, `furrow::module` in programs, and the
 //! first name of a path for foreign crates. Tests inside the sources are free: they may look anywhere to check something.
 
+#[path = "architecture/circles.rs"]
+mod circles;
+
+use circles::circles;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
-/// Rooms (left) that never import others (right), beyond what floors forbid.
+/// Modules (left) that never import others (right), beyond what layers forbid.
 ///
-/// A path with a slash is one file. `material` and `light` sit on neighbouring floors, `bsdf` and `scene` far apart; floors
-/// alone would let some of these through, or would if a room moved.
+/// A path with a slash is one file. `material` and `light` sit on neighbouring layers, `bsdf` and `scene` far apart; layers
+/// alone would let some of these through, or would if a module moved.
 const NEVER: &[(&str, &str)] = &[
     // Botany, soil and the places of plants know no optics.
     ("plant", "material bsdf scene light accel sensor integrator"),
@@ -49,8 +53,8 @@ const NEVER: &[(&str, &str)] = &[
     ("*", "cli bin"),
 ];
 
-/// Foreign crates and the only files (or folders, or rooms) that may name them. `*` is anywhere.
-const DOORS: &[(&str, &str)] = &[
+/// Foreign crates and the only files (or folders, or modules) that may name them. `*` is anywhere.
+const ALLOWED: &[(&str, &str)] = &[
     // Bytes written as text inside a model's document, or a page's.
     ("base64", "model/uri.rs report/page.rs"),
     // Numbers as bytes for the card, and waiting for it.
@@ -133,29 +137,29 @@ impl Source {
         Self { path: path.to_owned(), code: bare(text) }
     }
 
-    /// The room that the file belongs to; "bin" for programs.
-    fn room(&self) -> &str {
+    /// The module that the file belongs to; "bin" for programs.
+    fn module(&self) -> &str {
         self.path.split('/').next().unwrap_or_default().trim_end_matches(".rs")
     }
 
     /// Module path of the file: `plant/mod.rs` is `[plant]`, `plant/leaf.rs` is `[plant, leaf]`.
-    fn module(&self) -> Vec<&str> {
+    fn path_of_modules(&self) -> Vec<&str> {
         let parts = self.path.trim_end_matches(".rs").split('/');
         parts.filter(|p| !matches!(*p, "mod" | "lib")).collect()
     }
 
-    /// Rooms that the file names, its own among them.
-    fn rooms(&self) -> BTreeSet<String> {
-        let own = if self.room() == "bin" { "furrow" } else { "crate" };
-        let mut rooms: BTreeSet<String> = named(&self.code, own).into_iter().collect();
-        let depth = self.module().len();
+    /// Modules that the file names, its own among them.
+    fn modules(&self) -> BTreeSet<String> {
+        let own = if self.module() == "bin" { "furrow" } else { "crate" };
+        let mut modules: BTreeSet<String> = named(&self.code, own).into_iter().collect();
+        let depth = self.path_of_modules().len();
         let climb = "super::".repeat(depth);
         if depth > 0 {
             // As many steps up as the module is deep lead to the crate's root.
             let shorter = format!("{climb}super::");
-            rooms.extend(named(&self.code.replace(&shorter, ""), &format!("{climb}self").replace("::self", "")));
+            modules.extend(named(&self.code.replace(&shorter, ""), &format!("{climb}self").replace("::self", "")));
         }
-        rooms
+        modules
     }
 }
 
@@ -277,7 +281,7 @@ fn without_tests(code: &str) -> String {
     out + rest
 }
 
-/// Every source file; tests of a room in a file of their own left out.
+/// Every source file; tests of a module in a file of their own left out.
 fn sources() -> Vec<Source> {
     fn walk(folder: &Path, root: &Path, out: &mut Vec<Source>) {
         for entry in fs::read_dir(folder).unwrap() {
@@ -297,33 +301,33 @@ fn sources() -> Vec<Source> {
     out
 }
 
-/// Floors by room, from the table in `src/lib.rs`.
-fn floors(lib: &str) -> BTreeMap<String, u32> {
-    let mut floors = BTreeMap::new();
+/// Layers by module, from the table in `src/lib.rs`.
+fn layers(lib: &str) -> BTreeMap<String, u32> {
+    let mut layers = BTreeMap::new();
     for line in lib.lines() {
         let cells: Vec<&str> = line.trim_start_matches("//!").split('|').map(str::trim).collect();
-        let [_, floor, rooms, _] = cells.as_slice() else { continue };
-        let Ok(floor) = floor.parse() else { continue };
-        for room in rooms.split(',') {
-            floors.insert(room.trim().trim_matches(['[', ']', '`']).to_owned(), floor);
+        let [_, layer, modules, _] = cells.as_slice() else { continue };
+        let Ok(layer) = layer.parse() else { continue };
+        for module in modules.split(',') {
+            layers.insert(module.trim().trim_matches(['[', ']', '`']).to_owned(), layer);
         }
     }
-    floors
+    layers
 }
 
-fn floor_faults(sources: &[Source], floors: &BTreeMap<String, u32>) -> Vec<String> {
+fn layer_faults(sources: &[Source], layers: &BTreeMap<String, u32>) -> Vec<String> {
     let mut faults = Vec::new();
-    for source in sources.iter().filter(|s| !matches!(s.room(), "lib" | "bin")) {
-        let Some(own) = floors.get(source.room()) else {
-            faults.push(format!("src/{}: its room has no floor in the table of src/lib.rs", source.path));
+    for source in sources.iter().filter(|s| !matches!(s.module(), "lib" | "bin")) {
+        let Some(own) = layers.get(source.module()) else {
+            faults.push(format!("src/{}: its module has no layer in the table of src/lib.rs", source.path));
             continue;
         };
-        for room in source.rooms().iter().filter(|r| *r != source.room()) {
-            if let Some(other) = floors.get(room)
+        for module in source.modules().iter().filter(|r| *r != source.module()) {
+            if let Some(other) = layers.get(module)
                 && other >= own
             {
                 faults.push(format!(
-                    "src/{}: imports `{room}` of floor {other}, but stands on floor {own}: move what is shared below both",
+                    "src/{}: imports `{module}` of layer {other}, but is in layer {own}: move what is shared below both",
                     source.path
                 ));
             }
@@ -334,12 +338,12 @@ fn floor_faults(sources: &[Source], floors: &BTreeMap<String, u32>) -> Vec<Strin
 
 fn never_faults(sources: &[Source]) -> Vec<String> {
     let mut faults = Vec::new();
-    for source in sources.iter().filter(|s| !matches!(s.room(), "lib" | "bin")) {
-        let rooms = source.rooms();
+    for source in sources.iter().filter(|s| !matches!(s.module(), "lib" | "bin")) {
+        let modules = source.modules();
         for (who, whom) in NEVER {
-            if *who == "*" || *who == source.room() || *who == source.path {
-                for room in whom.split(' ').filter(|r| rooms.contains(*r) && *r != source.room()) {
-                    faults.push(format!("src/{}: `{who}` never imports `{room}`", source.path));
+            if *who == "*" || *who == source.module() || *who == source.path {
+                for module in whom.split(' ').filter(|r| modules.contains(*r) && *r != source.module()) {
+                    faults.push(format!("src/{}: `{who}` never imports `{module}`", source.path));
                 }
             }
         }
@@ -347,23 +351,26 @@ fn never_faults(sources: &[Source]) -> Vec<String> {
     faults
 }
 
-fn door_faults(sources: &[Source]) -> Vec<String> {
+fn crate_faults(sources: &[Source]) -> Vec<String> {
     let mut faults = Vec::new();
     for source in sources {
-        for (krate, doors) in DOORS {
-            if names(source, krate) && !doors.split(' ').any(|door| opens(door, &source.path)) {
-                faults.push(format!("src/{}: names the crate `{krate}`, whose only doors are: {doors}", source.path));
+        for (krate, places) in ALLOWED {
+            if names(source, krate) && !places.split(' ').any(|place| opens(place, &source.path)) {
+                faults.push(format!(
+                    "src/{}: names the crate `{krate}`, which only these may name: {places}",
+                    source.path
+                ));
             }
         }
     }
     faults
 }
 
-fn opens(door: &str, path: &str) -> bool {
-    door == "*" || path == door || door.ends_with('/') && path.starts_with(door)
+fn opens(place: &str, path: &str) -> bool {
+    place == "*" || path == place || place.ends_with('/') && path.starts_with(place)
 }
 
-/// Whether a source names a foreign crate. A room may have a crate's name: behind `mod noise;`, `noise::` is ours.
+/// Whether a source names a foreign crate. A module may have a crate's name: behind `mod noise;`, `noise::` is ours.
 fn names(source: &Source, krate: &str) -> bool {
     !own_module(source, krate) && named(&source.code, krate).len() + renamed(&source.code, krate) > 0
 }
@@ -402,57 +409,63 @@ fn lib() -> String {
 }
 
 #[test]
-fn rooms_import_only_lower_floors() {
-    let faults = floor_faults(&sources(), &floors(&lib()));
+fn modules_import_only_lower_layers() {
+    let faults = layer_faults(&sources(), &layers(&lib()));
     assert!(faults.is_empty(), "\n{}", faults.join("\n"));
 }
 
 #[test]
-fn the_codemap_lists_every_room_once() {
+fn the_codemap_lists_every_module_once() {
     let lib = lib();
     let declared: BTreeSet<String> =
         lib.lines().filter_map(|l| l.strip_prefix("pub mod ")?.strip_suffix(';')).map(str::to_owned).collect();
-    let listed: BTreeSet<String> = floors(&lib).into_keys().collect();
+    let listed: BTreeSet<String> = layers(&lib).into_keys().collect();
     assert_eq!(declared, listed);
     assert!(listed.len() > 15);
 }
 
 #[test]
-fn some_rooms_never_import_others() {
+fn some_modules_never_import_others() {
     let sources = sources();
     let faults = never_faults(&sources);
     assert!(faults.is_empty(), "\n{}", faults.join("\n"));
-    // A rule about a file or room that is gone would hold for ever.
+    // A rule about a file or module that is gone would hold for ever.
     for (who, _) in NEVER {
-        assert!(*who == "*" || sources.iter().any(|s| s.room() == *who || s.path == *who), "no source is called {who}");
+        assert!(
+            *who == "*" || sources.iter().any(|s| s.module() == *who || s.path == *who),
+            "no source is called {who}"
+        );
     }
 }
 
 #[test]
-fn every_foreign_crate_has_its_doors() {
+fn foreign_crates_are_named_only_where_the_table_allows() {
     let sources = sources();
-    let faults = door_faults(&sources);
+    let faults = crate_faults(&sources);
     assert!(faults.is_empty(), "\n{}", faults.join("\n"));
-    // A door that nobody uses is a hole in the wall.
-    for (krate, doors) in DOORS {
-        for door in doors.split(' ') {
-            assert!(sources.iter().any(|s| opens(door, &s.path) && names(s, krate)), "nothing in {door} names {krate}");
+    // A permission that nothing uses must go.
+    for (krate, places) in ALLOWED {
+        for place in places.split(' ') {
+            assert!(
+                sources.iter().any(|s| opens(place, &s.path) && names(s, krate)),
+                "nothing in {place} names {krate}"
+            );
         }
     }
 }
 
 #[test]
-fn every_dependency_is_in_the_table_of_doors() {
+fn every_dependency_is_in_the_table() {
     let manifest = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml")).unwrap();
     let section = manifest.split("[dependencies]").nth(1).unwrap().split("\n[").next().unwrap();
     let named: BTreeSet<String> =
         section.lines().filter_map(|l| l.split_once(" = ")).map(|(name, _)| name.replace('-', "_")).collect();
-    let doors = DOORS.iter().map(|(name, _)| name);
-    let listed: BTreeSet<String> = doors.chain(UNNAMED).map(|name| (*name).to_owned()).collect();
+    let places = ALLOWED.iter().map(|(name, _)| name);
+    let listed: BTreeSet<String> = places.chain(UNNAMED).map(|name| (*name).to_owned()).collect();
     assert_eq!(named, listed);
     for krate in UNNAMED {
         let faults: Vec<String> = sources().iter().filter(|s| names(s, krate)).map(|s| s.path.clone()).collect();
-        assert!(faults.is_empty(), "{krate} is named in {faults:?}: give it a door");
+        assert!(faults.is_empty(), "{krate} is named in {faults:?}: list it with its files");
     }
 }
 
@@ -492,11 +505,81 @@ fn no_message_hides_its_help() {
     }
 }
 
+#[test]
+fn files_of_one_module_do_not_need_each_other() {
+    let sources = sources();
+    let found: Vec<String> = circles(&sources).into_iter().map(|group| group.join(" ")).collect();
+    assert!(found.is_empty(), "files that need each other: put data below and what calls it above\n{found:#?}");
+}
+
+/// The search for circles must be able to fail, and must not see circles where there are none.
+#[test]
+fn made_up_circles_are_found() {
+    let found = |files: &[(&str, &str)]| {
+        let sources: Vec<Source> = files.iter().map(|(path, code)| Source::new(path, code)).collect();
+        circles(&sources).into_iter().map(|group| group.join(" ")).collect::<Vec<_>>()
+    };
+    for leaf in [
+        "use super::stem::Stem;",
+        "use super::{stem::Stem, Other};",
+        "use super::{\n    stem::{self, Stem},\n};",
+        "use crate::plant::stem::Stem as Other;",
+        "use super::stem;\nfn f() { stem::grow(); }",
+        "fn f() { super::stem::grow(); }",
+        "fn f(of: crate::plant::stem::Stem) {}",
+        // Through what mod.rs hands on.
+        "use super::Stem;",
+        "use crate::plant::Stem;",
+        "use super::*;\nuse super::stem::*;",
+    ] {
+        let files = [
+            ("plant/mod.rs", "mod leaf;\nmod stem;\npub use leaf::Leaf;\npub use stem::Stem;"),
+            ("plant/leaf.rs", leaf),
+            ("plant/stem.rs", "use super::leaf::Leaf;"),
+        ];
+        assert_eq!(found(&files), ["plant/leaf.rs plant/stem.rs"], "{leaf}");
+    }
+    // Of three, and across folders.
+    let files = [
+        ("a/mod.rs", "mod b;\nmod c;"),
+        ("a/b.rs", "use super::c::d::D;"),
+        ("a/c/mod.rs", "mod d;\nmod e;"),
+        ("a/c/d.rs", "use super::e::E;"),
+        ("a/c/e.rs", "use crate::a::b::B;"),
+    ];
+    assert_eq!(found(&files), ["a/b.rs a/c/d.rs a/c/e.rs"]);
+    // A mod.rs that both holds what a child uses and calls the child.
+    for code in
+        ["mod leaf;\nuse leaf::grow;\npub struct Plant;", "mod leaf;\nfn f() { leaf::grow() }\npub struct Plant;"]
+    {
+        assert_eq!(found(&[("p/mod.rs", code), ("p/leaf.rs", "use super::Plant;")]), ["p/leaf.rs p/mod.rs"], "{code}");
+    }
+    let used = "mod leaf;\npub use leaf::Leaf;\npub struct Plant(Leaf);";
+    assert_eq!(found(&[("p/mod.rs", used), ("p/leaf.rs", "use super::Plant;")]), ["p/leaf.rs p/mod.rs"]);
+
+    for (top, leaf) in [
+        // It names its children and hands on what they have.
+        ("mod leaf;\nmod stem;\npub use leaf::{Leaf, grow};\npub(crate) use stem::Stem;", "use super::Stem;"),
+        // It holds data and calls nobody, or calls and holds nothing.
+        ("mod leaf;\nmod stem;\npub struct Plant;", "use super::Plant;"),
+        ("mod leaf;\nmod stem;\nfn f() { leaf::grow(); stem::grow(); }", "use super::stem::Stem;"),
+        // A module in the file itself, a test, a comment, who may look, another module's file.
+        ("mod leaf;\nmod stem;\nfn f() { leaf::grow(); }\nmod inner { use super::Plant; }", ""),
+        ("mod leaf;\nfn f() { leaf::grow(); }", "#[cfg(test)]\nmod tests { use super::super::f; }"),
+        ("mod leaf;\nfn f() { leaf::grow(); }", "// use super::f;"),
+        ("mod leaf;\nfn f() { leaf::grow(); }", "pub(in crate::p) fn grow() {}"),
+        ("mod leaf;\nfn f() { leaf::grow(); }", "use crate::q::leaf::Leaf;"),
+    ] {
+        let files = [("p/mod.rs", top), ("p/leaf.rs", leaf), ("p/stem.rs", ""), ("q/leaf.rs", "use crate::p::f;")];
+        assert_eq!(found(&files), Vec::<String>::new(), "{top}\n{leaf}");
+    }
+}
+
 /// The test must be able to fail.
 #[test]
 fn made_up_violations_are_found() {
-    let floors = floors("//! | 3 | [`light`] |\n//! | 2 | [`film`], [`sampling`] |\n//! | 1 | [`math`] |");
-    assert_eq!(floors.len(), 4);
+    let layers = layers("//! | 3 | [`light`] |\n//! | 2 | [`film`], [`sampling`] |\n//! | 1 | [`math`] |");
+    assert_eq!(layers.len(), 4);
     for code in [
         "use crate::light::Sun;",
         "use crate::{Error, light::{self, Sun}, math};",
@@ -504,19 +587,19 @@ fn made_up_violations_are_found() {
         "use super::light::Sun;",
         "use crate::sampling::Stream;",
     ] {
-        assert_eq!(floor_faults(&[Source::new("film.rs", code)], &floors).len(), 1, "{code}");
+        assert_eq!(layer_faults(&[Source::new("film.rs", code)], &layers).len(), 1, "{code}");
     }
-    assert_eq!(floor_faults(&[Source::new("film/tile.rs", "use super::super::light::Sun;")], &floors).len(), 1);
-    assert_eq!(floor_faults(&[Source::new("film/tile.rs", "use super::light::Sun;")], &floors).len(), 0);
+    assert_eq!(layer_faults(&[Source::new("film/tile.rs", "use super::super::light::Sun;")], &layers).len(), 1);
+    assert_eq!(layer_faults(&[Source::new("film/tile.rs", "use super::light::Sun;")], &layers).len(), 0);
     for code in [
         "// use crate::light::Sun;",
         "const A: &str = \"crate::light\"; const B: char = '\"'; fn f<'a>() {} const C: &str = r#\"crate::light \"#;",
         "#[cfg(test)]\nmod tests { use crate::light::Sun; }",
         "use crate::math::Vec3; use crate::Error;",
     ] {
-        assert_eq!(floor_faults(&[Source::new("film.rs", code)], &floors), Vec::<String>::new(), "{code}");
+        assert_eq!(layer_faults(&[Source::new("film.rs", code)], &layers), Vec::<String>::new(), "{code}");
     }
-    assert_eq!(floor_faults(&[Source::new("attic/mod.rs", "")], &floors).len(), 1);
+    assert_eq!(layer_faults(&[Source::new("attic/mod.rs", "")], &layers).len(), 1);
 
     for (path, code) in [
         ("plant/leaf.rs", "use crate::material::Leaf;"),
@@ -534,13 +617,13 @@ fn made_up_violations_are_found() {
         ("soil/relief.rs", "let p = noise::Perlin::new(3);"),
         ("soil/relief.rs", "use ::noise::Perlin;"),
     ] {
-        assert_eq!(door_faults(&[Source::new(path, code)]).len(), 1, "{code}");
+        assert_eq!(crate_faults(&[Source::new(path, code)]).len(), 1, "{code}");
     }
     for (path, code) in [
         ("accel/embree.rs", "use embree3 as rtc;"),
         ("soil/relief.rs", "use crate::texture::noise; let p = noise::Perlin::new(3);"),
         ("output/mod.rs", "mod exr;\nexr::encode();"),
     ] {
-        assert_eq!(door_faults(&[Source::new(path, code)]), Vec::<String>::new(), "{code}");
+        assert_eq!(crate_faults(&[Source::new(path, code)]), Vec::<String>::new(), "{code}");
     }
 }

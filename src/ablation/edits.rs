@@ -2,12 +2,25 @@
 
 use super::{Change, Edit, growth, labels, light, picture};
 use crate::material::Feature;
+use crate::ron_file::choose;
 use crate::scene::assemble::Growing;
 use crate::settings::{Engine, Quality, RenderOptions};
+use crate::{Error, Result};
 
 /// No edit: what all others are compared with.
 pub static FULL: Edit =
     Edit { name: "full", about: "the field as its page says", keeps_labels: true, change: Change::Nothing };
+
+impl Edit {
+    /// The edit of this name; the error lists all names.
+    pub fn named(name: &str) -> Result<&'static Self> {
+        EDITS.iter().find(|edit| edit.name == name).ok_or_else(|| {
+            let known: Vec<&str> = EDITS.iter().map(|edit| edit.name).collect();
+            let help = choose("edits", &known, name);
+            Error::misuse(format!("there is no edit `{name}`")).help(help)
+        })
+    }
+}
 
 /// An edit of how the field is rendered.
 macro_rules! rendered {

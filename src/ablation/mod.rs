@@ -17,17 +17,16 @@ mod labels;
 mod light;
 mod picture;
 
+use crate::Result;
 use crate::film::{Film, Footprint};
 use crate::light::Light;
 use crate::material::Feature;
 use crate::render::LabelMap;
-use crate::ron_file::choose;
 use crate::scene::Field;
 use crate::scene::assemble::{Growing, Options, Source};
 use crate::scene::tag::Tag;
 use crate::sensor::{Camera, Photograph, SensorDesc};
 use crate::settings::RenderOptions;
-use crate::{Error, Result};
 use std::path::Path;
 
 pub use edits::{EDITS, FULL};
@@ -69,15 +68,6 @@ pub enum Change {
 }
 
 impl Edit {
-    /// The edit of this name; the error lists all names.
-    pub fn named(name: &str) -> Result<&'static Self> {
-        EDITS.iter().find(|edit| edit.name == name).ok_or_else(|| {
-            let known: Vec<&str> = EDITS.iter().map(|edit| edit.name).collect();
-            let help = choose("edits", &known, name);
-            Error::misuse(format!("there is no edit `{name}`")).help(help)
-        })
-    }
-
     /// Its name; none for [`FULL`].
     pub fn label(&self) -> Option<String> {
         (!matches!(self.change, Change::Nothing)).then(|| self.name.to_owned())

@@ -1,18 +1,14 @@
-//! All of it: from two paths to figures, and from these to files.
+//! All of it: from two paths to figures.
 
-use super::figures::{Figures, figures, maps};
+use super::figures::{Compared, figures, maps};
 use super::flip::PIXELS_PER_DEGREE;
 use super::pairs::{Pair, Pairs};
 use super::picture::{Picture, read_labels};
 use super::shot::{Shot, worst};
 use super::summary::{Summary, summaries};
-use super::{page, table};
 use crate::{Error, Result, output};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
-
-/// The files that are written, by name.
-pub const FILES: [&str; 4] = ["compare.json", "compare.csv", "compare.md", "compare.html"];
 
 /// How pictures are compared.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,19 +25,6 @@ impl Default for Options {
     fn default() -> Self {
         Self { labels: None, pixels_per_degree: PIXELS_PER_DEGREE, shown: 12 }
     }
-}
-
-/// One pair, measured.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Compared {
-    /// What both pictures are called.
-    pub name: String,
-    /// Width of both in pixels.
-    pub width: u32,
-    /// Height of both in pixels.
-    pub height: u32,
-    /// The measures.
-    pub figures: Figures,
 }
 
 /// Every pair of two pictures or folders, measured.
@@ -90,21 +73,6 @@ impl Comparison {
         }
         let means = summaries(&compared);
         Ok(Self { found, pixels_per_degree: options.pixels_per_degree, pairs: compared, means, shots })
-    }
-
-    /// The means as a table in Markdown, which is also fit to be read as it is.
-    pub fn table(&self) -> String {
-        table::means(self)
-    }
-
-    /// Writes [`FILES`] into `folder` and returns their paths.
-    pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>> {
-        let texts = [table::json(self)?, table::csv(self), table::markdown(self), page::html(self)];
-        let paths = FILES.map(|name| folder.join(name));
-        for (path, text) in paths.iter().zip(&texts) {
-            output::write_atomically(path, text.as_bytes())?;
-        }
-        Ok(paths.to_vec())
     }
 }
 

@@ -234,3 +234,16 @@ impl Sums {
         })
     }
 }
+
+/// One pair, measured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Compared {
+    /// What both pictures are called.
+    pub name: String,
+    /// Width of both in pixels.
+    pub width: u32,
+    /// Height of both in pixels.
+    pub height: u32,
+    /// The measures.
+    pub figures: Figures,
+}

@@ -20,8 +20,8 @@
 //! | `ssim`, `flip`, `color` | the measures, pixel by pixel |
 //! | `figures` | one pair: maps of error, and their means over regions |
 //! | `summary` | many pairs: means and their intervals |
-//! | `comparison` | all of it, from paths to files |
-//! | `table`, `shot`, `page` | how it is written: JSON, Markdown, CSV; pictures; one HTML page |
+//! | `comparison` | all of it, from paths to figures |
+//! | `table`, `shot`, `page`, `write` | how it is written: JSON, Markdown, CSV; pictures; one HTML page |
 //! | [`gap`] | sets whose pictures are of different things: how far synthetic ones are from real ones |
 
 mod color;
@@ -36,12 +36,14 @@ mod shot;
 mod ssim;
 mod summary;
 mod table;
+mod write;
 
 pub use color::ciede2000;
-pub use comparison::{Compared, Comparison, FILES, Options, folders};
-pub use figures::{Band, Figures, Maps, Region, Row, maps, pair};
+pub use comparison::{Comparison, Options, folders};
+pub use figures::{Band, Compared, Figures, Maps, Region, Row, maps, pair};
 pub use flip::PIXELS_PER_DEGREE;
 pub use pairs::{Pair, Pairs};
 pub use picture::{Picture, read_labels};
 pub use shot::Shot;
 pub use summary::{Mean, Summary};
+pub use write::FILES;

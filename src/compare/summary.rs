@@ -1,7 +1,6 @@
 //! Many pairs: means over pairs, each as heavy as the next, and how far they would stray on other images of the kind.
 
-use super::comparison::Compared;
-use super::figures::{Band, Region, Row, psnr_db};
+use super::figures::{Band, Compared, Region, Row, psnr_db};
 use crate::sampling::bootstrap::{self, Interval};
 
 /// A mean over pairs.

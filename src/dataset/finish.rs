@@ -1,8 +1,9 @@
 //! What belongs to all images together, written when all are there: the formats' lists, the manifest, the report.
 
+use super::checksum::Print;
 use super::generate::{self, Task};
 use super::recipe::{FILE, Recipe};
-use super::seal::{Print, Seal};
+use super::seal::Seal;
 use super::set::{Set, Stream, Whole};
 use super::{format, report};
 use crate::output::remove_unfinished;

@@ -21,7 +21,7 @@
 //! | `render` | an image from its field, by [`crate::job`] |
 //! | `sample`, `record`, `annotate`, `rle` | one image and all that is known of it |
 //! | `native`, `format` | as files, ours and other people's |
-//! | `seal`, `set` | which files make an image; the dataset on disk |
+//! | `checksum`, `seal`, `set` | what tells a file; which files make an image; the dataset on disk |
 //! | `make` | all of it in one call |
 //! | `plan`, `gather`, `generate`, `ledger`, `finish` | from a scene file to files; what remains to be done is found by looking at the disk |
 //! | `cluster` | the same on many machines: job files for schedulers |
@@ -30,6 +30,7 @@
 //! | `report` | all of it on one page, for people |
 
 pub mod annotate;
+pub mod checksum;
 pub mod cluster;
 pub mod finish;
 pub mod format;

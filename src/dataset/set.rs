@@ -1,9 +1,9 @@
 //! A dataset that lies in a folder: its recipe, its images by name, the files that belong to all of them.
 
+use super::checksum::Print;
 use super::native;
 use super::recipe::Recipe;
 use super::record::Record;
-use super::seal::Print;
 use super::split::Split;
 use crate::output::stream_atomically;
 use crate::{Error, Result};

@@ -1,9 +1,10 @@
 //! Whether a dataset is whole and is what it says it is.
 
+use super::checksum::Print;
 use super::finish::{MANIFEST, lacks, ranges};
 use super::generate::Task;
 use super::render::{render, scene_file};
-use super::seal::{Print, Seal};
+use super::seal::Seal;
 use super::set::Set;
 use super::split::Split;
 use super::{File, format, generate, invariants, ledger, native};

@@ -1,13 +1,10 @@
 //! One grown field, ready to be rendered.
 
-use super::image::Image;
-use super::renderer::{Renderer, Request};
 use super::threads::Threads;
 use crate::ablation::Edit;
 use crate::accel::EmbreeAccel;
 use crate::integrator::World;
 use crate::scene;
-use crate::settings::{Quality, RenderOptions};
 use crate::{Error, Result};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
@@ -24,13 +21,6 @@ pub struct Field {
 impl Field {
     pub(super) fn new(grown: scene::Field, edit: &'static Edit, threads: Threads, grow: Duration) -> Self {
         Self { grown, edit, threads, grow, geometry: OnceLock::new() }
-    }
-
-    /// Path traces what the camera sees, and labels it. [`Renderer`] offers the rasterizer, crops, progress and a stop as well, and
-    /// serves any number of fields.
-    pub fn render(&self, quality: &Quality) -> Result<Image<'_>> {
-        let options = self.edit.options(RenderOptions::path_traced(*quality));
-        Renderer::open(&options)?.render(self, &Request::default())
     }
 
     /// Scene, plants and sensor; seed, index and hash of what was read; conditions and warnings.

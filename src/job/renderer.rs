@@ -43,6 +43,15 @@ enum Opened {
     Rasterizer(Card),
 }
 
+impl Field {
+    /// Path traces what the camera sees, and labels it. [`Renderer`] offers the rasterizer, crops, progress and a stop as well, and
+    /// serves any number of fields.
+    pub fn render(&self, quality: &Quality) -> Result<Image<'_>> {
+        let options = self.edit().options(RenderOptions::path_traced(*quality));
+        Renderer::open(&options)?.render(self, &Request::default())
+    }
+}
+
 impl Renderer {
     /// Finds what the options need. An error where they contradict each other or this machine lacks something.
     pub fn open(options: &RenderOptions) -> Result<Self> {

@@ -1,7 +1,5 @@
 //! What a material can do without: each feature can be left out alone, to see what it does to a picture.
 
-use super::Material;
-
 /// Something that makes a surface more than a coloured sheet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Feature {
@@ -15,17 +13,4 @@ pub enum Feature {
     Relief,
     /// The colours of a leaf's picture; without them the leaf has the one colour of its pigments. Its outline and relief stay.
     Picture,
-}
-
-impl Material {
-    /// The same material without a feature; as it is where it has no such thing.
-    pub fn leave_out(&mut self, feature: Feature) {
-        match self {
-            Self::Leaf(m) => m.leave_out(feature),
-            Self::Ground(m) => m.leave_out(feature),
-            Self::Solid(m) => m.leave_out(feature),
-            Self::Painted(m) => m.leave_out(feature),
-            Self::Plain(_) => {}
-        }
-    }
 }

@@ -1,8 +1,9 @@
 //! The ground and its clods: the baked skin of the soil, made moist, in four bands.
 
+use super::feature::Feature;
 use super::shading::frame;
 use super::swatch::{Grain, Swatch, Tone};
-use super::{Feature, Varies};
+use super::varies::Varies;
 use crate::bsdf::{Bsdf, OrenNayar, Wet};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec2, Vec3, vec2};

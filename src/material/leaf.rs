@@ -1,9 +1,10 @@
 //! Blades, petioles, stems: pigments and a picture → coat, reflection of either side, transmission.
 
+use super::feature::Feature;
 use super::shading::{bump, grained_frame};
 use super::swatch::{Grain, Swatch, Tone, centre};
+use super::varies::Varies;
 use super::wear::{Wear, Worn};
-use super::{Feature, Varies};
 use crate::bsdf::{self, Bsdf, Side, Veil};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec2, Vec3};

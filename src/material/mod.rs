@@ -7,17 +7,20 @@ mod painted;
 mod shading;
 mod solid;
 pub mod swatch;
+mod varies;
 mod wear;
 
 use crate::bsdf::Bsdf;
 use crate::geometry::Interaction;
-use crate::math::{Frame, Vec3};
+use crate::math::{Frame, Spectrum, Vec3};
+use swatch::{Swatch, Tone};
 
 pub use feature::Feature;
 pub use ground::{Ground, GroundSkin};
 pub use leaf::{LeafDesc, LeafMaterial, Picture};
 pub use painted::{Painted, Repaint};
 pub use solid::Solid;
+pub use varies::Varies;
 pub use wear::{Tones, Wear, tissues};
 
 /// What a part is made of.
@@ -33,32 +36,6 @@ pub enum Material {
     Painted(Painted),
     /// The same scattering everywhere: for tests and teaching.
     Plain(Bsdf),
-}
-
-/// Over what a material's scattering varies.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Varies {
-    /// The same everywhere.
-    Nowhere,
-    /// Over texture coordinates, as finely as an image of this many texels across and down, or coarser where the ray is wider.
-    Picture(u32, u32),
-    /// The same, whatever the ray's width.
-    Raster(u32, u32),
-    /// Over the world.
-    Place,
-}
-
-impl Varies {
-    /// Over a picture of this size, read on `level` or, with `None`, on the level of each ray's width.
-    fn over((width, height): (u32, u32), level: Option<u32>) -> Self {
-        match level {
-            None => Self::Picture(width, height),
-            Some(level) => {
-                let texels = |n: u32| n.checked_shr(level).unwrap_or(0).max(1);
-                Self::Raster(texels(width), texels(height))
-            }
-        }
-    }
 }
 
 impl Material {
@@ -96,6 +73,34 @@ impl Material {
             Self::Solid(m) => m.scatter(at, wo),
             Self::Painted(m) => m.scatter(at, wo),
             Self::Plain(bsdf) => (*bsdf, shading::grained_frame(at, at.ns, at.tangents().0, wo)),
+        }
+    }
+
+    /// The same material without a feature; as it is where it has no such thing.
+    pub fn leave_out(&mut self, feature: Feature) {
+        match self {
+            Self::Leaf(m) => m.leave_out(feature),
+            Self::Ground(m) => m.leave_out(feature),
+            Self::Solid(m) => m.leave_out(feature),
+            Self::Painted(m) => m.leave_out(feature),
+            Self::Plain(_) => {}
+        }
+    }
+
+    /// The material as documents of other programs can hold it.
+    pub fn swatch(&self) -> Swatch<'_> {
+        match self {
+            Self::Leaf(m) => m.swatch(),
+            Self::Ground(m) => m.swatch(),
+            Self::Solid(m) => m.swatch(),
+            Self::Painted(m) => m.swatch(),
+            Self::Plain(bsdf) => {
+                let transmittance = match bsdf {
+                    Bsdf::Leaf(leaf) => leaf.transmittance(),
+                    _ => Spectrum::ZERO,
+                };
+                Swatch::plain(Tone { reflectance: bsdf.reflectance(1.0), transmittance }, 1.0)
+            }
         }
     }
 }

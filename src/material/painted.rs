@@ -5,9 +5,10 @@
 //! what is opaque returns as much as in red, as dry soil, stone and paint roughly do. Where the near infrared
 //! of something opaque is known, it is that of the picture's mean and follows the picture's red.
 
+use super::feature::Feature;
 use super::shading::{bump, frame};
 use super::swatch::{Swatch, Tone, centre};
-use super::{Feature, Varies};
+use super::varies::Varies;
 use crate::bsdf::{self, Bsdf, OrenNayar, Side};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec2, Vec3};

@@ -4,9 +4,10 @@
 //! [`crate::optics::soil::wet`]) and adds a film's gloss: the wetter, the smoother the piece looks. Soil lies on what faces up, in
 //! patches, and is as wet as the piece.
 
+use super::feature::Feature;
 use super::shading::frame;
 use super::swatch::{Swatch, Tone};
-use super::{Feature, Varies};
+use super::varies::Varies;
 use crate::bsdf::{Bsdf, OrenNayar, Wet};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec3, lerp, smoothstep};

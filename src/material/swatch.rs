@@ -3,7 +3,6 @@
 //!
 //! Specimens that differ only in their tint share one picture, as they do here: [`Swatch::key`] tells.
 
-use super::Material;
 use crate::math::{Spectrum, Vec2, Vec3};
 
 /// Reflectance and transmittance of one place.
@@ -117,23 +116,4 @@ impl<'a> Swatch<'a> {
 /// The middle of texel (x, y) of a picture of this size, as texture coordinates.
 pub(super) fn centre(size: (u32, u32), x: u32, y: u32) -> Vec2 {
     Vec2::new((x as f32 + 0.5) / size.0 as f32, (y as f32 + 0.5) / size.1 as f32)
-}
-
-impl Material {
-    /// The material as documents of other programs can hold it.
-    pub fn swatch(&self) -> Swatch<'_> {
-        match self {
-            Self::Leaf(m) => m.swatch(),
-            Self::Ground(m) => m.swatch(),
-            Self::Solid(m) => m.swatch(),
-            Self::Painted(m) => m.swatch(),
-            Self::Plain(bsdf) => {
-                let transmittance = match bsdf {
-                    crate::bsdf::Bsdf::Leaf(leaf) => leaf.transmittance(),
-                    _ => Spectrum::ZERO,
-                };
-                Swatch::plain(Tone { reflectance: bsdf.reflectance(1.0), transmittance }, 1.0)
-            }
-        }
-    }
 }

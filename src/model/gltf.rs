@@ -7,11 +7,10 @@ use super::document::{
     CLAMP_TO_EDGE, DIFFUSE_TRANSMISSION, DiffuseTransmission, Document, FLOAT, LIGHTS, Material, Primitive, REPEAT,
     TEXTURE_TRANSFORM, TextureInfo, TextureTransform, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT,
 };
+use super::glb;
+use super::parts::{Label, MOST_TRIANGLES, Model, Part, Relief, Surface, Transmission, Up};
+use super::settle::{Wrong, bytes, faceted, fraction, into_one_tile, settle, too_many_triangles};
 use super::uri::{Target, follow};
-use super::{
-    Label, MOST_TRIANGLES, Model, Part, Relief, Surface, Transmission, Up, Wrong, bytes, faceted, fraction, glb,
-    into_one_tile, settle, too_many_triangles,
-};
 use crate::geometry::{AlphaMask, Mesh};
 use crate::math::{DMat4, DQuat, DVec3, Vec2, Vec3, vec2};
 use crate::texture::{ColorSpace, NormalMap, Texture, Wrap};

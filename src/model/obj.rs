@@ -3,10 +3,8 @@
 //! Of materials: `Kd`, `map_Kd`, `d`, `map_d`, `Ns`. A picture's own opacity cuts the surface as `map_d` does; `map_d` counts
 //! by its opacity where it has one, else by its brightness. v runs up in OBJ and down here.
 
-use super::{
-    MOST_TRIANGLES, Model, Part, Surface, Up, Wrong, bytes, faceted, fraction, into_one_tile, settle,
-    too_many_triangles,
-};
+use super::parts::{MOST_TRIANGLES, Model, Part, Surface, Up};
+use super::settle::{Wrong, bytes, faceted, fraction, into_one_tile, settle, too_many_triangles};
 use crate::geometry::{AlphaMask, Mesh};
 use crate::math::{Vec3, vec2};
 use crate::texture::{ColorSpace, Texture, Wrap};

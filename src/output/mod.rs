@@ -18,9 +18,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 pub use self::exr::{Geometry, encode_geometry, encode_layers, half, read_geometry};
-pub use self::png::{
-    Map, Picture, encode as encode_png, read_gray, read_gray16, read_indexed, read_map, read_rgb, write_png,
-};
+pub use self::png::{Map, Picture, encode as encode_png, read_gray, read_gray16, read_indexed, read_map, read_rgb};
 pub use denoise::Denoiser;
 pub use photo::{encode_jpeg, photo_size, read_color_photo, read_gray_photo, read_photo, resize_gray, shrink, shrunk};
 
@@ -112,7 +110,12 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     stream_atomically(path, |file| file.write_all(bytes).map_err(Error::io(path)))
 }
 
-/// The same for a file that is written piece by piece.
+/// Writes a picture to a file, atomically.
+pub fn write_png(path: &Path, width: u32, height: u32, picture: &Picture<'_>, text: &str) -> Result<()> {
+    write_atomically(path, &png::encode(width, height, picture, text)?)
+}
+
+/// Writes a file piece by piece, whole or not at all, as [`write_atomically`] does.
 pub fn stream_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
     let folder = parent(path);
     std::fs::create_dir_all(folder).map_err(Error::io(folder))?;

@@ -73,11 +73,6 @@ pub fn encode(width: u32, height: u32, picture: &Picture<'_>, text: &str) -> Res
     Ok(bytes)
 }
 
-/// Writes a picture to a file, atomically.
-pub fn write_png(path: &Path, width: u32, height: u32, picture: &Picture<'_>, text: &str) -> Result<()> {
-    super::write_atomically(path, &encode(width, height, picture, text)?)
-}
-
 fn read(path: &Path, depth: BitDepth, color: ColorType, what: &str) -> Result<(u32, u32, Vec<u8>)> {
     let wrong = |e: &dyn std::fmt::Display| Error::input(e.to_string()).in_file(path);
     let file = input::open(path).map_err(|refusal| refusal.into_error(path))?;

@@ -1,8 +1,8 @@
 //! The growth axis g: the hypocotyl, the stem above it, and the seats of the leaves.
 
+use super::growth::{Growth, LeafNow};
 use super::leaf::Seat;
 use super::organ::{Organ, OrganKind};
-use super::stage::{Growth, LeafNow};
 use super::tube::{self, Profile, Ring};
 use crate::math::{Frame, Vec3, direction, lerp, vec3};
 use crate::sampling::Purpose;

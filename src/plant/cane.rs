@@ -4,9 +4,9 @@
 //! sheath's radius above it. Younger sheaths are narrower and come out of older ones.
 
 use super::axis::ROOT;
+use super::growth::{Growth, LeafNow};
 use super::leaf::{self, Lower, Seat};
 use super::organ::Organ;
-use super::stage::{Growth, LeafNow};
 use crate::math::{Vec3, direction, lerp};
 use crate::sampling::Purpose;
 use std::f32::consts::{FRAC_PI_2, TAU};

@@ -1,9 +1,9 @@
 //! Upright stems with stalked leaves, first in crossed pairs, then in a spiral: goosefoot.
 
 use super::axis::{self, Section};
+use super::growth::Growth;
 use super::leaf::{self, Lower};
 use super::organ::Organ;
-use super::stage::Growth;
 use super::tube::Profile;
 
 /// Round, tapering.

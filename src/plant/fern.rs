@@ -4,7 +4,7 @@
 //! plan with pinnules, and each pinnule is cut into lobes with a pointed tip. The ribbons are those of mayweed.
 
 use super::blade::Rest;
-use super::dissected::Ribbons;
+use super::ribbons::Ribbons;
 use super::skeleton::Skeleton;
 use crate::math::{Vec3, lerp, vec3};
 use crate::sampling::Stream;

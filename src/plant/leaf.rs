@@ -1,14 +1,14 @@
 //! One leaf: its skeleton takes a posture, and blade and stalk are bent by it.
 
 use super::blade::{self, Rest};
-use super::dissected;
 use super::fern;
+use super::growth::LeafNow;
 use super::kind::Shape;
 use super::leaflets;
 use super::organ::{Organ, OrganKind};
+use super::ribbons;
 use super::skeleton::{Measures, Pose, Skeleton};
 use super::skin::{self, Relief};
-use super::stage::LeafNow;
 use super::tube::{self, Profile, Ring};
 use crate::geometry::outline::Outline;
 use crate::math::{Mat3, Vec3, direction, lerp, smoothstep, vec3};
@@ -68,7 +68,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
         Shape::Pinnate { pairs, lobes, segment_mm } => {
             let counts = (pairs.draw(&mut stream) as usize, lobes.draw(&mut stream) as usize);
             let segment = segment_mm.draw32(&mut stream) * 1e-3;
-            pressed(leaf, dissected::blade(counts, segment, leaf.width, &skeleton, &mut stream))
+            pressed(leaf, ribbons::blade(counts, segment, leaf.width, &skeleton, &mut stream))
         }
         Shape::Fern { pairs, pinnules, segment_mm } => {
             let counts = (pairs.draw(&mut stream) as usize, pinnules.draw(&mut stream) as usize);

@@ -4,10 +4,10 @@
 //! coordinates, then it goes rigidly where the rachis carries its foot. Young leaflets stand up and lie against each other.
 
 use super::blade::{self, Rest};
+use super::growth::LeafNow;
 use super::kind::Shape;
 use super::skeleton::{Measures, Pose, Skeleton};
 use super::skin::{self, Relief};
-use super::stage::LeafNow;
 use crate::math::{Mat3, lerp, vec3};
 use crate::sampling::Stream;
 

@@ -1,9 +1,9 @@
 //! Rosettes: all leaves stand on one crown at the soil. Beet, shepherd's purse.
 
 use super::axis::{self, Section};
+use super::growth::Growth;
 use super::leaf::{self, Lower};
 use super::organ::Organ;
-use super::stage::Growth;
 use super::tube::Profile;
 
 /// A crown: older leaves on its flank, the youngest on top.

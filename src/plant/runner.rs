@@ -5,9 +5,9 @@
 //! turns to the light. Along a creeping stem leaves turn to its two sides and face the sky, whatever their place on it.
 
 use super::axis::{self, ROOT};
+use super::growth::{Growth, LeafNow};
 use super::leaf::{self, Lower, Seat};
 use super::organ::{Organ, OrganKind};
-use super::stage::{Growth, LeafNow};
 use super::tube::{self, Profile, Ring};
 use crate::math::{Vec3, direction, lerp, smoothstep};
 use crate::sampling::{Purpose, Stream};

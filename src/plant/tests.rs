@@ -3,8 +3,11 @@
 use super::*;
 use crate::geometry::{Mesh, outline};
 use crate::math::{Vec2, Vec3};
+use crate::ron_file::Vary;
 use crate::sampling::Purpose;
+use serde::Deserialize;
 use serde::de::IgnoredAny;
+use std::collections::BTreeMap;
 use std::f32::consts::{PI, TAU};
 
 /// A skin, which botany does not read.
@@ -224,7 +227,7 @@ fn leaves_are_as_many_as_the_stage_says() {
             return;
         }
         let stream = stream(0);
-        let grown = stage::growth(&page.plant, Stage::Bbch(stage.bbch), &stream, 1.0).unwrap();
+        let grown = growth::growth(&page.plant, Stage::Bbch(stage.bbch), &stream, 1.0).unwrap();
         let (unfolded, all) = unfolded(&page.plant, stage);
         let expected = (stage.bbch - 10) as usize;
         let fits = if expected == 9 { unfolded >= 9 } else { unfolded == expected };
@@ -261,7 +264,7 @@ fn sizes_lie_within_the_tables() {
         within("leaves", unfolded(plant, stage).0 as f32, 0.0);
         for seed in 0..20 {
             let stream = stream(seed);
-            let grown = stage::growth(plant, Stage::Bbch(bbch), &stream, 1.0).unwrap();
+            let grown = growth::growth(plant, Stage::Bbch(bbch), &stream, 1.0).unwrap();
             let leaf = grown
                 .leaves
                 .iter()
@@ -295,7 +298,7 @@ fn blades_fill_as_much_of_their_length_and_width_as_the_table_says() {
         let stream = stream(3);
         let stage = Stage::Bbch(page.plant.stages.iter().map(|s| s.bbch).filter(|b| *b <= 19).max().unwrap());
         let plant = grow(&page.plant, stage, &stream);
-        for leaf in stage::growth(&page.plant, stage, &stream, 1.0).unwrap().leaves {
+        for leaf in growth::growth(&page.plant, stage, &stream, 1.0).unwrap().leaves {
             let Shape::Sheet { outline: of @ outline::Outline::Power { .. } } = leaf.kind.shape else { continue };
             let blade = plant.organs.iter().find(|o| o.leaf == leaf.number && o.midrib.is_some()).unwrap();
             let share = blade.mesh.area() / (leaf.blade * leaf.width) / ratio(of);
@@ -311,7 +314,7 @@ fn bent_blades_keep_their_length() {
     for seed in 0..20 {
         let stream = stream(seed);
         let plant = grow(&beet, Stage::Bbch(16), &stream);
-        let grown = stage::growth(&beet, Stage::Bbch(16), &stream, 1.0).unwrap();
+        let grown = growth::growth(&beet, Stage::Bbch(16), &stream, 1.0).unwrap();
         for leaf in grown.leaves.iter().filter(|l| l.blade > 0.03) {
             let organ = plant.organs.iter().find(|o| o.leaf == leaf.number && o.kind == OrganKind::Blade).unwrap();
             let middle: Vec<Vec3> = (0..organ.mesh.positions.len())
@@ -343,7 +346,7 @@ fn leaves_follow_each_other_at_the_species_angle() {
         for (seed, stage) in (0..20).flat_map(|s| page.plant.stages.iter().map(move |t| (s, t))) {
             let at = format!("{} {} seed {seed}", page.eppo, stage.bbch);
             let stream = stream(seed);
-            let leaves = stage::growth(&page.plant, Stage::Bbch(stage.bbch), &stream, 1.0).unwrap().leaves;
+            let leaves = growth::growth(&page.plant, Stage::Bbch(stage.bbch), &stream, 1.0).unwrap().leaves;
             let mut layers: BTreeMap<usize, Vec<f32>> = BTreeMap::new();
             for leaf in &leaves {
                 layers.entry(leaf.layer).or_default().push(leaf.azimuth);
@@ -404,7 +407,7 @@ fn a_plant_only_grows_with_its_days() {
             let stream = stream(seed);
             let mut before: BTreeMap<u16, f32> = BTreeMap::new();
             for day in 4..=43 {
-                for leaf in stage::growth(&desc, Stage::Age(day as f32), &stream, 1.0).unwrap().leaves {
+                for leaf in growth::growth(&desc, Stage::Age(day as f32), &stream, 1.0).unwrap().leaves {
                     if leaf.kind.organ == OrganKind::Blade {
                         let last = before.insert(leaf.number, leaf.blade).unwrap_or(0.0);
                         assert!(leaf.blade > last * 0.999, "{eppo} leaf {} on day {day}", leaf.number);

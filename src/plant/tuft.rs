@@ -1,9 +1,9 @@
 //! Grasses: nested sheaths, each with an arching blade, in two ranks; later side shoots from the same base.
 
 use super::axis::ROOT;
+use super::growth::{Growth, LeafNow};
 use super::leaf::{self, Lower, Seat};
 use super::organ::Organ;
-use super::stage::{Growth, LeafNow};
 use crate::math::{Vec3, direction, lerp};
 use crate::sampling::Purpose;
 use std::f32::consts::{FRAC_PI_2, PI};

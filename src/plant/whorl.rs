@@ -1,9 +1,9 @@
 //! Whorls of leaves without stalks on a square stem: bedstraws such as cleavers.
 
 use super::axis::{self, Section};
+use super::growth::Growth;
 use super::leaf::{self, Lower};
 use super::organ::Organ;
-use super::stage::Growth;
 use super::tube::Profile;
 
 /// Square, slender, leaves seated just below the skin.

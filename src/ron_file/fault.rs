@@ -4,7 +4,7 @@
 //! text here. A [`Fault`] carries its place outward through serde's string-only errors, between control characters that no
 //! file's text can bring in by itself.
 
-use super::place::{Step, mismatch, place, token};
+use super::place::{Step, mismatch, offset_of, place, token};
 use super::renamed::{Keyword, is_old};
 use super::suggest::choose;
 use ron::error::{Error as Ron, SpannedError};
@@ -133,13 +133,6 @@ pub(super) fn locate(text: &str, error: &SpannedError) -> Fault {
         _ if end > start && !behind.starts_with(char::is_whitespace) => fault(start..end, message, help),
         _ => fault(token(text, start), message, help),
     }
-}
-
-/// The byte offset of a line and column (both from 1, columns in characters); the text's end when it lies beyond.
-pub(super) fn offset_of(text: &str, line: usize, column: usize) -> usize {
-    let start = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum::<usize>();
-    let rest = &text[start.min(text.len())..];
-    start + rest.char_indices().nth(column.saturating_sub(1)).map_or(rest.len(), |(i, _)| i)
 }
 
 /// The names that are not old ones: nobody is told to write a name that is about to go.

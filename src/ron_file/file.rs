@@ -1,7 +1,7 @@
 //! A RON file: its text, and the way from it to a value or to an error that shows its place.
 
-use super::fault::{Fault, locate, offset_of};
-use super::place::{Step, place, quoted};
+use super::fault::{Fault, locate};
+use super::place::{Step, offset_of, place, quoted};
 use super::renamed;
 use super::suggest::nearest;
 use crate::error::{Kind, Place, Span};

@@ -229,6 +229,13 @@ fn block_end(text: &str, mut at: usize) -> usize {
     }
 }
 
+/// The byte offset of a line and column (both from 1, columns in characters); the text's end when it lies beyond.
+pub(super) fn offset_of(text: &str, line: usize, column: usize) -> usize {
+    let start = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum::<usize>();
+    let rest = &text[start.min(text.len())..];
+    start + rest.char_indices().nth(column.saturating_sub(1)).map_or(rest.len(), |(i, _)| i)
+}
+
 #[cfg(test)]
 mod tests {
     use super::Step::{Field, Item};

@@ -3,8 +3,7 @@
 //! A renamed keyword gets a row in [`RENAMED`] and `#[serde(alias = "…")]` on its field or variant, both of which go in the version
 //! after. A test holds the aliases of the sources to the table.
 
-use super::fault::offset_of;
-use super::place::{Word, words};
+use super::place::{Word, offset_of, words};
 
 /// Where a keyword stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,6 @@
 //! Rows and patches as they were drawn.
 
-use super::{Rows, WeedsDesc};
-use crate::sampling::{Purpose, Stream};
+use super::rows::Rows;
 use serde::{Deserialize, Serialize};
 
 /// The rows of one field.
@@ -58,21 +57,4 @@ pub struct WeedsRecord {
     pub clusters_sd_m: f32,
     /// No two stems stand closer.
     pub min_distance_m: f32,
-}
-
-impl WeedsRecord {
-    /// Draws the numbers of a field's weeds; `stream` is that of their places.
-    pub fn draw(desc: &WeedsDesc, stream: &Stream) -> Self {
-        // 3 is the stream of the patches themselves.
-        let child = |k| stream.child(Purpose::Page, k);
-        Self {
-            per_m2: desc.per_m2.draw32(&mut child(0)),
-            k: desc.k.draw32(&mut child(1)),
-            range_m: desc.range_m.draw32(&mut child(2)),
-            clusters_share: desc.clusters.share.draw32(&mut child(4)),
-            clusters_plants: desc.clusters.plants.draw32(&mut child(5)),
-            clusters_sd_m: desc.clusters.sd_m.draw32(&mut child(6)),
-            min_distance_m: desc.min_distance_m.draw32(&mut child(7)),
-        }
-    }
 }

@@ -66,6 +66,23 @@ impl Default for ClustersDesc {
     }
 }
 
+impl WeedsRecord {
+    /// Draws the numbers of a field's weeds; `stream` is that of their places.
+    pub fn draw(desc: &WeedsDesc, stream: &Stream) -> Self {
+        // 3 is the stream of the patches themselves.
+        let child = |k| stream.child(Purpose::Page, k);
+        Self {
+            per_m2: desc.per_m2.draw32(&mut child(0)),
+            k: desc.k.draw32(&mut child(1)),
+            range_m: desc.range_m.draw32(&mut child(2)),
+            clusters_share: desc.clusters.share.draw32(&mut child(4)),
+            clusters_plants: desc.clusters.plants.draw32(&mut child(5)),
+            clusters_sd_m: desc.clusters.sd_m.draw32(&mut child(6)),
+            min_distance_m: desc.min_distance_m.draw32(&mut child(7)),
+        }
+    }
+}
+
 /// Side of the cells that plants and mothers are addressed by; the intensity is taken at their middle.
 const CELL_M: f32 = 0.1;
 

@@ -1,7 +1,7 @@
 //! Everything that pages name, read once: species, pictures, soil layers.
 
-use super::assemble::Growing;
 use super::desc::SpeciesDesc;
+use super::growing::Growing;
 use crate::error::{Kind, Place};
 use crate::geometry::{AlphaMask, Margin};
 use crate::input;

@@ -2,6 +2,7 @@
 
 pub mod assemble;
 pub mod desc;
+mod growing;
 mod library;
 pub mod record;
 pub mod tag;

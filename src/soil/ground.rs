@@ -6,6 +6,8 @@ use super::crumb::{Crumbs, Law, Raster};
 use super::grid::Grid;
 use super::record::{ClodsRecord, LayerRecord, LitterRecord, MoistureRecord, ReliefRecord, SoilRecord};
 use super::relief::Relief;
+use super::site::Site;
+use super::stone_cover;
 use super::{LayerMaps, MAX_LAYERS, Rect, SoilDesc};
 use crate::error::{Error, Result};
 use crate::geometry::Mesh;
@@ -17,30 +19,6 @@ use std::path::Path;
 
 /// Standard deviation of [`Perlin::fbm2`] with four octaves and gain 0.6.
 const FBM4_SD: f32 = 0.245;
-
-/// The seed rows that shaped the ground.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SeedRows {
-    /// From row to row, metres.
-    pub spacing_m: f32,
-    /// Direction of the rows, radians clockwise from north.
-    pub azimuth: f32,
-    /// Distance of row 0 from the world's origin, measured towards the rows' right-hand side.
-    pub offset_m: f32,
-}
-
-/// Which piece of ground to make, and how finely.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Site {
-    /// What the camera sees, with room for what leans in.
-    pub area: Rect,
-    /// Grid spacing inside the area: 0.0008–0.001 for pixels of 0.25 mm.
-    pub grid_m: f32,
-    /// How far the coarse ground goes on beyond the area, for low suns and light that bounces.
-    pub margin_m: f32,
-    /// The seed rows, if the ground was sown.
-    pub rows: Option<SeedRows>,
-}
 
 /// What is known at each vertex of the fine grid.
 #[derive(Clone, Debug, Default)]
@@ -217,7 +195,7 @@ impl Ground {
                 damp: self.law.damp,
                 loose: self.law.loose,
             },
-            stones_cover: super::stone::covers(&desc.stones, debris),
+            stones_cover: stone_cover::covers(&desc.stones, debris),
             litter: LitterRecord::draw(&desc.litter, litter),
         }
     }

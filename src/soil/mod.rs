@@ -14,6 +14,7 @@ mod canopy;
 mod clod;
 mod color;
 mod crumb;
+mod debris;
 mod desc;
 mod grid;
 mod ground;
@@ -22,8 +23,10 @@ mod pile;
 mod record;
 mod relief;
 mod residue;
+mod site;
 mod skin;
 mod stone;
+mod stone_cover;
 #[cfg(test)]
 mod tests;
 mod wheel;
@@ -31,22 +34,23 @@ mod wheel;
 pub use canopy::Canopy;
 pub use clod::{Clods, clods};
 pub use color::SoilColor;
+pub use debris::{Debris, DebrisKind};
 pub use desc::{
     BlendDesc, ClodsDesc, CrumbsDesc, LayerDesc, LitterDesc, MoistureDesc, ReliefDesc, RowReliefDesc, SoilDesc,
     StonesDesc,
 };
-pub use ground::{Ground, SeedRows, Site};
+pub use ground::Ground;
 pub use litter::litter;
 pub use pile::Pile;
 pub use record::{
     ClodsRecord, LayerRecord, LitterRecord, MoistureRecord, ReliefRecord, RowReliefRecord, SoilRecord, WheelRecord,
 };
+pub use site::{SeedRows, Site};
 pub use skin::Skin;
 pub use stone::stones;
 pub use wheel::WheelDesc;
 
-use crate::geometry::Mesh;
-use crate::math::{Spectrum, Vec2, Vec3, vec2};
+use crate::math::{Vec2, vec2};
 use crate::sampling::{Purpose, Stream};
 
 /// The most layers that a ground blends.
@@ -148,50 +152,6 @@ impl Rect {
     #[must_use]
     pub fn grown(self, by: f32) -> Self {
         Self { x0: self.x0 - by, y0: self.y0 - by, x1: self.x1 + by, y1: self.y1 + by }
-    }
-}
-
-/// What lies on the ground.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DebrisKind {
-    /// A stone.
-    Stone,
-    /// A twig.
-    Stick,
-    /// A piece of a cereal's stalk.
-    Straw,
-    /// A bit of a dead leaf or root.
-    Bit,
-}
-
-/// One thing that lies on the ground, in world metres.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Debris {
-    /// What it is.
-    pub kind: DebrisKind,
-    /// Its shape; uv runs along its own surface, 0..1.
-    pub mesh: Mesh,
-    /// Mean reflectance of its kind.
-    pub albedo: Spectrum,
-    /// Brightness of this one beside its kind; 1 is the mean.
-    pub tint: f32,
-    /// Share of what faces up that soil covers.
-    pub dust: f32,
-    /// A number of its own in 0..1, to vary its hue or pick its texture by.
-    pub hue: f32,
-    /// Centre.
-    pub centre: Vec3,
-    /// Radius of the disc that holds it, seen from above.
-    pub radius: f32,
-}
-
-impl Debris {
-    /// Lowers it from where it lies on `ground` onto the plane z = 0; what lay on a clod comes down all the way.
-    pub fn lower(&mut self, ground: &Ground) {
-        let lowest = self.mesh.positions.iter().map(|p| p.z).fold(f32::INFINITY, f32::min);
-        let by = ground.height(self.centre.x, self.centre.y).max(lowest);
-        self.mesh.positions.iter_mut().for_each(|p| p.z -= by);
-        self.centre.z -= by;
     }
 }
 

@@ -1,6 +1,7 @@
 //! Stones: worn bodies, laid before anything grows.
 
 use super::body::{self, Cut, Pose, Shape};
+use super::stone_cover::{cover, own};
 use super::{Debris, DebrisKind, Ground, Pile, Rect, StonesDesc, cell_stream, cells};
 use crate::geometry::Mesh;
 use crate::math::{Vec2, vec2, vec3};
@@ -28,20 +29,6 @@ pub fn stones(desc: &[StonesDesc], ground: &Ground, pile: &mut Pile, stream: &St
         }
     }
     all
-}
-
-/// Share of the ground under each population.
-pub(super) fn covers(desc: &[StonesDesc], stream: &Stream) -> Vec<f32> {
-    desc.iter().enumerate().map(|(i, population)| cover(population, &own(stream, i))).collect()
-}
-
-/// The stream of a population.
-fn own(stream: &Stream, i: usize) -> Stream {
-    stream.child(Purpose::Debris, 200 + i as u64)
-}
-
-fn cover(desc: &StonesDesc, stream: &Stream) -> f32 {
-    desc.cover.draw32(&mut stream.child(Purpose::Page, 0))
 }
 
 /// A length in mm: lognormal, cut.

@@ -1,6 +1,8 @@
 //! The ground as a whole: what the pieces must keep together.
 
 use super::*;
+use crate::geometry::Mesh;
+use crate::math::Vec3;
 use crate::ron_file::{Num, Vary};
 use std::collections::BTreeMap;
 

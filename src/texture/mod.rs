@@ -13,6 +13,7 @@ pub mod panorama;
 mod pyramid;
 mod rgbe;
 mod srgb;
+mod texels;
 
 pub use height::Height;
 pub use maps::{AmbientOcclusion, Maps, NormalMap, Relief};

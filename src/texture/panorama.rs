@@ -4,6 +4,7 @@
 //! read as Rec.709. Of OpenEXR the channels R, G, B (of the first layer that has them) and, where it is there, NIR; opacity is left out.
 
 use super::rgbe;
+use super::texels::{Texels, check};
 use crate::input;
 use crate::{Error, Result};
 use exr::prelude::{ReadChannels, ReadLayers, read};
@@ -26,14 +27,6 @@ pub struct Panorama {
     pub rgb: Vec<[f32; 3]>,
     /// Near infrared, where the file has it.
     pub nir: Option<Vec<f32>>,
-}
-
-/// Values as a file has them.
-pub(super) struct Texels {
-    pub(super) width: usize,
-    pub(super) height: usize,
-    pub(super) rgb: Vec<[f32; 3]>,
-    pub(super) nir: Option<Vec<f32>>,
 }
 
 impl Panorama {
@@ -84,17 +77,6 @@ impl Panorama {
         let nir = self.nir.as_ref().map(single);
         Self { width, height, rgb: (0..width * height).map(color).collect(), nir }
     }
-}
-
-/// Whether the size is that of a picture of all directions.
-pub(super) fn check(width: usize, height: usize) -> Result<(), String> {
-    if width != 2 * height || height == 0 {
-        return Err(format!("it has {width} × {height} pixels; a picture of all directions is twice as wide as high"));
-    }
-    if width > super::MAX_SIZE as usize {
-        return Err(format!("it has {width} columns; at most {} can be read", super::MAX_SIZE));
-    }
-    Ok(())
 }
 
 fn open_exr(bytes: &[u8]) -> Result<Texels, String> {

@@ -3,7 +3,7 @@
 //! Source: Ward 1991, "Real Pixels", Graphics Gems II. The decoder is that of the crate `image`; it leaves out the exposure, which is
 //! checked and divided by here.
 
-use super::panorama::Texels;
+use super::texels::{Texels, check};
 use image::codecs::hdr::HdrDecoder;
 use image::{DynamicImage, ImageDecoder};
 
@@ -13,7 +13,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Texels, String> {
     let decoder = HdrDecoder::new_nonstrict(bytes).map_err(|e| e.to_string())?;
     let exposure = exposure(&decoder.metadata().custom_attributes)?;
     let (width, height) = decoder.dimensions();
-    super::panorama::check(width as usize, height as usize)?;
+    check(width as usize, height as usize)?;
     let image = DynamicImage::from_decoder(decoder).map_err(|e| e.to_string())?;
     let rgb = image.into_rgb32f().pixels().map(|pixel| pixel.0.map(|value| value * (1.0 / exposure))).collect();
     Ok(Texels { width: width as usize, height: height as usize, rgb, nir: None })

@@ -26,7 +26,7 @@
 //! | `wasserstein`, `frequency`, `noise`, `regions`, `outline` | how |
 //! | `sets` | all of it, from two folders to distances |
 //! | `window` | what the page shows of a picture |
-//! | `table`, `curves`, `page` | how it is written: JSON, CSV, text; curves; one HTML page |
+//! | `table`, `curves`, `page`, `write` | how it is written: JSON, CSV, text; curves; one HTML page |
 
 mod curves;
 mod feature;
@@ -41,8 +41,10 @@ mod source;
 mod table;
 mod wasserstein;
 mod window;
+mod write;
 
 pub use feature::{Feature, Pool};
-pub use sets::{Distance, FILES, Gap, LARGE, Options, Set};
+pub use sets::{Distance, Gap, LARGE, Options, Set};
 pub use source::{Photo, photos};
 pub use window::Window;
+pub use write::FILES;

@@ -1,18 +1,16 @@
-//! All of it: from two folders to distances, and from these to files.
+//! All of it: from two folders to distances.
 
 use super::feature::{Feature, Pool, Samples};
 use super::source::{Photo, photos, warnings};
 use super::window::Window;
-use super::{frequency, measure, page, table, wasserstein};
+use super::{frequency, measure, wasserstein};
 use crate::compare::{Picture, pairs, read_labels};
 use crate::sampling::rng::{Purpose, Stream};
 use crate::{Result, output};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// The files that are written, by name.
-pub const FILES: [&str; 3] = ["gap.json", "gap.csv", "gap.html"];
 /// A ratio above this is a gap.
 pub const LARGE: f64 = 2.0;
 /// How often the real set is cut into halves.
@@ -123,21 +121,6 @@ impl Gap {
     /// How far the sets are in a feature; `None` where one has none of it.
     pub fn distance(&self, feature: Feature) -> Option<&Distance> {
         self.distances.iter().find(|distance| distance.feature == feature)
-    }
-
-    /// The distances as a table in Markdown, which is also fit to be read as it is, and which of them are large.
-    pub fn table(&self) -> String {
-        table::text(self)
-    }
-
-    /// Writes [`FILES`] into `folder` and returns their paths.
-    pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>> {
-        let texts = [table::json(self)?, table::csv(self), page::html(self)];
-        let paths = FILES.map(|name| folder.join(name));
-        for (path, text) in paths.iter().zip(&texts) {
-            output::write_atomically(path, text.as_bytes())?;
-        }
-        Ok(paths.to_vec())
     }
 }
 

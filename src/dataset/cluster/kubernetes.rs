@@ -3,7 +3,9 @@
 //! Source: Kubernetes documentation, "Indexed Job for Parallel Processing with Static Work Assignment" and "Handling retriable and
 //! non-retriable pod failures with Pod failure policy".
 
-use super::{File, Job, Pod, fill, name};
+use super::request::{Job, Pod};
+use super::script::{fill, name};
+use crate::dataset::File;
 use crate::{Error, Result};
 
 /// Where the volume is mounted in a pod.

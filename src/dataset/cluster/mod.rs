@@ -9,54 +9,17 @@
 
 mod kubernetes;
 mod parallel;
+mod request;
+mod script;
 mod slurm;
 
-use super::{File, Set};
+pub use request::{Job, Pod, Scheduler};
+
+use super::Set;
 use crate::output::write_atomically;
 use crate::{Error, Result};
+use script::plain;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
-
-/// Who starts the shards.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Scheduler {
-    /// Slurm: an array, and a job that follows it.
-    Slurm,
-    /// Kubernetes: an indexed job, and one to be applied when it has ended.
-    Kubernetes(Pod),
-    /// GNU parallel, or xargs where there is none: a script.
-    Parallel,
-}
-
-/// Where a pod finds the program and the dataset.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Pod {
-    /// Container image in which `trace` is on the path.
-    pub image: String,
-    /// Claim of the volume in which the dataset's folder lies.
-    pub claim: String,
-}
-
-/// What is asked of a scheduler.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Job {
-    /// Who starts the shards.
-    pub scheduler: Scheduler,
-    /// Into how many parts the dataset is cut.
-    pub shards: u64,
-    /// Cores of each shard.
-    pub cpus: u32,
-    /// Memory of each shard, GiB.
-    pub memory_gib: u32,
-    /// Longest time of a shard before it is stopped and queued again.
-    pub time: Duration,
-    /// How long before that it is told: longer than an image takes.
-    pub grace: Duration,
-    /// Images that are rendered again to check them.
-    pub again: u64,
-    /// The program, as the machines see it.
-    pub program: PathBuf,
-}
 
 /// More tasks than this Slurm takes only where its `MaxArraySize` was raised.
 const SLURM_ARRAY: u64 = 1001;
@@ -108,56 +71,4 @@ fn check(set: &Set, job: &Job) -> Result<()> {
         return fault(words, "--grace is how long before the end of --time a shard is told to stop");
     }
     Ok(())
-}
-
-/// A path as it may stand in a script, comments included.
-fn plain(path: &Path) -> Result<String> {
-    path.to_str().filter(|p| !p.contains(char::is_control)).map(str::to_owned).ok_or_else(|| {
-        Error::misuse("this path cannot be written into a script")
-            .in_file(path)
-            .help("use a folder whose name has no control characters and is UTF-8")
-    })
-}
-
-/// What the files of a dataset are called by: its folder's name in lower-case letters, digits and hyphens, at most 40 of them.
-fn name(dir: &str) -> String {
-    let last = dir.rsplit('/').next().unwrap_or_default().to_lowercase();
-    let plain: String = last.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).take(40).collect();
-    let plain = plain.trim_matches('-');
-    if plain.is_empty() { "furrow".into() } else { format!("furrow-{plain}") }
-}
-
-/// A word of a shell script, whatever it holds.
-fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+:,".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        return word.to_owned();
-    }
-    format!("'{}'", word.replace('\'', r"'\''"))
-}
-
-/// A template with its names filled in.
-fn fill(path: &str, template: &str, names: &[(&str, String)]) -> File {
-    let text = names.iter().fold(template.to_owned(), |text, (name, value)| text.replace(&format!("@{name}@"), value));
-    File { path: path.into(), bytes: text.into_bytes() }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn words_survive_a_shell() {
-        for word in ["/a/b.c", "it's here", "", "$(rm) \"x\" \\ `y` *", "@x"] {
-            let said = std::process::Command::new("sh").arg("-c").arg(format!("printf %s {}", quoted(word))).output();
-            assert_eq!(String::from_utf8(said.unwrap().stdout).unwrap(), word);
-        }
-    }
-
-    #[test]
-    fn names_are_what_every_scheduler_takes() {
-        assert_eq!(name("/data/Synthetic D"), "furrow-synthetic-d");
-        assert_eq!(name("/data/..."), "furrow");
-        assert!(name(&"x".repeat(300)).len() < 50);
-    }
 }

@@ -1,7 +1,9 @@
 //! GNU parallel on one machine, or on several by ssh; xargs where it is not installed.
 
-use super::{File, Job, fill, plain, quoted};
+use super::request::Job;
+use super::script::{fill, plain, quoted};
 use crate::Result;
+use crate::dataset::File;
 
 /// The script.
 pub(super) fn files(dir: &str, job: &Job) -> Result<Vec<File>> {

@@ -1,7 +1,9 @@
 //! Slurm: an array that renders, and a job that follows it.
 
-use super::{File, Job, fill, name, plain, quoted};
+use super::request::Job;
+use super::script::{fill, name, plain, quoted};
 use crate::Result;
+use crate::dataset::File;
 use std::time::Duration;
 
 /// The two jobs and the script that submits them.

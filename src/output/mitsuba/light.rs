@@ -2,8 +2,9 @@
 //!
 //! Lamps and the sun's disc let rays through (`null`), as ours cast no shadow and are no geometry.
 
+use super::files::{Band, Files, SCALE, matrix};
 use super::xml::Element;
-use super::{Band, Files, SCALE, matrix};
+
 use crate::Result;
 use crate::light::{Light, Outline, Sun};
 use crate::math::{Frame, Spectrum, Vec3, direction, vec3};

@@ -21,6 +21,7 @@
 //! is returned as warnings and stands in the files. The filter of the camera is exact for `Box`; `Gaussian`, a
 //! square blurred, is written as the Gaussian of the same variance. Mitsuba has no lens distortion, and square pixels only.
 
+mod files;
 mod level;
 mod light;
 mod look;
@@ -28,93 +29,26 @@ mod ply;
 mod surface;
 mod xml;
 
+use super::Export;
 use super::png::{self, Picture};
-use super::{Export, exr, write_atomically};
 use crate::Result;
 use crate::film::Filter;
 use crate::geometry::{AlphaMask, Mesh};
 use crate::integrator::Path as PathTracer;
 use crate::material::Varies;
-use crate::math::{Spectrum, Vec3};
+use crate::math::Spectrum;
 use crate::scene::{Part, Scene};
+use files::{Band, Files, Plugins, SCALE, matrix};
 use level::Leveled;
 pub use level::fix_levels;
 use light::Lights;
 use look::Look;
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeSet, HashMap};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use surface::Surface;
 use xml::Element;
-
-/// Units of length to a metre.
-const SCALE: f32 = 100.0;
-
-/// Which bands a scene shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Band {
-    /// R, G, B.
-    Color,
-    /// Near infrared, as grey.
-    Nir,
-}
-
-impl Band {
-    /// A spectrum as an element.
-    fn rgb(self, name: &str, s: Spectrum) -> Element {
-        let [r, g, b, nir] = s.to_array();
-        let value = match self {
-            Self::Color => format!("{r} {g} {b}"),
-            Self::Nir => format!("{nir} {nir} {nir}"),
-        };
-        Element::property("rgb", name, value)
-    }
-
-    /// The picture of these bands.
-    fn path(self, stem: &str) -> String {
-        match self {
-            Self::Color => format!("{stem}.exr"),
-            Self::Nir => format!("{stem}-nir.exr"),
-        }
-    }
-}
-
-/// Whose scattering plugins a scene names.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Plugins {
-    /// Mitsuba's.
-    BuiltIn,
-    /// Ours.
-    Own,
-}
-
-/// The files of the folder as they are written.
-struct Files<'a> {
-    folder: &'a Path,
-    paths: Vec<PathBuf>,
-}
-
-impl Files<'_> {
-    fn write(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
-        let path = self.folder.join(name);
-        write_atomically(&path, bytes)?;
-        self.paths.push(path);
-        Ok(())
-    }
-
-    /// Plain numbers, one vector a channel.
-    fn numbers(&mut self, name: &str, width: u32, height: u32, channels: &[(&str, Vec<f32>)]) -> Result<()> {
-        self.write(name, &exr::encode_map(width, height, channels)?)
-    }
-
-    /// `STEM.exr` with R, G, B and `STEM-nir.exr`.
-    fn spectra(&mut self, stem: &str, width: u32, height: u32, pixels: &[Spectrum]) -> Result<()> {
-        let band = |i: usize| pixels.iter().map(|p| p.to_array()[i]).collect::<Vec<f32>>();
-        self.numbers(&Band::Color.path(stem), width, height, &[("R", band(0)), ("G", band(1)), ("B", band(2))])?;
-        self.numbers(&Band::Nir.path(stem), width, height, &[("Y", band(3))])
-    }
-}
 
 /// Parts of one material, mask and plant: one shape there.
 struct Group {
@@ -271,13 +205,6 @@ fn camera_warnings(scene: &Scene) -> Vec<String> {
         warnings.push("the point spread is written as a Gaussian of the same variance".into());
     }
     warnings
-}
-
-/// `<transform name="to_world">` from its columns.
-fn matrix([x, y, z]: [Vec3; 3], origin: Vec3) -> Element {
-    let row = |i: usize| format!("{} {} {} {}", x[i], y[i], z[i], origin[i]);
-    let value = format!("{}  {}  {}  0 0 0 1", row(0), row(1), row(2));
-    Element::new("transform").with("name", "to_world").inside([Element::new("matrix").with("value", value)])
 }
 
 /// Everything that the documents say.

@@ -2,7 +2,7 @@
 //!
 //! Mitsuba reads `r g b` as the attribute `vertex_color` and `nir_x` as `vertex_nir`. Lengths are [`SCALE`] to a metre.
 
-use super::SCALE;
+use super::files::SCALE;
 use crate::geometry::Mesh;
 use crate::math::Spectrum;
 use std::fmt::Write;

@@ -16,9 +16,9 @@
 //! half is divided by its weight, so the pictures hold more than the reflectance. With our own plugins (`furrow_soil`,
 //! `furrow_leaf`, see `tests/mitsuba/bsdfs.py`) all of this is exact; they read the same pictures and are told the factors.
 
+use super::files::{Band, Files, Plugins};
 use super::look::{Kind, Look};
 use super::xml::Element;
-use super::{Band, Files, Plugins};
 use crate::bsdf::fresnel;
 use crate::bsdf::microfacet::Ggx;
 use crate::math::{Spectrum, Vec3};

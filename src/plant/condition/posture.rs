@@ -5,7 +5,7 @@
 
 use super::{Condition, ConditionDesc, leaf_stream};
 use crate::math::lerp;
-use crate::plant::stage::LeafNow;
+use crate::plant::growth::LeafNow;
 use crate::sampling::{Purpose, Stream};
 
 /// Stalk's angle from the axis, arch of the stalk, nod and hang of the blade, and how far its halves sink, at full wilt, degrees.

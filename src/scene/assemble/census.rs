@@ -1,6 +1,6 @@
 //! How many plants each part of a scene file has brought, and which part to name where they are too many.
 
-use super::MOST_PLANTS;
+use super::builder::MOST_PLANTS;
 use crate::ron_file::{RonFile, Step};
 use crate::{Error, Result};
 

@@ -1,6 +1,6 @@
 //! The ground of a field: broken, covered with what lies on it, and laid as parts.
 
-use super::{Builder, Floor};
+use super::builder::{Builder, Floor};
 use crate::Result;
 use crate::material::{Ground as GroundMaterial, GroundSkin, Material, Solid};
 use crate::math::Spectrum;

@@ -12,6 +12,11 @@ use crate::sampling::rng::mix;
 use crate::scene::PlantRecord;
 use std::collections::BTreeSet;
 
+/// The population of single plants; crops and weeds have those of their streams.
+pub(super) const PLACED: u64 = 2001;
+/// The population of the first model; each is one of its own.
+pub(super) const MODELS: u64 = 3001;
+
 /// The identity of what has this address in a population of a field, before collisions are resolved.
 pub(super) fn of(seed: u64, index: u64, population: u64, address: u64) -> u32 {
     folded(mix(mix(mix(mix(seed) ^ index) ^ population) ^ address))

@@ -1,12 +1,12 @@
 //! What a builder tells of the field that it built.
 
-use super::{Builder, models};
+use super::builder::Builder;
+use super::models::{self, model_name};
 use crate::Result;
 use crate::sampling::Purpose;
 use crate::scatter::{Rows, WeedsRecord};
 use crate::scene::PlantRecord;
 use crate::scene::record::{CropRecord, SpeciesRecord, WeedRecord};
-use std::path::Path;
 
 impl Builder<'_> {
     /// Every species that the page can draw: crops, weeds, plants, models, in the page's order and each once. The same for
@@ -56,11 +56,6 @@ impl Builder<'_> {
         }
         Ok(all)
     }
-}
-
-/// What a model is called: its file, without folder and ending.
-pub(super) fn model_name(file: &str) -> String {
-    Path::new(file).file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// Gives every plant the number of its species in the table, from 1.

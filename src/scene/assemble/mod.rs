@@ -1,10 +1,11 @@
 //! Page + seed + index → one field.
 
+mod builder;
 mod census;
 mod field;
 mod ground;
-mod growing;
 mod identity;
+mod individual;
 mod known;
 mod lighting;
 mod models;
@@ -13,12 +14,13 @@ mod view;
 mod wear;
 
 use super::desc::{FieldDesc, Growth, SpeciesDesc};
+pub use super::growing::Growing;
 use super::library::{Library, Species};
 use super::record::Conditions;
 use super::tag::Tag;
 use super::{Part, PlantRecord, Scene};
 use crate::geometry::Mesh;
-use crate::light::{LightDesc, LightRecord};
+use crate::light::LightDesc;
 use crate::material::{GroundSkin, Material};
 use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3, vec2};
 use crate::optics::soil::LOESS;
@@ -27,13 +29,13 @@ use crate::ron_file::RonFile;
 use crate::ron_file::{Positive, Step, Vary};
 use crate::sampling::{Purpose, Stream};
 use crate::scatter::{self, Disc, Spot};
-use crate::soil::{Ground, Rect};
+use crate::soil::Rect;
 use crate::{Error, Result};
+use builder::{Builder, Floor, Grown};
 use census::{Census, Population};
 pub use field::Field;
 use ground::{Earth, Skins};
-pub use growing::Growing;
-use growing::Individual;
+use individual::Individual;
 pub use lighting::Lighting;
 use lighting::Listed;
 use rayon::prelude::*;
@@ -64,16 +66,10 @@ const SHADOW: f32 = 2.75;
 const SEASON: u64 = 1 << 32;
 /// Address of the first of the streams from which lists of lights are drawn, one for each place among the page's lights.
 const LIGHTING: u64 = 2 << 32;
-/// The population of single plants in [`identity::of`]; crops and weeds have those of their streams.
-const PLACED: u64 = 2001;
-/// The population of the first model; each is one of its own.
-const MODELS: u64 = 3001;
 /// Most pixels of an image.
 const MOST_PIXELS: u64 = 1 << 28;
 /// About the most texels of the ground's skin: a larger view has larger ones.
 const MOST_TEXELS: f32 = 2.4e8;
-/// Most plants that a field can number.
-const MOST_PLANTS: usize = u16::MAX as usize;
 
 /// Builds field `options.index` of the page at `path`.
 pub fn field(path: &Path, options: &Options) -> Result<Field> {
@@ -151,35 +147,6 @@ impl Seedling {
         let condition = condition.cloned().or(self.condition);
         Self { vigour: vigour.clone(), condition, ..self }
     }
-}
-
-/// What plants and models stand on.
-#[derive(Clone, Copy)]
-struct Floor<'a> {
-    ground: &'a Ground,
-    /// Whether the ground is the plane z = 0; what grows leans on it as it does on the ground with its heights.
-    flat: bool,
-}
-
-impl Floor<'_> {
-    /// Height at a place, metres.
-    fn height(&self, x: f32, y: f32) -> f32 {
-        if self.flat { 0.0 } else { self.ground.height(x, y) }
-    }
-}
-
-struct Builder<'a> {
-    page: &'a RonFile,
-    desc: &'a FieldDesc,
-    library: Library,
-    seed: u64,
-    index: u64,
-    season: Season,
-    /// The lights as they were drawn.
-    lights: Vec<LightRecord>,
-    lighting: Vec<Lighting>,
-    scene: Scene,
-    warnings: Vec<String>,
 }
 
 impl<'a> Builder<'a> {
@@ -365,7 +332,7 @@ impl<'a> Builder<'a> {
                 individual: self.individual(&species.desc),
                 vigour: placed.vigour.clone(),
                 condition: species.desc.condition.clone(),
-                id: identity::of(self.seed, self.index, PLACED, k as u64),
+                id: identity::of(self.seed, self.index, identity::PLACED, k as u64),
             };
             all.push(seedling.tended(&placed.vigour, placed.condition.as_ref()));
         }
@@ -441,25 +408,6 @@ impl<'a> Builder<'a> {
             records.push(record);
         }
         Ok(records)
-    }
-}
-
-/// An organ that stands in the field.
-struct Grown {
-    part: Part,
-    skin: String,
-    choice: usize,
-    material: crate::material::LeafMaterial,
-    /// Whether no other organ of the plant has this material.
-    own: bool,
-}
-
-impl Grown {
-    /// The same of another shape.
-    fn with(&self, mesh: Mesh) -> Self {
-        let Part { mask, material, tag, .. } = &self.part;
-        let part = Part { mesh, mask: mask.clone(), material: *material, tag: *tag };
-        Self { part, skin: self.skin.clone(), material: self.material.clone(), ..*self }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Models from disk, stood on the ground and labelled.
 
-use super::known::model_name;
-use super::{Builder, Floor, MODELS, MOST_PLANTS, identity};
+use super::builder::{Builder, Floor, MOST_PLANTS};
+use super::identity;
 use crate::geometry::Mesh;
 use crate::material::{Material, Painted, Repaint};
 use crate::math::{Mat3, Spectrum, Vec3};
@@ -13,6 +13,7 @@ use crate::scene::tag::{Class, Tag};
 use crate::scene::{Part, PlantRecord};
 use crate::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
 /// Farthest that a model may reach from the world's origin along an axis, metres.
 const FARTHEST: f32 = 1000.0;
@@ -84,7 +85,7 @@ impl Builder<'_> {
         let plants = plants.into_iter().map(|(number, parts)| {
             // What of the model it is, whatever the number of plants before it.
             let own = u64::from(number) - numbered as u64;
-            let id = identity::of(self.seed, self.index, MODELS + k as u64, own);
+            let id = identity::of(self.seed, self.index, identity::MODELS + k as u64, own);
             self.record((number, id), &parts, &desc.file, foot, &model)
         });
         Ok(plants.collect())
@@ -145,4 +146,9 @@ fn tag(class: Option<Class>, label: Option<&Label>, numbered: usize) -> Option<T
         }
         (None, Some((class, l))) => Some(Tag { class, plant: 0, leaf: l.leaf }),
     }
+}
+
+/// What a model is called: its file, without folder and ending.
+pub(super) fn model_name(file: &str) -> String {
+    Path::new(file).file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }

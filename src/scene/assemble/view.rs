@@ -4,7 +4,7 @@
 //! One that sees the horizon, or ground further away, gets bare ground there: its pixels are then labelled soil, so the field says
 //! so in its warnings, with the share of the ground in view that this is. Where it is more than half, the scene is refused.
 
-use super::Builder;
+use super::builder::Builder;
 use crate::math::{Vec2, Vec3, vec2};
 use crate::ron_file::Step;
 use crate::soil::Rect;

@@ -1,6 +1,6 @@
 //! Plants in a condition: leaf by leaf, what is cut out of it and what its tissue has become.
 
-use super::Grown;
+use super::builder::Grown;
 use crate::geometry::Mesh;
 use crate::material::Wear;
 use crate::math::{Spectrum, Vec2};

@@ -1,8 +1,8 @@
 //! The steps by which ground is drawn; each changes heights and colours all over the tile. See [`super::soil`].
 
-use super::soil::{Litter, SoilRecipe};
+use super::drawn::{Drawn, Grey};
+use super::soil_recipe::{Litter, SoilRecipe};
 use super::stamp::Stamp;
-use super::{Drawn, Grey};
 use crate::math::{Vec2, Vec3, lerp, smoothstep, vec2, vec3};
 use crate::ron_file::Num;
 use crate::sampling::rng::{Purpose, Stream};

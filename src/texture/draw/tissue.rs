@@ -1,7 +1,7 @@
 //! What each place of a blade is made of: chlorophyll between veins and in them, red, brown and mealy tissue.
 
 use super::cells::{Cells, unit};
-use super::leaf::{LeafRecipe, Look};
+use super::leaf_recipe::{LeafRecipe, Look};
 use super::shape::Shape;
 use crate::math::{Vec2, lerp, smoothstep, vec2};
 use crate::sampling::rng::{Purpose, Stream, mix};

@@ -25,16 +25,11 @@ pub use green::Index;
 pub use size::SizeRule;
 
 use self::green::{LEVELS, begin, blurred, histogram, level, otsu};
-use self::size::Sizes;
+use self::size::{CLASSES, CROP, SOIL, Sizes};
 use crate::dataset::sample::IGNORE;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
-const SOIL: u8 = 0;
-const CROP: u8 = 1;
-const WEED: u8 = 2;
-/// Number of classes.
-const CLASSES: usize = 3;
 /// Standard deviations of the blur that are tried, as shares of the image's diagonal: none to six pixels of 1296 × 966.
 const BLURS: [f64; 5] = [0.0, 0.0005, 0.001, 0.002, 0.004];
 

@@ -1,11 +1,15 @@
 //! How large a green region is, and from which size on it is what.
 
-use super::{CLASSES, CROP, SOIL, WEED};
 use crate::dataset::sample::IGNORE;
 use crate::train::measure::components::Components;
 use crate::train::measure::{Confusion, Scores};
 use serde::{Deserialize, Serialize};
 
+pub(super) const SOIL: u8 = 0;
+pub(super) const CROP: u8 = 1;
+const WEED: u8 = 2;
+/// Number of classes.
+pub(super) const CLASSES: usize = 3;
 /// Sizes told apart in a doubling of a region's share of the image.
 const PER_DOUBLING: f64 = 8.0;
 /// Bins of sizes: shares from 2⁻³² to 1.

@@ -1,21 +1,11 @@
-//! Fields that grow otherwise than their pages say: what experiments change. No random number is drawn for it or left undrawn, so
-//! everything else is as it was.
+//! Plants that are all alike: one shape and age for a whole species.
 
-use super::Builder;
+use super::builder::Builder;
 use crate::math::{Mat3, Vec3};
 use crate::plant::{self, Condition, ConditionDesc, Plant};
 use crate::sampling::rng::mix;
 use crate::sampling::{Purpose, Stream};
-use crate::scene::desc::{FieldDesc, Growth, SpeciesDesc};
-
-/// What is changed of the pages after they were read and before anything grows.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Growing {
-    /// Of the field's page.
-    pub page: Option<fn(&mut FieldDesc)>,
-    /// Of each species' page.
-    pub species: Option<fn(&mut SpeciesDesc)>,
-}
+use crate::scene::desc::{Growth, SpeciesDesc};
 
 /// The one plant that all of a species are.
 pub(super) struct Individual {

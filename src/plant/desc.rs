@@ -1,0 +1,234 @@
+//! A species' plant as it is written, and how old one of it is.
+
+use super::kind::LeafKind;
+use super::stage::StageDesc;
+use crate::ron_file::{self, Finite, NonNegative, Num, Positive, Step, Vary};
+use serde::{Deserialize, Deserializer, Serialize};
+use std::collections::BTreeMap;
+
+/// How a plant stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Form {
+    /// All leaves on one crown at the soil.
+    Rosette,
+    /// Whorls of leaves without stalks on a square stem.
+    Whorl,
+    /// Stalked leaves on an upright stem.
+    Erect,
+    /// A rosette of finely divided leaves.
+    Dissected,
+    /// A grass: sheaths, arching blades in two ranks, side shoots.
+    Tuft,
+    /// A stout grass: one shoot of rolled sheaths, big arching blades in two ranks.
+    Cane,
+    /// A main shoot and side shoots from its lowest axils; stems too long for their width lie down.
+    Runner,
+}
+
+/// A species' plant, as it is written.
+///
+/// ```
+/// let plant: furrow::plant::PlantDesc = ron::from_str(r#"(
+///     form: Rosette,
+///     kinds: {
+///         "cotyledon": (shape: Sheet(outline: Power(a: 0.45, b: 0.45)), organ: Cotyledon),
+///         "leaf": (shape: Sheet(outline: Power(a: 0.55, b: 1.0)), wave: 0.015),
+///     },
+///     stages: [
+///         (bbch: 10, days: 4, hypocotyl_mm: 10, stem_mm: 1.5, layers: [
+///             (kind: "cotyledon", leaves: 2, blade_mm: 20, width_mm: 7, stalk_mm: 4, angle_deg: 70),
+///         ]),
+///         (bbch: 12, days: 15, hypocotyl_mm: 10, stem_mm: 2, layers: [
+///             (kind: "cotyledon", leaves: 2, blade_mm: 24, width_mm: 8, stalk_mm: 5, angle_deg: 80),
+///             (kind: "leaf", leaves: 2, alpha: 0.5, blade_mm: Uniform(30, 38), width_mm: 20, stalk_mm: 12,
+///              angle_deg: Uniform(40, 55), bend_deg: 20, fold_deg: 25),
+///         ]),
+///     ],
+/// )"#).unwrap();
+/// assert!(ron::from_str::<furrow::plant::PlantDesc>("(form: Rosette, kinds: {}, stages: [])").is_err());
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PlantDesc {
+    /// How it stands.
+    pub form: Form,
+    /// Its kinds of leaves. A kind's name is also its blades' key in the table of skins.
+    pub kinds: BTreeMap<String, LeafKind>,
+    /// Its stages, youngest first.
+    pub stages: Vec<StageDesc>,
+    /// Age in days at which the crop covers as much of the ground, at its ordinary spacing, as a BBCH code of principal stage 3 says: 31
+    /// for 10 %, 33 for 30 %, 39 for 90 %. Such a code then stands for this age, and leaves are counted by the stages as before: the two
+    /// run side by side. Source of the codes: Meier 2001. Empty: all codes are those of the stages.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub cover_days: BTreeMap<u32, Num<NonNegative>>,
+    /// Factor on all sizes of one plant.
+    pub vigour: Vary<Positive>,
+    /// Factor on the sizes of one leaf, the paper's r.
+    pub size: Vary<Positive>,
+    /// How far a leaf strays from its place in the layer.
+    pub azimuth_deg: Vary<Finite>,
+    /// How far the axis leans.
+    pub lean_deg: Vary<Finite>,
+    /// Skin of the hypocotyl; empty: `"stalk"`.
+    pub hypocotyl_skin: String,
+    /// Skin of the stem; empty: `"stalk"`.
+    pub stem_skin: String,
+}
+
+/// The same fields, before they were checked against each other.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename = "PlantDesc")]
+struct Written {
+    form: Form,
+    kinds: BTreeMap<String, LeafKind>,
+    stages: Vec<StageDesc>,
+    #[serde(default)]
+    cover_days: BTreeMap<u32, Num<NonNegative>>,
+    #[serde(default = "vigour")]
+    vigour: Vary<Positive>,
+    #[serde(default = "size")]
+    size: Vary<Positive>,
+    #[serde(default = "azimuth")]
+    azimuth_deg: Vary<Finite>,
+    #[serde(default = "lean")]
+    lean_deg: Vary<Finite>,
+    #[serde(default)]
+    hypocotyl_skin: String,
+    #[serde(default)]
+    stem_skin: String,
+}
+
+fn vigour() -> Vary<Positive> {
+    Vary::uniform(0.94, 1.06)
+}
+
+fn size() -> Vary<Positive> {
+    Vary::uniform(0.93, 1.07)
+}
+
+fn azimuth() -> Vary<Finite> {
+    Vary::uniform(-10.0, 10.0)
+}
+
+fn lean() -> Vary<Finite> {
+    Vary::uniform(0.0, 5.0)
+}
+
+impl<'de> Deserialize<'de> for PlantDesc {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        ron_file::from_raw(deserializer, |raw| {
+            let w: Written = ron_file::parse_in(raw)?;
+            let desc = Self {
+                form: w.form,
+                kinds: w.kinds,
+                stages: w.stages,
+                cover_days: w.cover_days,
+                vigour: w.vigour,
+                size: w.size,
+                azimuth_deg: w.azimuth_deg,
+                lean_deg: w.lean_deg,
+                hypocotyl_skin: w.hypocotyl_skin,
+                stem_skin: w.stem_skin,
+            };
+            desc.check_at().map_err(|(at, message, help)| ron_file::inside(raw, &at, message, help))?;
+            Ok(desc)
+        })
+    }
+}
+
+impl PlantDesc {
+    /// What does not fit together, in words. A page that was read has passed this.
+    pub fn check(&self) -> Result<(), String> {
+        self.check_at().map_err(|(_, message, _)| message)
+    }
+
+    /// The same, with the place in the page.
+    fn check_at(&self) -> Result<(), (Vec<Step<'static>>, String, String)> {
+        use Step::{Field, Item};
+        if self.stages.is_empty() {
+            let help = "write (bbch: 10, days: 4, hypocotyl_mm: 8, stem_mm: 1, layers: […])";
+            return Err((vec![Field("stages")], "a plant needs at least one stage".into(), help.into()));
+        }
+        for (i, stage) in self.stages.iter().enumerate() {
+            let mut at = vec![Field("stages"), Item(i), Field("layers")];
+            let leaves: f64 = stage.layers.iter().map(|l| l.leaves.get()).sum();
+            if leaves > 1000.0 {
+                let message = format!("{leaves} leaves at BBCH {}: labels number at most 1000 of a plant", stage.bbch);
+                return Err((at, message, "write fewer layers, or fewer leaves in each".into()));
+            }
+            if let Some(k) = stage.layers.iter().position(|l| !self.kinds.contains_key(&l.kind)) {
+                at.extend([Item(k), Field("kind")]);
+                let kind = &stage.layers[k].kind;
+                let known: Vec<&str> = self.kinds.keys().map(String::as_str).collect();
+                let message = format!("no kind of leaf is called \"{kind}\"");
+                return Err((at, message, ron_file::choose("kinds", &known, kind)));
+            }
+        }
+        let days: Vec<f64> = self.cover_days.values().map(|d| d.get()).collect();
+        if days.windows(2).any(|pair| pair[1] <= pair[0]) {
+            let message = "a higher BBCH code of ground cover must be reached later".into();
+            return Err((
+                vec![Field("cover_days")],
+                message,
+                "write {31: 32, 33: 44}: codes and days rise together".into(),
+            ));
+        }
+        for (i, pair) in self.stages.windows(2).enumerate() {
+            let [from, to] = pair else { continue };
+            let wrong = |field: Step<'static>, what: &str, help: &str| {
+                let at = vec![Field("stages"), Item(i + 1), field];
+                Err((at, format!("between BBCH {} and {}: {what}", from.bbch, to.bbch), help.to_owned()))
+            };
+            if to.bbch <= from.bbch {
+                return wrong(Field("bbch"), "stages must rise in bbch and in days", "write the youngest stage first");
+            }
+            if to.days.get() <= from.days.get() {
+                return wrong(Field("days"), "stages must rise in bbch and in days", "write the youngest stage first");
+            }
+            if to.layers.len() < from.layers.len() {
+                return wrong(Field("layers"), "layers are lost", "write blade_mm: 0 for a leaf that is gone");
+            }
+            let differs = |k: &usize| {
+                let (a, b) = (&from.layers[*k], &to.layers[*k]);
+                a.kind != b.kind || a.leaves != b.leaves
+            };
+            if let Some(k) = (0..from.layers.len()).find(differs) {
+                let at = vec![Field("stages"), Item(i + 1), Field("layers"), Item(k)];
+                let message = format!(
+                    "between BBCH {} and {}: a layer changes its kind or its number of leaves",
+                    from.bbch, to.bbch
+                );
+                return Err((at, message, "new layers come after those of the stage before".into()));
+            }
+        }
+        Ok(())
+    }
+
+    /// The keys that this plant's organs use in the table of skins.
+    pub fn skins(&self) -> Vec<String> {
+        let own = |s: &str| if s.is_empty() { "stalk".to_owned() } else { s.to_owned() };
+        let mut keys = vec![own(&self.hypocotyl_skin), own(&self.stem_skin)];
+        for (name, kind) in &self.kinds {
+            keys.push(if kind.skin.is_empty() { name.clone() } else { kind.skin.clone() });
+            keys.push(kind.stalk_skin.clone());
+        }
+        keys.sort();
+        keys.dedup();
+        keys
+    }
+
+    /// Days after emergence of the first and the last stage.
+    pub fn days(&self) -> (f32, f32) {
+        let day = |s: Option<&StageDesc>| s.map_or(0.0, |s| s.days.f32());
+        (day(self.stages.first()), day(self.stages.last()))
+    }
+}
+
+/// How old a plant is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Stage {
+    /// Days after emergence. Outside the page's stages: the nearest of them.
+    Age(f32),
+    /// BBCH code, by the ground that the crop covers where the page says at what age it does (see [`PlantDesc::cover_days`]), else by the
+    /// stages. Between two stages of the page: their blend.
+    Bbch(u32),
+}

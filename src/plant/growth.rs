@@ -1,0 +1,191 @@
+//! A plant at an age, before anything has a shape: its stages, and what lies between two of them.
+//!
+//! Between two stages every number is blended by age. A layer that only the later stage has grows from nothing, upright
+//! and folded like the bud that it is; a leaf shorter than [`BUD`] is still hidden and not there.
+
+use super::desc::{PlantDesc, Stage};
+use super::kind::LeafKind;
+use super::stage::{BUD, StageDesc};
+use crate::math::lerp;
+use crate::ron_file::{Bound, Vary};
+use crate::sampling::{Purpose, Stream};
+use std::f32::consts::PI;
+
+/// One leaf as it is today. Metres and radians.
+#[derive(Clone, Debug)]
+pub(super) struct LeafNow<'a> {
+    /// From 1.
+    pub(super) number: u16,
+    /// From 0.
+    pub(super) layer: usize,
+    pub(super) kind_name: &'a str,
+    pub(super) kind: &'a LeafKind,
+    /// Clockwise from north.
+    pub(super) azimuth: f32,
+    pub(super) blade: f32,
+    pub(super) width: f32,
+    pub(super) stalk: f32,
+    pub(super) angle: f32,
+    pub(super) pitch: f32,
+    pub(super) bend: f32,
+    pub(super) fold: f32,
+    /// Twist beyond the kind's.
+    pub(super) twist: f32,
+    /// Arch of the stalk beyond the kind's.
+    pub(super) arch: f32,
+    /// This leaf's own numbers.
+    pub(super) stream: Stream,
+}
+
+/// The plant as it is today, before anything has a shape.
+#[derive(Clone, Debug)]
+pub(super) struct Growth<'a> {
+    pub(super) desc: &'a PlantDesc,
+    pub(super) bbch: u32,
+    pub(super) age_days: f32,
+    /// Height of the first layer, metres.
+    pub(super) hypocotyl: f32,
+    /// Width of the stem at the soil, metres.
+    pub(super) stem: f32,
+    pub(super) tillers: usize,
+    /// Height of each layer over the first, metres.
+    pub(super) rise: Vec<f32>,
+    pub(super) leaves: Vec<LeafNow<'a>>,
+    /// The plant's own numbers.
+    pub(super) stream: &'a Stream,
+}
+
+/// Two neighbouring stages and the way from the first to the second.
+struct Between<'a> {
+    from: &'a StageDesc,
+    to: &'a StageDesc,
+    u: f32,
+}
+
+impl<'a> Between<'a> {
+    fn find(stages: &'a [StageDesc], stage: Stage) -> Option<Self> {
+        let key = |s: &StageDesc| match stage {
+            Stage::Age(_) => s.days.f32(),
+            Stage::Bbch(_) => s.bbch as f32,
+        };
+        let x = match stage {
+            Stage::Age(days) => days,
+            Stage::Bbch(code) => code as f32,
+        };
+        let after = stages.partition_point(|s| key(s) <= x);
+        let from = stages.get(after.saturating_sub(1))?;
+        let to = stages.get(after).unwrap_or(from);
+        let span = key(to) - key(from);
+        let u = if span > 0.0 { ((x - key(from)) / span).clamp(0.0, 1.0) } else { 0.0 };
+        Some(Self { from, to, u })
+    }
+
+    /// A number on the way: both ends are drawn from the same random numbers, so a plant that is large at one stage is
+    /// large at the next. `absent` stands for a layer that the earlier stage does not have.
+    fn draw<B: Bound, T>(
+        &self,
+        ends: (Option<&T>, &T),
+        absent: Option<f32>,
+        stream: &Stream,
+        slot: u64,
+        pick: impl Fn(&T) -> &Vary<B>,
+    ) -> f32 {
+        let draw = |desc| pick(desc).draw32(&mut stream.child(Purpose::Leaf, slot));
+        let to = draw(ends.1);
+        if self.u == 0.0 && ends.0.is_some_and(|from| std::ptr::eq(from, ends.1)) {
+            return to;
+        }
+        lerp(ends.0.map_or(absent.unwrap_or(to), draw), to, self.u)
+    }
+}
+
+/// The code of ground cover that `code` stands for and the age in days at which a crop has it; `None` for a code of the stages.
+fn covering(desc: &PlantDesc, code: u32) -> Option<(u32, f32)> {
+    let (before, early) = desc.cover_days.range(..=code).next_back()?;
+    let Some((after, late)) = desc.cover_days.range(code..).next() else { return Some((*before, early.f32())) };
+    let u = (code - before) as f32 / (after - before).max(1) as f32;
+    Some((code, lerp(early.f32(), late.f32(), u)))
+}
+
+/// Azimuth from which the leaves of the plant of `stream` count, radians clockwise from north.
+pub(super) fn turn(stream: &Stream) -> f32 {
+    stream.child(Purpose::Plant, 0).child(Purpose::Plant, 1).range32(0.0, 2.0 * PI)
+}
+
+/// What the plant of `stream` looks like at `stage`, all its sizes but its height over the soil times `vigour`; `None` without stages.
+pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, vigour: f32) -> Option<Growth<'a>> {
+    const MM: f32 = 1e-3;
+    let covering = match stage {
+        Stage::Bbch(code) => covering(desc, code),
+        Stage::Age(_) => None,
+    };
+    let stage = covering.map_or(stage, |(_, days)| Stage::Age(days));
+    let between = Between::find(&desc.stages, stage)?;
+    let Between { from, to, u } = between;
+    let whole = (Some(from), to);
+    let own = stream.child(Purpose::Plant, 0);
+    let stem = between.draw(whole, None, &own, 3, |s| &s.stem_mm) * MM * vigour;
+    let vigour = vigour * desc.vigour.draw32(&mut own.child(Purpose::Plant, 0));
+    let spin = turn(stream);
+    let hypocotyl = between.draw(whole, None, &own, 2, |s| &s.hypocotyl_mm) * MM;
+    let tillers = between.draw(whole, None, &own, 4, |s| &s.tillers).round() as usize;
+    let (mut leaves, mut rise, mut height, mut number) = (Vec::new(), Vec::new(), 0.0, 0);
+    for (k, layer) in to.layers.iter().enumerate() {
+        let before = from.layers.get(k);
+        let ends = (before, layer);
+        let shared = own.child(Purpose::Plant, 16 + k as u64);
+        height += between.draw(ends, Some(0.0), &shared, 0, |l| &l.internode_mm) * MM * vigour;
+        rise.push(height);
+        let alpha = between.draw(ends, None, &shared, 1, |l| &l.alpha);
+        let n = layer.leaves.get() as u32;
+        for i in 0..n {
+            number += 1;
+            let mut stream = stream.child(Purpose::Leaf, u64::from(number));
+            let size = desc.size.draw32(&mut stream) * vigour;
+            let jitter = desc.azimuth_deg.draw32(&mut stream).to_radians();
+            let blade = between.draw(ends, Some(0.0), &stream, 1, |l| &l.blade_mm) * MM * size;
+            let Some((name, kind)) = desc.kinds.get_key_value(&layer.kind) else { continue };
+            if blade < BUD {
+                continue;
+            }
+            let grown = before.map_or(u, |_| 1.0);
+            let angle = between.draw(ends, None, &stream, 4, |l| &l.angle_deg).to_radians();
+            let fold = between.draw(ends, None, &stream, 7, |l| &l.fold_deg).to_radians();
+            leaves.push(LeafNow {
+                number,
+                layer: k,
+                kind_name: name,
+                kind,
+                azimuth: spin + PI * (2.0 * i as f32 / n as f32 + alpha) + jitter,
+                blade,
+                width: between.draw(ends, Some(0.0), &stream, 2, |l| &l.width_mm) * MM * size,
+                stalk: between.draw(ends, Some(0.0), &stream, 3, |l| &l.stalk_mm) * MM * size,
+                angle: angle * lerp(0.5, 1.0, grown),
+                pitch: between.draw(ends, None, &stream, 5, |l| &l.pitch_deg).to_radians(),
+                bend: between.draw(ends, Some(0.0), &stream, 6, |l| &l.bend_deg).to_radians(),
+                fold: lerp(fold.max(0.9), fold, grown),
+                twist: 0.0,
+                arch: 0.0,
+                stream,
+            });
+        }
+    }
+    Some(Growth {
+        desc,
+        bbch: match (covering, stage) {
+            (Some((code, _)), _) => code,
+            (None, Stage::Bbch(code)) => code.clamp(from.bbch, to.bbch),
+            (None, Stage::Age(_)) => from.bbch,
+        },
+        age_days: match stage {
+            Stage::Age(days) => days,
+            Stage::Bbch(_) => lerp(from.days.f32(), to.days.f32(), u),
+        },
+        hypocotyl,
+        stem,
+        tillers,
+        rise,
+        leaves,
+        stream,
+    })
+}

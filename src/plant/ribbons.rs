@@ -1,0 +1,113 @@
+//! Finely divided blades: twice pinnate, of ribbons, by recursion.
+//!
+//! A ribbon is a narrow strip with a keel: three corners across, so that it catches light on two faces and is never a
+//! line when seen from its side. The blade's axis carries pairs of pinnae, each pinna pairs of lobes; lengths follow
+//! sin(πt)^0.7 along their axis, so that the whole has a leaf's outline. Pinnae stand out of the blade's plane by turns, as
+//! the leaves of mayweed do.
+
+use super::blade::Rest;
+use super::skeleton::Skeleton;
+use crate::math::{Vec3, lerp, vec2, vec3};
+use crate::sampling::Stream;
+use std::f32::consts::PI;
+
+/// The most ribbons of one blade: a guard against pages that ask for a million lobes.
+const MOST: usize = 600;
+
+/// A blade of ribbons while it grows.
+pub(super) struct Ribbons<'a> {
+    /// What has grown.
+    pub(super) rest: Rest,
+    /// The joints that carry it.
+    pub(super) skeleton: &'a Skeleton,
+    /// Width of a segment, metres.
+    pub(super) width: f32,
+    /// How many ribbons there are.
+    pub(super) count: usize,
+}
+
+impl Ribbons<'_> {
+    /// Adds a strip from `start` along `along` (metres), bowed towards `bow`, tapering at both ends.
+    pub(super) fn strip(&mut self, start: Vec3, along: Vec3, up: Vec3, bow: Vec3, width: f32, pieces: u32) {
+        self.count += 1;
+        if self.count > MOST {
+            return;
+        }
+        let right = along.cross(up).normalize_or(Vec3::X);
+        let mut previous = None;
+        for i in 0..=pieces {
+            let s = i as f32 / pieces as f32;
+            let centre = start + along * s + bow * (s * s);
+            let half = 0.5 * width * (1.0 - 0.8 * s * s * s) * if i == 0 { 0.7 } else { 1.0 };
+            let tie = self.skeleton.weights_on_chain(centre.y);
+            let first = self.rest.positions.len() as u32;
+            for (k, side) in [-1.0_f32, 0.0, 1.0].into_iter().enumerate() {
+                let keel = if side == 0.0 { -0.55 * half } else { 0.0 };
+                let p = centre + right * (half * side) + up * keel;
+                self.rest.corner(p, vec2(0.5 * k as f32, 1.0 - s), tie);
+            }
+            if let Some(near) = previous {
+                self.rest.stitch(near, first, 2);
+            }
+            previous = Some(first);
+        }
+    }
+
+    /// A pinna with its lobes, the last of them being its own tip.
+    fn pinna(&mut self, start: Vec3, along: Vec3, up: Vec3, lobes: usize, stream: &mut Stream) {
+        let length = along.length();
+        let bow = up * (length * stream.range32(-0.12, 0.2));
+        self.strip(start, along, up, bow, self.width, 2);
+        let ahead = along / length.max(1e-9);
+        let right = ahead.cross(up);
+        for k in 0..lobes {
+            let s = lerp(0.18, 0.88, (k as f32 + 0.5) / lobes as f32) + stream.range32(-0.05, 0.05);
+            for side in [-1.0_f32, 1.0] {
+                let reach = length * stream.range32(0.42, 0.68) * (1.2 - s);
+                if reach < self.width {
+                    continue;
+                }
+                let spread = stream.range32(0.55, 0.95);
+                let tilt = stream.range32(-0.35, 0.5);
+                let lobe = (ahead * spread.cos()
+                    + right * (side * spread.sin() * tilt.cos())
+                    + up * (spread.sin() * tilt.sin()))
+                .normalize_or(ahead);
+                let from = start + along * s + bow * (s * s);
+                self.strip(from, lobe * reach, up, Vec3::ZERO, 0.85 * self.width, 1);
+            }
+        }
+    }
+}
+
+/// The rest mesh of a blade with `pairs` of pinnae and `lobes` pairs of lobes on each, within `width`.
+pub(super) fn blade(
+    (pairs, lobes): (usize, usize),
+    segment: f32,
+    width: f32,
+    skeleton: &Skeleton,
+    stream: &mut Stream,
+) -> Rest {
+    let length = skeleton.length();
+    // Small leaves have fewer, not finer, segments.
+    let pairs = pairs.min((length / (2.2 * segment)) as usize).max(1);
+    let lobes = lobes.min((0.5 * width / (3.0 * segment)) as usize);
+    let mut ribbons = Ribbons { rest: Rest::default(), skeleton, width: segment, count: 0 };
+    ribbons.strip(Vec3::ZERO, vec3(0.0, length, 0.0), Vec3::Z, Vec3::ZERO, 1.25 * segment, 2 * pairs.min(12) as u32);
+    for k in 0..pairs {
+        let t = lerp(0.12, 0.93, (k as f32 + 0.5) / pairs as f32);
+        for side in [-1.0_f32, 1.0] {
+            let t = (t + stream.range32(-0.3, 0.3) / (pairs as f32 + 1.0)).clamp(0.05, 0.97);
+            let reach = 0.5 * width * (PI * t.powf(0.8)).sin().max(0.05).powf(0.7) * stream.range32(0.85, 1.15);
+            let spread = lerp(1.2, 0.6, t) + stream.range32(-0.12, 0.12);
+            let tilt = stream.range32(-0.25, 0.75);
+            let along = vec3(side * spread.sin() * tilt.cos(), spread.cos(), spread.sin() * tilt.sin());
+            let up = vec3(-side * tilt.sin(), 0.0, tilt.cos());
+            let up = (up - along * up.dot(along)).normalize_or(Vec3::Z);
+            // The outline's width is that of the projection: a steeper pinna is as long as a level one.
+            let lobes = if reach > 5.0 * segment { lobes } else { 0 };
+            ribbons.pinna(vec3(0.0, t * length, 0.0), along * (reach / spread.sin()), up, lobes, stream);
+        }
+    }
+    ribbons.rest
+}

@@ -1,0 +1,64 @@
+//! What a field is built with, and of.
+
+use super::lighting::Lighting;
+use super::season::Season;
+use crate::geometry::Mesh;
+use crate::light::LightRecord;
+use crate::material::LeafMaterial;
+use crate::ron_file::RonFile;
+use crate::scene::desc::FieldDesc;
+use crate::scene::library::Library;
+use crate::scene::{Part, Scene};
+use crate::soil::Ground;
+
+/// Most plants that a field can number.
+pub(super) const MOST_PLANTS: usize = u16::MAX as usize;
+
+/// A field under way.
+pub(super) struct Builder<'a> {
+    pub(super) page: &'a RonFile,
+    pub(super) desc: &'a FieldDesc,
+    pub(super) library: Library,
+    pub(super) seed: u64,
+    pub(super) index: u64,
+    pub(super) season: Season,
+    /// The lights as they were drawn.
+    pub(super) lights: Vec<LightRecord>,
+    pub(super) lighting: Vec<Lighting>,
+    pub(super) scene: Scene,
+    pub(super) warnings: Vec<String>,
+}
+
+/// What plants and models stand on.
+#[derive(Clone, Copy)]
+pub(super) struct Floor<'a> {
+    pub(super) ground: &'a Ground,
+    /// Whether the ground is the plane z = 0; what grows leans on it as it does on the ground with its heights.
+    pub(super) flat: bool,
+}
+
+impl Floor<'_> {
+    /// Height at a place, metres.
+    pub(super) fn height(&self, x: f32, y: f32) -> f32 {
+        if self.flat { 0.0 } else { self.ground.height(x, y) }
+    }
+}
+
+/// An organ that stands in the field.
+pub(super) struct Grown {
+    pub(super) part: Part,
+    pub(super) skin: String,
+    pub(super) choice: usize,
+    pub(super) material: LeafMaterial,
+    /// Whether no other organ of the plant has this material.
+    pub(super) own: bool,
+}
+
+impl Grown {
+    /// The same of another shape.
+    pub(super) fn with(&self, mesh: Mesh) -> Self {
+        let Part { mask, material, tag, .. } = &self.part;
+        let part = Part { mesh, mask: mask.clone(), material: *material, tag: *tag };
+        Self { part, skin: self.skin.clone(), material: self.material.clone(), ..*self }
+    }
+}
