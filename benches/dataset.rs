@@ -5,7 +5,7 @@
 //! Synthetic D with the formats PhenoBench and COCO, as users run it. What is not drawing (growing, labels, files) is told as a share of the
 //! time of the images: those under way at once have threads of their own, so their times add up. Rows that denoise need `OIDN_DIR`.
 
-use furrow::dataset::ledger::{Row, rows};
+use furrow::dataset::timing_log::{ImageTiming, rows};
 use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
@@ -25,8 +25,8 @@ fn main() {
         let folder = tempfile::tempdir().expect("a folder");
         let out = folder.path().join("data");
         let seconds = make(&out, [width, height, spp], count, denoise);
-        let images = rows(&out).expect("a ledger");
-        let sum = |of: fn(&Row) -> f64| images.iter().map(of).sum::<f64>();
+        let images = rows(&out).expect("a timing log");
+        let sum = |of: fn(&ImageTiming) -> f64| images.iter().map(of).sum::<f64>();
         let [all, grow, draw, label] = [sum(|r| r.seconds), sum(|r| r.grow_s), sum(|r| r.draw_s), sum(|r| r.label_s)];
         let share = |of: f64| 100.0 * of / all;
         println!(

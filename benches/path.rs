@@ -8,7 +8,7 @@
 
 use furrow::accel::EmbreeAccel;
 use furrow::geometry::{Hit, Intersect, PACKET, Ray, Window};
-use furrow::integrator::{Path as PathTracer, World};
+use furrow::integrator::{PathTracer, World};
 use furrow::render::{self, Settings, Watch};
 use furrow::sampling::Points;
 use furrow::scene::assemble;

@@ -13,7 +13,7 @@ use furrow::accel::EmbreeAccel;
 use furrow::dataset::{Set, native};
 use furrow::film::Film;
 use furrow::geometry::{Hit, Interaction, Window};
-use furrow::integrator::{Path as PathTracer, World};
+use furrow::integrator::{PathTracer, World};
 use furrow::light::{Emitter, Light};
 use furrow::material::Material;
 use furrow::math::Vec3;

@@ -10,7 +10,7 @@ use common::scenes::{camera, scene, shoot, sphere, square};
 use common::stats::{p_value, sidak};
 use furrow::bsdf::{Bsdf, Leaf, OrenNayar};
 use furrow::film::Film;
-use furrow::integrator::{Path, Technique};
+use furrow::integrator::{PathTracer, Technique};
 use furrow::light::{Constant, Lamp, Light, Outline, Sun};
 use furrow::math::{Frame, Spectrum, Vec3, vec3};
 use furrow::scene::Scene;
@@ -26,13 +26,13 @@ fn sky(radiance: f32) -> Light {
 }
 
 /// All combinations of techniques under which a scene's light can be found.
-fn techniques(by_chance: bool) -> Vec<Path> {
+fn techniques(by_chance: bool) -> Vec<PathTracer> {
     let mut all = Vec::new();
     for roulette in [false, true] {
         for (light_sampling, mis) in [(true, true), (true, false), (false, false)] {
             if light_sampling || by_chance {
                 let technique = Technique { light_sampling, mis, roulette };
-                all.push(Path { max_depth: 64, technique, ..Path::default() });
+                all.push(PathTracer { max_depth: 64, technique, ..PathTracer::default() });
             }
         }
     }
@@ -119,8 +119,11 @@ fn a_white_leaf_vanishes_in_a_furnace() {
     let mut crossed = square(vec3(0.2, 0.0, 0.1), 1.0);
     crossed.transform(furrow::math::Mat3::from_rotation_x(1.1), Vec3::ZERO);
     let s = scene(vec![(square(Vec3::ZERO, 1.5), leaf), (crossed, leaf)], vec![sky(1.0)], eye);
-    let path =
-        Path { max_depth: 200, technique: Technique { roulette: false, ..Technique::default() }, ..Path::default() };
+    let path = PathTracer {
+        max_depth: 200,
+        technique: Technique { roulette: false, ..Technique::default() },
+        ..PathTracer::default()
+    };
     let film = shoot(&s, &path, 64, 3);
     for p in &film.pixels {
         let [r, g, b, n] = p.mean.to_array();
@@ -171,7 +174,7 @@ fn no_example_surface_shines_brighter_than_the_sky() {
     for (name, bsdf) in Bsdf::examples() {
         let eye = camera((16, 16), vec3(0.0, -2.0, 0.6), Vec3::ZERO, 40.0);
         let s = scene(vec![(sphere(Vec3::ZERO, 0.7, 48), bsdf)], vec![sky(1.0)], eye);
-        let film = shoot(&s, &Path::default(), 128, 9);
+        let film = shoot(&s, &PathTracer::default(), 128, 9);
         for p in &film.pixels {
             let error = p.variance.map(f32::sqrt).max();
             assert!(p.mean.max() <= 1.0 + 5.0 * error + 2e-3, "{name}: {:?} ± {error}", p.mean);

@@ -90,7 +90,7 @@ const ALLOWED: &[(&str, &str)] = &[
     // Images, plants, the soil's skin and the sensor's pixels: loops over what is many.
     (
         "rayon",
-        "render/ sensor/ job/threads.rs dataset/ compare/ scene/assemble/mod.rs soil/skin.rs material/ground.rs raster/sheets.rs",
+        "render/ sensor/ job/threads.rs dataset/ compare/ scene/assemble/mod.rs soil/bake.rs material/ground.rs raster/sheets.rs",
     ),
     // One reader for all RON files; faults inside a value are found where they lie.
     ("ron", "ron_file/"),

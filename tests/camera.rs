@@ -11,7 +11,7 @@ use furrow::accel::EmbreeAccel;
 use furrow::bsdf::{Bsdf, OrenNayar};
 use furrow::film::Film;
 use furrow::geometry::Window;
-use furrow::integrator::Path;
+use furrow::integrator::PathTracer;
 use furrow::math::{Spectrum, Vec3, vec3};
 use furrow::render::label::NONE;
 use furrow::render::{self, Settings, label};
@@ -40,7 +40,7 @@ fn a_moving_edge_is_as_wide_as_the_way_driven() {
     let motion =
         Motion { velocity: vec3(0.5, 0.2, 0.0), exposure: (16.0 / (0.5 * pixels_a_metre)) as f32, readout: 0.0 };
     let (scene, _) = edge(motion);
-    for row in shares(&shoot(&scene, &Path::default(), 256, 1)) {
+    for row in shares(&shoot(&scene, &PathTracer::default(), 256, 1)) {
         for (x, share) in row.iter().enumerate() {
             // From 8 pixels before the edge's place in the middle of the exposure to 8 behind it.
             let expected = ((40.0 - (x as f64 + 0.5)) / 16.0).clamp(0.0, 1.0);
@@ -55,7 +55,7 @@ fn a_rolling_shutter_leans_light_and_labels_alike() {
     let lean = 20.0;
     let motion = Motion { velocity: vec3(1.0, 0.0, 0.0), exposure: 0.0, readout: (lean / pixels_a_metre) as f32 };
     let (scene, _) = edge(motion);
-    let film = shoot(&scene, &Path::default(), 64, 1);
+    let film = shoot(&scene, &PathTracer::default(), 64, 1);
     let geometry = EmbreeAccel::build(&scene.surfaces(), 1).expect("an accelerator");
     let labels = label(&geometry, &scene.parts, &scene.camera, Window::full(SIZE.0, SIZE.1));
     for (y, (row, labels)) in shares(&film).iter().zip(labels.parts.chunks(SIZE.0 as usize)).enumerate() {
@@ -74,7 +74,7 @@ fn a_driving_camera_gives_the_same_bits_on_any_number_of_threads() {
         with_world(&scene, threads, |world, watch| {
             let window = Window::full(SIZE.0, SIZE.1);
             let settings = Settings { spp: 8, seed: 5, window, points: Points::Sobol };
-            render::render(world, &Path::default(), &settings, watch).expect("a film")
+            render::render(world, &PathTracer::default(), &settings, watch).expect("a film")
         })
     };
     assert_eq!(film(1), film(3));

@@ -13,7 +13,7 @@ use common::scenes::{camera, scene, shoot, square, with_world};
 use furrow::bsdf::Bsdf;
 use furrow::film::Film;
 use furrow::geometry::Window;
-use furrow::integrator::{FalseColor, Path as PathTracer};
+use furrow::integrator::{FalseColor, PathTracer};
 use furrow::math::{Mat3, Vec3, vec3};
 use furrow::render::{self, Settings, coverage};
 use furrow::sampling::Points;

@@ -117,10 +117,10 @@ fn a_lying_label_is_found_though_its_hash_is_right() {
     let other = sample.semantics.iter().position(|c| *c == 0).unwrap();
     sample.semantics[other] = 2;
     let files = native::files(&sample, "").unwrap();
-    let mut seal = furrow::dataset::seal::Seal::read(&data, 1).unwrap();
+    let mut seal = furrow::dataset::checksum_record::ChecksumRecord::read(&data, 1).unwrap();
     for file in files {
         fs::write(data.join(&file.path), &file.bytes).unwrap();
-        seal.files.insert(file.path, furrow::dataset::checksum::Print::of(&file.bytes));
+        seal.files.insert(file.path, furrow::dataset::checksum::Checksum::of(&file.bytes));
     }
     seal.write(&data).unwrap();
     let said = fail(verb("verify", &set.folder, &[]), 1);

@@ -14,7 +14,7 @@ use common::program::{FILES, SMALL, names, scratch, trace};
 use common::scenes::with_world;
 use furrow::film::Film;
 use furrow::geometry::Window;
-use furrow::integrator::Path as PathTracer;
+use furrow::integrator::PathTracer;
 use furrow::math::Spectrum;
 use furrow::output::Denoiser;
 use furrow::render::{self, Settings};

@@ -11,7 +11,7 @@ use common::program::{FILES, bits, field, names, run, scratch, small_text, trace
 use common::scenes::with_world;
 use furrow::film::Film;
 use furrow::geometry::{PACKET, Window};
-use furrow::integrator::{Integrator, Path as PathTracer, Sample, Sighting, World};
+use furrow::integrator::{Integrator, PathTracer, Sample, Sighting, World};
 use furrow::math::Spectrum;
 use furrow::render::{self, Progressive, Settings};
 use furrow::sampling::Points;

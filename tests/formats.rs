@@ -12,7 +12,7 @@ use common::python::python;
 use furrow::dataset::format::{self, NAMES};
 use furrow::dataset::recipe::Made;
 use furrow::dataset::sample::IGNORE;
-use furrow::dataset::{Recipe, Record, Sample, Set, annotate, native, seal};
+use furrow::dataset::{Recipe, Record, Sample, Set, annotate, checksum_record, native};
 use furrow::output;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -115,7 +115,7 @@ fn every_format_writes_files_for_every_image_with_plants_and_without() {
         let (_, samples) = samples(folder);
         assert!(samples.iter().all(|s| s.record.plants.is_empty() == (*folder == *BARE)));
         for sample in &samples {
-            let seal = seal::Seal::read(folder, sample.record.index).unwrap();
+            let seal = checksum_record::ChecksumRecord::read(folder, sample.record.index).unwrap();
             let formats: BTreeSet<&str> = seal.files.keys().filter_map(|path| Some(path.split_once('/')?.0)).collect();
             let expected: BTreeSet<&str> = NAMES.iter().map(|(name, _)| *name).chain(["images"]).collect();
             assert_eq!(formats, expected);

@@ -65,7 +65,7 @@ fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// Every file of a folder by its path, without the ledger, which has clock times.
+/// Every file of a folder by its path, without the timing log, which has clock times.
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut all = BTreeMap::new();
     let mut todo = vec![folder.to_path_buf()];

@@ -21,7 +21,7 @@ use furrow::accel::EmbreeAccel;
 use furrow::bsdf::{Bsdf, Leaf, OrenNayar};
 use furrow::film::{Film, Filter};
 use furrow::geometry::{AlphaMask, Hit, Interaction, Mesh, Window};
-use furrow::integrator::Path as PathTracer;
+use furrow::integrator::PathTracer;
 use furrow::light::{Constant, Lamp, Light, Outline, daylight};
 use furrow::material::{LeafDesc, LeafMaterial, Material, Picture};
 use furrow::math::{Frame, Mat3, Spectrum, Vec3, vec2, vec3};
@@ -31,7 +31,7 @@ use furrow::scene::assemble::{self, Options};
 use furrow::scene::tag::{Class, Tag};
 use furrow::scene::{Part, Scene};
 use furrow::sensor::{Camera, Distortion, Pose};
-use furrow::texture::{ColorSpace, Maps, Relief, Texture};
+use furrow::texture::{ColorSpace, Maps, HeightFromBrightness, Texture};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -274,7 +274,7 @@ fn masks_are_pictures_of_their_bits() {
 fn large_and_small() -> Scene {
     let texels: Vec<u8> = (0..64 * 64_u32).flat_map(|i| [(i * 37 % 101) as u8 + 40, 120, 30, 255]).collect();
     let color = Texture::from_rgba8(64, 64, &texels, ColorSpace::Srgb);
-    let maps = Maps::derive(&color, &Relief::LEAF);
+    let maps = Maps::derive(&color, &HeightFromBrightness::LEAF);
     let leaf = LeafMaterial::new(&LeafDesc::default(), Some(Arc::new(Picture { color, maps })));
     let part = |half: f32, at: Vec3, leaf| {
         let mut mesh = square(half);

@@ -17,7 +17,7 @@ use common::scenes::{camera, scene, shoot_with, sphere, square};
 use common::stats::{p_value, sidak};
 use furrow::bsdf::{Bsdf, Leaf, OrenNayar};
 use furrow::film::Film;
-use furrow::integrator::{Path as PathTracer, Technique};
+use furrow::integrator::{PathTracer, Technique};
 use furrow::light::{Lamp, Light, Outline};
 use furrow::math::{Frame, Mat3, Spectrum, Vec3, vec3};
 use furrow::output::{Picture, write_png};

@@ -13,7 +13,7 @@ mod common;
 
 use common::scenes::with_world;
 use furrow::geometry::Window;
-use furrow::integrator::Path as PathTracer;
+use furrow::integrator::PathTracer;
 use furrow::render::{self, Settings};
 use furrow::sampling::Points;
 use furrow::scene::assemble::{self, Options};

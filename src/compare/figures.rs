@@ -83,7 +83,7 @@ pub struct Maps {
 
 /// The measures of one band over one region.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Row {
+pub struct RegionFigures {
     /// The band.
     pub band: Band,
     /// The region.
@@ -100,7 +100,7 @@ pub struct Row {
     pub ciede2000: Option<f64>,
 }
 
-impl Row {
+impl RegionFigures {
     /// Peak signal-to-noise ratio in dB; `None`, for infinity, where nothing differs.
     pub fn psnr_db(&self) -> Option<f64> {
         psnr_db(self.mse)
@@ -116,17 +116,17 @@ pub(super) fn psnr_db(mse: f64) -> Option<f64> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figures {
     /// One for each band and region.
-    pub rows: Vec<Row>,
+    pub rows: Vec<RegionFigures>,
 }
 
 impl Figures {
     /// Those of the whole picture in colour.
-    pub fn all(&self) -> &Row {
+    pub fn all(&self) -> &RegionFigures {
         &self.rows[0]
     }
 
     /// Those of a band over a region; `None` where it has no pixel there, or is not known.
-    pub fn of(&self, band: Band, region: Region) -> Option<&Row> {
+    pub fn of(&self, band: Band, region: Region) -> Option<&RegionFigures> {
         self.rows.iter().find(|row| (row.band, row.region) == (band, region))
     }
 }
@@ -220,10 +220,10 @@ struct Sums {
 }
 
 impl Sums {
-    fn row(&self, band: Band, region: Region) -> Option<Row> {
+    fn row(&self, band: Band, region: Region) -> Option<RegionFigures> {
         let n = self.pixels as f64;
         let colors = |sum: f64| (band == Band::Rgb).then_some(sum / n);
-        (self.pixels > 0).then(|| Row {
+        (self.pixels > 0).then(|| RegionFigures {
             band,
             region,
             pixels: self.pixels,

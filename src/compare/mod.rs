@@ -40,7 +40,7 @@ mod write;
 
 pub use color::ciede2000;
 pub use comparison::{Comparison, Options, folders};
-pub use figures::{Band, Compared, Figures, Maps, Region, Row, maps, pair};
+pub use figures::{Band, Compared, Figures, Maps, Region, RegionFigures, maps, pair};
 pub use flip::PIXELS_PER_DEGREE;
 pub use pairs::{Pair, Pairs};
 pub use picture::{Picture, read_labels};

@@ -1,6 +1,6 @@
 //! Many pairs: means over pairs, each as heavy as the next, and how far they would stray on other images of the kind.
 
-use super::figures::{Band, Compared, Region, Row, psnr_db};
+use super::figures::{Band, Compared, Region, RegionFigures, psnr_db};
 use crate::sampling::bootstrap::{self, Interval};
 
 /// A mean over pairs.
@@ -46,7 +46,7 @@ pub(super) fn summaries(pairs: &[Compared]) -> Vec<Summary> {
 }
 
 fn summary(pairs: &[Compared], band: Band, region: Region) -> Option<Summary> {
-    let rows: Vec<&Row> = pairs.iter().filter_map(|pair| pair.figures.of(band, region)).collect();
+    let rows: Vec<&RegionFigures> = pairs.iter().filter_map(|pair| pair.figures.of(band, region)).collect();
     if rows.is_empty() {
         return None;
     }

@@ -1,7 +1,7 @@
 //! Figures as JSON and CSV for programs, as tables for people.
 
 use super::comparison::Comparison;
-use super::figures::{Band, Region, Row};
+use super::figures::{Band, Region, RegionFigures};
 use super::summary::{Mean, Summary};
 use crate::report::{self, Cell, Lines, Table, count, number};
 use crate::{Error, Result};
@@ -75,7 +75,7 @@ pub(super) fn json(of: &Comparison) -> Result<String> {
         flip: s.flip.map(bounded),
         ciede2000: s.ciede2000.map(bounded),
     });
-    let values = |row: &Row| Values {
+    let values = |row: &RegionFigures| Values {
         band: row.band,
         region: row.region,
         pixels: row.pixels,
@@ -108,7 +108,7 @@ pub(super) fn json(of: &Comparison) -> Result<String> {
 /// A row for each pair, band and region.
 pub(super) fn csv(of: &Comparison) -> String {
     let value = |v: Option<f64>| v.map(|v| v.to_string()).unwrap_or_default();
-    let fields = |name: &str, row: &Row| -> Vec<String> {
+    let fields = |name: &str, row: &RegionFigures| -> Vec<String> {
         let words = [name, row.band.name(), row.region.name()].map(str::to_owned);
         let psnr = row.psnr_db().unwrap_or(f64::INFINITY);
         let [ssim, flip, color] = [row.ssim, row.flip, row.ciede2000].map(value);
@@ -171,7 +171,7 @@ pub(super) fn label(band: Band, region: Region) -> String {
 }
 
 /// The measures of a pair as people read them, in the order of [`MEASURES`].
-pub(super) fn cells(row: &Row) -> Vec<String> {
+pub(super) fn cells(row: &RegionFigures) -> Vec<String> {
     let shown = |(k, value): (usize, Option<f64>)| value.map_or_else(|| missing(k), |v| digits(k, v));
     [Some(row.mse), row.psnr_db(), row.ssim, row.flip, row.ciede2000].into_iter().enumerate().map(shown).collect()
 }

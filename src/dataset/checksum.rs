@@ -6,14 +6,14 @@ use std::path::Path;
 
 /// What tells a file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Print {
+pub struct Checksum {
     /// SHA-256, hex.
     pub sha256: String,
     /// Length.
     pub bytes: u64,
 }
 
-impl Print {
+impl Checksum {
     /// Of a file's contents.
     pub fn of(bytes: &[u8]) -> Self {
         Self { sha256: hex::encode(Sha256::digest(bytes)), bytes: bytes.len() as u64 }

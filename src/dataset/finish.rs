@@ -1,9 +1,9 @@
 //! What belongs to all images together, written when all are there: the formats' lists, the manifest, the report.
 
-use super::checksum::Print;
+use super::checksum::Checksum;
+use super::checksum_record::ChecksumRecord;
 use super::generate::{self, Task};
 use super::recipe::{FILE, Recipe};
-use super::seal::Seal;
 use super::set::{Set, Stream, Whole};
 use super::{format, report};
 use crate::output::remove_unfinished;
@@ -21,8 +21,8 @@ pub fn finish(set: &Set, shards: Option<u64>) -> Result<Vec<PathBuf>> {
     let Set { folder, recipe } = set;
     let mut missing = Vec::new();
     for index in 0..recipe.count {
-        match Seal::read(folder, index) {
-            Some(seal) if generate::owed(set, &seal)? == Task::Done => {}
+        match ChecksumRecord::read(folder, index) {
+            Some(checksums) if generate::owed(set, &checksums)? == Task::Done => {}
             _ => missing.push(index),
         }
     }
@@ -72,7 +72,7 @@ pub fn ranges(numbers: &[u64]) -> String {
 }
 
 /// The recipe and the scene, which belong to no image.
-fn own_files(folder: &Path, recipe: &Recipe) -> Result<BTreeMap<String, Print>> {
+fn own_files(folder: &Path, recipe: &Recipe) -> Result<BTreeMap<String, Checksum>> {
     let mut todo = vec![folder.join(FILE)];
     if recipe.rendering().is_ok() {
         todo.push(folder.join("scene"));
@@ -85,14 +85,14 @@ fn own_files(folder: &Path, recipe: &Recipe) -> Result<BTreeMap<String, Print>> 
         } else {
             let bytes = std::fs::read(&path).map_err(Error::reading(&path))?;
             let name = path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().replace('\\', "/");
-            files.insert(name, Print::of(&bytes));
+            files.insert(name, Checksum::of(&bytes));
         }
     }
     Ok(files)
 }
 
 /// The manifest, image by image: it may be larger than memory.
-fn manifest(set: &Set, files: &BTreeMap<String, Print>, out: &mut Stream<'_>) -> Result<()> {
+fn manifest(set: &Set, files: &BTreeMap<String, Checksum>, out: &mut Stream<'_>) -> Result<()> {
     let Set { folder, recipe } = set;
     let mut content = Sha256::new();
     out.put("{\n\"recipe\": ")?;
@@ -105,7 +105,7 @@ fn manifest(set: &Set, files: &BTreeMap<String, Print>, out: &mut Stream<'_>) ->
     }
     out.put(",\n\"files\": {")?;
     let mut first = true;
-    let mut add = |out: &mut Stream<'_>, path: &str, print: &Print| -> Result<()> {
+    let mut add = |out: &mut Stream<'_>, path: &str, print: &Checksum| -> Result<()> {
         content.update(format!("{} {path}\n", print.sha256));
         out.put(if std::mem::take(&mut first) { "\n" } else { ",\n" })?;
         out.json(&path)?;
@@ -117,11 +117,11 @@ fn manifest(set: &Set, files: &BTreeMap<String, Print>, out: &mut Stream<'_>) ->
     }
     let mut seals = Vec::new();
     for index in 0..recipe.count {
-        let Some(seal) = Seal::read(folder, index) else { continue };
-        for (path, print) in &seal.files {
+        let Some(checksums) = ChecksumRecord::read(folder, index) else { continue };
+        for (path, print) in &checksums.files {
             add(out, path, print)?;
         }
-        seals.push((index, seal.hash()?));
+        seals.push((index, checksums.hash()?));
     }
     out.put("\n},\n\"images\": [")?;
     let image = |(index, hash): (u64, String)| {

@@ -4,10 +4,10 @@
 //! each with a share of the threads as a pool of its own. (In one pool for all, a thread that waits for a part of its image takes up
 //! a part of another, and may take up all of it.) Memory grows with the images at once, not with the dataset.
 
-use super::ledger::{Ledger, Row};
+use super::checksum_record::{ChecksumRecord, write_files};
 use super::render::{Times, render, renderer, scene_file};
-use super::seal::{Seal, write_files};
 use super::set::Set;
+use super::timing_log::{ImageTiming, TimingLog};
 use super::{File, format, native};
 use crate::error::Kind;
 use crate::job::{Renderer, SceneFile, Threads};
@@ -120,7 +120,7 @@ pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()>
         callbacks,
         threads,
         at_once,
-        ledger: Ledger::new(&set.folder, &format!("{}-of-{}", shard.number, shard.of)),
+        timing_log: TimingLog::new(&set.folder, &format!("{}-of-{}", shard.number, shard.of)),
     };
     let next = AtomicUsize::new(0);
     let made = AtomicUsize::new(0);
@@ -187,13 +187,13 @@ fn together(failures: BTreeMap<u64, Error>) -> Error {
 
 /// What remains to be done for an image, from what lies on the disk.
 pub fn task(set: &Set, index: u64) -> Result<Task> {
-    let Some(seal) = Seal::read(&set.folder, index) else { return Ok(Task::All) };
-    let task = owed(set, &seal)?;
+    let Some(checksums) = ChecksumRecord::read(&set.folder, index) else { return Ok(Task::All) };
+    let task = owed(set, &checksums)?;
     if task == Task::All {
         return Ok(task);
     }
     let formats = format::all(&set.recipe)?;
-    let broken = seal.faults(&set.folder);
+    let broken = checksums.faults(&set.folder);
     let lost = |(path, _): &(String, String)| {
         path.starts_with("images/") || formats.iter().any(|(name, f)| f.needs_film() && in_format(path, name))
     };
@@ -206,13 +206,13 @@ pub fn task(set: &Set, index: u64) -> Result<Task> {
 }
 
 /// What a sealed image owes its recipe, whatever has become of its files: it may be of another recipe, or lack a format.
-pub(super) fn owed(set: &Set, seal: &Seal) -> Result<Task> {
-    if seal.recipe != set.recipe.fingerprint()? {
+pub(super) fn owed(set: &Set, checksums: &ChecksumRecord) -> Result<Task> {
+    if checksums.recipe != set.recipe.fingerprint()? {
         return Ok(Task::All);
     }
     let mut task = Task::Done;
     for (name, format) in format::all(&set.recipe)? {
-        if !seal.files.keys().any(|path| in_format(path, name)) {
+        if !checksums.files.keys().any(|path| in_format(path, name)) {
             if format.needs_film() {
                 return Ok(Task::All);
             }
@@ -235,11 +235,11 @@ struct Run<'a> {
     callbacks: &'a Callbacks<'a>,
     threads: usize,
     at_once: usize,
-    ledger: Ledger,
+    timing_log: TimingLog,
 }
 
 impl Run<'_> {
-    /// Makes one image and seals it.
+    /// Makes one image and writes its checksums.
     fn image(&self, index: u64, task: Task, threads: &Threads) -> Result<()> {
         let begin = Instant::now();
         let Set { folder, recipe } = self.set;
@@ -258,15 +258,22 @@ impl Run<'_> {
             return Err(Error::interrupted());
         }
         write_files(folder, &files)?;
-        let mut seal = Seal::of(index, recipe, &files)?;
+        let mut checksums = ChecksumRecord::of(index, recipe, &files)?;
         if task == Task::Formats
-            && let Some(before) = Seal::read(folder, index)
+            && let Some(before) = ChecksumRecord::read(folder, index)
         {
-            seal.files.extend(before.files.into_iter().filter(|(path, _)| path.starts_with("images/")));
+            checksums.files.extend(before.files.into_iter().filter(|(path, _)| path.starts_with("images/")));
         }
-        seal.write(folder)?;
+        checksums.write(folder)?;
         let seconds = begin.elapsed().as_secs_f64();
-        self.ledger.add(&Row::new(index, seal.image_hash()?, seconds, &times, self.at_once, self.threads))
+        self.timing_log.add(&ImageTiming::new(
+            index,
+            checksums.image_hash()?,
+            seconds,
+            &times,
+            self.at_once,
+            self.threads,
+        ))
     }
 }
 

@@ -21,9 +21,9 @@
 //! | `render` | an image from its field, by [`crate::job`] |
 //! | `sample`, `record`, `annotate`, `rle` | one image and all that is known of it |
 //! | `native`, `format` | as files, ours and other people's |
-//! | `checksum`, `seal`, `set` | what tells a file; which files make an image; the dataset on disk |
+//! | `checksum`, `checksum_record`, `set` | what tells a file; which files make an image; the dataset on disk |
 //! | `make` | all of it in one call |
-//! | `plan`, `gather`, `generate`, `ledger`, `finish` | from a scene file to files; what remains to be done is found by looking at the disk |
+//! | `plan`, `gather`, `generate`, `timing_log`, `finish` | from a scene file to files; what remains to be done is found by looking at the disk |
 //! | `cluster` | the same on many machines: job files for schedulers |
 //! | `invariants`, `verify` | what must hold of every image, and whether it does |
 //! | `import` | other people's images and labels |
@@ -31,6 +31,7 @@
 
 pub mod annotate;
 pub mod checksum;
+pub mod checksum_record;
 pub mod cluster;
 pub mod finish;
 pub mod format;
@@ -38,7 +39,6 @@ mod gather;
 pub mod generate;
 pub mod import;
 pub mod invariants;
-pub mod ledger;
 mod make;
 pub mod native;
 pub mod plan;
@@ -48,9 +48,9 @@ pub mod render;
 pub mod report;
 pub mod rle;
 pub mod sample;
-pub mod seal;
 pub mod set;
 pub mod split;
+pub mod timing_log;
 pub mod verify;
 
 pub use make::{begin, make, make_watched};

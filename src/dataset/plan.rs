@@ -4,7 +4,7 @@ use super::gather::{Gathered, gather};
 use super::recipe::{FILE, Made, Recipe, Rendering};
 use super::set::Set;
 use super::split::Shares;
-use super::{File, format, seal};
+use super::{File, checksum_record, format};
 use crate::ablation::{Edit, FULL};
 use crate::job::{Field, Renderer, SceneFile};
 use crate::output::is_unfinished;
@@ -121,9 +121,9 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
     } else {
         refuse_full(folder)?;
     }
-    seal::write_files(folder, &files)?;
+    checksum_record::write_files(folder, &files)?;
     // Last: a folder with a recipe has its scene.
-    seal::write_files(folder, &[File { path: FILE.into(), bytes: recipe.text()? }])?;
+    checksum_record::write_files(folder, &[File { path: FILE.into(), bytes: recipe.text()? }])?;
     Ok((Set { folder: folder.into(), recipe }, told))
 }
 
@@ -136,7 +136,7 @@ fn first_field(scene: &Path, order: &Order) -> Result<Field> {
 /// a folder of their own; an error where it still reads something outside.
 fn hash_of_copies(order: &Order, files: &[File], scene: &str) -> Result<String> {
     let folder = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir()))?;
-    seal::write_files(folder.path(), files)?;
+    checksum_record::write_files(folder.path(), files)?;
     let first = first_field(&folder.path().join(scene), order)?;
     let field = first.grown();
     match field.files.iter().find(|file| !file.starts_with(folder.path())) {
@@ -195,7 +195,7 @@ pub fn add_formats(set: &mut Set, names: &[String]) -> Result<Vec<String>> {
         ));
     }
     let warnings = warnings(&recipe)?;
-    seal::write_files(&set.folder, &[File { path: FILE.into(), bytes: recipe.text()? }])?;
+    checksum_record::write_files(&set.folder, &[File { path: FILE.into(), bytes: recipe.text()? }])?;
     set.recipe = recipe;
     Ok(warnings)
 }

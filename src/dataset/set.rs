@@ -1,6 +1,6 @@
 //! A dataset that lies in a folder: its recipe, its images by name, the files that belong to all of them.
 
-use super::checksum::Print;
+use super::checksum::Checksum;
 use super::native;
 use super::recipe::Recipe;
 use super::record::Record;
@@ -53,7 +53,7 @@ impl Set {
 pub struct Whole<'a> {
     folder: &'a Path,
     /// The files so far, by path below the dataset's folder.
-    pub files: BTreeMap<String, Print>,
+    pub files: BTreeMap<String, Checksum>,
 }
 
 impl<'a> Whole<'a> {
@@ -69,7 +69,7 @@ impl<'a> Whole<'a> {
         stream_atomically(&full, |file| {
             let mut stream = Stream { path: &full, file, hash: Sha256::new(), bytes: 0 };
             write(&mut stream)?;
-            print = Some(Print { sha256: hex::encode(stream.hash.finalize()), bytes: stream.bytes });
+            print = Some(Checksum { sha256: hex::encode(stream.hash.finalize()), bytes: stream.bytes });
             Ok(())
         })?;
         self.files.extend(print.map(|print| (path.to_owned(), print)));

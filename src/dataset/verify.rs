@@ -1,13 +1,13 @@
 //! Whether a dataset is whole and is what it says it is.
 
-use super::checksum::Print;
+use super::checksum::Checksum;
+use super::checksum_record::ChecksumRecord;
 use super::finish::{MANIFEST, lacks, ranges};
 use super::generate::Task;
 use super::render::{render, scene_file};
-use super::seal::Seal;
 use super::set::Set;
 use super::split::Split;
-use super::{File, format, generate, invariants, ledger, native};
+use super::{File, format, generate, invariants, native, timing_log};
 use crate::job::{Renderer, SceneFile, Threads};
 use crate::render::Watch;
 use crate::sampling::rng::mix;
@@ -104,13 +104,13 @@ struct Looked {
 
 fn look(set: &Set, index: u64) -> Result<Looked> {
     let name = Set::name(index);
-    let Some(seal) = Seal::read(&set.folder, index) else {
+    let Some(checksums) = ChecksumRecord::read(&set.folder, index) else {
         return Ok(Looked { missing: true, faults: Vec::new(), photograph: None });
     };
     let mut faults: Vec<String> =
-        seal.faults(&set.folder).into_iter().map(|(path, fault)| format!("{path} {fault}")).collect();
+        checksums.faults(&set.folder).into_iter().map(|(path, fault)| format!("{path} {fault}")).collect();
     let mut missing = !faults.is_empty();
-    if !missing && generate::owed(set, &seal)? != Task::Done {
+    if !missing && generate::owed(set, &checksums)? != Task::Done {
         missing = true;
         faults.push(format!("image {name}: it was made by another recipe, or lacks a format"));
     }
@@ -123,7 +123,7 @@ fn look(set: &Set, index: u64) -> Result<Looked> {
             Err(e) => faults.push(e.to_string()),
         }
     }
-    let photograph = seal.files.get(&format!("{}/rgb.png", native::folder(&name))).map(|p| p.sha256.clone());
+    let photograph = checksums.files.get(&format!("{}/rgb.png", native::folder(&name))).map(|p| p.sha256.clone());
     Ok(Looked { missing, faults, photograph })
 }
 
@@ -142,7 +142,7 @@ fn twins(set: &Set, looked: &[Looked]) -> Vec<String> {
 /// Images that two runs made differently.
 fn disputes(set: &Set) -> Result<Vec<String>> {
     let mut images: BTreeMap<u64, BTreeSet<String>> = BTreeMap::new();
-    for row in ledger::rows(&set.folder)? {
+    for row in timing_log::rows(&set.folder)? {
         images.entry(row.index).or_default().insert(row.image);
     }
     let several: Vec<u64> = images.into_iter().filter(|(_, found)| found.len() > 1).map(|(index, _)| index).collect();
@@ -155,7 +155,7 @@ fn disputes(set: &Set) -> Result<Vec<String>> {
 /// A manifest, as far as it is checked.
 #[derive(serde::Deserialize)]
 struct Listed {
-    files: BTreeMap<String, Print>,
+    files: BTreeMap<String, Checksum>,
 }
 
 /// What the manifest lists and is not so.
@@ -174,15 +174,15 @@ fn listed(set: &Set) -> Result<Vec<String>> {
         Ok(listed) => listed,
         Err(e) => return Ok(vec![format!("{MANIFEST} is damaged: {e}")]),
     };
-    let mut sealed: BTreeMap<String, Print> = BTreeMap::new();
+    let mut sealed: BTreeMap<String, Checksum> = BTreeMap::new();
     for index in 0..set.recipe.count {
-        sealed.extend(Seal::read(&set.folder, index).map(|s| s.files).unwrap_or_default());
+        sealed.extend(ChecksumRecord::read(&set.folder, index).map(|s| s.files).unwrap_or_default());
     }
     let mut faults = Vec::new();
     for (path, print) in &listed.files {
         match sealed.remove(path) {
             // Looked at with its image.
-            Some(seal) if seal == *print => {}
+            Some(checksums) if checksums == *print => {}
             Some(_) => faults.push(format!("{path} is another file than {MANIFEST} lists")),
             None => faults.extend(print.fault(&set.folder.join(path)).map(|fault| format!("{path} {fault}"))),
         }
@@ -215,7 +215,7 @@ fn rerender(
     for (_, format) in format::all(&set.recipe)? {
         files.extend(format.image(&set.recipe, &made.sample)?);
     }
-    let differs = |file: &&File| !Print::of(&file.bytes).holds(&set.folder.join(&file.path));
+    let differs = |file: &&File| !Checksum::of(&file.bytes).holds(&set.folder.join(&file.path));
     let wrong: Vec<&str> = files.iter().filter(differs).map(|f| f.path.as_str()).collect();
     Ok((!wrong.is_empty()).then(|| format!("rendered again, these come out otherwise: {}", wrong.join(", "))))
 }

@@ -1,8 +1,8 @@
 //! How much light comes back along a ray.
 
-mod effort;
 mod falsecolor;
 mod path;
+mod roulette;
 mod vertex;
 
 use crate::geometry::{Hit, Interaction, Intersect, PACKET, Ray};
@@ -11,7 +11,7 @@ use crate::sampling::Sampler;
 use crate::scene::Scene;
 
 pub use falsecolor::FalseColor;
-pub use path::{Path, Technique};
+pub use path::{PathTracer, Technique};
 
 /// A scene and what answers its rays.
 #[derive(Clone, Copy)]

@@ -3,9 +3,9 @@
 //! The surface that the eye sees asks every light; the surfaces behind it ask one, chosen by what it can give there. The same
 //! emission is also found by scattered rays, and multiple importance sampling (Veach & Guibas 1995, the balance heuristic)
 //! weighs the two. How many rays go on from the first surface, and which paths end, follows from what they can still bring
-//! beside what was found ([`Effort`]). Unbiased: every choice is paid back by its chance.
+//! beside what was found ([`RouletteSplitting`]). Unbiased: every choice is paid back by its chance.
 
-use super::effort::Effort;
+use super::roulette::RouletteSplitting;
 use super::vertex::Vertex;
 use super::{Integrator, Sample, Sighting, World};
 use crate::geometry::{PACKET, Ray};
@@ -32,7 +32,7 @@ impl Default for Technique {
 
 /// The path tracer.
 #[derive(Clone, Copy, Debug)]
-pub struct Path {
+pub struct PathTracer {
     /// Largest number of surfaces on a path, from 1. Energy beyond it is lost: the default, 12, is past what roulette leaves.
     pub max_depth: u32,
     /// Radiance a single path may bring, per band; infinite leaves the estimate unbiased.
@@ -41,7 +41,7 @@ pub struct Path {
     pub technique: Technique,
 }
 
-impl Default for Path {
+impl Default for PathTracer {
     fn default() -> Self {
         Self { max_depth: 12, clamp: f32::INFINITY, technique: Technique::default() }
     }
@@ -91,7 +91,7 @@ impl Flight {
     }
 }
 
-impl Path {
+impl PathTracer {
     /// Light of the infinite lights along a ray that left the scene.
     fn escaped(&self, world: &World<'_>, ray: &Ray, from: Option<&Origin>) -> Spectrum {
         let mut sum = Spectrum::ZERO;
@@ -154,7 +154,7 @@ impl Path {
     }
 
     /// Direct light at the first surfaces of a packet: every light, in order, as often as it matters beside those before it.
-    fn ask_all(&self, world: &World<'_>, seen: &Seen, effort: &Effort) -> [Spectrum; PACKET] {
+    fn ask_all(&self, world: &World<'_>, seen: &Seen, roulette: &RouletteSplitting) -> [Spectrum; PACKET] {
         let mut found = [Spectrum::ZERO; PACKET];
         for (k, light) in world.scene.lights.iter().enumerate() {
             let mut rays = [None; PACKET];
@@ -164,7 +164,7 @@ impl Path {
                 if importance <= 0.0 {
                     continue;
                 }
-                let chance = effort.light(importance, vertex.albedo(), found[i]);
+                let chance = roulette.light(importance, vertex.albedo(), found[i]);
                 let u = sampler.get4(sets::first_light(k as u32));
                 if u[2] >= chance {
                     continue;
@@ -221,7 +221,7 @@ impl Path {
         &self,
         world: &World<'_>,
         mut flight: Flight,
-        effort: &Effort,
+        roulette: &RouletteSplitting,
         sampler: Sampler,
         branch: u32,
         found: Spectrum,
@@ -246,7 +246,7 @@ impl Path {
             let [lobe, u, v, _] = sampler.get4(sets::scatter(branch, depth));
             let Some(next) = Flight::leave(&vertex, [lobe, u, v], throughput, false) else { break };
             flight = next;
-            let chance = effort.survive(flight.throughput, found + radiance);
+            let chance = roulette.survive(flight.throughput, found + radiance);
             if lights[3] >= chance {
                 break;
             }
@@ -260,13 +260,13 @@ impl Path {
         &self,
         world: &World<'_>,
         vertex: &Vertex,
-        effort: &Effort,
+        roulette: &RouletteSplitting,
         sampler: Sampler,
         direct: Spectrum,
     ) -> Spectrum {
         // What a leaf lets through counts as what it reflects.
         let returned = if vertex.bsdf.transmits() { vertex.albedo() * 2.0 } else { vertex.albedo() };
-        let mean = effort.split(returned, direct);
+        let mean = roulette.split(returned, direct);
         let [lobe, _, _, extra] = sampler.get4(sets::scatter(0, 0));
         let count = (mean + extra) as u32;
         let mut radiance = Spectrum::ZERO;
@@ -279,7 +279,7 @@ impl Path {
                 [lobe, u, v]
             };
             let Some(flight) = Flight::leave(vertex, u, Spectrum::splat(1.0 / mean), true) else { continue };
-            radiance += self.follow(world, flight, effort, sampler, branch, direct + radiance);
+            radiance += self.follow(world, flight, roulette, sampler, branch, direct + radiance);
         }
         radiance
     }
@@ -290,7 +290,7 @@ fn total_importance(world: &World<'_>, p: Vec3, normal: Vec3, two_sided: bool) -
     world.scene.lights.iter().map(|l| l.importance(p, normal, two_sided)).sum()
 }
 
-impl Integrator for Path {
+impl Integrator for PathTracer {
     fn li(&self, world: &World<'_>, sample: &Sample, spread: f32) -> Sighting {
         let mut alone = [None; PACKET];
         alone[0] = Some(*sample);
@@ -305,15 +305,18 @@ impl Integrator for Path {
                 seen[i] = Some((Vertex::new(world, ray, hit, world.at(hit, spread * hit.t)), *sampler));
             }
         }
-        let effort = Effort::new(world, self.technique.roulette);
-        let direct =
-            if self.technique.light_sampling { self.ask_all(world, &seen, &effort) } else { [Spectrum::ZERO; PACKET] };
+        let roulette = RouletteSplitting::new(world, self.technique.roulette);
+        let direct = if self.technique.light_sampling {
+            self.ask_all(world, &seen, &roulette)
+        } else {
+            [Spectrum::ZERO; PACKET]
+        };
         let mut sightings = [Sighting::default(); PACKET];
         for i in 0..PACKET {
             let Some(sample) = &samples[i] else { continue };
             let (radiance, first) = match (&seen[i], &hits[i]) {
                 (Some((vertex, sampler)), Some(hit)) => {
-                    let indirect = self.indirect(world, vertex, &effort, *sampler, direct[i]);
+                    let indirect = self.indirect(world, vertex, &roulette, *sampler, direct[i]);
                     (direct[i] + indirect, Some(vertex.describe(hit.t)))
                 }
                 _ => (self.escaped(world, &sample.ray, None), None),

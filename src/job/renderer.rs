@@ -179,9 +179,9 @@ impl Renderer {
 }
 
 /// The path tracer that techniques stand for.
-fn path(techniques: &Techniques) -> integrator::Path {
-    let default = integrator::Path::default();
-    integrator::Path {
+fn path(techniques: &Techniques) -> integrator::PathTracer {
+    let default = integrator::PathTracer::default();
+    integrator::PathTracer {
         max_depth: techniques.max_depth.unwrap_or(default.max_depth),
         clamp: techniques.clamp.unwrap_or(default.clamp),
         technique: integrator::Technique {

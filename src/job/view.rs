@@ -1,6 +1,6 @@
 //! What an image shows.
 
-use crate::integrator::{FalseColor, Integrator, Path};
+use crate::integrator::{FalseColor, Integrator, PathTracer};
 use crate::settings::{RenderOptions, Technique};
 use crate::{Error, Result};
 
@@ -48,7 +48,7 @@ impl View {
     }
 
     /// What computes it.
-    pub(super) fn integrator(self, path: Path) -> Box<dyn Integrator> {
+    pub(super) fn integrator(self, path: PathTracer) -> Box<dyn Integrator> {
         match self {
             Self::Path => Box::new(path),
             Self::FirstSurface(attribute) => Box::new(attribute),

@@ -8,7 +8,7 @@ use crate::bsdf::{Bsdf, OrenNayar, Wet};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec2, Vec3, vec2};
 use crate::optics::soil::{at as four_bands, wet};
-use crate::soil::Skin;
+use crate::soil::GroundMaps;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -32,7 +32,7 @@ struct Texel {
 
 /// The skin of one ground, baked once: shading reads one texel and no noise.
 #[derive(Debug)]
-pub struct GroundSkin {
+pub struct BakedGround {
     width: usize,
     height: usize,
     texels: Vec<Texel>,
@@ -40,12 +40,12 @@ pub struct GroundSkin {
     decode: [f32; 256],
 }
 
-impl GroundSkin {
+impl BakedGround {
     /// From the soil's skin: wetness darkens, NIR follows from red, pits that the mesh is too coarse for are darkened.
-    pub fn bake(skin: &Skin) -> Self {
+    pub fn bake(skin: &GroundMaps) -> Self {
         let texel = |i: usize| {
             let open = f32::from(skin.ao[i]) / 255.0;
-            let dry = four_bands(Skin::decode(skin.albedo[i]), skin.like) * open;
+            let dry = four_bands(GroundMaps::decode(skin.albedo[i]), skin.like) * open;
             let (moist, film) = wet(dry, f32::from(skin.moisture[i]) / 255.0);
             Texel {
                 reflectance: moist.to_array().map(|r| (r.max(0.0).sqrt() * 255.0 + 0.5) as u8),
@@ -81,14 +81,14 @@ impl GroundSkin {
             slope += vec2(f32::from(t.slope[0]), f32::from(t.slope[1])) * w;
             film += f32::from(t.film) * w;
         }
-        (reflectance, slope / Skin::SLOPE_STEPS, film / 255.0)
+        (reflectance, slope / GroundMaps::SLOPE_STEPS, film / 255.0)
     }
 }
 
 /// The ground itself, or clods of it.
 #[derive(Clone, Debug)]
 pub struct Ground {
-    skin: Arc<GroundSkin>,
+    skin: Arc<BakedGround>,
     tint: Spectrum,
     relief: bool,
     /// Slope angle of the facets, radians; `None` for Lambert's soil, which no film of water makes glossy.
@@ -97,12 +97,12 @@ pub struct Ground {
 
 impl Ground {
     /// The ground: its fine relief tilts the shading normal.
-    pub fn new(skin: Arc<GroundSkin>) -> Self {
+    pub fn new(skin: Arc<BakedGround>) -> Self {
         Self { skin, tint: Spectrum::ONE, relief: true, facets: Some(SIGMA) }
     }
 
     /// Clods of it, of a reflectance `tint` times as high: they have relief of their own.
-    pub fn clods(skin: Arc<GroundSkin>, tint: Spectrum) -> Self {
+    pub fn clods(skin: Arc<BakedGround>, tint: Spectrum) -> Self {
         Self { skin, tint, relief: false, facets: Some(SIGMA) }
     }
 
@@ -128,7 +128,7 @@ impl Ground {
         // The skin's rows run north, the picture's down: up the picture is south.
         let slope = move |x: u32, y: u32| {
             let [east, north] = skin.texels[y as usize * skin.width + x as usize].slope.map(f32::from);
-            vec2(east, -north) / Skin::SLOPE_STEPS
+            vec2(east, -north) / GroundMaps::SLOPE_STEPS
         };
         Swatch::pictured(key, size, texel, mean, 1.0)
             .tinted(self.tint.0.truncate(), Vec3::ONE)

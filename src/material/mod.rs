@@ -16,7 +16,7 @@ use crate::math::{Frame, Spectrum, Vec3};
 use swatch::{Swatch, Tone};
 
 pub use feature::Feature;
-pub use ground::{Ground, GroundSkin};
+pub use ground::{BakedGround, Ground};
 pub use leaf::{LeafDesc, LeafMaterial, Picture};
 pub use painted::{Painted, Repaint};
 pub use solid::Solid;

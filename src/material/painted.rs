@@ -12,7 +12,7 @@ use super::varies::Varies;
 use crate::bsdf::{self, Bsdf, OrenNayar, Side};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec2, Vec3};
-use crate::model::{Relief, Surface, Transmission};
+use crate::model::{NormalTexture, Surface, Transmission};
 use crate::texture::Texture;
 use std::sync::Arc;
 
@@ -42,7 +42,7 @@ pub struct Painted {
     color: Vec3,
     picture: Option<Arc<Texture>>,
     nir: Nir,
-    relief: Option<Relief>,
+    relief: Option<NormalTexture>,
     transmission: Option<Sheet>,
     coat: Option<Side>,
     /// The one mip level of the colours' picture that every ray reads; `None` for the level of each ray's width.
@@ -139,7 +139,7 @@ impl Painted {
         // What a page repaints does not share the file's picture.
         let swatch = Swatch::pictured([std::ptr::from_ref(self) as usize, 1], size, texel, mean, roughness);
         match &self.relief {
-            Some(Relief { normals, strength }) => {
+            Some(NormalTexture { normals, strength }) => {
                 swatch.raised(move |x, y| normals.sample(centre(size, x, y), 0.0), *strength)
             }
             None => swatch,
@@ -180,7 +180,7 @@ impl Painted {
                 Bsdf::Leaf(bsdf::Leaf::new(side, side, transmittance))
             }
         };
-        let normal = self.relief.as_ref().map_or(at.ns, |Relief { normals, strength }| {
+        let normal = self.relief.as_ref().map_or(at.ns, |NormalTexture { normals, strength }| {
             bump(at, at.tangents(), normals.sample(at.uv, normals.lod(extent)) * *strength)
         });
         (bsdf, frame(at, normal, wo))

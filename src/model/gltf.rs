@@ -8,7 +8,7 @@ use super::document::{
     TEXTURE_TRANSFORM, TextureInfo, TextureTransform, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT,
 };
 use super::glb;
-use super::parts::{Label, MOST_TRIANGLES, Model, Part, Relief, Surface, Transmission, Up};
+use super::parts::{Label, MOST_TRIANGLES, Model, NormalTexture, Part, Surface, Transmission, Up};
 use super::settle::{Wrong, bytes, faceted, fraction, into_one_tile, settle, too_many_triangles};
 use super::uri::{Target, follow};
 use crate::geometry::{AlphaMask, Mesh};
@@ -321,7 +321,7 @@ impl Reader<'_> {
                 self.normals.insert((image, repeats), Arc::new(NormalMap::from_picture(&picture)));
             }
             let strength = info.scale.filter(|s| s.is_finite()).unwrap_or(1.0);
-            look.surface.relief = Some(Relief { normals: self.normals[&(image, repeats)].clone(), strength });
+            look.surface.relief = Some(NormalTexture { normals: self.normals[&(image, repeats)].clone(), strength });
         }
         let cutoff = match material.alpha_mode.as_deref() {
             Some("MASK") => material.alpha_cutoff.unwrap_or(0.5),

@@ -16,7 +16,7 @@ mod parts;
 mod settle;
 mod uri;
 
-pub use parts::{Label, Model, Part, Relief, Surface, Transmission, Up};
+pub use parts::{Label, Model, NormalTexture, Part, Surface, Transmission, Up};
 
 use crate::{Error, Result};
 use settle::Wrong;

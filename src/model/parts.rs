@@ -79,7 +79,7 @@ pub struct Surface {
     /// Where it is there at all; `None` for everywhere.
     pub mask: Option<Arc<AlphaMask>>,
     /// Its relief.
-    pub relief: Option<Relief>,
+    pub relief: Option<NormalTexture>,
     /// GGX roughness α, where the file says it.
     pub roughness: Option<f32>,
     /// What passes through, where the file says it.
@@ -108,7 +108,7 @@ impl Default for Surface {
 
 /// A relief too fine for the triangles.
 #[derive(Clone, Debug)]
-pub struct Relief {
+pub struct NormalTexture {
     /// Its slopes.
     pub normals: Arc<NormalMap>,
     /// Factor on them.

@@ -8,7 +8,7 @@ use super::leaflets;
 use super::organ::{Organ, OrganKind};
 use super::ribbons;
 use super::skeleton::{Measures, Pose, Skeleton};
-use super::skin::{self, Relief};
+use super::skin::{self, BladeRelief};
 use super::tube::{self, Profile, Ring};
 use crate::geometry::outline::Outline;
 use crate::math::{Mat3, Vec3, direction, lerp, smoothstep, vec3};
@@ -197,10 +197,10 @@ fn pressed(leaf: &LeafNow<'_>, mut rest: Rest) -> Rest {
 }
 
 /// The blade's undulations.
-fn relief(leaf: &LeafNow<'_>, stream: &mut Stream) -> Relief {
+fn relief(leaf: &LeafNow<'_>, stream: &mut Stream) -> BladeRelief {
     let kind = leaf.kind;
     let angle = kind.vein_angle_deg.f32().to_radians();
-    let relief = Relief {
+    let relief = BladeRelief {
         fold: leaf.fold,
         fold_tip: 0.6 * leaf.fold,
         curl: kind.curl_deg.draw32(stream).to_radians(),
@@ -216,16 +216,16 @@ fn relief(leaf: &LeafNow<'_>, stream: &mut Stream) -> Relief {
     };
     // A rachis is straight; what bows and turns are its leaflets, each by itself.
     let relief = match kind.shape {
-        Shape::Leaflets { .. } => Relief { sway: 0.0, twist: 0.0, ..relief },
+        Shape::Leaflets { .. } => BladeRelief { sway: 0.0, twist: 0.0, ..relief },
         _ => relief,
     };
     // What lies in the blade's plane stays.
-    let Relief { asymmetry, sway, seed, .. } = relief;
-    if kind.flat { Relief { asymmetry, sway, seed, ..Relief::default() } } else { relief }
+    let BladeRelief { asymmetry, sway, seed, .. } = relief;
+    if kind.flat { BladeRelief { asymmetry, sway, seed, ..BladeRelief::default() } } else { relief }
 }
 
 /// The stalk in the flat leaf's coordinates, and the midrib that it becomes under the blade.
-fn stalk(leaf: &LeafNow<'_>, skeleton: &Skeleton, relief: &Relief, lower: Lower, stream: &mut Stream) -> Rest {
+fn stalk(leaf: &LeafNow<'_>, skeleton: &Skeleton, relief: &BladeRelief, lower: Lower, stream: &mut Stream) -> Rest {
     let mut rest = Rest::default();
     if leaf.stalk <= 0.0 && leaf.kind.rib.get() == 0.0 {
         return rest;

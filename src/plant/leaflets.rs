@@ -7,7 +7,7 @@ use super::blade::{self, Rest};
 use super::growth::LeafNow;
 use super::kind::Shape;
 use super::skeleton::{Measures, Pose, Skeleton};
-use super::skin::{self, Relief};
+use super::skin::{self, BladeRelief};
 use crate::math::{Mat3, lerp, vec3};
 use crate::sampling::Stream;
 
@@ -17,7 +17,7 @@ const JOINTS: usize = 4;
 /// The rest mesh of all leaflets, each of `cells` along and across; nothing for another shape.
 pub(super) fn blade(
     leaf: &LeafNow<'_>,
-    relief: &Relief,
+    relief: &BladeRelief,
     (rows, columns): (usize, usize),
     rachis: &Skeleton,
     stream: &mut Stream,
@@ -47,7 +47,7 @@ pub(super) fn blade(
             }
             let mut sheet = blade::sheet(*outline, width, rows, columns, &skeleton);
             let seed = stream.seed32();
-            Relief { fold: 0.5 * leaf.fold, fold_tip: 0.3 * leaf.fold, seed, ..*relief }.apply(&mut sheet, along);
+            BladeRelief { fold: 0.5 * leaf.fold, fold_tip: 0.3 * leaf.fold, seed, ..*relief }.apply(&mut sheet, along);
             let foot = Pose { rotation: stance(side, turn, rise), origin: vec3(0.0, reach * share, 0.0) };
             let tie = rachis.weights_on_chain(foot.origin.y);
             let first = rest.positions.len() as u32;

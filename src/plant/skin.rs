@@ -17,7 +17,7 @@ use std::f32::consts::{PI, TAU};
 
 /// The relief of one blade. All zero is the flat blade.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Relief {
+pub struct BladeRelief {
     /// Angle by which each half rises from the midrib at the base, radians.
     pub fold: f32,
     /// The same at the tip, radians.
@@ -44,7 +44,7 @@ pub struct Relief {
     pub seed: u32,
 }
 
-impl Relief {
+impl BladeRelief {
     /// Lays the relief on a flat sheet.
     pub fn apply(&self, sheet: &mut Sheet, length: f32) {
         if *self == (Self { seed: self.seed, ..Self::default() }) {
@@ -159,7 +159,7 @@ mod tests {
     fn zero_angles_give_the_flat_rest_mesh() {
         let s = skeleton();
         let mut sheet = blade::sheet(Outline::Power { a: 0.55, b: 1.0 }, 0.05, 20, 8, &s);
-        Relief::default().apply(&mut sheet, 0.08);
+        BladeRelief::default().apply(&mut sheet, 0.08);
         let bent = bend(&sheet.rest, &s.motions(Pose::leaf(-0.03)));
         for (p, q) in sheet.rest.positions.iter().zip(&bent) {
             assert!(p.distance(*q) < 1e-7, "{p} {q}");
@@ -188,7 +188,7 @@ mod tests {
         let s = skeleton();
         let mut sheet = blade::sheet(Outline::Power { a: 0.55, b: 1.0 }, 0.05, 20, 16, &s);
         let flat = sheet.rest.positions.clone();
-        Relief { fold: 0.6, fold_tip: 0.3, curl: -0.5, ..Relief::default() }.apply(&mut sheet, 0.08);
+        BladeRelief { fold: 0.6, fold_tip: 0.3, curl: -0.5, ..BladeRelief::default() }.apply(&mut sheet, 0.08);
         for i in 0..=20 {
             let walk = |p: &[Vec3]| (0..16).map(|j| p[i * 17 + j].distance(p[i * 17 + j + 1])).sum::<f32>();
             assert!((walk(&flat) - walk(&sheet.rest.positions)).abs() < 1e-6);

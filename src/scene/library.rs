@@ -12,7 +12,7 @@ use crate::model::{Model, Up};
 use crate::optics::{Pigments, soil};
 use crate::ron_file::{RonFile, Step, choose};
 use crate::soil::{LayerDesc, LayerMaps};
-use crate::texture::{ColorSpace, Height, Maps, Relief, Texture, Wrap};
+use crate::texture::{ColorSpace, Height, HeightFromBrightness, Maps, Texture, Wrap};
 use crate::{Error, Result};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -162,7 +162,7 @@ impl Library {
             self.note(&beside)?;
             Maps::from_height(Height::load(&beside, relief_range).map_err(|e| at_its_place(page, path, IMAGE_HELP, e))?)
         } else {
-            Maps::derive(&color, &Relief::LEAF)
+            Maps::derive(&color, &HeightFromBrightness::LEAF)
         };
         let mask = color.alpha_mask().map(Arc::new);
         let margin = mask.as_deref().map(|m| Arc::new(Margin::of(m)));
@@ -244,9 +244,9 @@ impl Library {
 
 /// Heights 0 to 1 read off a soil's brightness, for a photograph without a height map.
 fn read_off(albedo: &Texture) -> Height {
-    let height = Maps::derive(albedo, &Relief::SOIL).height;
+    let height = Maps::derive(albedo, &HeightFromBrightness::SOIL).height;
     let (columns, rows) = height.size();
-    let unit = |h: &f32| (0.5 + 0.5 * h / Relief::SOIL.amplitude).clamp(0.0, 1.0);
+    let unit = |h: &f32| (0.5 + 0.5 * h / HeightFromBrightness::SOIL.amplitude).clamp(0.0, 1.0);
     Height::from_values(columns, rows, height.values().iter().map(unit).collect())
 }
 

@@ -28,7 +28,7 @@ pub use chip::{
     Adc, AdcDesc, Black, Demosaic, Depth, Exposure, ExposureDesc, MosaicDesc, Noise, NoiseDesc, Pattern, Percent,
 };
 pub use develop::{
-    Jpeg, JpegDesc, MatrixDesc, Quality, Row, Sharpen, SharpenDesc, Tone, WhiteBalance, WhiteBalanceDesc,
+    Jpeg, JpegDesc, MatrixDesc, MatrixRow, Quality, Sharpen, SharpenDesc, Tone, WhiteBalance, WhiteBalanceDesc,
 };
 pub use lens::{
     Aperture, ApertureDesc, ApertureRecord, Camera, CameraDesc, CameraRecord, Distortion, DistortionDesc,

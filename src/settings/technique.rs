@@ -86,7 +86,7 @@ impl Technique {
 pub struct Techniques {
     /// What is left out, sorted, each once.
     without: Vec<Technique>,
-    /// Most surfaces on a path, 1 to 1024; [`integrator::Path`](crate::integrator::Path)'s default unless given. Few are biased: light that comes by more is missing.
+    /// Most surfaces on a path, 1 to 1024; [`integrator::PathTracer`](crate::integrator::PathTracer)'s default unless given. Few are biased: light that comes by more is missing.
     pub max_depth: Option<u32>,
     /// Most radiance that one path may bring, W·m⁻²·sr⁻¹·nm⁻¹; no limit unless given. Biased: what is cut off is missing.
     pub clamp: Option<f32>,

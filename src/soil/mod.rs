@@ -1,13 +1,14 @@
 //! The ground: soil layers blended by noise, relief, moisture, and the clods, stones and litter that lie on it.
 //!
 //! [`SoilDesc`] is what a page says. [`Ground`] is one piece of ground: a displaced grid ([`Ground::mesh`]) that goes on
-//! beyond the view with growing cells, and a texture of its own ([`Ground::skin`]) with all that is finer than the grid.
+//! beyond the view with growing cells, and a texture of its own ([`Ground::bake`]) with all that is finer than the grid.
 //! The same blend weights drive both. Bodies are then laid on a [`Pile`], which remembers what lies there already, largest
 //! first: [`stones()`], [`clods()`], [`litter()`].
 //!
 //! Every random number is addressed: noise by its field, a body by the cell of the world it fell into. A larger area holds
 //! the same ground.
 
+mod bake;
 pub mod blend;
 mod body;
 mod canopy;
@@ -24,13 +25,13 @@ mod record;
 mod relief;
 mod residue;
 mod site;
-mod skin;
 mod stone;
 mod stone_cover;
 #[cfg(test)]
 mod tests;
 mod wheel;
 
+pub use bake::GroundMaps;
 pub use canopy::Canopy;
 pub use clod::{Clods, clods};
 pub use color::SoilColor;
@@ -46,7 +47,6 @@ pub use record::{
     ClodsRecord, LayerRecord, LitterRecord, MoistureRecord, ReliefRecord, RowReliefRecord, SoilRecord, WheelRecord,
 };
 pub use site::{SeedRows, Site};
-pub use skin::Skin;
 pub use stone::stones;
 pub use wheel::WheelDesc;
 

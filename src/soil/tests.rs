@@ -105,7 +105,7 @@ fn one_blend_drives_colour_and_height_and_sums_to_one() {
     page.clods.over_5mm_per_m2 = Vary::fixed(0.0);
     page.blend.scale_m = Vary::fixed(0.05);
     let ground = ground(&page, 0.1);
-    let skin = ground.skin(&MAPS, 0.0005);
+    let skin = ground.bake(&MAPS, 0.0005);
     let (mut low, mut high) = (0, 0);
     for j in (0..skin.height).step_by(7) {
         for i in (0..skin.width).step_by(7) {
@@ -113,7 +113,7 @@ fn one_blend_drives_colour_and_height_and_sums_to_one() {
             let sum: u32 = skin.weights[k].iter().map(|w| u32::from(*w)).sum();
             assert!((254..=256).contains(&sum), "{:?}", skin.weights[k]);
             // The layers are pure red and green, so the colour is the weights, up to the tone of the place.
-            let [r, g, _] = Skin::decode(skin.albedo[k]);
+            let [r, g, _] = GroundMaps::decode(skin.albedo[k]);
             let second = f32::from(skin.weights[k][1]) / 255.0;
             assert!((g / (r + g) - second).abs() < 0.02);
             let p = skin.origin + (vec2(i as f32, j as f32) + 0.5) * skin.texel_m;
@@ -137,7 +137,7 @@ fn the_skin_and_the_mesh_together_have_the_slopes_of_the_whole_relief() {
     let maps = [Waves(150.0, [0.2; 3])];
     let site = Site { grid_m: 0.002, ..site(0.05) };
     let ground = Ground::new(&page, &maps, &site, &stream()).unwrap();
-    let skin = ground.skin(&maps, 0.0001);
+    let skin = ground.bake(&maps, 0.0001);
     let height = |p: Vec2| ground.blend.displacement([1.0, 0.0, 0.0, 0.0], ground.blend.heights(&maps, p));
     let mut off = 0.0;
     let mut n = 0.0;
@@ -151,7 +151,7 @@ fn the_skin_and_the_mesh_together_have_the_slopes_of_the_whole_relief() {
         let d = 1e-4;
         let exact = (height(p + vec2(d, 0.0)) - height(p - vec2(d, 0.0))) / (2.0 * d);
         let normal = ground.normal(p.x, p.y);
-        let both = -normal.x / normal.z + f32::from(skin.slope[k][0]) / Skin::SLOPE_STEPS;
+        let both = -normal.x / normal.z + f32::from(skin.slope[k][0]) / GroundMaps::SLOPE_STEPS;
         off += (both - exact).abs();
         n += 1.0;
     }
@@ -163,7 +163,7 @@ fn the_same_address_gives_the_same_ground_and_a_larger_area_holds_it() {
     let page = page();
     let (a, b) = (ground(&page, 0.05), ground(&page, 0.05));
     assert_eq!(a.mesh(), b.mesh());
-    assert_eq!(a.skin(&MAPS, 0.0005), b.skin(&MAPS, 0.0005));
+    assert_eq!(a.bake(&MAPS, 0.0005), b.bake(&MAPS, 0.0005));
     let large = ground(&page, 0.08);
     for k in 0..400 {
         let (x, y) = (-0.04 + 0.004 * (k % 20) as f32, -0.04 + 0.004 * (k / 20) as f32);

@@ -12,7 +12,7 @@ use crate::math::Vec2;
 
 /// How a texture's brightness becomes height.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Relief {
+pub struct HeightFromBrightness {
     /// Height of a strong feature above or below the mean, in image lengths. Bright is high where positive, low where
     /// negative (veins impressed in a leaf's upper side).
     pub amplitude: f32,
@@ -22,7 +22,7 @@ pub struct Relief {
     pub coarsest: f32,
 }
 
-impl Relief {
+impl HeightFromBrightness {
     /// A leaf's upper side: veins impressed by about 0.2 mm on a leaf of 100 mm.
     pub const LEAF: Self = Self { amplitude: -0.002, finest: 0.003, coarsest: 0.05 };
     /// Crumbly soil: bright crumbs stand up, 1.5 mm on half a metre.
@@ -42,7 +42,7 @@ pub struct Maps {
 
 impl Maps {
     /// From a texture's brightness.
-    pub fn derive(texture: &Texture, relief: &Relief) -> Self {
+    pub fn derive(texture: &Texture, relief: &HeightFromBrightness) -> Self {
         let (width, height) = (texture.width(), texture.height());
         let mut values = Vec::with_capacity(width as usize * height as usize);
         for y in 0..height {

@@ -16,7 +16,7 @@ mod srgb;
 mod texels;
 
 pub use height::Height;
-pub use maps::{AmbientOcclusion, Maps, NormalMap, Relief};
+pub use maps::{AmbientOcclusion, HeightFromBrightness, Maps, NormalMap};
 pub use pyramid::Wrap;
 pub use srgb::ColorSpace;
 

@@ -129,7 +129,7 @@ fn a_pale_vein_is_impressed() {
     let rgba: Vec<u8> = (0..w * h)
         .flat_map(|i| if (30..34).contains(&(i % w)) { [150, 170, 110, 255] } else { [50, 90, 30, 255] })
         .collect();
-    let maps = Maps::derive(&Texture::from_rgba8(w, h, &rgba, ColorSpace::Srgb), &Relief::LEAF);
+    let maps = Maps::derive(&Texture::from_rgba8(w, h, &rgba, ColorSpace::Srgb), &HeightFromBrightness::LEAF);
     assert!(maps.height.at(vec2(0.5, 0.5)) < maps.height.at(vec2(0.3, 0.5)) - 0.001);
     assert!(maps.normal.sample(vec2(0.46, 0.5), 0.0).x < -0.05);
 }
@@ -140,16 +140,17 @@ fn maps_take_no_longer_for_coarse_features_than_for_fine_ones() {
     let texture = Texture::from_rgba8(1024, 1024, &rgba, ColorSpace::Srgb);
     let derive = |coarsest: f32| {
         let start = std::time::Instant::now();
-        let maps = Maps::derive(&texture, &Relief { coarsest, ..Relief::LEAF });
+        let maps = Maps::derive(&texture, &HeightFromBrightness { coarsest, ..HeightFromBrightness::LEAF });
         (start.elapsed(), maps)
     };
     // Blurs of radius 3 and 26 texels: one whose cost grows with its radius would take many times as long. The shortest of three
     // alternate runs each, as the machine may be busy.
     let shortest = |coarsest: f32, so_far: std::time::Duration| so_far.min(derive(coarsest).0);
     let most = std::time::Duration::MAX;
-    let [fine, coarse] =
-        (0..3).fold([most; 2], |[fine, coarse], _| [shortest(0.006, fine), shortest(Relief::LEAF.coarsest, coarse)]);
+    let [fine, coarse] = (0..3).fold([most; 2], |[fine, coarse], _| {
+        [shortest(0.006, fine), shortest(HeightFromBrightness::LEAF.coarsest, coarse)]
+    });
     assert!(coarse < 2 * fine, "{coarse:?} and {fine:?}");
-    let maps = derive(Relief::LEAF.coarsest).1;
+    let maps = derive(HeightFromBrightness::LEAF.coarsest).1;
     assert!(maps.height.values().iter().all(|h| h.abs() <= 0.002));
 }

@@ -42,7 +42,7 @@ pub fn path(folder: &Path) -> &str {
     folder.to_str().expect("a path in UTF-8")
 }
 
-/// Every file below a folder by its path, hidden ones too, with its bytes; clock times (the ledger) left out.
+/// Every file below a folder by its path, hidden ones too, with its bytes; clock times (the timing log) left out.
 pub fn tree(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut files = BTreeMap::new();
     let mut todo = vec![folder.to_path_buf()];
@@ -75,5 +75,5 @@ pub fn same(found: &BTreeMap<String, Vec<u8>>, expected: &BTreeMap<String, Vec<u
 
 /// Images that the runs on a dataset made, in the order in which they were done.
 pub fn made(folder: &Path) -> Vec<u64> {
-    furrow::dataset::ledger::rows(folder).expect("a ledger").iter().map(|row| row.index).collect()
+    furrow::dataset::timing_log::rows(folder).expect("a timing log").iter().map(|row| row.index).collect()
 }

@@ -3,7 +3,7 @@
 use furrow::accel::EmbreeAccel;
 use furrow::film::Film;
 use furrow::geometry::Window;
-use furrow::integrator::{Path as PathTracer, World};
+use furrow::integrator::{PathTracer, World};
 use furrow::render::{self, LabelMap, Settings, Watch};
 use furrow::sampling::Points;
 use furrow::scene::Field;

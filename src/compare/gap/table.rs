@@ -14,7 +14,7 @@ struct Document<'a> {
     synthetic: About<'a>,
     /// Middles of the bands of `spectrum`, cycles a pixel.
     frequencies: Vec<f64>,
-    distances: Vec<Row>,
+    distances: Vec<DistanceRow>,
     warnings: &'a [String],
 }
 
@@ -27,7 +27,7 @@ struct About<'a> {
 }
 
 #[derive(Serialize)]
-struct Row {
+struct DistanceRow {
     key: String,
     unit: &'static str,
     distance: f64,
@@ -50,8 +50,8 @@ impl<'a> About<'a> {
     }
 }
 
-fn rows(of: &Gap) -> Vec<Row> {
-    let row = |distance: &Distance| Row {
+fn rows(of: &Gap) -> Vec<DistanceRow> {
+    let row = |distance: &Distance| DistanceRow {
         key: distance.feature.key(),
         unit: distance.feature.unit(),
         distance: distance.distance,

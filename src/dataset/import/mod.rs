@@ -18,12 +18,12 @@ mod instances;
 pub mod masks;
 pub mod phenobench;
 
+use super::checksum_record::{ChecksumRecord, write_files};
 use super::generate::{self, Task};
 use super::plan::refuse_full;
 use super::recipe::{FILE, Made, Recipe};
 use super::record::{Keypoint, Record};
 use super::sample::Sample;
-use super::seal::{Seal, write_files};
 use super::set::Set;
 use super::split::{Shares, Split};
 use super::{File, annotate, invariants, native};
@@ -165,7 +165,7 @@ fn bring(set: &Set, source: &dyn Source, index: u64) -> Result<()> {
         }
     };
     write_files(folder, &files)?;
-    Seal::of(index, recipe, &files)?.write(folder)
+    ChecksumRecord::of(index, recipe, &files)?.write(folder)
 }
 
 /// What was read as a sample of ours.

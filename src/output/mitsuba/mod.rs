@@ -34,7 +34,7 @@ use super::png::{self, Picture};
 use crate::Result;
 use crate::film::Filter;
 use crate::geometry::{AlphaMask, Mesh};
-use crate::integrator::Path as PathTracer;
+use crate::integrator::PathTracer;
 use crate::material::Varies;
 use crate::math::Spectrum;
 use crate::scene::{Part, Scene};

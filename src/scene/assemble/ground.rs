@@ -2,7 +2,7 @@
 
 use super::builder::{Builder, Floor};
 use crate::Result;
-use crate::material::{Ground as GroundMaterial, GroundSkin, Material, Solid};
+use crate::material::{BakedGround, Ground as GroundMaterial, Material, Solid};
 use crate::math::Spectrum;
 use crate::ron_file::Step;
 use crate::sampling::Purpose;
@@ -43,9 +43,9 @@ pub(super) struct Earth {
 }
 
 /// What the ground shows, and what its clods show: dry ones and damp ones.
-pub(super) struct Skins {
-    pub(super) ground: Arc<GroundSkin>,
-    pub(super) clods: [Arc<GroundSkin>; 2],
+pub(super) struct BakedGrounds {
+    pub(super) ground: Arc<BakedGround>,
+    pub(super) clods: [Arc<BakedGround>; 2],
     /// Reflectance of the dry soil that lies on stones and straw.
     pub(super) dust: Spectrum,
 }
@@ -104,13 +104,13 @@ impl Builder<'_> {
     }
 
     /// Makes parts of everything of the ground; they come before those of the plants.
-    pub(super) fn lay(&mut self, floor: Floor<'_>, clods: Vec<Clods>, debris: Vec<Debris>, skins: &Skins) {
+    pub(super) fn lay(&mut self, floor: Floor<'_>, clods: Vec<Clods>, debris: Vec<Debris>, baked: &BakedGrounds) {
         let plants = std::mem::take(&mut self.scene.parts);
-        let material = self.material(Material::Ground(GroundMaterial::new(skins.ground.clone())));
+        let material = self.material(Material::Ground(GroundMaterial::new(baked.ground.clone())));
         let mesh = if floor.flat { floor.ground.levelled().mesh() } else { floor.ground.mesh() };
         self.part(mesh, material);
         for group in clods {
-            let skin = skins.clods[usize::from(group.damp)].clone();
+            let skin = baked.clods[usize::from(group.damp)].clone();
             let material = self.material(Material::Ground(GroundMaterial::clods(skin, group.tint)));
             self.part(group.mesh, material);
         }
@@ -120,7 +120,7 @@ impl Builder<'_> {
             let patch = 0.5 * thing.radius.max(1e-3);
             let patch = if thing.kind == DebrisKind::Stone { patch } else { patch.min(MOTTLE) };
             let solid = solid.with_grain(mix(i as u64) as u32, patch, 0.35);
-            let solid = solid.with_dust(skins.dust, thing.dust, DUST_PATCH);
+            let solid = solid.with_dust(baked.dust, thing.dust, DUST_PATCH);
             // In steps, so that pieces of the same film can be exported as one.
             let moisture = floor.ground.moisture(thing.centre.x, thing.centre.y);
             let solid = solid.moist((moisture * MOISTURE_STEPS).round() / MOISTURE_STEPS);

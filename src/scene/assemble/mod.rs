@@ -21,7 +21,7 @@ use super::tag::Tag;
 use super::{Part, PlantRecord, Scene};
 use crate::geometry::Mesh;
 use crate::light::LightDesc;
-use crate::material::{GroundSkin, Material};
+use crate::material::{BakedGround, Material};
 use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3, vec2};
 use crate::optics::soil::LOESS;
 use crate::plant::{self, ConditionDesc, LeafAxis, OrganKind};
@@ -34,7 +34,7 @@ use crate::{Error, Result};
 use builder::{Builder, Floor, Grown};
 use census::{Census, Population};
 pub use field::Field;
-use ground::{Earth, Skins};
+use ground::{BakedGrounds, Earth};
 use individual::Individual;
 pub use lighting::Lighting;
 use lighting::Listed;
@@ -230,10 +230,10 @@ impl<'a> Builder<'a> {
                 known = Some(self.soil_record(soil, &ground));
                 let texel = (0.9 * self.ground_pixel()).clamp(2e-4, 2e-3).max((view.area() / MOST_TEXELS).sqrt());
                 // The skin takes as long as everything else, and neither needs the other.
-                let fabric = |wet| Arc::new(GroundSkin::bake(&ground.fabric(&maps, texel, wet)));
-                let (skins, rest) = rayon::join(
-                    || Skins {
-                        ground: Arc::new(GroundSkin::bake(&ground.skin(&maps, texel))),
+                let fabric = |wet| Arc::new(BakedGround::bake(&ground.fabric(&maps, texel, wet)));
+                let (baked, rest) = rayon::join(
+                    || BakedGrounds {
+                        ground: Arc::new(BakedGround::bake(&ground.bake(&maps, texel))),
                         clods: ground.clods_moisture().map(fabric),
                         dust: ground.mean_dry(&maps),
                     },
@@ -246,7 +246,7 @@ impl<'a> Builder<'a> {
                     },
                 );
                 let (clods, plants) = rest?;
-                self.lay(floor, clods, stones, &skins);
+                self.lay(floor, clods, stones, &baked);
                 plants
             }
         };

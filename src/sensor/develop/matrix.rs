@@ -17,11 +17,11 @@ pub enum MatrixDesc {
     /// Colours drawn away from grey by this factor: 0 is grey, 1 no change. Luminance stays.
     Saturation(Vary<NonNegative>),
     /// Weights of R, G, B in the new R, in the new G and in the new B. A row that adds up to 1 keeps white.
-    Rows(Row, Row, Row),
+    Rows(MatrixRow, MatrixRow, MatrixRow),
 }
 
 /// Weights of R, G, B.
-pub type Row = (Vary<Finite>, Vary<Finite>, Vary<Finite>);
+pub type MatrixRow = (Vary<Finite>, Vary<Finite>, Vary<Finite>);
 
 /// Luminance of linear Rec. 709 colours.
 const LUMA: [f32; 3] = [0.2126, 0.7152, 0.0722];

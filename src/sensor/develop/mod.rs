@@ -17,7 +17,7 @@ mod tone;
 pub use balance::{WhiteBalance, WhiteBalanceDesc};
 pub use jpeg::{Jpeg, JpegDesc, Quality};
 pub(super) use matrix::apply as apply_matrix;
-pub use matrix::{MatrixDesc, Row};
+pub use matrix::{MatrixDesc, MatrixRow};
 pub(super) use sharpen::SharpenWritten;
 pub use sharpen::{Sharpen, SharpenDesc};
 pub use tone::Tone;

@@ -5,7 +5,7 @@
 use super::canvas::Canvas;
 use super::cells::Cells;
 use super::drawn::{Drawn, Grey};
-use super::leaf_recipe::{LeafRecipe, Relief};
+use super::leaf_recipe::{LeafRecipe, LeafRelief};
 use super::shape::{Margin, Shape};
 use super::tissue::Surface;
 use super::veins::{self, Segment, Veins};
@@ -193,7 +193,7 @@ impl<'a> Painter<'a> {
     }
 
     /// Heights, half the image's size: relief is smoother than colour.
-    fn relief(&self, relief: &Relief) -> Grey {
+    fn relief(&self, relief: &LeafRelief) -> Grey {
         let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
         let mm = self.recipe.length_mm.f32() / self.scale;
         let mut ink = self.veins[0].clone();

@@ -49,7 +49,7 @@ pub struct LeafRecipe {
     pub look: Look,
     /// Relief; without it no height is drawn.
     #[serde(default)]
-    pub relief: Option<Relief>,
+    pub relief: Option<LeafRelief>,
 }
 
 /// What varies over a blade. Shares are of the blade's chlorophyll unless stated.
@@ -101,8 +101,8 @@ impl Default for Look {
 
 /// Relief of the upper side, mm.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Relief {
+#[serde(deny_unknown_fields, rename = "Relief")]
+pub struct LeafRelief {
     /// Height that white stands for; all the rest must fit in.
     pub range_mm: Num<Positive>,
     /// Depth of the furrow over the midrib; secondaries lie at half, finer veins at a fifth of it.

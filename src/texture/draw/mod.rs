@@ -18,7 +18,7 @@ mod veins;
 mod write;
 
 pub use drawn::{Drawn, Grey};
-pub use leaf_recipe::{LeafRecipe, Look, Relief};
+pub use leaf_recipe::{LeafRecipe, LeafRelief, Look};
 pub use shape::{Margin, Sinus};
 pub use soil_recipe::{Crumbs, Ground, Litter, SoilRecipe};
 pub use veins::Veins;

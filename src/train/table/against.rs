@@ -11,7 +11,7 @@ use super::sets::Bound;
 use crate::Result;
 use crate::compare::{Band, Comparison, Options, Pairs, Region};
 use crate::dataset::recipe::{FILE, Rendering};
-use crate::dataset::{Set, ledger, native};
+use crate::dataset::{Set, native, timing_log};
 use crate::report::{Cell, Table};
 use crate::train::data::Pick;
 use crate::train::figure::Shot;
@@ -116,7 +116,7 @@ fn change(pairs: &[(&Seen, &Seen)], test: usize, class: Option<usize>) -> [Cell;
 fn cost(bound: &Bound, train: &TrainSet) -> Result<Option<f64>> {
     let Some(part) = train.from.first() else { return Ok(None) };
     let mut last: BTreeMap<u64, f64> = BTreeMap::new();
-    for row in ledger::rows(bound.folder(part.set))?.into_iter().filter(|row| row.draw_s > 0.0) {
+    for row in timing_log::rows(bound.folder(part.set))?.into_iter().filter(|row| row.draw_s > 0.0) {
         last.insert(row.index, row.seconds * row.threads as f64 / row.at_once.max(1) as f64);
     }
     Ok(mean(&last.into_values().collect::<Vec<_>>()))

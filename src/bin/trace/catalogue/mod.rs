@@ -12,7 +12,7 @@ use crate::quality::threads;
 use furrow::accel::EmbreeAccel;
 use furrow::cli::{self, signal::Signals};
 use furrow::geometry::Window;
-use furrow::integrator::{Path as PathTracer, World};
+use furrow::integrator::{PathTracer, World};
 use furrow::math::vec3;
 use furrow::output::{self, Picture};
 use furrow::render::{self, Settings, Watch};

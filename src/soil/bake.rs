@@ -10,7 +10,7 @@ use rayon::prelude::*;
 /// A texture over [`Ground::area`], row 0 in the south, so that [`Ground::uv`] reads it with v growing down its rows.
 /// All vectors hold `width · height` texels.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Skin {
+pub struct GroundMaps {
     /// Texels along x.
     pub width: usize,
     /// Texels along y.
@@ -33,7 +33,7 @@ pub struct Skin {
     pub like: Spectrum,
 }
 
-impl Skin {
+impl GroundMaps {
     /// Steps of [`Skin::slope`] to a slope of 1.
     pub const SLOPE_STEPS: f32 = 60.0;
 
@@ -58,7 +58,7 @@ const PIT_WETTING: f32 = 0.2;
 
 impl Ground {
     /// Bakes the texture with texels of at most `texel_m`; `maps` are those the ground was made with.
-    pub fn skin<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32) -> Skin {
+    pub fn bake<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32) -> GroundMaps {
         let area = self.area();
         // Texels that split the grid's steps evenly: the area then holds whole texels, and each knows its cell.
         let split = ((self.step / texel_m.max(2e-5) - 1e-3).ceil() as usize).max(1);
@@ -66,7 +66,7 @@ impl Ground {
         let (width, height) = (self.grid.x.steps * split, self.grid.y.steps * split);
         let raster = Raster { origin: area.corners()[0] + 0.5 * texel, step: texel, width, height };
         let n = width * height;
-        let mut skin = Skin {
+        let mut skin = GroundMaps {
             width,
             height,
             origin: area.corners()[0],
@@ -102,7 +102,7 @@ impl Ground {
                     t => f32::from(t) / 128.0,
                 };
                 let tone = tint * cell.mix(|v| self.fine.tone[v]);
-                albedo[i] = Skin::encode(self.dry(maps, share, p).map(|a| a * tone));
+                albedo[i] = GroundMaps::encode(self.dry(maps, share, p).map(|a| a * tone));
                 weights[i] = share.map(|w| (w * 255.0 + 0.5) as u8);
             }
         });
@@ -113,7 +113,7 @@ impl Ground {
 
     /// What clods are made of: a square of 12 cm of the ground's own matter without crumbs or relief, all of it as wet as
     /// `moisture`, 0..1. Clods read it, each from a place of its own.
-    pub fn fabric<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32, moisture: f32) -> Skin {
+    pub fn fabric<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32, moisture: f32) -> GroundMaps {
         let side = ((FABRIC_M / texel_m) as usize).clamp(16, 1024);
         let texel = FABRIC_M / side as f32;
         let n = side * side;
@@ -128,9 +128,9 @@ impl Ground {
         let (albedo, weights) = (0..n)
             .into_par_iter()
             .map(|k| rest(place(k)))
-            .map(|(p, w)| (Skin::encode(self.dry(maps, w, p)), w.map(|w| (w * 255.0 + 0.5) as u8)))
+            .map(|(p, w)| (GroundMaps::encode(self.dry(maps, w, p)), w.map(|w| (w * 255.0 + 0.5) as u8)))
             .unzip();
-        Skin {
+        GroundMaps {
             width: side,
             height: side,
             origin: Vec2::ZERO,
@@ -163,19 +163,19 @@ impl Ground {
     }
 
     /// Slopes of the detail, less those that the mesh's normals already have.
-    fn bake_slopes(&self, raster: Raster, split: usize, detail: &[f32], skin: &mut Skin) {
+    fn bake_slopes(&self, raster: Raster, split: usize, detail: &[f32], skin: &mut GroundMaps) {
         let coarse = differences(&self.fine.detail, self.raster());
         let slope = |(k, fine): (usize, Vec2)| {
             let cell = self.texel_cell(k % raster.width, k / raster.width, split);
             let mesh = vec2(cell.mix(|v| coarse[v].x), cell.mix(|v| coarse[v].y));
-            let rest = (fine - mesh).clamp_length_max(2.0) * Skin::SLOPE_STEPS;
+            let rest = (fine - mesh).clamp_length_max(2.0) * GroundMaps::SLOPE_STEPS;
             [rest.x as i8, rest.y as i8]
         };
         skin.slope = differences(detail, raster).into_par_iter().enumerate().map(slope).collect();
     }
 
     /// What lies in pits of the detail sees less of the sky and dries later; crumbs dry first, by the shares in `dry`.
-    fn bake_pits(&self, raster: Raster, split: usize, mut detail: Vec<f32>, dry: &[u8], skin: &mut Skin) {
+    fn bake_pits(&self, raster: Raster, split: usize, mut detail: Vec<f32>, dry: &[u8], skin: &mut GroundMaps) {
         let cell = |k: usize| self.texel_cell(k % raster.width, k / raster.width, split);
         detail.par_iter_mut().enumerate().for_each(|(k, d)| *d -= cell(k).mix(|v| self.fine.detail[v]));
         let around = blur(&detail, raster.width, (0.0008 / raster.step).ceil() as usize);

@@ -1,9 +1,9 @@
-//! Which files make an image, each with its SHA-256: an image is there when its seal is and every file agrees with it.
+//! Which files make an image, each with its SHA-256: an image is there when its record of checksums is and every file agrees with it.
 //!
-//! A seal is written last. It holds a hash of itself, so a damaged seal is no seal.
+//! It is written last and holds a hash of itself, so a damaged record is none.
 
 use super::File;
-use super::checksum::Print;
+use super::checksum::Checksum;
 use super::recipe::{Recipe, compact};
 use super::set::Set;
 use crate::output::{link_atomically, write_atomically};
@@ -15,47 +15,47 @@ use std::path::{Path, PathBuf};
 
 /// What an image is made of.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Seal {
+pub struct ChecksumRecord {
     /// Its number.
     pub index: u64,
     /// [`Recipe::fingerprint`] of what made it.
     pub recipe: String,
     /// Its files by path below the dataset's folder.
-    pub files: BTreeMap<String, Print>,
+    pub files: BTreeMap<String, Checksum>,
 }
 
-/// A seal as it lies on disk.
+/// A record of checksums as it lies on disk.
 #[derive(Serialize, Deserialize)]
 struct Written {
     #[serde(flatten)]
-    seal: Seal,
+    checksums: ChecksumRecord,
     /// SHA-256 of the rest.
     seal_sha256: String,
 }
 
-impl Seal {
+impl ChecksumRecord {
     /// Of files that were just made.
     pub fn of(index: u64, recipe: &Recipe, files: &[File]) -> Result<Self> {
-        let files = files.iter().map(|f| (f.path.clone(), Print::of(&f.bytes))).collect();
+        let files = files.iter().map(|f| (f.path.clone(), Checksum::of(&f.bytes))).collect();
         Ok(Self { index, recipe: recipe.fingerprint()?, files })
     }
 
-    /// Where the seal of an image lies.
+    /// Where the checksums of an image lie.
     pub fn path(folder: &Path, index: u64) -> PathBuf {
         folder.join("seals").join(format!("{}.json", Set::name(index)))
     }
 
-    /// Reads an image's seal; `None` where there is none or it is damaged.
+    /// Reads an image's checksums; `None` where there is none or it is damaged.
     pub fn read(folder: &Path, index: u64) -> Option<Self> {
         let bytes = std::fs::read(Self::path(folder, index)).ok()?;
         let written: Written = serde_json::from_slice(&bytes).ok()?;
-        let own = written.seal.hash().ok()?;
-        (own == written.seal_sha256 && written.seal.index == index).then_some(written.seal)
+        let own = written.checksums.hash().ok()?;
+        (own == written.seal_sha256 && written.checksums.index == index).then_some(written.checksums)
     }
 
     /// Writes it: after everything that it names.
     pub fn write(&self, folder: &Path) -> Result<()> {
-        let written = Written { seal: self.clone(), seal_sha256: self.hash()? };
+        let written = Written { checksums: self.clone(), seal_sha256: self.hash()? };
         write_atomically(&Self::path(folder, self.index), &compact(&written)?)
     }
 
@@ -73,7 +73,7 @@ impl Seal {
 
     /// The files that are missing or changed, each with what is wrong with it.
     pub fn faults(&self, folder: &Path) -> Vec<(String, String)> {
-        let fault = |(path, print): (&String, &Print)| Some((path.clone(), print.fault(&folder.join(path))?));
+        let fault = |(path, print): (&String, &Checksum)| Some((path.clone(), print.fault(&folder.join(path))?));
         self.files.iter().filter_map(fault).collect()
     }
 }

@@ -13,12 +13,12 @@ use std::sync::Mutex;
 
 /// What a run tells of one image.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Row {
+pub struct ImageTiming {
     /// The image's number.
     pub index: u64,
     /// Hash of its native files: two runs that made one image must agree.
     pub image: String,
-    /// Seconds from start to seal.
+    /// Seconds from the start until its checksums are written.
     pub seconds: f64,
     /// Of them, growing the field.
     pub grow_s: f64,
@@ -32,7 +32,7 @@ pub struct Row {
     pub threads: usize,
 }
 
-impl Row {
+impl ImageTiming {
     /// A row of an image that took this long.
     pub fn new(index: u64, image: String, seconds: f64, times: &Times, at_once: usize, threads: usize) -> Self {
         let [grow_s, draw_s, label_s] = [times.grow, times.draw, times.label].map(|t| t.as_secs_f64());
@@ -41,20 +41,20 @@ impl Row {
 }
 
 /// A run's file, made when the first image is.
-pub struct Ledger {
+pub struct TimingLog {
     folder: PathBuf,
     shard: String,
     file: Mutex<Option<(PathBuf, File)>>,
 }
 
-impl Ledger {
+impl TimingLog {
     /// For a run of a shard, `k-of-n`.
     pub fn new(dataset: &Path, shard: &str) -> Self {
         Self { folder: dataset.join("ledger"), shard: shard.to_owned(), file: Mutex::new(None) }
     }
 
     /// Adds a row.
-    pub fn add(&self, row: &Row) -> Result<()> {
+    pub fn add(&self, row: &ImageTiming) -> Result<()> {
         let mut held = self.file.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let (path, file) = match held.as_mut() {
             Some(open) => open,
@@ -81,7 +81,7 @@ impl Ledger {
 }
 
 /// All rows of all runs, by file name. Lines that a killed run left half are passed over.
-pub fn rows(dataset: &Path) -> Result<Vec<Row>> {
+pub fn rows(dataset: &Path) -> Result<Vec<ImageTiming>> {
     let folder = dataset.join("ledger");
     let entries = match std::fs::read_dir(&folder) {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
@@ -93,7 +93,9 @@ pub fn rows(dataset: &Path) -> Result<Vec<Row>> {
     let mut rows = Vec::new();
     for path in paths {
         let bytes = std::fs::read(&path).map_err(Error::io(&path))?;
-        rows.extend(String::from_utf8_lossy(&bytes).lines().filter_map(|l| serde_json::from_str::<Row>(l).ok()));
+        rows.extend(
+            String::from_utf8_lossy(&bytes).lines().filter_map(|l| serde_json::from_str::<ImageTiming>(l).ok()),
+        );
     }
     Ok(rows)
 }

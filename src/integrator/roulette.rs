@@ -1,10 +1,10 @@
-//! How often the rest of a path is followed: by what it can bring beside what the path has brought.
+//! Russian roulette and splitting: how often the rest of a path is followed, by what it can bring beside what the path has brought.
 //!
 //! An eye, a network and a relative error ask about each pixel's noise beside its own brightness. In the sun a bounce adds a
 //! tenth of what is there and may be followed now and then; in a shadow it is nearly all, and worth several rays. So roulette
 //! and splitting follow `expected contribution / light found so far`, a small share of the scene's usual radiance standing in
-//! for the light of what is nearly black. Both numbers are known before the contribution is drawn, so paying back by the
-//! chance keeps the estimate unbiased. After Arvo & Kirk 1990, "Particle transport and image synthesis", with the weight
+//! for the light of what is nearly black. Both numbers are known before the contribution is drawn, so dividing by the
+//! probability keeps the estimate unbiased. After Arvo & Kirk 1990, "Particle transport and image synthesis", with the weight
 //! relative to the pixel as in Vorba & Křivánek 2016, "Adjoint-driven Russian roulette and splitting".
 
 use super::World;
@@ -20,16 +20,16 @@ const LEAST: f32 = 0.1;
 /// The most scattered rays that leave the first surface.
 const MOST: f32 = 4.0;
 
-/// What is usual in a scene.
+/// Russian roulette and splitting in a scene: what is usual there.
 #[derive(Clone, Copy)]
-pub(super) struct Effort {
+pub(super) struct RouletteSplitting {
     /// Radiance of a level plane of [`USUAL_ALBEDO`] in the open.
     usual: Spectrum,
     /// Whether choices are made at all.
     on: bool,
 }
 
-impl Effort {
+impl RouletteSplitting {
     /// For a scene; with `on` false everything is followed once, as in a scene whose lights shine elsewhere than up here, which
     /// tell nothing of what is usual.
     #[inline]
@@ -83,13 +83,13 @@ mod tests {
     #[test]
     fn whatever_can_bring_light_has_a_chance() {
         for usual in [Spectrum::splat(1e-20), Spectrum::new(0.0, 0.0, 0.0, 1.0), Spectrum::ONE] {
-            let effort = Effort { usual, on: true };
+            let roulette = RouletteSplitting { usual, on: true };
             for found in [0.0, 1e-6, 1.0, 1e6].map(Spectrum::splat) {
                 for throughput in [Spectrum::splat(0.01), Spectrum::new(0.7, 0.0, 0.0, 0.0), Spectrum::splat(5.0)] {
-                    let chance = effort.survive(throughput, found);
+                    let chance = roulette.survive(throughput, found);
                     assert!(chance <= 1.0 && throughput.max() / chance <= 10.001, "{throughput:?} {found:?} {chance}");
-                    assert!((LEAST..=1.0).contains(&effort.light(1e-6, throughput, found)));
-                    assert!((LEAST..=MOST).contains(&effort.split(throughput, found)));
+                    assert!((LEAST..=1.0).contains(&roulette.light(1e-6, throughput, found)));
+                    assert!((LEAST..=MOST).contains(&roulette.split(throughput, found)));
                 }
             }
         }
