@@ -225,7 +225,7 @@ fn wrong_input_is_one_clear_error_and_leaves_nothing() {
         assert!(!out.exists());
     }
     let arguments: [(&[&str], &str); 6] = [
-        (&["--scale", "huge"], "the page has no scale `huge`"),
+        (&["--scale", "huge"], "the experiment has no scale `huge`"),
         (&["--without", "frames"], "no test set left"),
         (&["--real", "small=frames"], "there is no real set `small`"),
         (&["--row", "2/2"], "k/N"),

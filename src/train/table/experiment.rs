@@ -212,7 +212,7 @@ impl Checker<'_> {
             Some(i) => Ok((i, &scales.0[i].1)),
             None => Err(Error::input(format!("the experiment has no scale `{name}`"))
                 .in_file(&self.page.path)
-                .help(choose("its scales", &scales.names(), name))),
+                .help(choose("scales", &scales.names(), name))),
         }
     }
 
