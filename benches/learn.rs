@@ -7,10 +7,10 @@
 #![allow(clippy::print_stdout, reason = "a program that prints a table")]
 
 use furrow::train::data::{Selection, Shape};
-use furrow::train::engine::{Model, Precision, Where};
 use furrow::train::fit::{Callbacks, Hyperparameters, Plan};
 use furrow::train::net::Network;
 use furrow::train::session::{self, Machine};
+use furrow::train::torch::{Model, Precision, Where};
 use std::cell::RefCell;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;

@@ -113,7 +113,7 @@ const ALLOWED: &[(&str, &str)] = &[
     // How far a misspelt name is from those that are known.
     ("strsim", "ron_file/suggest.rs"),
     // libtorch: networks and how they learn.
-    ("tch", "train/engine/ train/fit/loss.rs train/fit/optimiser.rs train/fit/trainer.rs train/deploy/"),
+    ("tch", "train/torch/ train/fit/loss.rs train/fit/optimiser.rs train/fit/trainer.rs train/deploy/"),
     // Files appear whole or not at all: images of fields, and drawn textures below them. The denoiser's go through a folder,
     // and so does a scene that is taken into a dataset.
     ("tempfile", "dataset/plan.rs output/mod.rs output/denoise.rs texture/draw/write.rs"),

@@ -9,7 +9,7 @@
 mod common;
 
 use common::chi2::check_sphere;
-use furrow::bsdf::{Bsdf, Leaf, OrenNayar, Scatter, Side, Veil, Wet, fresnel};
+use furrow::bsdf::{Bsdf, Leaf, OrenNayar, Scatter, Side, SurfaceLayer, Wet, fresnel};
 use furrow::math::{Spectrum, Vec3, direction, vec3};
 use furrow::sampling::{Purpose, Sampler, Stream};
 use proptest::prelude::*;
@@ -257,7 +257,7 @@ fn a_veil_hides_and_scatters_but_takes_nothing() {
     for hairs in [0.02_f32, 0.1, 0.3] {
         let tau = -(1.0 - hairs).ln();
         let under = |r: f32, t: f32| {
-            let side = Side::bare(Spectrum::splat(r)).veiled(Veil::new(hairs, 0.0));
+            let side = Side::bare(Spectrum::splat(r)).layered(SurfaceLayer::new(hairs, 0.0));
             Leaf::new(side, side, Spectrum::splat(t))
         };
         for (r, t) in [(1.0, 0.0), (0.5, 0.5)] {
@@ -279,12 +279,12 @@ fn a_veil_hides_and_scatters_but_takes_nothing() {
     }
 }
 
-/// Expected: a bloom makes a leaf bluer, hairs make it paler in all bands alike; both take gloss; none is no veil at all.
+/// Expected: a bloom makes a leaf bluer, hairs make it paler in all bands alike; both take gloss; none is no layer at all.
 #[test]
 fn bloom_is_blue_and_hairs_are_white() {
     let black = |hairs, bloom| {
         Leaf::new(
-            Side::bare(Spectrum::ZERO).veiled(Veil::new(hairs, bloom)),
+            Side::bare(Spectrum::ZERO).layered(SurfaceLayer::new(hairs, bloom)),
             Side::bare(Spectrum::ZERO),
             Spectrum::ZERO,
         )
@@ -293,12 +293,12 @@ fn bloom_is_blue_and_hairs_are_white() {
     assert!(b > g && g > r && r > nir && nir > 0.5 * b, "{r} {g} {b} {nir}");
     let [r, g, b, nir] = black(0.1, 0.0).eval(Vec3::Z, vec3(0.0, 0.6, 0.8)).to_array();
     assert!(r == g && g == b && b == nir && r > 0.0, "{r} {g} {b} {nir}");
-    let glossy = |veil| {
-        Leaf::new(Side::new(1.45, [0.1; 2], Spectrum::ZERO).veiled(veil), Side::bare(Spectrum::ZERO), Spectrum::ZERO)
+    let glossy = |layer| {
+        Leaf::new(Side::new(1.45, [0.1; 2], Spectrum::ZERO).layered(layer), Side::bare(Spectrum::ZERO), Spectrum::ZERO)
     };
-    let mirror = |veil| glossy(veil).eval(vec3(0.6, 0.0, 0.8), vec3(-0.6, 0.0, 0.8)).max();
-    assert!(mirror(Veil::new(0.3, 0.0)) < 0.8 * mirror(None));
-    assert!(Veil::new(0.0, 0.0).is_none());
+    let mirror = |layer| glossy(layer).eval(vec3(0.6, 0.0, 0.8), vec3(-0.6, 0.0, 0.8)).max();
+    assert!(mirror(SurfaceLayer::new(0.3, 0.0)) < 0.8 * mirror(None));
+    assert!(SurfaceLayer::new(0.0, 0.0).is_none());
 }
 
 /// Source: Oren & Nayar's qualitative model leaves out what facets pass to each other.
@@ -366,7 +366,7 @@ proptest! {
     ) {
         let t = t * (1.0 - r[0].max(r[1]));
         let side = |alpha, r| {
-            Side::new(ior, alpha, Spectrum::new(r, 0.06, r * 0.5 + 0.03, r)).veiled(Veil::new(hairs, bloom))
+            Side::new(ior, alpha, Spectrum::new(r, 0.06, r * 0.5 + 0.03, r)).layered(SurfaceLayer::new(hairs, bloom))
         };
         keeps_energy(&Leaf::new(side(front, r[0]), side(back, r[1]), Spectrum::splat(t)), wo, 2e-3)?;
     }

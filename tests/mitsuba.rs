@@ -31,7 +31,7 @@ use furrow::scene::assemble::{self, Options};
 use furrow::scene::tag::{Class, Tag};
 use furrow::scene::{Part, Scene};
 use furrow::sensor::{Camera, Distortion, Pose};
-use furrow::texture::{ColorSpace, Maps, HeightFromBrightness, Texture};
+use furrow::texture::{ColorSpace, HeightFromBrightness, Maps, Texture};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;

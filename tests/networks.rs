@@ -9,10 +9,10 @@ mod common;
 
 use common::python::{ask, python, torch};
 use common::training::{self, learn, normalised, pictures, stirred};
-use furrow::train::engine::{Model, Precision, Where, device};
 use furrow::train::fit::hyper::NormalizationMode;
 use furrow::train::net::Network;
 use furrow::train::run::TrainedModel;
+use furrow::train::torch::{Model, Precision, Where, device};
 use furrow::train::weights::{self, Array};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;

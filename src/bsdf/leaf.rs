@@ -4,13 +4,13 @@
 //! directional-hemispherical reflectance and transmittance near normal incidence (as PROSPECT gives them, coat included),
 //! E is the coat's own albedo there, and `c(θ) = (1 − F(θ)) / √((1 − F₀)(1 − F̄))` is what the coat lets through.
 //! Reciprocal, returns R and T at normal incidence, and nowhere more than R + T + 0.001 for roughness 0.1–0.6.
-//! Hairs and bloom may stand on it, see [`Veil`]: their light comes on top, and the rest is seen through them.
+//! Hairs and bloom may stand on it, see [`SurfaceLayer`]: their light comes on top, and the rest is seen through them.
 //! Transmission of broad leaves is Lambertian in the visible and near infrared: Walter-Shea & Norman 1991.
 
 use super::fresnel;
 use super::microfacet::Ggx;
 use super::sample::{BsdfSample, Scatter, cosine, facing};
-use super::veil::Veil;
+use super::surface_layer::SurfaceLayer;
 use crate::math::{Spectrum, Vec3};
 use std::f32::consts::FRAC_1_PI;
 
@@ -24,7 +24,7 @@ pub struct Side {
     albedo: f32,
     diffuse: Spectrum,
     /// Hairs and bloom.
-    veil: Option<Veil>,
+    layer: Option<SurfaceLayer>,
 }
 
 impl Side {
@@ -33,12 +33,13 @@ impl Side {
     pub fn new(ior: f32, alpha: [f32; 2], reflectance: Spectrum) -> Self {
         let coat = Ggx { alpha, ior };
         let norm = 1.0 / ((1.0 - fresnel::dielectric(1.0, ior)) * (1.0 - fresnel::hemispherical(ior))).sqrt();
-        Self { coat: Some(coat), norm, albedo: coat.albedo(1.0), diffuse: Spectrum::ZERO, veil: None }.with(reflectance)
+        Self { coat: Some(coat), norm, albedo: coat.albedo(1.0), diffuse: Spectrum::ZERO, layer: None }
+            .with(reflectance)
     }
 
     /// A side without a coat.
     pub fn bare(reflectance: Spectrum) -> Self {
-        Self { coat: None, norm: 1.0, albedo: 0.0, diffuse: reflectance, veil: None }
+        Self { coat: None, norm: 1.0, albedo: 0.0, diffuse: reflectance, layer: None }
     }
 
     /// The same coat over another total reflectance. Where a dark leaf reflects less than its coat the rest is black.
@@ -51,13 +52,13 @@ impl Side {
 
     /// The same side under hairs and bloom.
     #[must_use]
-    pub fn veiled(self, veil: Option<Veil>) -> Self {
-        Self { veil, ..self }
+    pub fn layered(self, layer: Option<SurfaceLayer>) -> Self {
+        Self { layer, ..self }
     }
 
     /// Hairs and bloom.
-    pub fn veil(&self) -> Option<Veil> {
-        self.veil
+    pub fn layer(&self) -> Option<SurfaceLayer> {
+        self.layer
     }
 
     /// The coat; `None` for a bare side.
@@ -70,10 +71,10 @@ impl Side {
         self.diffuse
     }
 
-    /// What the veil lets through to this side.
+    /// What the layer lets through to this side.
     #[inline]
     fn seen(&self, w: Vec3) -> Spectrum {
-        self.veil.map_or(Spectrum::ONE, |veil| veil.through(w.z.abs()))
+        self.layer.map_or(Spectrum::ONE, |layer| layer.through(w.z.abs()))
     }
 
     /// c(θ).
@@ -113,7 +114,7 @@ impl Leaf {
     pub fn reflectance(&self, cos: f32) -> Spectrum {
         let side = if cos > 0.0 { &self.upper } else { &self.lower };
         let bare = side.diffuse + Spectrum::splat(side.albedo);
-        side.veil.map_or(bare, |veil| veil.over(bare))
+        side.layer.map_or(bare, |layer| layer.over(bare))
     }
 
     /// The upper side and the lower.
@@ -136,7 +137,7 @@ impl Leaf {
     fn chances(&self, side: &Side, cos_o: f32) -> Chances {
         let coat = side.coat.map_or(0.0, |c| fresnel::dielectric(cos_o, c.ior).max(side.albedo));
         // Red, green and near infrared matter alike; the mean of the bands stands for them.
-        let reflect = side.diffuse.mean() + side.veil.map_or(0.0, |veil| veil.albedo(cos_o).mean());
+        let reflect = side.diffuse.mean() + side.layer.map_or(0.0, |layer| layer.albedo(cos_o).mean());
         let transmit = self.transmittance.mean();
         let total = (coat + reflect + transmit).max(1e-6);
         Chances { coat: coat / total, reflect: reflect / total, transmit: transmit / total }
@@ -149,16 +150,16 @@ impl Leaf {
         let lambert = wi.z.abs() * FRAC_1_PI;
         let through = near.through(wo.z.abs()) * lambert;
         if wo.z * wi.z < 0.0 {
-            let veils = near.seen(wo) * far.seen(wi);
-            return (self.transmittance * (through * far.through(wi.z.abs())) * veils, chances.transmit * lambert);
+            let layers = near.seen(wo) * far.seen(wi);
+            return (self.transmittance * (through * far.through(wi.z.abs())) * layers, chances.transmit * lambert);
         }
         let s = wo.z.signum();
         let (coat, coat_pdf) = near.coat.map_or((0.0, 0.0), |c| c.eval_pdf(facing(wo, s), facing(wi, s)));
         let mut value = near.diffuse * (through * near.through(wi.z.abs())) + Spectrum::splat(coat);
-        if let Some(veil) = near.veil {
+        if let Some(layer) = near.layer {
             let cos = [wo.z.abs(), wi.z.abs()];
-            let through = cos.map(|c| veil.through(c));
-            value = value * through[0] * through[1] + Veil::reflect(cos, through) * cos[1];
+            let through = cos.map(|c| layer.through(c));
+            value = value * through[0] * through[1] + SurfaceLayer::reflect(cos, through) * cos[1];
         }
         (value, chances.coat * coat_pdf + chances.reflect * lambert)
     }

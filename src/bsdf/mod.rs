@@ -5,7 +5,7 @@ pub mod fresnel;
 mod leaf;
 pub mod microfacet;
 mod sample;
-mod veil;
+mod surface_layer;
 mod wet;
 
 use crate::math::{Spectrum, Vec3};
@@ -13,7 +13,7 @@ use crate::math::{Spectrum, Vec3};
 pub use diffuse::OrenNayar;
 pub use leaf::{Leaf, Side};
 pub use sample::{BsdfSample, Scatter};
-pub use veil::Veil;
+pub use surface_layer::SurfaceLayer;
 pub use wet::Wet;
 
 /// The scattering of one point. `Copy`: it lives on the stack for one bounce.
@@ -92,8 +92,8 @@ impl Bsdf {
             Side::new(1.45, [0.5, 0.2], Spectrum::splat(0.3)),
             Spectrum::splat(0.4),
         );
-        let veiled = |hairs: f32, bloom: f32| {
-            let side = |r: Spectrum| Side::new(1.45, [0.45; 2], r).veiled(Veil::new(hairs, bloom));
+        let layered = |hairs: f32, bloom: f32| {
+            let side = |r: Spectrum| Side::new(1.45, [0.45; 2], r).layered(SurfaceLayer::new(hairs, bloom));
             let [upper, lower] =
                 [Spectrum::new(0.07, 0.11, 0.05, 0.44), Spectrum::new(0.1, 0.15, 0.08, 0.44)].map(side);
             Leaf::new(upper, lower, Spectrum::new(0.07, 0.12, 0.02, 0.5))
@@ -108,8 +108,8 @@ impl Bsdf {
             ("beet leaf", Self::Leaf(leaf(0.3, 0.5))),
             ("dull leaf", Self::Leaf(leaf(0.6, 0.6))),
             ("grass", Self::Leaf(grass)),
-            ("hairy leaf", Self::Leaf(veiled(0.3, 0.0))),
-            ("blue leaf", Self::Leaf(veiled(0.0, 0.1))),
+            ("hairy leaf", Self::Leaf(layered(0.3, 0.0))),
+            ("blue leaf", Self::Leaf(layered(0.0, 0.1))),
             ("leaf without a coat", Self::Leaf(Leaf::bare(Spectrum::splat(0.45), Spectrum::splat(0.55)))),
         ]
     }

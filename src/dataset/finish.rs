@@ -22,7 +22,7 @@ pub fn finish(set: &Set, shards: Option<u64>) -> Result<Vec<PathBuf>> {
     let mut missing = Vec::new();
     for index in 0..recipe.count {
         match ChecksumRecord::read(folder, index) {
-            Some(checksums) if generate::owed(set, &checksums)? == Task::Done => {}
+            Some(checksums) if generate::remaining(set, &checksums)? == Task::Done => {}
             _ => missing.push(index),
         }
     }

@@ -188,7 +188,7 @@ fn together(failures: BTreeMap<u64, Error>) -> Error {
 /// What remains to be done for an image, from what lies on the disk.
 pub fn task(set: &Set, index: u64) -> Result<Task> {
     let Some(checksums) = ChecksumRecord::read(&set.folder, index) else { return Ok(Task::All) };
-    let task = owed(set, &checksums)?;
+    let task = remaining(set, &checksums)?;
     if task == Task::All {
         return Ok(task);
     }
@@ -206,7 +206,7 @@ pub fn task(set: &Set, index: u64) -> Result<Task> {
 }
 
 /// What a sealed image owes its recipe, whatever has become of its files: it may be of another recipe, or lack a format.
-pub(super) fn owed(set: &Set, checksums: &ChecksumRecord) -> Result<Task> {
+pub(super) fn remaining(set: &Set, checksums: &ChecksumRecord) -> Result<Task> {
     if checksums.recipe != set.recipe.fingerprint()? {
         return Ok(Task::All);
     }

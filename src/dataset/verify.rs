@@ -72,8 +72,8 @@ pub fn verify(
         }
         found.faults.extend(looked.faults.iter().cloned());
     }
-    found.faults.extend(twins(set, &looked));
-    found.faults.extend(disputes(set)?);
+    found.faults.extend(shared_between_splits(set, &looked));
+    found.faults.extend(made_differently(set)?);
     if found.missing.is_empty() {
         found.faults.extend(listed(set)?);
     }
@@ -110,7 +110,7 @@ fn look(set: &Set, index: u64) -> Result<Looked> {
     let mut faults: Vec<String> =
         checksums.faults(&set.folder).into_iter().map(|(path, fault)| format!("{path} {fault}")).collect();
     let mut missing = !faults.is_empty();
-    if !missing && generate::owed(set, &checksums)? != Task::Done {
+    if !missing && generate::remaining(set, &checksums)? != Task::Done {
         missing = true;
         faults.push(format!("image {name}: it was made by another recipe, or lacks a format"));
     }
@@ -128,7 +128,7 @@ fn look(set: &Set, index: u64) -> Result<Looked> {
 }
 
 /// Photographs that are in two splits.
-fn twins(set: &Set, looked: &[Looked]) -> Vec<String> {
+fn shared_between_splits(set: &Set, looked: &[Looked]) -> Vec<String> {
     let mut places: BTreeMap<&str, BTreeSet<Split>> = BTreeMap::new();
     for (index, looked) in looked.iter().enumerate() {
         if let Some(hash) = &looked.photograph {
@@ -140,7 +140,7 @@ fn twins(set: &Set, looked: &[Looked]) -> Vec<String> {
 }
 
 /// Images that two runs made differently.
-fn disputes(set: &Set) -> Result<Vec<String>> {
+fn made_differently(set: &Set) -> Result<Vec<String>> {
     let mut images: BTreeMap<u64, BTreeSet<String>> = BTreeMap::new();
     for row in timing_log::rows(&set.folder)? {
         images.entry(row.index).or_default().insert(row.image);

@@ -1,11 +1,11 @@
 //! Blades, petioles, stems: pigments and a picture → coat, reflection of either side, transmission.
 
+use super::condition::{ConditionOptics, Worn};
 use super::feature::Feature;
 use super::shading::{bump, grained_frame};
 use super::swatch::{Grain, Swatch, Tone, centre};
 use super::varies::Varies;
-use super::wear::{Wear, Worn};
-use crate::bsdf::{self, Bsdf, Side, Veil};
+use crate::bsdf::{self, Bsdf, Side, SurfaceLayer};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec2, Vec3};
 use crate::optics::{Leaf, LeafOptics, Pigments};
@@ -115,7 +115,7 @@ pub struct LeafMaterial {
     /// Whether the picture gives the colour, not the pigments alone.
     pictured: bool,
     /// What its condition has made of it.
-    wear: Option<Wear>,
+    condition: Option<ConditionOptics>,
     /// The one mip level that every ray reads; `None` for the level of each ray's width.
     level: Option<u32>,
 }
@@ -127,7 +127,7 @@ impl LeafMaterial {
         let along = desc.roughness_along.map_or(across, |r| r.f32().max(0.02));
         let back = desc.roughness_back.f32().max(0.02);
         let ior = desc.ior.f32();
-        let veil = Veil::new(desc.hairs.f32(), desc.bloom.f32());
+        let layer = SurfaceLayer::new(desc.hairs.f32(), desc.bloom.f32());
         let optics = Arc::new(LeafOptics::new(&desc.pigments));
         let exposure = match &picture {
             Some(picture) if !desc.calibrated => exposure(&picture.color, optics.plain().reflectance.0.truncate()),
@@ -137,14 +137,14 @@ impl LeafMaterial {
             picture,
             optics,
             exposure,
-            upper: Side::new(ior, [across, along], Spectrum::ZERO).veiled(veil),
-            lower: Side::new(ior, [back, along.max(back)], Spectrum::ZERO).veiled(veil),
+            upper: Side::new(ior, [across, along], Spectrum::ZERO).layered(layer),
+            lower: Side::new(ior, [back, along.max(back)], Spectrum::ZERO).layered(layer),
             back_paleness: desc.back_paleness.f32(),
             relief: desc.relief.f32(),
             tint: Vec3::ONE,
             transmits: true,
             pictured: true,
-            wear: None,
+            condition: None,
             level: None,
         }
     }
@@ -158,19 +158,19 @@ impl LeafMaterial {
 
     /// The same leaf in a condition; `gloss` is a factor on the roughness of its upper side.
     #[must_use]
-    pub fn worn(&self, wear: Wear, gloss: f32) -> Self {
+    pub fn worn(&self, condition: ConditionOptics, gloss: f32) -> Self {
         let upper = match self.upper.coat() {
             Some(coat) => {
-                let alpha = coat.alpha.map(|a| wear.dulled((a * gloss).clamp(0.02, 0.9)));
+                let alpha = coat.alpha.map(|a| condition.dulled((a * gloss).clamp(0.02, 0.9)));
                 if alpha == coat.alpha {
                     self.upper
                 } else {
-                    Side::new(coat.ior, alpha, Spectrum::ZERO).veiled(self.upper.veil())
+                    Side::new(coat.ior, alpha, Spectrum::ZERO).layered(self.upper.layer())
                 }
             }
             None => self.upper,
         };
-        Self { upper, wear: Some(wear), ..self.clone() }
+        Self { upper, condition: Some(condition), ..self.clone() }
     }
 
     pub(super) fn fix_level(&mut self, level: u32) {
@@ -182,7 +182,7 @@ impl LeafMaterial {
             Feature::Transmission => self.transmits = false,
             Feature::Coat => {
                 [self.upper, self.lower] =
-                    [self.upper, self.lower].map(|side| Side::bare(Spectrum::ZERO).veiled(side.veil()));
+                    [self.upper, self.lower].map(|side| Side::bare(Spectrum::ZERO).layered(side.layer()));
             }
             Feature::Relief => self.relief = 0.0,
             Feature::Picture => self.pictured = false,
@@ -197,11 +197,11 @@ impl LeafMaterial {
 
     /// A place as its condition has it.
     fn worn_at(&self, leaf: Leaf, uv: Vec2) -> Worn {
-        match &self.wear {
+        match &self.condition {
             None => Worn { tissue: leaf, upper: leaf, waxy: true },
-            Some(wear) => {
+            Some(condition) => {
                 let picture = self.picture.as_ref().filter(|_| self.pictured);
-                wear.at(leaf, uv, picture.map(|p| &p.color))
+                condition.at(leaf, uv, picture.map(|p| &p.color))
             }
         }
     }
@@ -209,15 +209,17 @@ impl LeafMaterial {
     /// What a picture of the upper side shows of a tissue, hairs and bloom where there is wax.
     fn tone(&self, leaf: Leaf, waxy: bool) -> Tone {
         let transmittance = if self.transmits { leaf.transmittance } else { Spectrum::ZERO };
-        match self.upper.veil().filter(|_| waxy) {
-            Some(veil) => Tone { reflectance: veil.over(leaf.reflectance), transmittance: veil.below(transmittance) },
+        match self.upper.layer().filter(|_| waxy) {
+            Some(layer) => {
+                Tone { reflectance: layer.over(leaf.reflectance), transmittance: layer.below(transmittance) }
+            }
             None => Tone { reflectance: leaf.reflectance, transmittance },
         }
     }
 
     /// The swatch of a leaf in a condition: a picture of its own, tinted already.
-    fn worn_swatch<'a>(&'a self, picture: &'a Picture, wear: &Wear, roughness: f32) -> Swatch<'a> {
-        let size = wear.picture_size((picture.color.width(), picture.color.height()));
+    fn condition_swatch<'a>(&'a self, picture: &'a Picture, condition: &ConditionOptics, roughness: f32) -> Swatch<'a> {
+        let size = condition.picture_size((picture.color.width(), picture.color.height()));
         let lod = picture.color.lod(1.0 / size.0.max(size.1) as f32);
         let tone = move |uv: Vec2| {
             let [r, g, b, _] = picture.color.sample(uv, lod);
@@ -237,7 +239,7 @@ impl LeafMaterial {
         }
         let share = 1.0 / f32::max(count, 1.0);
         let mean = Tone { reflectance: sum.reflectance * share, transmittance: sum.transmittance * share };
-        let key = [wear.key(), Arc::as_ptr(&self.optics) as usize];
+        let key = [condition.key(), Arc::as_ptr(&self.optics) as usize];
         Swatch::pictured(key, size, move |x, y| tone(centre(size, x, y)), mean, roughness)
             .raised(move |x, y| picture.maps.normal.sample(centre(size, x, y), lod), self.relief)
             .grained(move |x, y| Grain { open: picture.maps.occlusion.sample(centre(size, x, y), lod), film: 0.0 })
@@ -252,8 +254,8 @@ impl LeafMaterial {
             let Worn { upper, waxy, .. } = self.worn_at(leaf, Vec2::splat(0.5));
             return Swatch::plain(self.tone(upper, waxy), roughness).paler_below(self.back_paleness);
         };
-        if let Some(wear) = &self.wear {
-            return self.worn_swatch(picture, wear, roughness);
+        if let Some(condition) = &self.condition {
+            return self.condition_swatch(picture, condition, roughness);
         }
         let color = |[r, g, b, _]: [f32; 4]| Vec3::new(r, g, b) * self.exposure;
         let texel = move |x, y| read(color(picture.color.texel(x, y)));

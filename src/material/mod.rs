@@ -1,5 +1,6 @@
 //! What parts are made of: textures and optics at a point → its scattering and the frame it scatters in.
 
+mod condition;
 mod feature;
 pub mod ground;
 pub mod leaf;
@@ -8,20 +9,19 @@ mod shading;
 mod solid;
 pub mod swatch;
 mod varies;
-mod wear;
 
 use crate::bsdf::Bsdf;
 use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec3};
 use swatch::{Swatch, Tone};
 
+pub use condition::{ConditionOptics, Tones, tissues};
 pub use feature::Feature;
 pub use ground::{BakedGround, Ground};
 pub use leaf::{LeafDesc, LeafMaterial, Picture};
 pub use painted::{Painted, Repaint};
 pub use solid::Solid;
 pub use varies::Varies;
-pub use wear::{Tones, Wear, tissues};
 
 /// What a part is made of.
 #[derive(Clone, Debug)]
@@ -32,7 +32,7 @@ pub enum Material {
     Ground(Ground),
     /// Stone, wood, straw: one colour, rough.
     Solid(Solid),
-    /// What models from disk wear.
+    /// How models from disk look.
     Painted(Painted),
     /// The same scattering everywhere: for tests and teaching.
     Plain(Bsdf),

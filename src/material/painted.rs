@@ -1,4 +1,4 @@
-//! What models from disk wear: a base colour and picture under a smooth or rough coat, opaque or a sheet that lets light through.
+//! What models from disk condition: a base colour and picture under a smooth or rough coat, opaque or a sheet that lets light through.
 //!
 //! A file knows three bands. Near infrared is the page's, or what the program wrote into the file, or an estimate: a sheet that
 //! lets light through is taken for a leaf, which returns and passes 0.45 each (the plateau of PROSPECT-D's green leaves);

@@ -1,8 +1,8 @@
-//! One scene, one picture: shadow maps, ids, openness, light, and back.
+//! One scene, one picture: shadow maps, ids, ambient occlusion, light, and back.
 
 use super::gpu::{Gpu, view};
 use super::lights::{Lights, SHADOW_SIZE};
-use super::pipelines::{DEPTH, NORMALS, OPENNESS, PARTS, POSITIONS, Pipelines, RADIANCE, SAMPLES};
+use super::pipelines::{AMBIENT_OCCLUSION, DEPTH, NORMALS, PARTS, POSITIONS, Pipelines, RADIANCE, SAMPLES};
 use super::sheets::Sheets;
 use super::vertices::Vertices;
 use super::{Drawn, Effect, Settings};
@@ -87,13 +87,14 @@ pub(super) fn draw(gpu: &Gpu, pipelines: &Pipelines, scene: &Scene, settings: &S
     let mut encoder = gpu.device.create_command_encoder(&CommandEncoderDescriptor::default());
     let shadows = stage.shadows(&mut encoder, &lights, settings.has(Effect::Shadows));
     let [parts, positions, normals] = stage.labels(&mut encoder, size);
-    let openness = stage.openness(&mut encoder, size, &positions, &normals);
+    let ambient_occlusion = stage.ambient_occlusion(&mut encoder, size, &positions, &normals);
     // Which pixels see the sky is known when the labels are.
     gpu.queue.submit([encoder.finish()]);
     let labels = read_labels(gpu, scene, &parts, &positions, &normals)?;
     let sky = sky(gpu, scene, &labels);
     let mut encoder = gpu.device.create_command_encoder(&CommandEncoderDescriptor::default());
-    let picture = stage.picture(&mut encoder, size, &[&shadows, &view(&openness), &sky], settings.has(Effect::Msaa));
+    let picture =
+        stage.picture(&mut encoder, size, &[&shadows, &view(&ambient_occlusion), &sky], settings.has(Effect::Msaa));
     gpu.queue.submit([encoder.finish()]);
     let radiance = gpu.read(&picture)?;
     gpu.check()?;
@@ -228,14 +229,14 @@ impl Stage<'_> {
     }
 
     /// Share of the sky that each pixel sees past its neighbours.
-    fn openness(
+    fn ambient_occlusion(
         &self,
         encoder: &mut CommandEncoder,
         size: (u32, u32),
         positions: &Texture,
         normals: &Texture,
     ) -> Texture {
-        let target = self.gpu.target(size, OPENNESS, 1);
+        let target = self.gpu.target(size, AMBIENT_OCCLUSION, 1);
         let (positions, normals) = (view(positions), view(normals));
         let of = [BindingResource::TextureView(&positions), BindingResource::TextureView(&normals)];
         let surface = bind(self.gpu, &self.pipelines.surface, &of);
@@ -248,7 +249,7 @@ impl Stage<'_> {
         target
     }
 
-    /// Radiance; `around` are the shadow maps, the openness, the sky.
+    /// Radiance; `around` are the shadow maps, the ambient occlusion, the sky.
     fn picture(
         &self,
         encoder: &mut CommandEncoder,
@@ -264,10 +265,10 @@ impl Stage<'_> {
             ..Default::default()
         });
         let clamped = sampler(self.gpu, AddressMode::ClampToEdge, 1);
-        let [maps, openness, sky] = around.map(BindingResource::TextureView);
+        let [maps, ambient_occlusion, sky] = around.map(BindingResource::TextureView);
         let sampled = [BindingResource::Sampler(&comparing), BindingResource::Sampler(&clamped)];
         let [comparing, clamped] = sampled;
-        let around = bind(self.gpu, &self.pipelines.around, &[maps, comparing, openness, sky, clamped]);
+        let around = bind(self.gpu, &self.pipelines.around, &[maps, comparing, ambient_occlusion, sky, clamped]);
         let result = self.gpu.target(size, RADIANCE, 1);
         let many = smooth.then(|| view(&self.gpu.target(size, RADIANCE, SAMPLES[which])));
         let shown = view(&result);

@@ -1,7 +1,7 @@
 //! The rasterized engine: a field as a game engine of 2017 draws it, to be held against the path tracer.
 //!
 //! What Di Cicco et al. 2017 rendered their data with is Unreal Engine 4. This has the same parts, each as the literature of that time
-//! has it: a coat of GGX over Lambert (Karis 2013), leaves cut by alpha test with mip maps, normal maps, openness from the height maps,
+//! has it: a coat of GGX over Lambert (Karis 2013), leaves cut by alpha test with mip maps, normal maps, ambient occlusion from the height maps,
 //! gloss where soil is wet; a shadow map of 2048² with percentage-closer filtering for each sun and lamp; an even
 //! surrounding in spherical harmonics for the sky; screen-space ambient occlusion; light from behind through leaves; four
 //! samples a pixel on edges (MSAA). No light bounces. [`Effect`]s can be left out one at a time.

@@ -18,8 +18,8 @@ pub(super) const PARTS: TextureFormat = TextureFormat::R32Uint;
 pub(super) const POSITIONS: TextureFormat = TextureFormat::Rgba32Float;
 /// And how it faces.
 pub(super) const NORMALS: TextureFormat = TextureFormat::Rgba16Float;
-/// Openness to the sky.
-pub(super) const OPENNESS: TextureFormat = TextureFormat::R8Unorm;
+/// Ambient occlusion (1 where all of the sky is seen).
+pub(super) const AMBIENT_OCCLUSION: TextureFormat = TextureFormat::R8Unorm;
 /// Depth.
 pub(super) const DEPTH: TextureFormat = TextureFormat::Depth32Float;
 
@@ -29,7 +29,7 @@ pub(super) struct Pipelines {
     pub(super) frame: BindGroupLayout,
     /// A sheet's textures.
     pub(super) sheet: BindGroupLayout,
-    /// Shadow maps, openness, sky.
+    /// Shadow maps, ambient occlusion, sky.
     pub(super) around: BindGroupLayout,
     /// The matrix of a shadow map.
     pub(super) caster: BindGroupLayout,
@@ -123,7 +123,7 @@ impl Pipelines {
         let occlude = pass(&Pass {
             vertex: "screen",
             fragment: "occlude",
-            targets: &[OPENNESS],
+            targets: &[AMBIENT_OCCLUSION],
             depth: None,
             ..Pass::of(&occlusion, &[Some(&frame), Some(&surface)])
         });

@@ -31,7 +31,7 @@ const PI = 3.14159265359;
 
 @group(1) @binding(0) var reflected: texture_2d<f32>;
 @group(1) @binding(1) var transmitted: texture_2d<f32>;
-// Normal x and y, openness, film.
+// Normal x and y, ambient occlusion, film.
 @group(1) @binding(2) var relief: texture_2d<f32>;
 @group(1) @binding(3) var mask: texture_2d<f32>;
 @group(1) @binding(4) var smooth_sampler: sampler;

@@ -33,7 +33,7 @@ pub(super) struct Sheet {
     pub(super) reflected: TextureView,
     /// Transmittance, likewise.
     pub(super) transmitted: TextureView,
-    /// Normal's x and y, openness, film of water.
+    /// Normal's x and y, ambient occlusion, film of water.
     pub(super) relief: TextureView,
     /// Opacity.
     pub(super) mask: TextureView,

@@ -36,7 +36,7 @@ pub struct Maps {
     pub height: Height,
     /// Slopes.
     pub normal: NormalMap,
-    /// Openness to the sky.
+    /// Ambient occlusion (1 where all of the sky is seen).
     pub occlusion: AmbientOcclusion,
 }
 
@@ -164,7 +164,7 @@ impl AmbientOcclusion {
         Self { pyramid: build(Plane { width, height: rows, values: open }), wrap: height.wrap() }
     }
 
-    /// Openness at `uv`, bilinear on the level nearest to `lod`.
+    /// Ambient occlusion at `uv`, bilinear on the level nearest to `lod`.
     #[inline]
     pub fn sample(&self, uv: Vec2, lod: f32) -> f32 {
         self.pyramid.taps(uv, lod, self.wrap).iter().map(|(v, weight)| v[0] * weight).sum()

@@ -20,8 +20,6 @@ pub mod baseline;
 pub mod classes;
 pub mod data;
 pub mod deploy;
-#[cfg(feature = "train")]
-pub mod engine;
 pub mod figure;
 pub mod fit;
 pub mod measure;
@@ -31,4 +29,6 @@ pub mod run;
 #[cfg(feature = "train")]
 pub mod session;
 pub mod table;
+#[cfg(feature = "train")]
+pub mod torch;
 pub mod weights;

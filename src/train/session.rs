@@ -1,13 +1,13 @@
 //! Training, calibration and evaluation, from files to files.
 
 use super::data::{Pick, Selection, Store, augment};
-use super::engine::{Model, Precision, Where, device};
 use super::fit::calibrate::calibrate;
 use super::fit::checkpoint::Checkpoint;
 use super::fit::{self, Callbacks, Data, Plan};
 use super::measure::{Evaluation, Prediction, Report};
 use super::net::{Parameter, parameters};
 use super::run::{self, Identity, ModelCard, Results, TrainedModel};
+use super::torch::{Model, Precision, Where, device};
 use super::weights;
 use crate::dataset::split::Split;
 use crate::output::remove_unfinished;

@@ -55,7 +55,7 @@ class _Coat:
         return (1 - mi.fresnel(dr.abs(cos), self.ior)[0]) / self.norm
 
 
-class _Veil:
+class _SurfaceLayer:
     """A thin layer of white bodies: single scattering (Chandrasekhar 1960), the half scattered onwards counted as let through."""
 
     def __init__(self, depth, scale):
@@ -186,7 +186,7 @@ class Soil(_Surface):
 
 
 class Leaf(_Surface):
-    """A sheet that reflects and transmits evenly, each side under a coat and a veil of hairs and bloom."""
+    """A sheet that reflects and transmits evenly, each side under a coat and a layer of hairs and bloom."""
 
     TRANSMITS = True
 
@@ -197,24 +197,24 @@ class Leaf(_Surface):
             coat = None
             if props.has_property(side + "_ior"):
                 coat = _Coat(props[side + "_alpha_u"], props[side + "_alpha_v"], props[side + "_ior"])
-            veil = None
-            if props.has_property(side + "_veil"):
-                veil = _Veil(_texture(props, side + "_veil"), props[side + "_veil_scale"])
-            self.sides.append((coat, veil, _texture(props, side), props[side + "_scale"]))
+            layer = None
+            if props.has_property(side + "_layer"):
+                layer = _SurfaceLayer(_texture(props, side + "_layer"), props[side + "_layer_scale"])
+            self.sides.append((coat, layer, _texture(props, side), props[side + "_scale"]))
         self.transmittance, self.scale = _texture(props, "through"), props["through_scale"]
 
     def value(self, si, a, b, active):
         let = lambda coat, cos: mi.Float(1) if coat is None else coat.through(cos)
-        seen = lambda veil, cos: mi.Color3f(1) if veil is None else veil.through(si, cos, active)
+        seen = lambda layer, cos: mi.Color3f(1) if layer is None else layer.through(si, cos, active)
         lambert = dr.abs(b.z) * dr.inv_pi
         above = a.z > 0
         values = []
-        for (coat, veil, paint, scale), flip in zip(self.sides, (1, -1)):
+        for (coat, layer, paint, scale), flip in zip(self.sides, (1, -1)):
             value = paint.eval(si, active) * (scale * lambert * let(coat, a.z) * let(coat, b.z))
             if coat is not None:
                 value += coat.eval(mi.Vector3f(a.x, a.y, flip * a.z), mi.Vector3f(b.x, b.y, flip * b.z))
-            if veil is not None:
-                value = value * seen(veil, a.z) * seen(veil, b.z) + veil.eval(si, a, b, active)
+            if layer is not None:
+                value = value * seen(layer, a.z) * seen(layer, b.z) + layer.eval(si, a, b, active)
             values.append(value)
         through = self.transmittance.eval(si, active) * (
             self.scale * lambert * let(self.sides[0][0], dr.select(above, a.z, b.z)) * let(self.sides[1][0], dr.select(above, b.z, a.z))

@@ -4,7 +4,7 @@
 //! texel of the one level that its pictures are read on, see [`super::level`].
 
 use crate::bsdf::microfacet::Ggx;
-use crate::bsdf::{Bsdf, Veil};
+use crate::bsdf::{Bsdf, SurfaceLayer};
 use crate::geometry::{Hit, Interaction, Mesh};
 use crate::material::{Material, Varies};
 use crate::math::{Spectrum, Vec2, Vec3, vec2};
@@ -24,7 +24,7 @@ pub(super) enum Kind {
         /// The coats.
         coats: [Option<Ggx>; 2],
         /// Hairs and bloom.
-        veils: [Option<Veil>; 2],
+        layers: [Option<SurfaceLayer>; 2],
     },
 }
 
@@ -68,7 +68,7 @@ impl Look {
                 texels.push(texel);
             }
         }
-        let kind = kind.unwrap_or(Kind::Sheet { coats: [None; 2], veils: [None; 2] });
+        let kind = kind.unwrap_or(Kind::Sheet { coats: [None; 2], layers: [None; 2] });
         Self { kind, width, height, texels }
     }
 
@@ -84,8 +84,8 @@ impl Kind {
     fn and(self, other: Self) -> Self {
         match (self, other) {
             (Self::Soil { shape, film: None }, Self::Soil { film, .. }) => Self::Soil { shape, film },
-            (Self::Sheet { coats: [a, b], veils: [v, w] }, Self::Sheet { coats: [c, d], veils: [x, y] }) => {
-                Self::Sheet { coats: [a.or(c), b.or(d)], veils: [v.or(x), w.or(y)] }
+            (Self::Sheet { coats: [a, b], layers: [v, w] }, Self::Sheet { coats: [c, d], layers: [x, y] }) => {
+                Self::Sheet { coats: [a.or(c), b.or(d)], layers: [v.or(x), w.or(y)] }
             }
             (known, _) => known,
         }
@@ -126,7 +126,7 @@ fn at(material: &Material, patch: &Mesh, uv: Vec2) -> (Kind, Texel) {
             let [upper, lower] = b.both_sides();
             let reflect = [upper.diffuse(), lower.diffuse()];
             let texel = Texel { reflect, transmit: b.transmittance(), film: 0.0, normal: frame.z };
-            let kind = Kind::Sheet { coats: [upper.coat(), lower.coat()], veils: [upper.veil(), lower.veil()] };
+            let kind = Kind::Sheet { coats: [upper.coat(), lower.coat()], layers: [upper.layer(), lower.layer()] };
             (kind, texel)
         }
     }

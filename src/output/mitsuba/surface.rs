@@ -30,7 +30,7 @@ const THROUGH: f32 = 0.4;
 /// Weight of a coat within a side's reflection.
 const COAT: f32 = 0.2;
 /// Optical depth of hairs and bloom over what is written for it: colours above 1 are refused.
-const VEIL: f32 = 16.0;
+const DEEPEST_LAYER: f32 = 16.0;
 /// Weight of a film of water over soil.
 const FILM: f32 = 0.1;
 
@@ -154,8 +154,8 @@ impl Surface {
                     warn("the film of water is about equal");
                 }
             }
-            Kind::Sheet { coats, veils } => {
-                if veils.iter().flatten().count() > 0 {
+            Kind::Sheet { coats, layers } => {
+                if layers.iter().flatten().count() > 0 {
                     warn("hairs and bloom are left out");
                 }
                 if coats.iter().flatten().count() > 0 {
@@ -243,7 +243,7 @@ impl Surface {
                     _ => soil,
                 }
             }
-            Kind::Sheet { coats, veils } => {
+            Kind::Sheet { coats, layers } => {
                 let mut leaf = Element::plugin("bsdf", "furrow_leaf");
                 for (i, side) in ["upper", "lower"].into_iter().enumerate() {
                     if let Some(coat) = coats[i] {
@@ -252,9 +252,9 @@ impl Surface {
                             .float(&format!("{side}_alpha_v"), coat.alpha[1])
                             .float(&format!("{side}_ior"), coat.ior);
                     }
-                    if let Some(veil) = veils[i] {
-                        let depth = band.rgb(&format!("{side}_veil"), veil.depth() / VEIL);
-                        leaf = leaf.float(&format!("{side}_veil_scale"), VEIL).inside([depth]);
+                    if let Some(layer) = layers[i] {
+                        let depth = band.rgb(&format!("{side}_layer"), layer.depth() / DEEPEST_LAYER);
+                        leaf = leaf.float(&format!("{side}_layer_scale"), DEEPEST_LAYER).inside([depth]);
                     }
                     leaf = leaf.float(&format!("{side}_scale"), 1.0 / self.factor[i]).inside([paint(
                         side,

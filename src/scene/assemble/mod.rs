@@ -2,6 +2,7 @@
 
 mod builder;
 mod census;
+mod condition;
 mod field;
 mod ground;
 mod identity;
@@ -11,7 +12,6 @@ mod lighting;
 mod models;
 mod season;
 mod view;
-mod wear;
 
 use super::desc::{FieldDesc, Growth, SpeciesDesc};
 pub use super::growing::Growing;
@@ -33,6 +33,7 @@ use crate::soil::Rect;
 use crate::{Error, Result};
 use builder::{Builder, Floor, Grown};
 use census::{Census, Population};
+use condition::{Ailing, Bare};
 pub use field::Field;
 use ground::{BakedGrounds, Earth};
 use individual::Individual;
@@ -43,7 +44,6 @@ pub use season::Season;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use view::View;
-use wear::{Ailing, Bare};
 
 /// What the command line adds to a page.
 #[derive(Clone, Copy, Debug, Default)]

@@ -6,9 +6,9 @@
 use super::pictures::{PREDICTION, Picture, Prediction, files};
 use super::{enlarge, overlay};
 use crate::output::{self, Picture as Png};
-use crate::train::engine::{Model, device};
 use crate::train::run::{ModelCard, TrainedModel};
 use crate::train::session::Machine;
+use crate::train::torch::{Model, device};
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -6,7 +6,7 @@
 
 use crate::dataset::sample::IGNORE;
 use crate::train::data::{Normalization, Store, augment};
-use crate::train::engine::Model;
+use crate::train::torch::Model;
 use crate::train::weights::Array;
 use crate::{Error, Result};
 

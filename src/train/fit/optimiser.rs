@@ -2,7 +2,7 @@
 
 use super::hyper::OptimiserKind;
 use crate::Result;
-use crate::train::engine::{Model, laid, values};
+use crate::train::torch::{Model, laid, values};
 use crate::train::weights::Array;
 use std::collections::BTreeMap;
 use tch::Tensor;

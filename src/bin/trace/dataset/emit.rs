@@ -14,7 +14,7 @@ pub(crate) struct Args {
     dir: PathBuf,
     /// Who starts the shards.
     #[arg(long, value_enum)]
-    engine: Engine,
+    scheduler: SchedulerName,
     /// Into how many parts the dataset is cut; each should last minutes to hours.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
     shards: u64,
@@ -48,7 +48,7 @@ pub(crate) struct Args {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum Engine {
+enum SchedulerName {
     /// An array job, and one that follows it.
     Slurm,
     /// An indexed job, and one that follows it.
@@ -66,10 +66,12 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
         Some(program) => program.clone(),
         None => std::env::current_exe().map_err(Error::io("trace".as_ref()))?,
     };
-    let scheduler = match args.engine {
-        Engine::Slurm => Scheduler::Slurm,
-        Engine::Kubernetes => Scheduler::Kubernetes(Pod { image: args.image.clone(), claim: args.claim.clone() }),
-        Engine::Parallel => Scheduler::Parallel,
+    let scheduler = match args.scheduler {
+        SchedulerName::Slurm => Scheduler::Slurm,
+        SchedulerName::Kubernetes => {
+            Scheduler::Kubernetes(Pod { image: args.image.clone(), claim: args.claim.clone() })
+        }
+        SchedulerName::Parallel => Scheduler::Parallel,
     };
     let job = Job {
         scheduler,

@@ -2,7 +2,7 @@
 
 use super::builder::Grown;
 use crate::geometry::Mesh;
-use crate::material::Wear;
+use crate::material::ConditionOptics;
 use crate::math::{Spectrum, Vec2};
 use crate::optics::Pigments;
 use crate::plant::condition::{Bearer, Marks, leaf_stream};
@@ -88,7 +88,7 @@ impl<'a> Ailing<'a> {
             one.own = wears || green != 1.0;
             if wears {
                 let of = (bare.pigments, bare.choice.tones(bare.pigments));
-                one.material = own.worn(Wear::new(of, marks, self.drawn.reddening, self.soil), gloss);
+                one.material = own.worn(ConditionOptics::new(of, marks, self.drawn.reddening, self.soil), gloss);
             }
             dressed.push(one);
         }

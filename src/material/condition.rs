@@ -125,7 +125,7 @@ pub(super) struct Worn {
 
 /// The condition of one leaf, ready to shade. Cloning shares it.
 #[derive(Clone, Debug)]
-pub struct Wear(Arc<Inner>);
+pub struct ConditionOptics(Arc<Inner>);
 
 #[derive(Debug)]
 struct Inner {
@@ -137,7 +137,7 @@ struct Inner {
     soil: Spectrum,
 }
 
-impl Wear {
+impl ConditionOptics {
     /// Of a leaf made of `pigments`, with its tissues: its marks, none for a stalk; anthocyanin beyond the page's, µg/cm²; reflectance of the
     /// soil that lies on it.
     pub fn new(
@@ -240,7 +240,7 @@ mod tests {
         (nir - r) / (nir + r)
     }
 
-    fn wear(condition: &Condition, seed: u64) -> Wear {
+    fn optics(condition: &Condition, seed: u64) -> ConditionOptics {
         let bearer = Bearer {
             age: 1.0,
             cotyledon: false,
@@ -253,14 +253,14 @@ mod tests {
         let stream = Stream::of(seed, 0, Purpose::Test, 0);
         let marks = Marks::draw(&ConditionDesc::flawless(), condition, &bearer, &stream);
         let pigments = Pigments::default();
-        Wear::new((&pigments, Arc::new(Tones::new(&pigments))), Some(marks), condition.reddening, LOESS)
+        ConditionOptics::new((&pigments, Arc::new(Tones::new(&pigments))), Some(marks), condition.reddening, LOESS)
     }
 
     fn mean_ndvi(condition: &Condition) -> f32 {
-        let wear = wear(condition, 4);
+        let of = optics(condition, 4);
         let leaf = LeafOptics::new(&Pigments::default()).plain();
         let at = |i: usize| vec2((i % 40) as f32 / 40.0, (i / 40) as f32 / 40.0);
-        (0..1600).map(|i| ndvi(wear.at(leaf, at(i), None).upper)).sum::<f32>() / 1600.0
+        (0..1600).map(|i| ndvi(of.at(leaf, at(i), None).upper)).sum::<f32>() / 1600.0
     }
 
     /// Expected: measured leaves: green 0.7–0.9, chlorotic 0.3–0.7, necrotic 0.1–0.3.
@@ -308,7 +308,7 @@ mod tests {
             let condition =
                 Condition { chlorosis, spots, dust, splash, reddening, scorched: 1.0, scorch: 0.1, ..Condition::default() };
             let leaf = LeafOptics::new(&Pigments::default()).at(rgb);
-            let worn = wear(&condition, seed).at(leaf, vec2(u, v), None);
+            let worn = optics(&condition, seed).at(leaf, vec2(u, v), None);
             for side in [worn.tissue, worn.upper] {
                 let sum = (side.reflectance + side.transmittance).max();
                 prop_assert!(sum <= 0.9901 && side.reflectance.is_finite(), "{side:?}");

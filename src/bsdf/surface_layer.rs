@@ -1,4 +1,4 @@
-//! Hairs and crystals of wax that stand on a leaf: what makes it velvety, mealy or blue.
+//! The layer of trichomes (hairs) and epicuticular wax on a leaf: what makes it velvety, mealy or blue.
 //!
 //! A thin layer of bodies that absorb nothing and scatter alike to all sides, of optical depth τ. What it sends back is single
 //! scattering, `f = (1 − e^{−τ(1/μi + 1/μo)}) / 4π(μi + μo)` (Chandrasekhar 1960, *Radiative Transfer*; as a skin on things:
@@ -16,12 +16,12 @@ const BLOOM: Spectrum = Spectrum::new(0.92, 1.0, 1.2, 0.65);
 
 /// The layer on one side.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Veil {
+pub struct SurfaceLayer {
     /// Optical depth along the normal.
     depth: Spectrum,
 }
 
-impl Veil {
+impl SurfaceLayer {
     /// From the share of the light from straight above that meets a hair, and a crystal of wax at 550 nm: 0 to 1. `None` where
     /// both are nothing.
     pub fn new(hairs: f32, bloom: f32) -> Option<Self> {
@@ -40,7 +40,7 @@ impl Veil {
         self.depth.map(|depth| (-0.5 * depth / cos).exp())
     }
 
-    /// The layer's own BRDF between directions whose [`Veil::through`] is known.
+    /// The layer's own BRDF between directions whose [`SurfaceLayer::through`] is known.
     #[inline]
     pub(super) fn reflect(cos: [f32; 2], through: [Spectrum; 2]) -> Spectrum {
         let both = through[0] * through[1];
