@@ -61,6 +61,8 @@ const ALLOWED: &[(&str, &str)] = &[
     ("bytemuck", "raster/"),
     // Command lines; hyper-parameters are read from flags and from files alike.
     ("clap", "bin/ train/fit/settings.rs"),
+    // Tables: measured spectra in; boxes of plants and numbers of reports out.
+    ("csv", "optics/prospect.rs dataset/format/cropandweed.rs report/csv.rs"),
     ("embree3", "accel/embree.rs"),
     // Layers out, pictures of light in.
     ("exr", "output/exr/mod.rs texture/panorama.rs"),
@@ -84,6 +86,8 @@ const ALLOWED: &[(&str, &str)] = &[
     ("pollster", "raster/gpu.rs"),
     // ONNX files.
     ("prost", "train/deploy/onnx/"),
+    // Documents of Mitsuba.
+    ("quick_xml", "output/mitsuba/xml.rs"),
     ("rand", "sampling/rng.rs"),
     ("rand_pcg", "sampling/rng.rs"),
     // Parallel at the top only.
@@ -123,7 +127,7 @@ const ALLOWED: &[(&str, &str)] = &[
 ];
 
 /// Dependencies that no source names: libtorch's place is told to the build script of whoever depends on it directly.
-const UNNAMED: &[&str] = &["thiserror", "torch_sys"];
+const UNNAMED: &[&str] = &["torch_sys"];
 
 /// A source file without its comments, strings and tests.
 struct Source {

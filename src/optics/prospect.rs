@@ -45,15 +45,11 @@ struct Row {
 }
 
 static TABLE: LazyLock<Vec<Row>> = LazyLock::new(|| {
-    include_str!("prospect_d.csv")
-        .lines()
-        .filter(|line| line.starts_with(|c: char| c.is_ascii_digit()))
-        .map(|line| {
-            let mut number = line.split(',').map(|cell| cell.parse::<f64>().expect("the embedded table is numbers"));
-            let mut next = || number.next().expect("the embedded table has eight columns");
-            let _wavelength = next();
-            let n = next();
-            let k = std::array::from_fn(|_| next());
+    let mut table = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(&include_bytes!("prospect_d.csv")[..]);
+    table
+        .deserialize::<[f64; 8]>()
+        .map(|row| {
+            let [_wavelength, n, k @ ..] = row.expect("the embedded table is eight columns of numbers");
             let cone = |degrees: f64| transmissivity(degrees.to_radians(), n);
             Row { n, k, t40: cone(40.0), t90: cone(90.0) }
         })

@@ -1,5 +1,7 @@
 //! Comma-separated values: a row of heads, then rows of text, quoted where they must be. Source: RFC 4180.
 
+use csv::{Terminator, WriterBuilder};
+
 /// How lines end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lines {
@@ -10,16 +12,21 @@ pub enum Lines {
 }
 
 /// The text of a table with one field for each head in every row.
+///
+/// # Panics
+///
+/// If a row has more or fewer fields than there are heads.
 pub fn csv<S: AsRef<str>>(heads: &[S], rows: impl IntoIterator<Item = Vec<String>>, lines: Lines) -> String {
-    let end = if lines == Lines::Lf { "\n" } else { "\r\n" };
-    let line = |fields: Vec<String>| fields.join(",") + end;
-    let head = line(heads.iter().map(|head| field(head.as_ref())).collect());
-    rows.into_iter().fold(head, |out, row| out + &line(row.iter().map(|text| field(text)).collect()))
-}
-
-/// A field, in quotes where it must be.
-fn field(text: &str) -> String {
-    if text.contains([',', '"', '\r', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+    let terminator = match lines {
+        Lines::Lf => Terminator::Any(b'\n'),
+        Lines::CrLf => Terminator::CRLF,
+    };
+    let mut out = WriterBuilder::new().terminator(terminator).from_writer(Vec::new());
+    out.write_record(heads.iter().map(|head| head.as_ref().as_bytes())).expect("memory takes every row");
+    for row in rows {
+        out.write_record(&row).expect("as many fields as heads");
+    }
+    String::from_utf8(out.into_inner().expect("memory takes every row")).expect("fields are text")
 }
 
 #[cfg(test)]

@@ -29,7 +29,6 @@ use crate::output::{self, Picture};
 use crate::{Error, Result};
 use serde_json::json;
 use std::collections::BTreeMap;
-use std::fmt::Write;
 
 pub(super) struct Writer;
 
@@ -78,22 +77,25 @@ impl Format for Writer {
         let labels = Labels::of(recipe)?;
         let (width, height) = sample.size();
         let jpeg = output::encode_jpeg(width, height, &sample.rgb, QUALITY)?;
-        let mut rows = String::new();
+        let mut rows = csv::WriterBuilder::new().has_headers(false).from_writer(Vec::new());
         let mut of_plant = BTreeMap::new();
         for plant in record.seen() {
             let label = labels.of_plant(plant);
             of_plant.insert(plant.number, label);
-            rows.push_str(&row(plant, label));
+            if let Some(row) = row(plant, label) {
+                rows.serialize(row).map_err(|e| failed(&e))?;
+            }
         }
+        let mut rows = rows.into_inner().map_err(|e| failed(&e))?;
         if rows.is_empty() {
-            rows.push('\n');
+            rows.push(b'\n');
         }
         let map: Vec<u8> = sample.plants.iter().map(|plant| of_plant.get(plant).copied().unwrap_or(0)).collect();
         Ok(vec![
             File { path: format!("{FOLDER}/images/{name}.jpg"), bytes: jpeg },
-            File { path: format!("{FOLDER}/bboxes/CropAndWeed/{name}.csv"), bytes: rows.into_bytes() },
+            File { path: format!("{FOLDER}/bboxes/CropAndWeed/{name}.csv"), bytes: rows },
             picture::file(sample, format!("{FOLDER}/labelIds/CropAndWeed/{name}.png"), &Picture::Gray(&map))?,
-            File { path: format!("{FOLDER}/params/{name}.csv"), bytes: Params::of(record).text().into_bytes() },
+            File { path: format!("{FOLDER}/params/{name}.csv"), bytes: Params::of(record).csv()? },
         ])
     }
 
@@ -124,14 +126,15 @@ fn name(index: u64) -> String {
     format!("ave-{:04}-{:04}", index / SESSION, index % SESSION)
 }
 
-fn row(plant: &Plant, label: u8) -> String {
-    let mut text = String::new();
-    if let Some(bounds) = plant.seen.bounds {
-        let [x, y, w, h] = bounds.0;
-        let (stem_x, stem_y) = plant.stem.map_or((-1, -1), |p| (p.x.floor() as i64, p.y.floor() as i64));
-        let _ = writeln!(text, "{x},{y},{},{},{label},{stem_x},{stem_y}", x + w, y + h);
-    }
-    text
+/// Left, top, right, bottom, label, stem across and down (−1 without a stem) of a plant; `None` where nothing of it is seen.
+fn row(plant: &Plant, label: u8) -> Option<[i64; 7]> {
+    let [x, y, w, h] = plant.seen.bounds?.0.map(i64::from);
+    let (stem_x, stem_y) = plant.stem.map_or((-1, -1), |p| (p.x.floor() as i64, p.y.floor() as i64));
+    Some([x, y, x + w, y + h, i64::from(label), stem_x, stem_y])
+}
+
+fn failed(e: &dyn std::fmt::Display) -> Error {
+    Error::failed(format!("cannot write a table of CropAndWeed: {e}"))
 }
 
 /// The label of each species of a recipe, by its number less one.
@@ -203,10 +206,11 @@ impl Params {
     }
 
     /// A head and a row.
-    fn text(&self) -> String {
-        let heads = self.0.map(|(name, _)| name).join(",");
-        let values = self.0.map(|(_, value)| value.map_or(String::new(), |v| v.to_string())).join(",");
-        format!("{heads}\n{values}\n")
+    fn csv(&self) -> Result<Vec<u8>> {
+        let mut rows = csv::Writer::from_writer(Vec::new());
+        rows.serialize(self.0.map(|(name, _)| name)).map_err(|e| failed(&e))?;
+        rows.serialize(self.0.map(|(_, value)| value)).map_err(|e| failed(&e))?;
+        rows.into_inner().map_err(|e| failed(&e))
     }
 }
 

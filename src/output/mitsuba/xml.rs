@@ -1,6 +1,10 @@
 //! Elements of an XML document, written with indents and escapes.
 
-use std::fmt::Write;
+use quick_xml::Writer;
+use quick_xml::events::{BytesDecl, BytesStart, BytesText, Event};
+
+/// Spaces that each level is indented by.
+const INDENT: usize = 4;
 
 /// An element with its attributes and what stands in it.
 #[derive(Clone, Debug)]
@@ -81,39 +85,32 @@ impl Element {
 
     /// The document.
     pub(super) fn document(&self) -> String {
-        let mut out = String::from("<?xml version=\"1.0\" encoding=\"utf-8\"?>\n");
-        self.write(&mut out, 0);
-        out
+        let mut out = Writer::new_with_indent(Vec::new(), b' ', INDENT);
+        let declaration = Event::Decl(BytesDecl::new("1.0", Some("utf-8"), None));
+        out.write_event(declaration).and_then(|()| self.write(&mut out, 0)).expect("memory takes every event");
+        String::from_utf8(out.into_inner()).expect("tags, names and values are text") + "\n"
     }
 
-    fn write(&self, out: &mut String, depth: usize) {
-        let indent = "    ".repeat(depth);
-        let _ = write!(out, "{indent}<{}", self.tag);
-        for (name, value) in &self.attributes {
-            let _ = write!(out, " {name}=\"{}\"", escape(value));
-        }
+    fn write(&self, out: &mut Writer<Vec<u8>>, depth: usize) -> std::io::Result<()> {
+        let attributes = self.attributes.iter().map(|(name, value)| (*name, value.as_str()));
+        let start = BytesStart::new(self.tag).with_attributes(attributes);
         if self.children.is_empty() {
-            out.push_str("/>\n");
-            return;
+            return out.write_event(Event::Empty(start));
         }
-        out.push_str(">\n");
+        let end = start.to_end().into_owned();
+        out.write_event(Event::Start(start))?;
         for child in &self.children {
             match child {
-                Node::Element(e) => e.write(out, depth + 1),
+                Node::Element(e) => e.write(out, depth + 1)?,
                 Node::Comment(text) => {
-                    let inner = "    ".repeat(depth + 1);
-                    let text = text.lines().collect::<Vec<_>>().join(&format!("\n{inner}     "));
-                    let _ = writeln!(out, "{inner}<!-- {text} -->");
+                    let indent = " ".repeat(INDENT * (depth + 1));
+                    let text = text.lines().collect::<Vec<_>>().join(&format!("\n{indent}     "));
+                    out.write_event(Event::Comment(BytesText::from_escaped(format!(" {text} "))))?;
                 }
             }
         }
-        let _ = writeln!(out, "{indent}</{}>", self.tag);
+        out.write_event(Event::End(end))
     }
-}
-
-/// Text as an attribute's value holds it.
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]
