@@ -60,3 +60,13 @@ fn the_example_of_a_dataset_makes_a_whole_one() {
     let output = trace(&["dataset", "verify", dataset.to_str().expect("text")]).output().expect("the program");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
+
+#[cfg(feature = "train")]
+#[test]
+fn the_example_of_a_training_leaves_a_trained_model() {
+    let (_keep, folder) = run("dataset", &[SMALL, "10", "1", "40"]);
+    let dataset = folder.join("out/example-dataset");
+    let (_other, run_folder) = run("train", &[dataset.to_str().expect("text"), "run", "2"]);
+    let card = fs::read_to_string(run_folder.join("run/model.json")).expect("a model card");
+    assert!(card.contains("basic-segnet"), "{card}");
+}

@@ -29,36 +29,59 @@
 //! | `import` | other people's images and labels |
 //! | `report` | all of it on one page, for people |
 
+#[doc(hidden)]
 pub mod annotate;
+#[doc(hidden)]
 pub mod checksum;
+#[doc(hidden)]
 pub mod checksum_record;
+#[doc(hidden)]
 pub mod cluster;
+#[doc(hidden)]
 pub mod finish;
+#[doc(hidden)]
 pub mod format;
 mod gather;
+#[doc(hidden)]
 pub mod generate;
+#[doc(hidden)]
 pub mod import;
+#[doc(hidden)]
 pub mod invariants;
 mod make;
+#[doc(hidden)]
 pub mod native;
+#[doc(hidden)]
 pub mod plan;
+#[doc(hidden)]
 pub mod recipe;
 pub mod record;
+#[doc(hidden)]
 pub mod render;
+#[doc(hidden)]
 pub mod report;
+#[doc(hidden)]
 pub mod rle;
+#[doc(hidden)]
 pub mod sample;
+#[doc(hidden)]
 pub mod set;
+#[doc(hidden)]
 pub mod split;
+#[doc(hidden)]
 pub mod timing_log;
+#[doc(hidden)]
 pub mod verify;
 
+pub use generate::{Callbacks, Shard, Work};
 pub use make::{begin, make, make_watched};
 pub use plan::Order;
 pub use recipe::Recipe;
 pub use record::Record;
 pub use sample::Sample;
 pub use set::Set;
+pub use split::{Shares, Split};
+pub use verify::{Findings, verify};
 
 /// A file of a dataset.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -19,13 +19,13 @@ pub struct GroundMaps {
     pub origin: Vec2,
     /// Side of a texel, metres.
     pub texel_m: f32,
-    /// Linear reflectance R, G, B of the dry soil, each stored as 255·√reflectance; see [`Skin::decode`].
+    /// Linear reflectance R, G, B of the dry soil, each stored as 255·√reflectance; see [`GroundMaps::decode`].
     pub albedo: Vec<[u8; 3]>,
     /// Weight of each layer times 255.
     pub weights: Vec<[u8; MAX_LAYERS]>,
     /// 0 air-dry, 255 saturated.
     pub moisture: Vec<u8>,
-    /// Slope ∂z/∂x, ∂z/∂y to be added to that of the mesh's shading normal, times [`Skin::SLOPE_STEPS`].
+    /// Slope ∂z/∂x, ∂z/∂y to be added to that of the mesh's shading normal, times [`GroundMaps::SLOPE_STEPS`].
     pub slope: Vec<[i8; 2]>,
     /// Share of the sky that the relief finer than the mesh leaves open, times 255.
     pub ao: Vec<u8>,
@@ -34,7 +34,7 @@ pub struct GroundMaps {
 }
 
 impl GroundMaps {
-    /// Steps of [`Skin::slope`] to a slope of 1.
+    /// Steps of [`GroundMaps::slope`] to a slope of 1.
     pub const SLOPE_STEPS: f32 = 60.0;
 
     /// Reflectance from a stored albedo.

@@ -28,6 +28,13 @@ pub struct Machine {
     pub memory: u64,
 }
 
+impl Default for Machine {
+    /// The CPU, one loader, 4 GiB of cache.
+    fn default() -> Self {
+        Self { device: "cpu".into(), loaders: 1, memory: 4 << 30 }
+    }
+}
+
 impl Machine {
     /// The device and the precision of a plan on it.
     pub fn place(&self, precision: &str) -> Result<Where> {

@@ -38,6 +38,14 @@ pub struct Callbacks<'a> {
     pub stop: &'a AtomicBool,
 }
 
+impl Default for Callbacks<'_> {
+    /// None, and never stopped.
+    fn default() -> Self {
+        static NEVER: AtomicBool = AtomicBool::new(false);
+        Self { step: &|_, _| {}, validation: &|_, _| {}, stop: &NEVER }
+    }
+}
+
 /// What a training results in.
 pub struct Outcome {
     /// The weights at the best validation pass, or the last where there was none.

@@ -1,7 +1,7 @@
 //! An experiment from one file to the paper's tables.
 //!
 //! An experiment file ([`ExperimentDesc`]) names networks, seeds, datasets, training sets and test sets. Every network (and every
-//! baseline) with every training set and every seed is a row ([`Row`]); [`run`] makes the datasets, trains the rows, evaluates them on
+//! baseline) with every training set and every seed is a row; [`run`] makes the datasets, trains the rows, evaluates them on
 //! every test set, and [`tables`] prints what is there.
 //!
 //! ```text
@@ -54,12 +54,20 @@ mod variants;
 mod work;
 
 pub use desc::{ExperimentDesc, Named, PartDesc, ScaleDesc, SetDesc, TestDesc, TrainDesc};
+#[doc(hidden)]
 pub use evaluation::StoredEvaluation;
+#[doc(hidden)]
 pub use experiment::{Experiment, Part, Source, TestSet, TrainSet};
+#[doc(hidden)]
 pub use names::slug;
+#[doc(hidden)]
 pub use print::{RUNS, TIMES, Tables, listing, tables};
+#[doc(hidden)]
 pub use renamed::renamed;
+#[doc(hidden)]
 pub use rows::{Learner, Row, rows};
+#[doc(hidden)]
 pub use sets::{Bound, Real};
+#[doc(hidden)]
 pub use variants::variants;
 pub use work::{Callbacks, Only, Order, PAGE, Predictor, State, run};
