@@ -91,7 +91,7 @@ const ALLOWED: &[(&str, &str)] = &[
     ("rand", "sampling/rng.rs"),
     ("rand_pcg", "sampling/rng.rs"),
     // Parallel at the top only.
-    // Images, plants, the soil's skin and the sensor's pixels: loops over what is many.
+    // Images, plants, the soil's maps and the sensor's pixels: loops over what is many.
     (
         "rayon",
         "render/ sensor/ job/threads.rs dataset/ compare/ scene/assemble/mod.rs soil/bake.rs material/ground.rs raster/sheets.rs",

@@ -340,12 +340,12 @@ fn absolute_paths_are_taken_into_the_dataset() {
     fs::create_dir_all(texture.parent().unwrap()).unwrap();
     fs::copy(from.join("earth.png"), &texture).unwrap();
     // The species lies elsewhere and names its picture by a relative path; the soil's picture is named by an absolute one.
-    let skin = "\"stalk\": Leaf(";
+    let stalk = "\"stalk\": Leaf(";
     let grass = fs::read_to_string(from.join("grass.ron")).unwrap();
-    assert!(grass.contains(skin));
+    assert!(grass.contains(stalk));
     write(
         &there.join("species/grass.ron"),
-        grass.replace(skin, &format!("{skin}texture: \"../textures/earth.png\", ")),
+        grass.replace(stalk, &format!("{stalk}texture: \"../textures/earth.png\", ")),
     );
     write(&here.join("species/beet.ron"), fs::read_to_string(from.join("beet.ron")).unwrap());
     let scene = here.join("scenes/field.ron");

@@ -80,7 +80,12 @@ fn every_species_page_grows_at_every_stage() {
             assert!(!plant.organs.is_empty(), "{} BBCH {}", path.display(), stage.bbch);
             for organ in &plant.organs {
                 assert_eq!(organ.mesh.fault(), None, "{} BBCH {}", path.display(), stage.bbch);
-                assert!(desc.skins.contains_key(&organ.skin), "{}: no skin {}", path.display(), organ.skin);
+                assert!(
+                    desc.materials.contains_key(&organ.material),
+                    "{}: no material {}",
+                    path.display(),
+                    organ.material
+                );
             }
         }
         for texture in desc.textures() {

@@ -323,7 +323,7 @@ fn a_photograph_is_exposed_as_the_pigments_say() {
     let of = |calibrated: &str| {
         let species = format!(
             r#"Species(name: "photographed", eppo: "TEST", role: Weed, chlorophyll_sd: 0,
-                skins: {{
+                materials: {{
                     "leaf": Leaf(texture: "leaf.png", roughness: 0.4{calibrated}),
                     "stalk": Leaf(roughness: 0.4),
                 }},

@@ -1,4 +1,4 @@
-//! The ground and its clods: the baked skin of the soil, made moist, in four bands.
+//! The ground and its clods: the baked maps of the soil, made moist, in four bands.
 
 use super::feature::Feature;
 use super::shading::frame;
@@ -24,13 +24,13 @@ const DRY: f32 = 0.04;
 struct Texel {
     /// 255 · √reflectance of the moist soil, R, G, B, NIR.
     reflectance: [u8; 4],
-    /// Slope as the skin stores it.
+    /// Slope as the maps store it.
     slope: [i8; 2],
     /// 255 · share under a film of water.
     film: u8,
 }
 
-/// The skin of one ground, baked once: shading reads one texel and no noise.
+/// The maps of one ground, baked once: shading reads one texel and no noise.
 #[derive(Debug)]
 pub struct BakedGround {
     width: usize,
@@ -41,22 +41,22 @@ pub struct BakedGround {
 }
 
 impl BakedGround {
-    /// From the soil's skin: wetness darkens, NIR follows from red, pits that the mesh is too coarse for are darkened.
-    pub fn bake(skin: &GroundMaps) -> Self {
+    /// From the soil's maps: wetness darkens, NIR follows from red, pits that the mesh is too coarse for are darkened.
+    pub fn bake(maps: &GroundMaps) -> Self {
         let texel = |i: usize| {
-            let open = f32::from(skin.ao[i]) / 255.0;
-            let dry = four_bands(GroundMaps::decode(skin.albedo[i]), skin.like) * open;
-            let (moist, film) = wet(dry, f32::from(skin.moisture[i]) / 255.0);
+            let open = f32::from(maps.ao[i]) / 255.0;
+            let dry = four_bands(GroundMaps::decode(maps.albedo[i]), maps.like) * open;
+            let (moist, film) = wet(dry, f32::from(maps.moisture[i]) / 255.0);
             Texel {
                 reflectance: moist.to_array().map(|r| (r.max(0.0).sqrt() * 255.0 + 0.5) as u8),
-                slope: skin.slope[i],
+                slope: maps.slope[i],
                 film: (film * 255.0 + 0.5) as u8,
             }
         };
         Self {
-            width: skin.width,
-            height: skin.height,
-            texels: (0..skin.width * skin.height).into_par_iter().map(texel).collect(),
+            width: maps.width,
+            height: maps.height,
+            texels: (0..maps.width * maps.height).into_par_iter().map(texel).collect(),
             decode: std::array::from_fn(|i| (i as f32 / 255.0).powi(2)),
         }
     }
@@ -88,7 +88,7 @@ impl BakedGround {
 /// The ground itself, or clods of it.
 #[derive(Clone, Debug)]
 pub struct Ground {
-    skin: Arc<BakedGround>,
+    baked: Arc<BakedGround>,
     tint: Spectrum,
     relief: bool,
     /// Slope angle of the facets, radians; `None` for Lambert's soil, which no film of water makes glossy.
@@ -97,13 +97,13 @@ pub struct Ground {
 
 impl Ground {
     /// The ground: its fine relief tilts the shading normal.
-    pub fn new(skin: Arc<BakedGround>) -> Self {
-        Self { skin, tint: Spectrum::ONE, relief: true, facets: Some(SIGMA) }
+    pub fn new(baked: Arc<BakedGround>) -> Self {
+        Self { baked, tint: Spectrum::ONE, relief: true, facets: Some(SIGMA) }
     }
 
     /// Clods of it, of a reflectance `tint` times as high: they have relief of their own.
-    pub fn clods(skin: Arc<BakedGround>, tint: Spectrum) -> Self {
-        Self { skin, tint, relief: false, facets: Some(SIGMA) }
+    pub fn clods(baked: Arc<BakedGround>, tint: Spectrum) -> Self {
+        Self { baked, tint, relief: false, facets: Some(SIGMA) }
     }
 
     pub(super) fn leave_out(&mut self, feature: Feature) {
@@ -115,37 +115,37 @@ impl Ground {
     }
 
     pub(super) fn swatch(&self) -> Swatch<'_> {
-        let skin = &self.skin;
-        let decode = |t: &Texel| Spectrum::from(t.reflectance.map(|r| skin.decode[r as usize]));
+        let baked = &self.baked;
+        let decode = |t: &Texel| Spectrum::from(t.reflectance.map(|r| baked.decode[r as usize]));
         let tone = |reflectance| Tone { reflectance, transmittance: Spectrum::ZERO };
-        let texel = move |x: u32, y: u32| tone(decode(&skin.texels[y as usize * skin.width + x as usize]));
+        let texel = move |x: u32, y: u32| tone(decode(&baked.texels[y as usize * baked.width + x as usize]));
         // One texel in a thousand or so tells the mean.
-        let some = skin.texels.iter().step_by(997);
+        let some = baked.texels.iter().step_by(997);
         let (sum, count) = some.fold((Spectrum::ZERO, 0.0), |(s, n), t| (s + decode(t), n + 1.0));
         let mean = tone(sum / count * self.tint);
-        let key = [Arc::as_ptr(skin) as usize, 0];
-        let size = (skin.width as u32, skin.height as u32);
-        // The skin's rows run north, the picture's down: up the picture is south.
+        let key = [Arc::as_ptr(baked) as usize, 0];
+        let size = (baked.width as u32, baked.height as u32);
+        // The maps' rows run north, the picture's down: up the picture is south.
         let slope = move |x: u32, y: u32| {
-            let [east, north] = skin.texels[y as usize * skin.width + x as usize].slope.map(f32::from);
+            let [east, north] = baked.texels[y as usize * baked.width + x as usize].slope.map(f32::from);
             vec2(east, -north) / GroundMaps::SLOPE_STEPS
         };
         Swatch::pictured(key, size, texel, mean, 1.0)
             .tinted(self.tint.0.truncate(), Vec3::ONE)
             .raised(slope, f32::from(u8::from(self.relief)))
             .grained(move |x, y| {
-                let film = skin.texels[y as usize * skin.width + x as usize].film;
+                let film = baked.texels[y as usize * baked.width + x as usize].film;
                 Grain { open: 1.0, film: f32::from(film) / 255.0 }
             })
     }
 
     pub(super) fn varies(&self) -> Varies {
-        Varies::Raster(self.skin.width as u32, self.skin.height as u32)
+        Varies::Raster(self.baked.width as u32, self.baked.height as u32)
     }
 
     #[inline]
     pub(super) fn scatter(&self, at: &Interaction, wo: Vec3) -> (Bsdf, Frame) {
-        let (reflectance, slope, film) = self.skin.sample(at.uv);
+        let (reflectance, slope, film) = self.baked.sample(at.uv);
         let reflectance = (reflectance * self.tint).clamp(0.0, 0.95);
         let normal = if self.relief {
             // Slopes of heights over the plane add up; the mesh's normal is (−∂z/∂x, −∂z/∂y, 1) to scale.

@@ -38,14 +38,14 @@ pub(super) struct Axis {
 }
 
 impl Axis {
-    /// Where a leaf stands: inside the stem's skin, on its own side.
+    /// Where a leaf stands: inside the stem's surface, on its own side.
     pub(super) fn seat(&self, leaf: &LeafNow<'_>) -> Seat {
         let last = self.nodes.len().saturating_sub(1);
         let (point, axis) = self.nodes[leaf.layer.min(last)];
         let out = direction(FRAC_PI_2, leaf.azimuth);
         let share = leaf.layer as f32 / last.max(1) as f32;
         let r = self.radii[leaf.layer.min(last)] * lerp(self.section.seat.0, self.section.seat.1, share);
-        // On a crown the younger leaves stand higher up the dome, just under its skin.
+        // On a crown the younger leaves stand higher up the dome, just under its surface.
         let whole = self.radii[0];
         let lift = whole * (self.crown * (1.0 - (r / whole).powi(2)).max(0.0).sqrt() - 0.1 * self.crown);
         Seat { point: point + (out - axis * out.dot(axis)) * r + axis * lift, axis }
@@ -82,7 +82,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
         nodes.push((base, direction_now));
         radii.push(radius);
     }
-    let skin = |own: &str| if own.is_empty() { "stalk".to_owned() } else { own.to_owned() };
+    let material = |own: &str| if own.is_empty() { "stalk".to_owned() } else { own.to_owned() };
     let foot = -ROOT / nodes[0].1.z.max(0.3);
     let rings: Vec<Ring> = [foot, 0.0, growth.hypocotyl * 0.5, growth.hypocotyl]
         .into_iter()
@@ -92,7 +92,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
     organs.push(Organ {
         kind: OrganKind::Hypocotyl,
         leaf: 0,
-        skin: skin(&growth.desc.hypocotyl_skin),
+        material: material(&growth.desc.hypocotyl_material),
         mesh,
         midrib: None,
     });
@@ -118,7 +118,13 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
         }
     }
     let mesh = tube::rigid(&rings, if stemless { 10 } else { 12 });
-    organs.push(Organ { kind: OrganKind::Stem, leaf: 0, skin: skin(&growth.desc.stem_skin), mesh, midrib: None });
+    organs.push(Organ {
+        kind: OrganKind::Stem,
+        leaf: 0,
+        material: material(&growth.desc.stem_material),
+        mesh,
+        midrib: None,
+    });
     Axis { nodes, radii, section, crown }
 }
 

@@ -51,7 +51,7 @@ pub enum Form {
 pub struct PlantDesc {
     /// How it stands.
     pub form: Form,
-    /// Its kinds of leaves. A kind's name is also its blades' key in the table of skins.
+    /// Its kinds of leaves. A kind's name is also its blades' key among the species' materials.
     pub kinds: BTreeMap<String, LeafKind>,
     /// Its stages, youngest first.
     pub stages: Vec<StageDesc>,
@@ -68,10 +68,10 @@ pub struct PlantDesc {
     pub azimuth_deg: Vary<Finite>,
     /// How far the axis leans.
     pub lean_deg: Vary<Finite>,
-    /// Skin of the hypocotyl; empty: `"stalk"`.
-    pub hypocotyl_skin: String,
-    /// Skin of the stem; empty: `"stalk"`.
-    pub stem_skin: String,
+    /// Material of the hypocotyl; empty: `"stalk"`.
+    pub hypocotyl_material: String,
+    /// Material of the stem; empty: `"stalk"`.
+    pub stem_material: String,
 }
 
 /// The same fields, before they were checked against each other.
@@ -91,10 +91,10 @@ struct Written {
     azimuth_deg: Vary<Finite>,
     #[serde(default = "lean")]
     lean_deg: Vary<Finite>,
-    #[serde(default)]
-    hypocotyl_skin: String,
-    #[serde(default)]
-    stem_skin: String,
+    #[serde(default, alias = "hypocotyl_skin")]
+    hypocotyl_material: String,
+    #[serde(default, alias = "stem_skin")]
+    stem_material: String,
 }
 
 fn vigour() -> Vary<Positive> {
@@ -126,8 +126,8 @@ impl<'de> Deserialize<'de> for PlantDesc {
                 size: w.size,
                 azimuth_deg: w.azimuth_deg,
                 lean_deg: w.lean_deg,
-                hypocotyl_skin: w.hypocotyl_skin,
-                stem_skin: w.stem_skin,
+                hypocotyl_material: w.hypocotyl_material,
+                stem_material: w.stem_material,
             };
             desc.check_at().map_err(|(at, message, help)| ron_file::inside(raw, &at, message, help))?;
             Ok(desc)
@@ -203,13 +203,13 @@ impl PlantDesc {
         Ok(())
     }
 
-    /// The keys that this plant's organs use in the table of skins.
-    pub fn skins(&self) -> Vec<String> {
+    /// The keys that this plant's organs use among the species' materials.
+    pub fn materials(&self) -> Vec<String> {
         let own = |s: &str| if s.is_empty() { "stalk".to_owned() } else { s.to_owned() };
-        let mut keys = vec![own(&self.hypocotyl_skin), own(&self.stem_skin)];
+        let mut keys = vec![own(&self.hypocotyl_material), own(&self.stem_material)];
         for (name, kind) in &self.kinds {
-            keys.push(if kind.skin.is_empty() { name.clone() } else { kind.skin.clone() });
-            keys.push(kind.stalk_skin.clone());
+            keys.push(if kind.material.is_empty() { name.clone() } else { kind.material.clone() });
+            keys.push(kind.stalk_material.clone());
         }
         keys.sort();
         keys.dedup();

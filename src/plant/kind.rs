@@ -61,12 +61,12 @@ pub struct LeafKind {
     /// What its blade is: `Blade` or `Cotyledon`.
     #[serde(default = "blade")]
     pub organ: OrganKind,
-    /// The blade's skin; empty: named like the kind.
-    #[serde(default)]
-    pub skin: String,
-    /// The stalk's skin.
-    #[serde(default = "stalk")]
-    pub stalk_skin: String,
+    /// The blade's material; empty: named like the kind.
+    #[serde(default, alias = "skin")]
+    pub material: String,
+    /// The stalk's material.
+    #[serde(default = "stalk", alias = "stalk_skin")]
+    pub stalk_material: String,
     /// Cells along the blade.
     #[serde(default = "num::<PositiveCount, 20>")]
     pub rows: Num<PositiveCount>,

@@ -77,7 +77,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
         }
         Shape::Leaflets { .. } => leaflets::blade(leaf, &relief, cells(leaf), &skeleton, &mut stream),
     };
-    let skin = if leaf.kind.skin.is_empty() { leaf.kind_name } else { &leaf.kind.skin };
+    let material = if leaf.kind.material.is_empty() { leaf.kind_name } else { &leaf.kind.material };
     let kind = leaf.kind.organ;
     // The relief leaves the midrib's ends where they are, so they go where their joints go.
     let end = |joint: usize| motions[joint].point(vec3(0.0, skeleton.along()[joint], 0.0));
@@ -87,7 +87,13 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
         _ => end(skeleton.along().len() - 1),
     };
     let midrib = Some([end(skeleton.base()), tip]);
-    organs.push(Organ { kind, leaf: leaf.number, skin: skin.to_owned(), mesh: skin::skin(rest, &motions), midrib });
+    organs.push(Organ {
+        kind,
+        leaf: leaf.number,
+        material: material.to_owned(),
+        mesh: skin::skin(rest, &motions),
+        midrib,
+    });
     let rest = stalk(leaf, &skeleton, &relief, lower, &mut stream);
     if rest.triangles.is_empty() {
         return;
@@ -95,7 +101,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
     let mut mesh = skin::skin(rest, &motions);
     tube::close_seams(&mut mesh, SIDES, 0);
     let kind = if lower == Lower::Petiole { OrganKind::Petiole } else { OrganKind::Sheath };
-    organs.push(Organ { kind, leaf: leaf.number, skin: leaf.kind.stalk_skin.clone(), mesh, midrib: None });
+    organs.push(Organ { kind, leaf: leaf.number, material: leaf.kind.stalk_material.clone(), mesh, midrib: None });
 }
 
 /// Cells along and across the blade: those of the kind, but none shorter than [`CELL`], so that a bud costs little.

@@ -38,8 +38,8 @@ pub struct Organ {
     pub kind: OrganKind,
     /// The leaf it belongs to, counted from 1 in order of appearance, seed leaves first; 0 for stem and hypocotyl.
     pub leaf: u16,
-    /// Its key in the species page's table of skins.
-    pub skin: String,
+    /// Its key in the species file's `materials`.
+    pub material: String,
     /// Its shape in plant coordinates: metres, growth axis +z, origin where the stem meets the soil.
     pub mesh: Mesh,
     /// Of a blade, and of nothing else: the ends of its midrib in the same coordinates, base (joint B) and tip (joint PK).

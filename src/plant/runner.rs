@@ -62,7 +62,7 @@ struct Foot {
     length: f32,
 }
 
-fn skin(own: &str) -> String {
+fn material(own: &str) -> String {
     if own.is_empty() { "stalk".to_owned() } else { own.to_owned() }
 }
 
@@ -72,8 +72,8 @@ fn hypocotyl(organs: &mut Vec<Organ>, growth: &Growth<'_>, foot: &Foot) {
     let ring = |h: f32| axis::ring(foot.along * h, foot.along, foot.radius, Profile::Channelled(1.0));
     let mut rings: Vec<Ring> = heights.into_iter().map(ring).collect();
     axis::dome(&mut rings, foot.along, foot.radius, 0.5);
-    let (mesh, skin) = (tube::rigid(&rings, 10), skin(&growth.desc.hypocotyl_skin));
-    organs.push(Organ { kind: OrganKind::Hypocotyl, leaf: 0, skin, mesh, midrib: None });
+    let (mesh, material) = (tube::rigid(&rings, 10), material(&growth.desc.hypocotyl_material));
+    organs.push(Organ { kind: OrganKind::Hypocotyl, leaf: 0, material, mesh, midrib: None });
 }
 
 /// Grows a stem through nodes at these lengths along it; returns them.
@@ -109,8 +109,8 @@ fn stem(organs: &mut Vec<Organ>, growth: &Growth<'_>, foot: &Foot, rise: &[f32],
     }
     let (_, _, radius) = nodes.last().copied().unwrap_or((point, along, foot.radius));
     axis::dome(&mut rings, along, radius, 1.0);
-    let (mesh, skin) = (tube::rigid(&rings, 10), skin(&growth.desc.stem_skin));
-    organs.push(Organ { kind: OrganKind::Stem, leaf: 0, skin, mesh, midrib: None });
+    let (mesh, material) = (tube::rigid(&rings, 10), material(&growth.desc.stem_material));
+    organs.push(Organ { kind: OrganKind::Stem, leaf: 0, material, mesh, midrib: None });
     nodes
 }
 

@@ -10,10 +10,10 @@ use serde::de::IgnoredAny;
 use std::collections::BTreeMap;
 use std::f32::consts::{PI, TAU};
 
-/// A skin, which botany does not read.
+/// A material, which botany does not read.
 #[derive(Deserialize)]
 #[serde(rename = "Leaf")]
-struct Skin {
+struct Material {
     roughness: f32,
 }
 
@@ -25,7 +25,7 @@ struct Page {
     name: String,
     eppo: String,
     role: IgnoredAny,
-    skins: BTreeMap<String, Skin>,
+    materials: BTreeMap<String, Material>,
     plant: PlantDesc,
 }
 
@@ -72,7 +72,7 @@ fn every_species_grows_valid_meshes_at_every_stage() {
             let at = format!("{} {} {:?} {}", page.eppo, stage.bbch, organ.kind, organ.leaf);
             assert_eq!(organ.mesh.fault(), None, "{at}");
             assert!(!organ.mesh.triangles.is_empty(), "{at}");
-            assert!(page.skins.contains_key(&organ.skin), "{at}: no skin {}", organ.skin);
+            assert!(page.materials.contains_key(&organ.material), "{at}: no material {}", organ.material);
             assert_eq!(organ.leaf == 0, matches!(organ.kind, OrganKind::Stem | OrganKind::Hypocotyl), "{at}");
         }
     });
@@ -93,11 +93,11 @@ fn every_age_between_the_stages_grows_valid_meshes() {
 }
 
 #[test]
-fn a_page_names_all_its_skins() {
+fn a_species_names_all_its_materials() {
     for page in pages() {
-        for key in page.plant.skins() {
+        for key in page.plant.materials() {
             // A grass has no stem of its own; its key may still stand for its stalk.
-            assert!(page.skins.get(&key).is_some_and(|s| s.roughness > 0.0), "{}: {key}", page.eppo);
+            assert!(page.materials.get(&key).is_some_and(|s| s.roughness > 0.0), "{}: {key}", page.eppo);
         }
     }
 }
@@ -162,7 +162,7 @@ fn nothing_floats() {
             let base = &organ.mesh.positions[..organ.mesh.positions.len().min(15)];
             let gap = match organ.kind {
                 OrganKind::Sheath => base.iter().map(|p| p.z.max(0.0)).fold(f32::MAX, f32::min),
-                // A stalk may begin inside the crown: it must pass through the crown's skin within its first rings.
+                // A stalk may begin inside the crown: it must pass through the crown's surface within its first rings.
                 OrganKind::Petiole => distance(&organ.mesh.positions[..organ.mesh.positions.len().min(50)], &axis),
                 _ => plant
                     .organs
@@ -171,7 +171,7 @@ fn nothing_floats() {
                     .map(|o| distance(base, &o.mesh))
                     .fold(f32::MAX, f32::min),
             };
-            // Rings stand a tenth of a stalk apart, so the crown's skin may lie half of that from the nearest; and the blade of a
+            // Rings stand a tenth of a stalk apart, so the crown's surface may lie half of that from the nearest; and the blade of a
             // large leaf lies over a channel that is some millimetres deep.
             let (low, high) = organ.mesh.bounds().unwrap();
             let share = if organ.kind == OrganKind::Petiole { 0.05 } else { 0.008 };

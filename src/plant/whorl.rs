@@ -6,7 +6,7 @@ use super::leaf::{self, Lower};
 use super::organ::Organ;
 use super::tube::Profile;
 
-/// Square, slender, leaves seated just below the skin.
+/// Square, slender, leaves seated just below the surface.
 const SECTION: Section = Section { profile: Profile::Square, taper: 0.65, wander: 0.11, seat: (0.7, 0.7) };
 
 /// Grows whorls.

@@ -247,7 +247,7 @@ mod tests {
 Field(
     name: "a \" b, (", /* one /* two */ , */ raw: r#"c " ("#,
     plants: [(at: (1, -2)), Beet(at: (3, 4), /* é */ age: Uniform(5, 6))],
-    skins: {"leaf": Leaf(size: 7), "stalk": Leaf()},
+    materials: {"leaf": Leaf(size: 7), "stalk": Leaf()},
 )"##;
 
     fn at<'a>(path: &[Step<'_>]) -> &'a str {
@@ -261,12 +261,12 @@ Field(
         assert_eq!(at(&[Field("plants"), Item(0)]), "(at: (1, -2))");
         assert_eq!(at(&[Field("plants"), Item(1), Field("at"), Item(1)]), "4");
         assert_eq!(at(&[Field("plants"), Item(1), Field("age")]), "Uniform(5, 6)");
-        assert_eq!(at(&[Field("skins"), Field("leaf"), Field("size")]), "7");
+        assert_eq!(at(&[Field("materials"), Field("leaf"), Field("size")]), "7");
     }
 
     #[test]
     fn a_step_that_leads_nowhere_ends_the_way() {
-        assert_eq!(at(&[Field("skins"), Field("stalk"), Field("size")]), "Leaf()");
+        assert_eq!(at(&[Field("materials"), Field("stalk"), Field("size")]), "Leaf()");
         assert!(at(&[Field("lights"), Item(3)]).starts_with("Field("));
         assert_eq!(place("", &[Item(1)]), 0..0);
     }

@@ -26,7 +26,14 @@ pub struct Renamed {
 }
 
 /// All renamed keywords that are still read.
-pub const RENAMED: &[Renamed] = &[Renamed { keyword: Keyword::Value, old: "Environment", new: "EnvironmentMap" }];
+pub const RENAMED: &[Renamed] = &[
+    Renamed { keyword: Keyword::Value, old: "Environment", new: "EnvironmentMap" },
+    Renamed { keyword: Keyword::Field, old: "skins", new: "materials" },
+    Renamed { keyword: Keyword::Field, old: "skin", new: "material" },
+    Renamed { keyword: Keyword::Field, old: "stalk_skin", new: "stalk_material" },
+    Renamed { keyword: Keyword::Field, old: "hypocotyl_skin", new: "hypocotyl_material" },
+    Renamed { keyword: Keyword::Field, old: "stem_skin", new: "stem_material" },
+];
 
 /// Whether a name is an old one, of fields or of values.
 pub(super) fn is_old(keyword: Keyword, name: &str) -> bool {

@@ -232,7 +232,8 @@ pub struct SpeciesDesc {
     /// Crop or weed.
     pub role: Role,
     /// What its organs look like, by the names that the plant uses.
-    pub skins: BTreeMap<String, LeafDesc>,
+    #[serde(alias = "skins")]
+    pub materials: BTreeMap<String, LeafDesc>,
     /// How it grows.
     pub plant: PlantDesc,
     /// Relative spread of the chlorophyll from plant to plant.
@@ -273,6 +274,6 @@ impl Role {
 impl SpeciesDesc {
     /// The textures that the page names.
     pub fn textures(&self) -> impl Iterator<Item = &str> {
-        self.skins.values().flat_map(|leaf| leaf.texture.iter().flat_map(Pick::all)).map(String::as_str)
+        self.materials.values().flat_map(|leaf| leaf.texture.iter().flat_map(Pick::all)).map(String::as_str)
     }
 }

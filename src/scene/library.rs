@@ -27,7 +27,7 @@ pub(super) struct Cut {
     margin: Option<Arc<Margin>>,
 }
 
-/// One choice of a skin.
+/// One choice of a material.
 pub(super) struct Choice {
     pub(super) material: LeafMaterial,
     /// What of a blade is there.
@@ -49,8 +49,8 @@ impl Choice {
 /// A species with its materials ready.
 pub(super) struct Species {
     pub(super) desc: SpeciesDesc,
-    /// By the skin's name.
-    pub(super) skins: BTreeMap<String, Vec<Choice>>,
+    /// By the material's name.
+    pub(super) materials: BTreeMap<String, Vec<Choice>>,
 }
 
 /// What was read so far. Every file's bytes go into the hash in the order of their paths.
@@ -105,45 +105,45 @@ impl Library {
         let own = self.page(&full)?;
         let mut desc: SpeciesDesc = own.parse()?;
         self.renamed.insert(full.clone(), own.renamed());
-        for key in desc.plant.skins() {
-            if !desc.skins.contains_key(&key) {
-                let known: Vec<&str> = desc.skins.keys().map(String::as_str).collect();
-                let message = format!("the plant uses a skin \"{key}\", which `skins` does not have");
+        for key in desc.plant.materials() {
+            if !desc.materials.contains_key(&key) {
+                let known: Vec<&str> = desc.materials.keys().map(String::as_str).collect();
+                let message = format!("the plant uses a material \"{key}\", which `materials` does not have");
                 let help = format!(
-                    "add \"{key}\": Leaf(…) to `skins`, or name one of them; {}",
-                    choose("skins", &known, &key)
+                    "add \"{key}\": Leaf(…) to `materials`, or name one of them; {}",
+                    choose("materials", &known, &key)
                 );
                 // Where the key is written, or else the table that lacks it: some keys are defaults.
                 return Err(if own.text.contains(&format!("\"{key}\"")) {
                     own.about(&key, message, help)
                 } else {
-                    own.blame(&[Step::Field("skins")], Error::input(message).help(help))
+                    own.blame(&[Step::Field("materials")], Error::input(message).help(help))
                 });
             }
         }
-        let mut skins = BTreeMap::new();
-        for (name, skin) in &desc.skins {
-            let choices = match &skin.texture {
+        let mut materials = BTreeMap::new();
+        for (name, leaf) in &desc.materials {
+            let choices = match &leaf.texture {
                 None => {
-                    let material = LeafMaterial::new(skin, None);
+                    let material = LeafMaterial::new(leaf, None);
                     vec![Choice { material, mask: None, margin: None, pictured: false, tones: OnceLock::new() }]
                 }
                 Some(of) => {
                     let mut choices = Vec::new();
                     for path in of.all() {
-                        let Cut { picture, mask, margin } = self.picture(&own, path, skin.relief_range.f32())?;
-                        let material = LeafMaterial::new(skin, Some(picture));
+                        let Cut { picture, mask, margin } = self.picture(&own, path, leaf.relief_range.f32())?;
+                        let material = LeafMaterial::new(leaf, Some(picture));
                         choices.push(Choice { material, mask, margin, pictured: true, tones: OnceLock::new() });
                     }
                     choices
                 }
             };
-            skins.insert(name.clone(), choices);
+            materials.insert(name.clone(), choices);
         }
         if let Some(change) = self.growing.species {
             change(&mut desc);
         }
-        let species = Arc::new(Species { desc, skins });
+        let species = Arc::new(Species { desc, materials });
         self.species.insert(full, species.clone());
         Ok(species)
     }
@@ -301,7 +301,7 @@ mod tests {
     /// Rationale: two species may share a picture and say different heights of its relief. Expected: heights in the ratio of what
     /// each says. Source: the meaning of `relief_range`.
     #[test]
-    fn one_picture_has_the_relief_that_each_skin_gives_it() {
+    fn one_picture_has_the_relief_that_each_material_gives_it() {
         let page = RonFile::of("Species()");
         let mut library = Library::default();
         let mut highest = |range: f32| {

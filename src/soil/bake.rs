@@ -66,7 +66,7 @@ impl Ground {
         let (width, height) = (self.grid.x.steps * split, self.grid.y.steps * split);
         let raster = Raster { origin: area.corners()[0] + 0.5 * texel, step: texel, width, height };
         let n = width * height;
-        let mut skin = GroundMaps {
+        let mut baked = GroundMaps {
             width,
             height,
             origin: area.corners()[0],
@@ -82,8 +82,8 @@ impl Ground {
         let mut detail = crumbs.height;
         let rows = (
             detail.par_chunks_mut(width),
-            skin.albedo.par_chunks_mut(width),
-            skin.weights.par_chunks_mut(width),
+            baked.albedo.par_chunks_mut(width),
+            baked.weights.par_chunks_mut(width),
             crumbs.tint.par_chunks(width),
         );
         rows.into_par_iter().enumerate().for_each(|(j, (detail, albedo, weights, tints))| {
@@ -106,9 +106,9 @@ impl Ground {
                 weights[i] = share.map(|w| (w * 255.0 + 0.5) as u8);
             }
         });
-        self.bake_slopes(raster, split, &detail, &mut skin);
-        self.bake_pits(raster, split, detail, &crumbs.dry, &mut skin);
-        skin
+        self.bake_slopes(raster, split, &detail, &mut baked);
+        self.bake_pits(raster, split, detail, &crumbs.dry, &mut baked);
+        baked
     }
 
     /// What clods are made of: a square of 12 cm of the ground's own matter without crumbs or relief, all of it as wet as
@@ -163,7 +163,7 @@ impl Ground {
     }
 
     /// Slopes of the detail, less those that the mesh's normals already have.
-    fn bake_slopes(&self, raster: Raster, split: usize, detail: &[f32], skin: &mut GroundMaps) {
+    fn bake_slopes(&self, raster: Raster, split: usize, detail: &[f32], baked: &mut GroundMaps) {
         let coarse = differences(&self.fine.detail, self.raster());
         let slope = |(k, fine): (usize, Vec2)| {
             let cell = self.texel_cell(k % raster.width, k / raster.width, split);
@@ -171,11 +171,11 @@ impl Ground {
             let rest = (fine - mesh).clamp_length_max(2.0) * GroundMaps::SLOPE_STEPS;
             [rest.x as i8, rest.y as i8]
         };
-        skin.slope = differences(detail, raster).into_par_iter().enumerate().map(slope).collect();
+        baked.slope = differences(detail, raster).into_par_iter().enumerate().map(slope).collect();
     }
 
     /// What lies in pits of the detail sees less of the sky and dries later; crumbs dry first, by the shares in `dry`.
-    fn bake_pits(&self, raster: Raster, split: usize, mut detail: Vec<f32>, dry: &[u8], skin: &mut GroundMaps) {
+    fn bake_pits(&self, raster: Raster, split: usize, mut detail: Vec<f32>, dry: &[u8], baked: &mut GroundMaps) {
         let cell = |k: usize| self.texel_cell(k % raster.width, k / raster.width, split);
         detail.par_iter_mut().enumerate().for_each(|(k, d)| *d -= cell(k).mix(|v| self.fine.detail[v]));
         let around = blur(&detail, raster.width, (0.0008 / raster.step).ceil() as usize);
@@ -186,7 +186,7 @@ impl Ground {
             let wet = (cell(k).mix(|v| self.fine.moisture[v]) + PIT_WETTING * pit(k).min(1.0)) * left;
             (wet.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
         };
-        (skin.ao, skin.moisture) = (0..detail.len()).into_par_iter().map(|k| (open(k), moisture(k))).unzip();
+        (baked.ao, baked.moisture) = (0..detail.len()).into_par_iter().map(|k| (open(k), moisture(k))).unzip();
     }
 }
 

@@ -25,7 +25,7 @@ const FBM4_SD: f32 = 0.245;
 pub(super) struct Fine {
     /// Noise of each layer.
     pub(super) noise: Vec<Weights>,
-    /// Height of layers and crumbs, the part of the relief that the skin knows more finely.
+    /// Height of layers and crumbs, the part of the relief that the baked maps know more finely.
     pub(super) detail: Vec<f32>,
     /// 0..1.
     pub(super) moisture: Vec<f32>,
@@ -281,13 +281,13 @@ impl Ground {
         self.fine_value(&self.fine.moisture, self.mirrored(vec2(x, y)))
     }
 
-    /// Texture coordinates of a place in [`Ground::skin`]; beyond the area the skin is mirrored.
+    /// Texture coordinates of a place in [`Ground::bake`]; beyond the area the maps are mirrored.
     pub fn uv(&self, x: f32, y: f32) -> Vec2 {
         let area = self.area();
         (self.mirrored(vec2(x, y)) - area.corners()[0]) / area.size()
     }
 
-    /// The displaced grid, with the skin's texture coordinates.
+    /// The displaced grid, with the texture coordinates of the baked maps.
     pub fn mesh(&self) -> Mesh {
         let (columns, rows) = (self.grid.columns(), self.grid.rows());
         let mut mesh = Mesh {

@@ -105,18 +105,18 @@ fn one_blend_drives_colour_and_height_and_sums_to_one() {
     page.clods.over_5mm_per_m2 = Vary::fixed(0.0);
     page.blend.scale_m = Vary::fixed(0.05);
     let ground = ground(&page, 0.1);
-    let skin = ground.bake(&MAPS, 0.0005);
+    let baked = ground.bake(&MAPS, 0.0005);
     let (mut low, mut high) = (0, 0);
-    for j in (0..skin.height).step_by(7) {
-        for i in (0..skin.width).step_by(7) {
-            let k = j * skin.width + i;
-            let sum: u32 = skin.weights[k].iter().map(|w| u32::from(*w)).sum();
-            assert!((254..=256).contains(&sum), "{:?}", skin.weights[k]);
+    for j in (0..baked.height).step_by(7) {
+        for i in (0..baked.width).step_by(7) {
+            let k = j * baked.width + i;
+            let sum: u32 = baked.weights[k].iter().map(|w| u32::from(*w)).sum();
+            assert!((254..=256).contains(&sum), "{:?}", baked.weights[k]);
             // The layers are pure red and green, so the colour is the weights, up to the tone of the place.
-            let [r, g, _] = GroundMaps::decode(skin.albedo[k]);
-            let second = f32::from(skin.weights[k][1]) / 255.0;
+            let [r, g, _] = GroundMaps::decode(baked.albedo[k]);
+            let second = f32::from(baked.weights[k][1]) / 255.0;
             assert!((g / (r + g) - second).abs() < 0.02);
-            let p = skin.origin + (vec2(i as f32, j as f32) + 0.5) * skin.texel_m;
+            let p = baked.origin + (vec2(i as f32, j as f32) + 0.5) * baked.texel_m;
             let h = ground.height(p.x, p.y) * 1e3;
             assert!(h > -1.1 * (1.0 - second) + 3.8 * second - 0.6 && h < 1.1 * (1.0 - second) + 8.2 * second + 0.6);
             low += i32::from(second < 0.1);
@@ -127,7 +127,7 @@ fn one_blend_drives_colour_and_height_and_sums_to_one() {
 }
 
 #[test]
-fn the_skin_and_the_mesh_together_have_the_slopes_of_the_whole_relief() {
+fn the_baked_maps_and_the_mesh_together_have_the_slopes_of_the_whole_relief() {
     let mut page = page();
     page.layers.truncate(1);
     page.layers[0].height_mm = (Num::new(-0.2), Num::new(0.2));
@@ -137,21 +137,21 @@ fn the_skin_and_the_mesh_together_have_the_slopes_of_the_whole_relief() {
     let maps = [Waves(150.0, [0.2; 3])];
     let site = Site { grid_m: 0.002, ..site(0.05) };
     let ground = Ground::new(&page, &maps, &site, &stream()).unwrap();
-    let skin = ground.bake(&maps, 0.0001);
+    let baked = ground.bake(&maps, 0.0001);
     let height = |p: Vec2| ground.blend.displacement([1.0, 0.0, 0.0, 0.0], ground.blend.heights(&maps, p));
     let mut off = 0.0;
     let mut n = 0.0;
-    for k in (0..skin.slope.len()).step_by(1009) {
-        let (i, j) = (k % skin.width, k / skin.width);
+    for k in (0..baked.slope.len()).step_by(1009) {
+        let (i, j) = (k % baked.width, k / baked.width);
         let inner = |i: usize, n: usize| i > n / 8 && i < 7 * n / 8;
-        if !inner(i, skin.width) || !inner(j, skin.height) {
+        if !inner(i, baked.width) || !inner(j, baked.height) {
             continue;
         }
-        let p = skin.origin + (vec2(i as f32, j as f32) + 0.5) * skin.texel_m;
+        let p = baked.origin + (vec2(i as f32, j as f32) + 0.5) * baked.texel_m;
         let d = 1e-4;
         let exact = (height(p + vec2(d, 0.0)) - height(p - vec2(d, 0.0))) / (2.0 * d);
         let normal = ground.normal(p.x, p.y);
-        let both = -normal.x / normal.z + f32::from(skin.slope[k][0]) / GroundMaps::SLOPE_STEPS;
+        let both = -normal.x / normal.z + f32::from(baked.slope[k][0]) / GroundMaps::SLOPE_STEPS;
         off += (both - exact).abs();
         n += 1.0;
     }

@@ -47,7 +47,8 @@ impl Floor<'_> {
 /// An organ that stands in the field.
 pub(super) struct Grown {
     pub(super) part: Part,
-    pub(super) skin: String,
+    /// Its key among the species' materials.
+    pub(super) key: String,
     pub(super) choice: usize,
     pub(super) material: LeafMaterial,
     /// Whether no other organ of the plant has this material.
@@ -59,6 +60,6 @@ impl Grown {
     pub(super) fn with(&self, mesh: Mesh) -> Self {
         let Part { mask, material, tag, .. } = &self.part;
         let part = Part { mesh, mask: mask.clone(), material: *material, tag: *tag };
-        Self { part, skin: self.skin.clone(), material: self.material.clone(), ..*self }
+        Self { part, key: self.key.clone(), material: self.material.clone(), ..*self }
     }
 }

@@ -28,9 +28,9 @@ pub(super) struct Ailing<'a> {
 pub(super) struct Bare<'a> {
     /// What it is.
     pub(super) kind: OrganKind,
-    /// Its skin.
+    /// Its material.
     pub(super) choice: &'a Choice,
-    /// What its skin is made of.
+    /// What its material is made of.
     pub(super) pigments: &'a Pigments,
     /// Factor on its chlorophyll.
     pub(super) green: f32,

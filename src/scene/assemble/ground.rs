@@ -110,8 +110,8 @@ impl Builder<'_> {
         let mesh = if floor.flat { floor.ground.levelled().mesh() } else { floor.ground.mesh() };
         self.part(mesh, material);
         for group in clods {
-            let skin = baked.clods[usize::from(group.damp)].clone();
-            let material = self.material(Material::Ground(GroundMaterial::clods(skin, group.tint)));
+            let maps = baked.clods[usize::from(group.damp)].clone();
+            let material = self.material(Material::Ground(GroundMaterial::clods(maps, group.tint)));
             self.part(group.mesh, material);
         }
         for (i, thing) in debris.into_iter().enumerate() {

@@ -68,7 +68,7 @@ const SEASON: u64 = 1 << 32;
 const LIGHTING: u64 = 2 << 32;
 /// Most pixels of an image.
 const MOST_PIXELS: u64 = 1 << 28;
-/// About the most texels of the ground's skin: a larger view has larger ones.
+/// About the most texels of the ground's maps: a larger view has larger ones.
 const MOST_TEXELS: f32 = 2.4e8;
 
 /// Builds field `options.index` of the page at `path`.
@@ -229,7 +229,7 @@ impl<'a> Builder<'a> {
                 let floor = Floor { ground: &ground, flat: soil.flat };
                 known = Some(self.soil_record(soil, &ground));
                 let texel = (0.9 * self.ground_pixel()).clamp(2e-4, 2e-3).max((view.area() / MOST_TEXELS).sqrt());
-                // The skin takes as long as everything else, and neither needs the other.
+                // The bake takes as long as everything else, and neither needs the other.
                 let fabric = |wet| Arc::new(BakedGround::bake(&ground.fabric(&maps, texel, wet)));
                 let (baked, rest) = rayon::join(
                     || BakedGrounds {
@@ -383,7 +383,7 @@ impl<'a> Builder<'a> {
             if view.is_some_and(|v| !v.grown(reach).contains(record.position.truncate())) {
                 continue;
             }
-            // One material a plant and skin: plants differ in their green, and leaves that have met something in more.
+            // One material a plant and key: plants differ in their green, and leaves that have met something in more.
             let mut made: Vec<(String, usize, u32)> = Vec::new();
             for organ in organs {
                 if let Some(fault) = organ.part.mesh.fault() {
@@ -394,12 +394,12 @@ impl<'a> Builder<'a> {
                     ))
                     .help("look for extreme sizes in its page"));
                 }
-                let same = |m: &&(String, usize, u32)| !organ.own && m.0 == organ.skin && m.1 == organ.choice;
+                let same = |m: &&(String, usize, u32)| !organ.own && m.0 == organ.key && m.1 == organ.choice;
                 let known = made.iter().find(same).map(|m| m.2);
                 let material = known.unwrap_or_else(|| {
                     let material = self.material(Material::Leaf(organ.material));
                     if !organ.own {
-                        made.push((organ.skin, organ.choice, material));
+                        made.push((organ.key, organ.choice, material));
                     }
                     material
                 });
@@ -444,22 +444,22 @@ fn grow(s: &Seedling, number: u16, floor: Option<Floor<'_>>, dust: Spectrum) -> 
     let organs = plant.organs.into_iter().filter(|o| kept(o.leaf)).flat_map(|organ| {
         let mut mesh = organ.mesh;
         mesh.transform(rotation, foot);
-        let choices = &s.species.skins[&organ.skin];
+        let choices = &s.species.materials[&organ.material];
         let choice = shape.child(Purpose::Leaf, 1 << 20 | u64::from(organ.leaf)).index(choices.len());
-        let skin = &choices[choice];
-        let pigments = &desc.skins[&organ.skin].pigments;
+        let chosen = &choices[choice];
+        let pigments = &desc.materials[&organ.material].pigments;
         let cut = matches!(organ.kind, OrganKind::Blade | OrganKind::Cotyledon);
-        let bare = Bare { kind: organ.kind, choice: skin, pigments, green, ground: z, last };
+        let bare = Bare { kind: organ.kind, choice: chosen, pigments, green, ground: z, last };
         let grown = Grown {
             part: Part {
                 mesh,
-                mask: if cut { skin.mask.clone() } else { None },
+                mask: if cut { chosen.mask.clone() } else { None },
                 material: 0,
                 tag: Tag { class, plant: number, leaf: organ.leaf },
             },
-            skin: organ.skin,
+            key: organ.material,
             choice,
-            material: skin.material.with_chlorophyll(pigments.chlorophyll.f32(), green),
+            material: chosen.material.with_chlorophyll(pigments.chlorophyll.f32(), green),
             own: false,
         };
         match &ailing {
