@@ -2,7 +2,7 @@
 
 use super::fault::{Fault, locate};
 use super::place::{Step, offset_of, place, quoted};
-use super::renamed;
+use super::renamed::{self, Renamed};
 use super::suggest::nearest;
 use crate::error::{Kind, Place, Span};
 use crate::input::{self, Refusal};
@@ -93,11 +93,11 @@ impl RonFile {
             .map_err(|e| Error::failed(format!("this cannot be written as RON: {e}")))
     }
 
-    /// A warning for each keyword that was renamed, in the order in which they stand: where, and what to write.
-    pub fn renamed(&self) -> Vec<String> {
+    /// A warning for each keyword of a table that was renamed, in the order in which they stand: where, and what to write.
+    pub fn renamed(&self, table: &[Renamed]) -> Vec<String> {
         // Without its folder: warnings are recorded in datasets, which name no folder of a machine.
         let name = self.path.file_name().unwrap_or_default().to_string_lossy();
-        renamed::warnings(&name, &self.text)
+        renamed::warnings(&name, &self.text, table)
     }
 
     /// A path written in the file, relative to the file's folder.

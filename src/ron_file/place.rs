@@ -102,15 +102,17 @@ pub(super) fn quoted(text: &str) -> Vec<Range<usize>> {
     all
 }
 
-/// A name in a text.
+/// A name or a quoted text.
 pub(super) struct Word {
-    /// Its bytes.
+    /// Its bytes, without quotes.
     pub(super) at: Range<usize>,
     /// Whether a colon follows it.
     pub(super) colon: bool,
+    /// Whether it is in quotes.
+    pub(super) quoted: bool,
 }
 
-/// Every name outside quotes and comments, in their order.
+/// Every name and every quoted text outside comments, in their order.
 pub(super) fn words(text: &str) -> Vec<Word> {
     let is_name = |c: char| c.is_alphanumeric() || c == '_';
     let mut all = Vec::new();
@@ -119,9 +121,12 @@ pub(super) fn words(text: &str) -> Vec<Word> {
         let mut next = at + c.len_utf8();
         if c == '"' {
             next = quote_end(text, at);
+            let closed = next > at + 1 && text[..next].ends_with('"');
+            let inner = at + 1..if closed { next - 1 } else { next };
+            all.push(Word { at: inner, colon: text[skip(text, next)..].starts_with(':'), quoted: true });
         } else if is_name(c) {
             next = text[at..].find(|c| !is_name(c)).map_or(text.len(), |i| at + i);
-            all.push(Word { at: at..next, colon: text[skip(text, next)..].starts_with(':') });
+            all.push(Word { at: at..next, colon: text[skip(text, next)..].starts_with(':'), quoted: false });
         }
         at = skip(text, next);
     }

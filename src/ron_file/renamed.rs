@@ -12,6 +12,8 @@ pub enum Keyword {
     Field,
     /// Elsewhere: the name of a value.
     Value,
+    /// In quotes, as the value of one of these fields.
+    Text(&'static [&'static str]),
 }
 
 /// One renamed keyword.
@@ -25,14 +27,22 @@ pub struct Renamed {
     pub new: &'static str,
 }
 
-/// All renamed keywords that are still read.
+impl Renamed {
+    /// A renamed field.
+    pub const fn field(old: &'static str, new: &'static str) -> Self {
+        Self { keyword: Keyword::Field, old, new }
+    }
+}
+
+/// All renamed keywords of scene and species files that are still read; experiment files have a table of their own, since some of its
+/// words are fields of these.
 pub const RENAMED: &[Renamed] = &[
     Renamed { keyword: Keyword::Value, old: "Environment", new: "EnvironmentMap" },
-    Renamed { keyword: Keyword::Field, old: "skins", new: "materials" },
-    Renamed { keyword: Keyword::Field, old: "skin", new: "material" },
-    Renamed { keyword: Keyword::Field, old: "stalk_skin", new: "stalk_material" },
-    Renamed { keyword: Keyword::Field, old: "hypocotyl_skin", new: "hypocotyl_material" },
-    Renamed { keyword: Keyword::Field, old: "stem_skin", new: "stem_material" },
+    Renamed::field("skins", "materials"),
+    Renamed::field("skin", "material"),
+    Renamed::field("stalk_skin", "stalk_material"),
+    Renamed::field("hypocotyl_skin", "hypocotyl_material"),
+    Renamed::field("stem_skin", "stem_material"),
 ];
 
 /// Whether a name is an old one, of fields or of values.
@@ -40,14 +50,20 @@ pub(super) fn is_old(keyword: Keyword, name: &str) -> bool {
     RENAMED.iter().any(|r| r.keyword == keyword && r.old == name)
 }
 
-/// A warning for each old name in a file's text, in their order; `file` is what the file is called.
-pub(super) fn warnings(file: &str, text: &str) -> Vec<String> {
-    let old = |word: &Word| {
-        let keyword = if word.colon { Keyword::Field } else { Keyword::Value };
-        RENAMED.iter().find(|r| r.keyword == keyword && r.old == &text[word.at.clone()])
-    };
+/// A warning for each old name of a table in a file's text, in their order; `file` is what the file is called.
+pub(super) fn warnings(file: &str, text: &str, table: &[Renamed]) -> Vec<String> {
+    let mut field = "";
     let told = |word: Word| {
-        let Renamed { old, new, .. } = old(&word)?;
+        let name = &text[word.at.clone()];
+        if word.colon && !word.quoted {
+            field = name;
+        }
+        let stands = |keyword: Keyword| match keyword {
+            Keyword::Field => word.colon && !word.quoted,
+            Keyword::Value => !word.colon && !word.quoted,
+            Keyword::Text(fields) => word.quoted && fields.contains(&field),
+        };
+        let Renamed { old, new, .. } = table.iter().find(|r| r.old == name && stands(r.keyword))?;
         let line = text[..word.at.start].matches('\n').count() + 1;
         let column = text[offset_of(text, line, 1)..word.at.start].chars().count() + 1;
         Some(format!(
@@ -66,15 +82,15 @@ mod tests {
     fn old_names_are_told_with_their_place_and_nothing_else_is() {
         let text = "(lights: [ // Environment\n  Environment(file: \"Environment(\"), EnvironmentMap(file: \"b\"),\n], Environment: 3)";
         assert_eq!(
-            warnings("field.ron", text),
+            warnings("field.ron", text, RENAMED),
             [
                 "field.ron:2:3: `Environment` is now called `EnvironmentMap`: write `EnvironmentMap`; the next version no longer reads `Environment`"
             ]
         );
     }
 
-    /// Every alias of the sources is in the table and warns, and every row of the table has its alias. Experiment files have a table of
-    /// their own, since some of their words are fields of other files: [`crate::train::table::renamed`].
+    /// Every alias of the sources is in the table and warns, and every row of the table has its alias. Aliases of experiment files are in
+    /// theirs: `crate::train::table`.
     #[test]
     fn the_table_and_the_aliases_are_the_same() {
         fn read(folder: &Path, found: &mut Vec<String>) {

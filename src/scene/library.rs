@@ -10,7 +10,7 @@ use crate::material::{LeafMaterial, Picture, Tones};
 use crate::math::{Spectrum, Vec2};
 use crate::model::{Model, Up};
 use crate::optics::{Pigments, soil};
-use crate::ron_file::{RonFile, Step, choose};
+use crate::ron_file::{RENAMED, RonFile, Step, choose};
 use crate::soil::{LayerDesc, LayerMaps};
 use crate::texture::{ColorSpace, Height, HeightFromBrightness, Maps, Texture, Wrap};
 use crate::{Error, Result};
@@ -104,7 +104,7 @@ impl Library {
         }
         let own = self.page(&full)?;
         let mut desc: SpeciesDesc = own.parse()?;
-        self.renamed.insert(full.clone(), own.renamed());
+        self.renamed.insert(full.clone(), own.renamed(RENAMED));
         for key in desc.plant.materials() {
             if !desc.materials.contains_key(&key) {
                 let known: Vec<&str> = desc.materials.keys().map(String::as_str).collect();

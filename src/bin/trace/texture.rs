@@ -1,6 +1,6 @@
 //! `trace texture`: draws textures from their recipes.
 
-use furrow::ron_file::RonFile;
+use furrow::ron_file::{RENAMED, RonFile};
 use furrow::{Result, texture};
 use std::path::PathBuf;
 
@@ -16,7 +16,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     let mut paths = Vec::new();
     for recipe in &args.recipes {
-        for warning in RonFile::read(recipe)?.renamed() {
+        for warning in RonFile::read(recipe)?.renamed(RENAMED) {
             eprintln!("warning: {warning}");
         }
         paths.extend(texture::draw::write(recipe)?);

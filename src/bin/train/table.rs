@@ -80,7 +80,7 @@ enum Part {
 /// Does what is missing.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let page = RonFile::read(&args.page)?;
-    for warning in page.renamed().into_iter().chain(table::renamed(&page)) {
+    for warning in page.renamed(table::RENAMED) {
         eprintln!("warning: {warning}");
     }
     let experiment = Experiment::of(&page, args.scale.as_deref())?;

@@ -25,8 +25,7 @@ use crate::material::{BakedGround, Material};
 use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3, vec2};
 use crate::optics::soil::LOESS;
 use crate::plant::{self, ConditionDesc, LeafAxis, OrganKind};
-use crate::ron_file::RonFile;
-use crate::ron_file::{Positive, Step, Vary};
+use crate::ron_file::{Positive, RENAMED, RonFile, Step, Vary};
 use crate::sampling::{Purpose, Stream};
 use crate::scatter::{self, Disc, Spot};
 use crate::soil::Rect;
@@ -184,7 +183,7 @@ impl<'a> Builder<'a> {
             light_records.push(record);
             lights.extend(drawn);
         }
-        let mut warnings = page.renamed();
+        let mut warnings = page.renamed(RENAMED);
         if lights.is_empty() {
             warnings.push("no light in the scene: the image will be black".into());
         }

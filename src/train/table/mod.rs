@@ -63,7 +63,7 @@ pub use names::slug;
 #[doc(hidden)]
 pub use print::{RUNS, TIMES, Tables, listing, tables};
 #[doc(hidden)]
-pub use renamed::renamed;
+pub use renamed::RENAMED;
 #[doc(hidden)]
 pub use rows::{Learner, Row, rows};
 #[doc(hidden)]

@@ -16,7 +16,7 @@ use furrow::integrator::{PathTracer, World};
 use furrow::math::vec3;
 use furrow::output::{self, Picture};
 use furrow::render::{self, Settings, Watch};
-use furrow::ron_file::RonFile;
+use furrow::ron_file::{RENAMED, RonFile};
 use furrow::sampling::Points;
 use furrow::scene::desc::SpeciesDesc;
 use furrow::scene::{Field, PlantRecord, assemble};
@@ -100,7 +100,7 @@ impl Args {
     /// One species: its sheet's path, and its entry in the page.
     fn species(&self, page: &Path, signals: &Signals) -> Result<(PathBuf, Entry)> {
         let file = RonFile::read(page)?;
-        for warning in file.renamed() {
+        for warning in file.renamed(RENAMED) {
             eprintln!("warning: {warning}");
         }
         let desc: SpeciesDesc = file.parse()?;
