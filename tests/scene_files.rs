@@ -6,12 +6,15 @@
 //! words: `FURROW_BLESS=1 cargo test --test scene_files` writes them anew; read the difference before committing it.
 
 use furrow::Result;
+use furrow::model::{Model, Up};
 use furrow::plant::{Stage, grow};
 use furrow::ron_file::RonFile;
 use furrow::sampling::{Purpose, Stream};
 use furrow::scene::assemble::{self, Options};
 use furrow::scene::desc::{FieldDesc, SpeciesDesc};
 use furrow::texture::draw::Recipe;
+use furrow::texture::panorama::Panorama;
+use furrow::texture::{ColorSpace, Texture};
 use furrow::train::table::{Experiment, ExperimentDesc};
 use proptest::prelude::*;
 use serde::Serialize;
@@ -304,5 +307,35 @@ proptest! {
         let page = std::fs::read_to_string("scenes/field.ron").unwrap();
         let text = edits.iter().fold(page, |text, edit| edited(&text, edit));
         tidy(RonFile::of(&text).parse::<FieldDesc>())?;
+    }
+}
+
+/// Rationale: a pipe that nobody writes into and a device that never ends would hold the program for ever. Expected: every kind of file
+/// that a scene names is refused at once, with words that say what it is.
+#[cfg(unix)]
+#[test]
+fn pipes_and_devices_are_refused_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = |name: &str| {
+        let path = folder.path().join(name);
+        assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
+        path
+    };
+    let (scene, picture, panorama, model) = (pipe("a.ron"), pipe("a.png"), pipe("a.exr"), pipe("a.obj"));
+    let zero = std::path::PathBuf::from("/dev/zero");
+    let (done, wait) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        let words = |error: furrow::Error| (error.exit_code(), error.to_string());
+        done.send(words(RonFile::read(&scene).unwrap_err())).unwrap();
+        done.send(words(RonFile::read(&zero).unwrap_err())).unwrap();
+        done.send(words(Texture::load(&picture, ColorSpace::Srgb).unwrap_err())).unwrap();
+        done.send(words(Panorama::load(&panorama).unwrap_err())).unwrap();
+        done.send(words(Model::load(&model, Up::Z).unwrap_err())).unwrap();
+        let text = format!("Field(lights: [EnvironmentMap(file: {panorama:?})])");
+        done.send(words(RonFile::of(&text).need_file(panorama.to_str().unwrap()).unwrap_err())).unwrap();
+    });
+    for k in 0..6 {
+        let (code, words) = wait.recv_timeout(std::time::Duration::from_secs(60)).expect("it waits for ever");
+        assert!(code == 2 && words.contains("a pipe, a socket or a device, not a file"), "{k}: {code} {words}");
     }
 }
