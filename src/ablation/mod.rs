@@ -1,6 +1,6 @@
 //! Named edits of a field, each of which changes exactly one thing: what does a network lose, or a render cost, without it?
 //!
-//! An edit acts at one place on the way from page to files, and its type says where ([`Change`]): it cannot reach anything else. No
+//! An edit acts at one place on the way from scene file to files, and its type says where ([`Change`]): it cannot reach anything else. No
 //! random number is drawn for it, so plants, light and noise are those of the field without it, and where geometry stays the
 //! labels stay bit for bit ([`Edit::keeps_labels`]).
 //!
@@ -44,12 +44,12 @@ pub struct Edit {
     pub change: Change,
 }
 
-/// Where an edit acts, on the way from page to files.
+/// Where an edit acts, on the way from scene file to files.
 #[derive(Clone, Copy, Debug)]
 pub enum Change {
     /// Nowhere.
     Nothing,
-    /// On what the pages say, before anything grows.
+    /// On what the scene files say, before anything grows.
     Growth(Growing),
     /// On what shines.
     Lights(fn(&mut Vec<Light>)),
@@ -73,13 +73,13 @@ impl Edit {
         (!matches!(self.change, Change::Nothing)).then(|| self.name.to_owned())
     }
 
-    /// Opens a page for [`Edit::field`].
+    /// Opens a scene file for [`Edit::field`].
     pub fn open(&self, page: &Path) -> Result<Source> {
         let growing = if let Change::Growth(growing) = self.change { growing } else { Growing::default() };
         Ok(Source::open(page)?.growing(growing))
     }
 
-    /// Builds a field of a page that this edit has opened. Call it inside a pool.
+    /// Builds a field of a scene file that this edit has opened. Call it inside a pool.
     pub fn field(&self, source: &Source, options: &Options) -> Result<Field> {
         let mut field = source.field(options)?;
         let scene = &mut field.scene;

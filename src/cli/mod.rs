@@ -46,24 +46,24 @@ pub fn check_folder(folder: &Path) -> Result<()> {
     }
 }
 
-/// Checks that a scene page is there, and says which pages are where it is not.
-pub fn check_scene(page: &Path) -> Result<()> {
-    if page.exists() {
+/// Checks that a scene file is there, and says which scene files are where it is not.
+pub fn check_scene(file: &Path) -> Result<()> {
+    if file.exists() {
         return Ok(());
     }
-    let folder = page.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut pages: Vec<String> = std::fs::read_dir(folder)
+    let folder = file.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut files: Vec<String> = std::fs::read_dir(folder)
         .map(|entries| entries.filter_map(|e| e.ok()?.file_name().into_string().ok()).collect())
         .unwrap_or_default();
-    pages.retain(|name| Path::new(name).extension().is_some_and(|e| e == "ron"));
-    pages.sort();
-    let name = page.file_name().unwrap_or_default().to_string_lossy();
-    let help = match (nearest(&pages, &name), pages.is_empty()) {
+    files.retain(|name| Path::new(name).extension().is_some_and(|e| e == "ron"));
+    files.sort();
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    let help = match (nearest(&files, &name), files.is_empty()) {
         (Some(near), _) => format!("did you mean {}?", folder.join(near).display()),
-        (None, false) => format!("pages in {} are {}", folder.display(), pages.join(", ")),
+        (None, false) => format!("scene files in {} are {}", folder.display(), files.join(", ")),
         (None, true) => "the main scene is scenes/field.ron in the project's folder".to_owned(),
     };
-    Err(Error::input("there is no such page").in_file(page).help(help))
+    Err(Error::input("there is no such scene file").in_file(file).help(help))
 }
 
 /// Checks that a crop lies in the image.

@@ -1,11 +1,11 @@
 //! Datasets: from one field to a hundred thousand, each with every label, in the formats people use.
 //!
-//! Image k is field k of the page: a function of page, seed and k, whichever process on whichever machine makes it, and in which
+//! Image k is field k of the scene file: a function of scene file, seed and k, whichever process on whichever machine makes it, and in which
 //! order. So the work may be cut, killed, moved and gone on with anywhere.
 //!
 //! ```text
 //! dataset.json          the recipe: what decides every byte
-//! scene/                the page and everything that it reads, so that the folder stands alone
+//! scene/                the scene file and everything that it reads, so that the folder stands alone
 //! images/000123/        one image: photographs, label maps, record.json
 //! coco/ phenobench/ …   the same for other people's tools
 //! seals/000123.json     SHA-256 of each of its files; written last

@@ -1,4 +1,4 @@
-//! Begins a dataset: checks the page by growing its first field, takes everything that it reads into the folder, writes the recipe.
+//! Begins a dataset: checks the scene file by growing its first field, takes everything that it reads into the folder, writes the recipe.
 
 use super::gather::{Gathered, gather};
 use super::recipe::{FILE, Made, Recipe, Rendering};
@@ -15,13 +15,13 @@ use std::path::{Path, PathBuf};
 /// A dataset that is asked for.
 #[derive(Clone, Debug)]
 pub struct Order {
-    /// The page.
+    /// The scene file.
     pub scene: PathBuf,
-    /// Seed, instead of the page's.
+    /// Seed, instead of the scene file's.
     pub seed: Option<u64>,
     /// How many images.
     pub count: u64,
-    /// Image width, instead of the page's.
+    /// Image width, instead of the scene file's.
     pub width: Option<u32>,
     /// Image height.
     pub height: Option<u32>,

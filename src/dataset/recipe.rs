@@ -35,7 +35,7 @@ pub struct Recipe {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Made {
-    /// Rendered from a page.
+    /// Rendered from a scene file.
     Rendered(Rendering),
     /// Brought from elsewhere.
     Imported {
@@ -49,11 +49,11 @@ pub enum Made {
 /// How images are rendered.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rendering {
-    /// The page, below the dataset's folder.
+    /// The scene file, below the dataset's folder.
     pub scene: String,
-    /// SHA-256 of the page and every page, texture and table that it names.
+    /// SHA-256 of the scene file and every scene file, texture and table that it names.
     pub scene_sha256: String,
-    /// Seed; image k is field k of the page with this seed.
+    /// Seed; image k is field k of the scene file with this seed.
     pub seed: u64,
     /// Pixels across.
     pub width: u32,

@@ -6,7 +6,7 @@
 //! its nodes two quantities are interpolated that barely bend there: the logarithm of the direct beam, linear in air mass
 //! and in optical depth (Beer's law), and the share of the lost beam that arrives as diffuse light. At a node the table stands.
 //!
-//! Pages say turbidity, as sky models do. Aerosol optical depth at 500 nm is τ = 0.10 ((T − 1)/2)^1.30: zero at T = 1, the
+//! Scene files say turbidity, as sky models do. Aerosol optical depth at 500 nm is τ = 0.10 ((T − 1)/2)^1.30: zero at T = 1, the
 //! pure molecular sky, and matching the diffuse light of Hosek & Wilkie at T = 3 (τ 0.10) and T = 6 (τ 0.33).
 
 use crate::math::Spectrum;

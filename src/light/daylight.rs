@@ -1,4 +1,4 @@
-//! Sun and sky together, as a page writes them: a clear day, a clouded one, an overcast one.
+//! Sun and sky together, as a scene file writes them: a clear day, a clouded one, an overcast one.
 //!
 //! Clouds follow Kasten & Czeplak 1980, "Solar and terrestrial radiation dependent on the amount and type of cloud", Solar
 //! Energy 24: with cloud cover N (0 to 1) the global irradiance is 1 − 0.75 N^3.4 of the clear one, and the diffuse share of it

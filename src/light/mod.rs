@@ -1,4 +1,4 @@
-//! Light: sun, sky, constant environments and environment maps, lamps; how a page writes them and how a path tracer draws from them.
+//! Light: sun, sky, constant environments and environment maps, lamps; how a scene file writes them and how a path tracer draws from them.
 //!
 //! `sample.rs` holds the promise, each variant keeps it in a file of its own, the enum here only chooses. Radiance is
 //! W·m⁻²·sr⁻¹·nm⁻¹ and irradiance W·m⁻²·nm⁻¹, both in the four bands R, G, B, NIR.
@@ -148,8 +148,8 @@ impl Light {
 /// ```
 /// use furrow::light::LightDesc;
 /// use furrow::sampling::{Purpose, Stream};
-/// let mut stream = Stream::of(1, 0, Purpose::Page, 0);
-/// for (page, count) in [
+/// let mut stream = Stream::of(1, 0, Purpose::Scene file, 0);
+/// for (text, count) in [
 ///     (r#"Daylight(sun: At(latitude_deg: 50.6, longitude_deg: 7, utc: "2016-05-27T11:30:00Z"), turbidity: 3)"#, 2),
 ///     ("Daylight(sun: Angles(elevation_deg: Uniform(20, 65), azimuth_deg: Uniform(0, 360)), cloud: 0.4)", 2),
 ///     ("Overcast(illuminance_klx: Uniform(5, 25))", 1),
@@ -165,18 +165,18 @@ impl Light {
 ///     ),
 ///     ("Lamp(shape: Disc(radius_m: 0.05), position_m: (0, 0.3, 0.8), glow: Radiance(1, 1, 1, 0.5))", 1),
 /// ] {
-///     let desc: LightDesc = ron::from_str(page)?;
+///     let desc: LightDesc = ron::from_str(text)?;
 ///     assert_eq!(desc.build(&mut stream)?.len(), count);
 /// }
 /// // A robot that drives by day and under its own two lamps by night: each field is one or the other.
-/// let page = "OneOf([
+/// let text = "OneOf([
 ///     [Daylight(sun: Angles(elevation_deg: Uniform(20, 65), azimuth_deg: Uniform(0, 360)))],
 ///     [
 ///         Lamp(shape: Disc(radius_m: 0.05), position_m: (-0.3, 0, 0.8), glow: WhiteLed(irradiance: 1, at_m: 0.9)),
 ///         Lamp(shape: Disc(radius_m: 0.05), position_m: (0.3, 0, 0.8), glow: WhiteLed(irradiance: 1, at_m: 0.9)),
 ///     ],
 /// ])";
-/// let LightDesc::OneOf(lists) = ron::from_str(page)? else { unreachable!() };
+/// let LightDesc::OneOf(lists) = ron::from_str(text)? else { unreachable!() };
 /// assert_eq!((lists[0].len(), lists[1].len()), (1, 2));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -234,7 +234,7 @@ pub enum LightDesc {
         glow: GlowDesc,
     },
     /// One of these lists, each as likely as the others, drawn once a field: its lights stand here as if they were written so.
-    /// Only where a page lists its lights; no list is empty or holds a `OneOf`.
+    /// Only where a scene file lists its lights; no list is empty or holds a `OneOf`.
     OneOf(Vec<Vec<LightDesc>>),
 }
 
@@ -261,7 +261,7 @@ impl LightDesc {
         Ok(self.draw(stream, &mut open)?.1)
     }
 
-    /// Draws the lights as [`LightDesc::build`] does, and tells what was drawn. `open` reads a file that the page names. An
+    /// Draws the lights as [`LightDesc::build`] does, and tells what was drawn. `open` reads a file that the scene file names. An
     /// [`Kind::Input`](crate::error::Kind::Input) for a [`LightDesc::OneOf`], from which the field draws.
     pub fn draw(&self, stream: &mut Stream, open: &mut Open<'_>) -> Result<(LightRecord, Vec<Light>)> {
         let sky = |sky: Option<Sky>| sky.map(|sky| Light::Sky(Box::new(sky)));

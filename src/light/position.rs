@@ -1,5 +1,5 @@
 //! Where the sun stands: NREL's algorithm (Reda & Andreas 2004, "Solar position algorithm for solar radiation applications")
-//! by `solar-positioning`, and the one way a page writes time: `2016-05-27T14:30:00Z`.
+//! by `solar-positioning`, and the one way a scene file writes time: `2016-05-27T14:30:00Z`.
 
 use crate::ron_file::{from_raw, parse_in, whole};
 use crate::{Error, Result};

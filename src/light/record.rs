@@ -7,7 +7,7 @@ use crate::light::sample::Emitter;
 use crate::math::Spectrum;
 use serde::{Deserialize, Serialize};
 
-/// A light as it was drawn: one for each that the page lists.
+/// A light as it was drawn: one for each that the scene file lists.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum LightRecord {
@@ -43,7 +43,7 @@ pub enum LightRecord {
     /// An environment map.
     #[serde(rename = "environment")]
     EnvironmentMap {
-        /// The file, as the page names it.
+        /// The file, as the scene file names it.
         file: String,
         /// By what its values became radiance.
         scale: f32,

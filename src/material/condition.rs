@@ -1,7 +1,7 @@
 //! What a leaf's condition does to its light: each kind of tissue is pigments, so that its colour, its near infrared and what
 //! passes through it belong together.
 //!
-//! | tissue | pigments over the page's |
+//! | tissue | pigments over the species file's |
 //! |---|---|
 //! | yellow, s | Cab × (1 − 0.85 s), Car × (1 − 0.45 s), N + 0.15 s: chlorophyll goes before carotenoids |
 //! | dead | N 2.2, Cab 1, Car 2, brown 1.1, water 0.003 cm |
@@ -138,7 +138,7 @@ struct Inner {
 }
 
 impl ConditionOptics {
-    /// Of a leaf made of `pigments`, with its tissues: its marks, none for a stalk; anthocyanin beyond the page's, µg/cm²; reflectance of the
+    /// Of a leaf made of `pigments`, with its tissues: its marks, none for a stalk; anthocyanin beyond the species file's, µg/cm²; reflectance of the
     /// soil that lies on it.
     pub fn new(
         (pigments, tones): (&Pigments, Arc<Tones>),

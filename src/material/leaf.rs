@@ -24,12 +24,12 @@ impl Bound for Index {
     const WORDS: &'static str = "between 1.2 and 2";
 }
 
-/// A leaf as a species page writes it.
+/// A leaf as a species file writes it.
 ///
 /// ```
 /// use furrow::{material::LeafDesc, ron_file::RonFile};
-/// let page = RonFile::of(r#"Leaf(texture: "leaf.png", roughness: 0.3, pigments: (chlorophyll: 38))"#);
-/// let leaf: LeafDesc = page.parse().unwrap();
+/// let file = RonFile::of(r#"Leaf(texture: "leaf.png", roughness: 0.3, pigments: (chlorophyll: 38))"#);
+/// let leaf: LeafDesc = file.parse().unwrap();
 /// assert!(RonFile::of("Leaf(roughnes: 0.3)").parse::<LeafDesc>().is_err());
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -149,7 +149,7 @@ impl LeafMaterial {
         }
     }
 
-    /// The same leaf with another chlorophyll content, as a factor on the page's: how one specimen differs from the next.
+    /// The same leaf with another chlorophyll content, as a factor on the species file's: how one specimen differs from the next.
     #[must_use]
     pub fn with_chlorophyll(&self, base: f32, factor: f32) -> Self {
         let rgb = |c: f32| self.optics.with_chlorophyll(c).reflectance.0.truncate().max(Vec3::splat(1e-3));

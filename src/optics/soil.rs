@@ -30,7 +30,7 @@ pub const STONE: Spectrum = Spectrum::new(0.30, 0.27, 0.23, 0.36);
 /// Dry straw and wood shavings.
 pub const STRAW: Spectrum = Spectrum::new(0.35, 0.24, 0.16, 0.585);
 
-/// The presets by the name a page writes.
+/// The presets by the name a scene file writes.
 pub const PRESETS: [(&str, Spectrum); 8] = [
     ("loam", LOAM),
     ("loess", LOESS),

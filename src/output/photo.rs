@@ -1,4 +1,4 @@
-//! Photographs of other people, in whatever shape they come; and ours made small, for pages that people look at.
+//! Photographs of other people, in whatever shape they come; and ours made small, for scene files that people look at.
 
 use crate::{Error, Result};
 use image::codecs::jpeg::JpegEncoder;

@@ -6,24 +6,37 @@ use crate::ron_file::{self, Finite, NonNegative, Num, Positive, Step, Vary};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 
-/// How a plant stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Form {
-    /// All leaves on one crown at the soil.
-    Rosette,
-    /// Whorls of leaves without stalks on a square stem.
-    Whorl,
-    /// Stalked leaves on an upright stem.
-    Erect,
-    /// A rosette of finely divided leaves.
-    Dissected,
-    /// A grass: sheaths, arching blades in two ranks, side shoots.
-    Tuft,
-    /// A stout grass: one shoot of rolled sheaths, big arching blades in two ranks.
-    Cane,
-    /// A main shoot and side shoots from its lowest axils; stems too long for their width lie down.
-    Runner,
+/// The growth forms: each is a name in species files and a file with a `grow(&Growth) -> Vec<Organ>`. Calls a macro with the list.
+macro_rules! forms {
+    ($call:ident) => {
+        $call! {
+            /// All leaves on one crown at the soil.
+            Rosette => rosette,
+            /// Whorls of leaves without stalks on a square stem.
+            Whorl => whorl,
+            /// Stalked leaves on an upright stem.
+            Erect => erect,
+            /// A rosette of finely divided leaves.
+            Dissected => dissected,
+            /// A grass: sheaths, arching blades in two ranks, side shoots.
+            Tuft => tuft,
+            /// A stout grass: one shoot of rolled sheaths, big arching blades in two ranks.
+            Cane => cane,
+            /// A main shoot and side shoots from its lowest axils; stems too long for their width lie down.
+            Runner => runner,
+        }
+    };
 }
+pub(super) use forms;
+
+macro_rules! declare {
+    ($($(#[$doc:meta])* $name:ident => $file:ident,)*) => {
+        /// How a plant stands.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+        pub enum Form { $($(#[$doc])* $name,)* }
+    };
+}
+forms!(declare);
 
 /// A species' plant, as it is written.
 ///
@@ -136,12 +149,12 @@ impl<'de> Deserialize<'de> for PlantDesc {
 }
 
 impl PlantDesc {
-    /// What does not fit together, in words. A page that was read has passed this.
+    /// What does not fit together, in words. A species file that was read has passed this.
     pub fn check(&self) -> Result<(), String> {
         self.check_at().map_err(|(_, message, _)| message)
     }
 
-    /// The same, with the place in the page.
+    /// The same, with the place in the species file.
     fn check_at(&self) -> Result<(), (Vec<Step<'static>>, String, String)> {
         use Step::{Field, Item};
         if self.stages.is_empty() {
@@ -226,9 +239,9 @@ impl PlantDesc {
 /// How old a plant is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Stage {
-    /// Days after emergence. Outside the page's stages: the nearest of them.
+    /// Days after emergence. Outside the species file's stages: the nearest of them.
     Age(f32),
-    /// BBCH code, by the ground that the crop covers where the page says at what age it does (see [`PlantDesc::cover_days`]), else by the
-    /// stages. Between two stages of the page: their blend.
+    /// BBCH code, by the ground that the crop covers where the species file says at what age it does (see [`PlantDesc::cover_days`]), else by the
+    /// stages. Between two stages of the species file: their blend.
     Bbch(u32),
 }

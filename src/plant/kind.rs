@@ -1,4 +1,4 @@
-//! Kinds of leaves: what all leaves of a kind share on the species page, whatever their size.
+//! Kinds of leaves: what all leaves of a kind share on the species file, whatever their size.
 
 use super::organ::OrganKind;
 use crate::geometry::outline::Outline;
@@ -124,7 +124,7 @@ pub struct LeafKind {
     /// How far the stalk of a full-sized leaf arches outward.
     #[serde(default = "vary::<Finite, 15>")]
     pub stalk_bend_deg: Vary<Finite>,
-    /// Whether its blades are flat sheets from base to tip: no fold, curl, wave, blister, twist or bend. Pages do not say so,
+    /// Whether its blades are flat sheets from base to tip: no fold, curl, wave, blister, twist or bend. Species files do not say so,
     /// experiments do.
     #[serde(skip)]
     pub flat: bool,

@@ -1,4 +1,4 @@
-//! Plants, grown from a species page: botany without optics.
+//! Plants, grown from a species file: botany without optics.
 //!
 //! A [`PlantDesc`] says how a species looks at its stages; [`grow`] makes one [`Plant`] of it, for an age and a stream of
 //! random numbers. The same stream gives the same plant at every age, larger or smaller. Leaf i draws only from its own
@@ -16,7 +16,7 @@
 //! | `condition` | age, health and damage of a plant and its leaves |
 //! | `rosette`, `whorl`, `erect`, `dissected`, `tuft`, `cane`, `runner` | growth forms |
 //!
-//! A new growth form is a file with a `grow(&Growth) -> Vec<Organ>` and one line in [`Form`].
+//! A new growth form is a file with a `grow(&Growth) -> Vec<Organ>` and one line in `forms!` (`desc.rs`).
 
 mod axis;
 pub mod blade;
@@ -103,18 +103,15 @@ pub fn grow_in(
     Plant { organs, bbch: growth.bbch, age_days: growth.age_days, height, radius }
 }
 
-/// The organs of a plant that stands like this.
-fn organs_of(form: Form, growth: &Growth<'_>) -> Vec<Organ> {
-    match form {
-        Form::Rosette => rosette::grow(growth),
-        Form::Whorl => whorl::grow(growth),
-        Form::Erect => erect::grow(growth),
-        Form::Dissected => dissected::grow(growth),
-        Form::Tuft => tuft::grow(growth),
-        Form::Cane => cane::grow(growth),
-        Form::Runner => runner::grow(growth),
-    }
+macro_rules! grow_by_form {
+    ($($(#[$doc:meta])* $name:ident => $file:ident,)*) => {
+        /// The organs of a plant that stands like this.
+        fn organs_of(form: Form, growth: &Growth<'_>) -> Vec<Organ> {
+            match form { $(Form::$name => $file::grow(growth),)* }
+        }
+    };
 }
+desc::forms!(grow_by_form);
 
 #[cfg(test)]
 mod tests;

@@ -11,7 +11,7 @@ use crate::math::{Vec3, lerp, vec2, vec3};
 use crate::sampling::Stream;
 use std::f32::consts::PI;
 
-/// The most ribbons of one blade: a guard against pages that ask for a million lobes.
+/// The most ribbons of one blade: a guard against species files that ask for a million lobes.
 const MOST: usize = 600;
 
 /// A blade of ribbons while it grows.

@@ -21,7 +21,7 @@ const CREEP: f32 = -0.35;
 const SIDE: (f32, f32) = (0.7, 0.95);
 /// Angle between upright and a side shoot at its foot, radians.
 const SPREAD: (f32, f32) = (0.95, 1.3);
-/// Side shoots stop here, whatever a page asks for.
+/// Side shoots stop here, whatever a species file asks for.
 const MOST: usize = 24;
 /// Rings of one internode.
 const PIECES: usize = 4;

@@ -1,4 +1,4 @@
-//! System tests of the species pages: they find every page of `scenes/species` unasked.
+//! System tests of the species files: they find every species file of `scenes/species` unasked.
 
 use super::*;
 use crate::geometry::{Mesh, outline};
@@ -17,7 +17,7 @@ struct Material {
     roughness: f32,
 }
 
-/// As much of a species page as botany needs.
+/// As much of a species file as botany needs.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename = "Species")]
 #[allow(dead_code)]
@@ -307,7 +307,7 @@ fn blades_fill_as_much_of_their_length_and_width_as_the_table_says() {
     }
 }
 
-/// The midrib of the grown mesh is as long as the page says: relief and joints bend, they do not stretch.
+/// The midrib of the grown mesh is as long as the species file says: relief and joints bend, they do not stretch.
 #[test]
 fn bent_blades_keep_their_length() {
     let beet = page("BEAVX");

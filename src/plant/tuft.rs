@@ -10,7 +10,7 @@ use std::f32::consts::{FRAC_PI_2, PI};
 
 /// Size of a side shoot over that of the main one.
 const TILLER: (f32, f32) = (0.45, 0.7);
-/// Side shoots stop here, whatever a page asks for.
+/// Side shoots stop here, whatever a species file asks for.
 const MOST: usize = 24;
 
 /// Grows a tuft.

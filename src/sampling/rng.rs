@@ -12,7 +12,7 @@ use rand_pcg::Pcg64Mcg;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u64)]
 pub enum Purpose {
-    /// Values drawn by the page itself: light, camera, soil moisture.
+    /// Values drawn by the scene file itself: light, camera, soil moisture.
     Page = 1,
     /// Where things stand.
     Scatter = 2,

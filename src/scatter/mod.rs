@@ -1,6 +1,6 @@
 //! Where things stand: crops in rows, weeds in patches.
 //!
-//! Pure functions of a page, an area and a stream. Every place has an address of its own (the slot of its row, the cell of
+//! Pure functions of a scene file, an area and a stream. Every place has an address of its own (the slot of its row, the cell of
 //! the ground), never its turn in a list: a larger area holds the same plants at the same places, and one more species
 //! moves nothing of another.
 

@@ -1,4 +1,4 @@
-//! What a page says: the field and the species, composed of what each room can read.
+//! What a scene file says: the field and the species, composed of what each room can read.
 
 use crate::film::Filter;
 use crate::light::LightDesc;
@@ -14,16 +14,16 @@ use crate::soil::SoilDesc;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// A distribution over fields. Every number may be fixed or drawn; paths are relative to the page.
+/// A distribution over fields. Every number may be fixed or drawn; paths are relative to the scene file.
 ///
 /// ```
-/// let page = r#"Field(
+/// let text = r#"Field(
 ///     seed: 7,
 ///     camera: JaiAd130(height_m: 0.85),
 ///     lights: [Daylight(sun: Angles(elevation_deg: Uniform(30, 60), azimuth_deg: 140))],
 ///     plants: [(species: "species/sugar_beet.ron", growth: Bbch(14))],
 /// )"#;
-/// let field: furrow::scene::desc::FieldDesc = ron::from_str(page).unwrap();
+/// let field: furrow::scene::desc::FieldDesc = ron::from_str(text).unwrap();
 /// assert_eq!(field.plants.len(), 1);
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -80,7 +80,7 @@ pub enum Growth {
     AgeDays(Vary<NonNegative>),
     /// Growth stage, BBCH scale (Meier 2001).
     Bbch(Vary<PositiveCount>),
-    /// One of these, drawn once a field: the same place in every such list of the page, so all of them have the same length.
+    /// One of these, drawn once a field: the same place in every such list of the scene file, so all of them have the same length.
     Either(Vec<Growth>),
 }
 
@@ -102,16 +102,16 @@ impl Growth {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename = "Crop")]
 pub struct CropDesc {
-    /// Species page.
+    /// Species file.
     pub species: String,
     /// How far each plant has grown.
     pub growth: Growth,
-    /// Factor on its sizes, beyond that of the species' page: below 1 where cold or drought kept plants small for their leaves.
+    /// Factor on its sizes, beyond that of the species file: below 1 where cold or drought kept plants small for their leaves.
     #[serde(default = "as_it_is", skip_serializing_if = "is_as_it_is")]
     pub vigour: Vary<Positive>,
     /// Where they stand.
     pub rows: RowsDesc,
-    /// Age, health and damage of its plants; as the species' page has it unless given.
+    /// Age, health and damage of its plants; as the species file has it unless given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub condition: Option<ConditionDesc>,
 }
@@ -120,17 +120,17 @@ pub struct CropDesc {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename = "Weed")]
 pub struct WeedDesc {
-    /// Species page.
+    /// Species file.
     pub species: String,
     /// How far each plant has grown.
     pub growth: Growth,
-    /// Factor on its sizes, beyond that of the species' page: below 1 where cold or drought kept plants small for their leaves.
+    /// Factor on its sizes, beyond that of the species file: below 1 where cold or drought kept plants small for their leaves.
     #[serde(default = "as_it_is", skip_serializing_if = "is_as_it_is")]
     pub vigour: Vary<Positive>,
     /// How many and how they gather.
     #[serde(default)]
     pub spread: WeedsDesc,
-    /// Age, health and damage of its plants; as the species' page has it unless given.
+    /// Age, health and damage of its plants; as the species file has it unless given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub condition: Option<ConditionDesc>,
 }
@@ -139,11 +139,11 @@ pub struct WeedDesc {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename = "Plant")]
 pub struct PlacedDesc {
-    /// Species page.
+    /// Species file.
     pub species: String,
     /// How far it has grown.
     pub growth: Growth,
-    /// Factor on its sizes, beyond that of the species' page: below 1 where cold or drought kept plants small for their leaves.
+    /// Factor on its sizes, beyond that of the species file: below 1 where cold or drought kept plants small for their leaves.
     #[serde(default = "as_it_is", skip_serializing_if = "is_as_it_is")]
     pub vigour: Vary<Positive>,
     /// Where its stem meets the ground, metres east and north.
@@ -155,7 +155,7 @@ pub struct PlacedDesc {
     /// Only this leaf of it, counted from 1 with the seed leaves; the whole plant unless given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub only_leaf: Option<Num<PositiveCount>>,
-    /// Age, health and damage of it; as the species' page has it unless given.
+    /// Age, health and damage of it; as the species file has it unless given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub condition: Option<ConditionDesc>,
 }
@@ -164,8 +164,8 @@ pub struct PlacedDesc {
 ///
 /// ```
 /// use furrow::{ron_file::RonFile, scene::desc::ModelDesc};
-/// let page = RonFile::of(r#"Model(file: "thistle.glb", class: Weed, position_m: (0.1, Uniform(-0.1, 0.1)), scale: 0.01)"#);
-/// let model: ModelDesc = page.parse().unwrap();
+/// let file = RonFile::of(r#"Model(file: "thistle.glb", class: Weed, position_m: (0.1, Uniform(-0.1, 0.1)), scale: 0.01)"#);
+/// let model: ModelDesc = file.parse().unwrap();
 /// assert!(RonFile::of(r#"Model(file: "thistle.glb", clas: Weed)"#).parse::<ModelDesc>().is_err());
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -221,7 +221,7 @@ fn no_turn() -> Vary<Finite> {
     Vary::fixed(0.0)
 }
 
-/// A species, as its page writes it.
+/// A species, as its scene file writes it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename = "Species")]
 pub struct SpeciesDesc {
@@ -243,7 +243,7 @@ pub struct SpeciesDesc {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub condition: Option<ConditionDesc>,
     /// Whether all its plants are one individual: of one shape in all fields, of one age in each, so that a field has one mesh of it
-    /// many times. Place, lean, turn and green stay each plant's own. Pages do not say so, experiments do.
+    /// many times. Place, lean, turn and green stay each plant's own. Scene files do not say so, experiments do.
     #[serde(skip)]
     pub alike: bool,
 }
@@ -272,7 +272,7 @@ impl Role {
 }
 
 impl SpeciesDesc {
-    /// The textures that the page names.
+    /// The textures that the scene file names.
     pub fn textures(&self) -> impl Iterator<Item = &str> {
         self.materials.values().flat_map(|leaf| leaf.texture.iter().flat_map(Pick::all)).map(String::as_str)
     }

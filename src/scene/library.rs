@@ -1,4 +1,4 @@
-//! Everything that pages name, read once: species, pictures, soil layers.
+//! Everything that scene files name, read once: species, pictures, soil layers.
 
 use super::desc::SpeciesDesc;
 use super::growing::Growing;
@@ -65,12 +65,12 @@ pub(super) struct Library {
     environment_maps: BTreeMap<(PathBuf, Infrared), Arc<Table>>,
     /// Keywords of species files that were renamed, by file.
     renamed: BTreeMap<PathBuf, Vec<String>>,
-    /// How species grow otherwise than their pages say.
+    /// How species grow otherwise than their scene files say.
     pub(super) growing: Growing,
 }
 
 impl Library {
-    /// The page itself.
+    /// The scene file itself.
     pub(super) fn page(&mut self, path: &Path) -> Result<RonFile> {
         let page = RonFile::read(path)?;
         self.files.insert(path.into(), Sha256::digest(page.text.as_bytes()).into());
@@ -96,7 +96,7 @@ impl Library {
         hex::encode(all.finalize())
     }
 
-    /// The species page that `page` names.
+    /// The species file that `page` names.
     pub(super) fn species(&mut self, page: &RonFile, path: &str) -> Result<Arc<Species>> {
         let full = page.need_file(path)?;
         if let Some(known) = self.species.get(&full) {
@@ -256,7 +256,7 @@ const IMAGE_HELP: &str = "name a PNG or JPEG image, or draw it: trace texture RE
 /// What helps where a model cannot be used and nothing more is known.
 const MODEL_HELP: &str = "export it again from the program that made it";
 
-/// A file that cannot be read as an image or a model is the page's fault: shown where the page names it, with `help` where the error
+/// A file that cannot be read as an image or a model is the scene file's fault: shown where the scene file names it, with `help` where the error
 /// has none of its own.
 fn at_its_place(page: &RonFile, literal: &str, help: &str, error: Error) -> Error {
     match error.place() {

@@ -66,7 +66,7 @@ pub struct PlantRecord {
     pub leaves: u16,
     /// Base and tip of its leaves' blades, metres, world, by rising leaf; none of a model from disk, which has no midribs.
     pub leaf_axes: Vec<LeafAxis>,
-    /// Its condition; none where no page says any.
+    /// Its condition; none where no scene file says any.
     pub condition: Option<Condition>,
 }
 

@@ -8,7 +8,7 @@ use crate::sensor::{CameraRecord, SensorRecord};
 use crate::soil::SoilRecord;
 use serde::{Deserialize, Serialize};
 
-/// One of the species that a page can draw, or a model from disk.
+/// One of the species that a scene file can draw, or a model from disk.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SpeciesRecord {
     /// Scientific name; of a model its file's name.
@@ -28,18 +28,18 @@ pub struct Conditions {
     /// What its sensor does beyond counting light; none where that is all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensor: Option<SensorRecord>,
-    /// What shines, in the order of the page.
+    /// What shines, in the order of the scene file.
     pub lights: Vec<LightRecord>,
-    /// Which of the page's lists of lights are among them; left out where it has none.
+    /// Which of the scene file's lists of lights are among them; left out where it has none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lighting: Vec<Lighting>,
-    /// The ground; none where the page has none.
+    /// The ground; none where the scene file has none.
     pub soil: Option<SoilRecord>,
-    /// What was sown, in the order of the page.
+    /// What was sown, in the order of the scene file.
     pub crops: Vec<CropRecord>,
-    /// What came by itself, in the order of the page.
+    /// What came by itself, in the order of the scene file.
     pub weeds: Vec<WeedRecord>,
-    /// Which of the page's growths all plants have.
+    /// Which of the scene file's growths all plants have.
     pub season: Season,
 }
 

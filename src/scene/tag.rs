@@ -41,7 +41,7 @@ impl Class {
     }
 }
 
-/// Classes in records: by their lower-case names, where pages write `Crop`. For `#[serde(with = "lowercase")]`.
+/// Classes in records: by their lower-case names, where scene files write `Crop`. For `#[serde(with = "lowercase")]`.
 pub mod lowercase {
     use super::Class;
     use serde::{Deserialize, Deserializer, Serializer, de};

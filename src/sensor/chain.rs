@@ -80,7 +80,7 @@ pub struct Photograph {
     pub rgb: Vec<u8>,
     /// NIR of each pixel, row by row.
     pub nir: Vec<u8>,
-    /// The same before compression in more than 8 bits, where the page asks for them.
+    /// The same before compression in more than 8 bits, where the scene file asks for them.
     pub deep: Option<Deep>,
     /// Level per G radiance that the colour image was exposed with.
     pub gain: f32,

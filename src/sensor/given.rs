@@ -1,8 +1,8 @@
-//! What a page gives of a thing whose other values come from a preset.
+//! What a scene file gives of a thing whose other values come from a preset.
 
 use serde::{Deserialize, Deserializer};
 
-/// A value that a page may leave to its preset.
+/// A value that a scene file may leave to its preset.
 #[derive(Clone, Debug)]
 pub(in crate::sensor) struct Given<T>(Option<T>);
 
@@ -25,7 +25,7 @@ impl<T> Given<T> {
     }
 }
 
-/// A struct, and beside it what a page gives of it: each field with its type and how it is given, which is [`Given`] or the second
+/// A struct, and beside it what a scene file gives of it: each field with its type and how it is given, which is [`Given`] or the second
 /// name of another such struct.
 macro_rules! layered {
     (

@@ -1,4 +1,4 @@
-//! A sensor as a page writes it: each step of the camera chain with its switch, and cameras by their names.
+//! A sensor as a scene file writes it: each step of the camera chain with its switch, and cameras by their names.
 
 use super::chain::Sensor;
 use super::chip::{AdcDesc, Depth, ExposureDesc, MosaicDesc, NoiseDesc, NoiseWritten};
@@ -11,12 +11,12 @@ use serde::Serialize;
 
 layered! {
     /// A sensor, as it is written: `(…)` with every field as its default says, or a camera's name, whose values any field replaces.
-    /// The steps behind the noise are off unless a page or a preset asks for them.
+    /// The steps behind the noise are off unless a scene file or a preset asks for them.
     ///
     /// ```
     /// use furrow::sampling::{Purpose, Stream};
     /// use furrow::sensor::SensorDesc;
-    /// for page in [
+    /// for scene file in [
     ///     "(
     ///         exposure: Auto(level: Uniform(0.15, 0.21)),
     ///         nir_exposure: White(level: 0.8),
@@ -41,7 +41,7 @@ layered! {
     ///     "Phone(jpeg: Off, matrix: Saturation(1.1), noise: (read: 5))",
     ///     "MachineVision(exposure: Auto(level: 0.12))",
     /// ] {
-    ///     let desc: SensorDesc = ron::from_str(page)?;
+    ///     let desc: SensorDesc = ron::from_str(text)?;
     ///     let sensor = desc.build(&mut Stream::of(1, 0, Purpose::Sensor, 0));
     /// }
     /// assert_eq!(ron::from_str::<SensorDesc>("()")?, SensorDesc::default());

@@ -25,7 +25,7 @@ fn small() -> Camera {
     few(1)
 }
 
-/// Rationale: pages are drawn in fewer pixels for networks and for a look. Expected: the blur of the same lens, in the new pixels; no mosaic
+/// Rationale: scene files are drawn in fewer pixels for networks and for a look. Expected: the blur of the same lens, in the new pixels; no mosaic
 /// where pixels are of two by two.
 #[test]
 fn a_smaller_image_is_blurred_by_the_same_lens() {

@@ -50,7 +50,7 @@ impl GroundMaps {
 /// Depth of a pit between crumbs that hides half of the sky, metres.
 const HALF_SKY_M: f32 = 0.0005;
 
-/// Side of the square of matter that clods show, metres ([`Ground::fabric`] says it too): more than the longest clod that a page asks for as a rule.
+/// Side of the square of matter that clods show, metres ([`Ground::fabric`] says it too): more than the longest clod that a scene file asks for as a rule.
 const FABRIC_M: f32 = 0.12;
 
 /// How much wetter such a pit is.

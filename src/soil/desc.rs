@@ -1,4 +1,4 @@
-//! The written form of the ground: what a page says about soil, clods, stones and litter.
+//! The written form of the ground: what a scene file says about soil, clods, stones and litter.
 
 use super::{SoilColor, WheelDesc};
 use crate::math::Spectrum;
@@ -58,7 +58,7 @@ pub struct SoilDesc {
     #[serde(default)]
     pub litter: LitterDesc,
     /// Whether the ground is a plane without clods, under the same texture: everything else lies and stands where it would, as it would,
-    /// only lower or higher. Pages do not say so, experiments do.
+    /// only lower or higher. Scene files do not say so, experiments do.
     #[serde(skip)]
     pub flat: bool,
 }

@@ -18,7 +18,7 @@ const ROTTEN: Spectrum = Spectrum::new(0.20, 0.09, 0.05, 0.32);
 /// Side of the cells that litter is addressed by.
 const CELL_M: f32 = 0.1;
 
-/// The litter of a page, laid onto the pile.
+/// The litter of a scene file, laid onto the pile.
 pub fn litter(desc: &LitterDesc, ground: &Ground, pile: &mut Pile, stream: &Stream) -> Vec<Debris> {
     let mut all = Vec::new();
     let child = |k| own(stream, k);

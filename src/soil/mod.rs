@@ -1,6 +1,6 @@
 //! The ground: soil layers blended by noise, relief, moisture, and the clods, stones and litter that lie on it.
 //!
-//! [`SoilDesc`] is what a page says. [`Ground`] is one piece of ground: a displaced grid ([`Ground::mesh`]) that goes on
+//! [`SoilDesc`] is what a scene file says. [`Ground`] is one piece of ground: a displaced grid ([`Ground::mesh`]) that goes on
 //! beyond the view with growing cells, and a texture of its own ([`Ground::bake`]) with all that is finer than the grid.
 //! The same blend weights drive both. Bodies are then laid on a [`Pile`], which remembers what lies there already, largest
 //! first: [`stones()`], [`clods()`], [`litter()`].

@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 pub struct SoilRecord {
     /// How wet it is.
     pub moisture: MoistureRecord,
-    /// Mean reflectance of the dry soil, R, G, B, NIR, where the page names colours; of loess, whose NIR is taken, where it does not.
+    /// Mean reflectance of the dry soil, R, G, B, NIR, where the scene file names colours; of loess, whose NIR is taken, where it does not.
     pub reflectance: Spectrum,
-    /// The layers in the order of the page.
+    /// The layers in the order of the scene file.
     pub layers: Vec<LayerRecord>,
     /// Size of the largest patches of one layer.
     pub blend_scale_m: f64,

@@ -19,7 +19,7 @@ const APART: f32 = 0.8;
 /// Side of the cells that stones are addressed by.
 const CELL_M: f32 = 0.1;
 
-/// All populations of stones of a page, laid onto the pile, largest first within each.
+/// All populations of stones of a scene file, laid onto the pile, largest first within each.
 pub fn stones(desc: &[StonesDesc], ground: &Ground, pile: &mut Pile, stream: &Stream) -> Vec<Debris> {
     let mut all = Vec::new();
     for (i, population) in desc.iter().enumerate() {
@@ -141,7 +141,7 @@ mod tests {
     }
 
     /// Rationale: what has fallen to pieces lies in groups. Expected: asked for four together, the nearest neighbour of a stone lies
-    /// nearer than four of five that fall alone have theirs; as much ground is covered. Source: the page's words.
+    /// nearer than four of five that fall alone have theirs; as much ground is covered. Source: the scene file's words.
     #[test]
     fn pieces_lie_together() {
         let area = Rect::new(0.0, 0.0, 4.0, 4.0);

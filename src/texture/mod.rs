@@ -1,6 +1,6 @@
 //! Images decoded once, the noise they are drawn with, and the maps derived from them.
 //!
-//! A leaf's texture may be drawn by the program ([`draw`]) or photographed: both are PNG or JPEG files named by a page, and
+//! A leaf's texture may be drawn by the program ([`draw`]) or photographed: both are PNG or JPEG files named by a scene file, and
 //! nothing below knows the difference. v runs down the image: uv (0, 0) is its top left corner.
 //!
 //! This file is the only door to the `image` crate for reading.

@@ -32,7 +32,7 @@ pub(crate) struct Args {
     /// Tell the edits, one a line, and make nothing.
     #[arg(long, exclusive = true)]
     list: bool,
-    /// Names of the sets of real images that DIR/ablation.ron, the page for `train table`, asks for.
+    /// Names of the sets of real images that DIR/ablation.ron, the scene file for `train table`, asks for.
     #[arg(long, value_name = "NAMES", value_delimiter = ',', default_value = "real", value_parser = set_name)]
     real: Vec<String>,
     /// Begin the datasets and render nothing: for shards, and for a cluster.
@@ -154,7 +154,7 @@ fn possible(options: &RenderOptions, full: &RenderOptions) -> Result<()> {
     Renderer::open(&RenderOptions { techniques: Techniques::default(), ..options.clone() }).map(drop)
 }
 
-/// Writes the page of an experiment on all datasets that lie in the folder. Networks learn from red, green and blue: where only near
+/// Writes the scene file of an experiment on all datasets that lie in the folder. Networks learn from red, green and blue: where only near
 /// infrared differs there is nothing to learn.
 fn page(out: &Path, reals: &[String]) -> Result<PathBuf> {
     let mut sets = Vec::new();
@@ -169,7 +169,7 @@ fn page(out: &Path, reals: &[String]) -> Result<PathBuf> {
     Ok(path)
 }
 
-/// A name of a set in an experiment's page.
+/// A name of a set in an experiment file.
 fn set_name(text: &str) -> Result<String, String> {
     let good = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
     let taken = [&FULL].into_iter().chain(EDITS).any(|edit| edit.name == text);

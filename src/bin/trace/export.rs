@@ -17,7 +17,7 @@ pub(crate) struct Args {
     /// The other program's format.
     #[arg(long, value_enum)]
     format: Format,
-    /// Folder for the files; `out/`, the page's name and the format's unless given.
+    /// Folder for the files; `out/`, the scene file's name and the format's unless given.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print nothing but errors and the paths of the files.

@@ -18,7 +18,7 @@ use std::process::ExitCode;
 
 /// Grows a procedural crop field, path traces it, and labels every pixel exactly.
 ///
-/// A scene page describes a distribution over fields; page + seed + index is one field, and always the same bits.
+/// A scene file describes a distribution over fields; scene file + seed + index is one field, and always the same bits.
 #[derive(Parser)]
 #[command(name = "trace", version, args_conflicts_with_subcommands = true, arg_required_else_help = true, after_help = EXAMPLES)]
 struct Cli {

@@ -1,7 +1,7 @@
 //! The layout of Cityscapes: `leftImg8bit/SPLIT/CITY/CITY_SSSSSS_FFFFFF_leftImg8bit.png` and
 //! `gtFine/SPLIT/CITY/…_gtFine_{labelIds,labelTrainIds,instanceIds,color}.png`; torchvision, mmsegmentation and datumaro read it.
 //!
-//! The city is the page's name, the sequence and frame are the image's number. `labelIds` and `labelTrainIds` are the same:
+//! The city is the scene file's name, the sequence and frame are the image's number. `labelIds` and `labelTrainIds` are the same:
 //! 0 soil, 1 crop, 2 weed, 255 no label. `instanceIds`, 16 bit, are class · 1000 + k for the k-th plant of its class in the image,
 //! k from 0, and the class alone where there is no plant. `label_colors.txt` tells datumaro the classes, which it would else take for
 //! streets'; it reads classes from `labelTrainIds`, since it knows no instances.
@@ -80,7 +80,7 @@ fn path(recipe: &Recipe, record: &Record, kind: &str, suffix: &str) -> String {
     format!("{FOLDER}/{kind}/{split}/{city}/{city}_{sequence:06}_{frame:06}_{suffix}.png")
 }
 
-/// The page's name, or the format that images were imported from, in letters and digits: a `_` would end it.
+/// The scene file's name, or the format that images were imported from, in letters and digits: a `_` would end it.
 fn city(recipe: &Recipe) -> String {
     let name = match &recipe.made {
         Made::Rendered(rendering) => rendering.scene.rsplit('/').next().and_then(|file| file.split('.').next()),

@@ -1,4 +1,4 @@
-//! A scene as glTF 2.0, in one GLB file: for Blender, for viewers, and for pages that place it again.
+//! A scene as glTF 2.0, in one GLB file: for Blender, for viewers, and for scene files that place it again.
 //!
 //! One node and mesh a part, in the order of the scene, named by its label, which also stands in its `extras` as class, plant
 //! and leaf. Positions, normals, texture coordinates and indices are ours bit for bit; a node above them all turns z up into

@@ -17,7 +17,7 @@ use std::sync::Arc;
 const YOUNG: f32 = 0.2;
 /// Share of a seed leaf's flea-beetle holes that a true leaf has.
 const BEETLE: f32 = 0.33;
-/// Area of a leaf that meets as many holes of slugs as the page says, of flea beetles on seed leaves, and on true leaves, mm²:
+/// Area of a leaf that meets as many holes of slugs as the species file says, of flea beetles on seed leaves, and on true leaves, mm²:
 /// a beet's of four leaves, and its seed leaf. Smaller leaves meet fewer, in proportion; larger ones not more.
 const MEETS_MM2: [f32; 3] = [800.0, 150.0, 400.0];
 /// Most of a blade that holes may take: a leaf that has lost more is shed, or was never the size that it is.
@@ -465,7 +465,7 @@ mod tests {
         assert!((young - 0.6).abs() < 0.13, "{young}");
     }
 
-    /// Rationale: what a page calls a radius must be one. Expected: π r² within 15 % over 60 leaves of holes that do not overlap.
+    /// Rationale: what a species file calls a radius must be one. Expected: π r² within 15 % over 60 leaves of holes that do not overlap.
     #[test]
     fn holes_remove_the_area_of_their_radius() {
         let mask = oval();

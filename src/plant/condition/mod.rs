@@ -1,7 +1,7 @@
 //! Condition: what age, weather, pests and chance have done to a plant. Botany and geometry only; what it looks like is the
 //! materials' business.
 //!
-//! A page says how bad it may be ([`ConditionDesc`]), each plant draws how bad it is ([`Condition`]), each leaf draws its own
+//! A species file says how bad it may be ([`ConditionDesc`]), each plant draws how bad it is ([`Condition`]), each leaf draws its own
 //! [`Marks`]: holes and bites, which cut its mask, and tissue that is yellow, dead or covered with soil. All of it comes from
 //! streams of its own, so a plant without condition and the same plant with one have the same leaves in the same places.
 
@@ -26,7 +26,7 @@ impl Bound for MarkCount {
 }
 
 /// How far plants are from flawless. Every number that may vary is drawn once a plant; `condition: ()` is an ordinary field,
-/// a page without `condition` has flawless plants, as [`ConditionDesc::flawless`] has.
+/// a species file without `condition` has flawless plants, as [`ConditionDesc::flawless`] has.
 ///
 /// Numbers of marks are means of a Poisson on the oldest leaf; the youngest has a fifth of them, having been out for less
 /// long. Radii and numbers of holes and spots: slugs and caterpillars 0–6 holes of 1–4 mm, flea beetles 0–10 of 0.4–1 mm on a
@@ -34,8 +34,8 @@ impl Bound for MarkCount {
 ///
 /// ```
 /// use furrow::{ron_file::RonFile, plant::ConditionDesc};
-/// let page = RonFile::of("Condition(holes: Uniform(0, 6), chlorosis: 0.4, dust: Uniform(0.05, 0.2), wilt: 0.3)");
-/// let tired: ConditionDesc = page.parse().unwrap();
+/// let file = RonFile::of("Condition(holes: Uniform(0, 6), chlorosis: 0.4, dust: Uniform(0.05, 0.2), wilt: 0.3)");
+/// let tired: ConditionDesc = file.parse().unwrap();
 /// assert!(RonFile::of("Condition(hole: 3)").parse::<ConditionDesc>().is_err());
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -75,7 +75,7 @@ pub struct ConditionDesc {
     /// The old keyword, for one version: a dead margin of so many mm on every leaf, in place of `scorched` and `scorch`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scorch_mm: Option<Vary<NonNegative>>,
-    /// Anthocyanin that veins, stalks and stem have more than the page's pigments say, µg/cm².
+    /// Anthocyanin that veins, stalks and stem have more than the species file's pigments say, µg/cm².
     pub reddening: Vary<NonNegative>,
     /// Share of a leaf at the soil that dust covers; 10 cm up it is a third.
     pub dust: Vary<Fraction>,
@@ -93,7 +93,7 @@ pub struct ConditionDesc {
     pub width_sd: Num<Fraction>,
     /// Relative spread of bend and fold from leaf to leaf.
     pub bend_sd: Num<Fraction>,
-    /// Spread of the twist about the midrib from leaf to leaf, beyond the page's.
+    /// Spread of the twist about the midrib from leaf to leaf, beyond the species file's.
     pub twist_sd_deg: Num<NonNegative>,
 }
 

@@ -23,13 +23,13 @@ pub struct Field {
     pub seed: u64,
     /// Which field of the distribution.
     pub index: u64,
-    /// Every species that its page can draw, in the page's order: the same for all indices.
+    /// Every species that its scene file can draw, in the scene file's order: the same for all indices.
     pub species: Vec<SpeciesRecord>,
     /// What was drawn for it.
     pub conditions: Conditions,
     /// Every file that was read for it, in order.
     pub files: Vec<PathBuf>,
-    /// Its page.
+    /// Its scene file.
     pub text: String,
     /// What the user should know.
     pub warnings: Vec<String>,
@@ -41,7 +41,7 @@ impl Field {
         mix(mix(self.seed) ^ self.index)
     }
 
-    /// Where the field came from, one `key: value` a line: program, pages, seed, index.
+    /// Where the field came from, one `key: value` a line: program, scene files, seed, index.
     pub fn provenance(&self) -> String {
         let Self { hash, seed, index, .. } = self;
         format!("program: furrow {}\nscene: sha256 {hash}\nseed: {seed}\nindex: {index}", env!("CARGO_PKG_VERSION"))

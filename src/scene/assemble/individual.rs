@@ -18,7 +18,7 @@ pub(super) struct Individual {
 impl Builder<'_> {
     /// The individual of a species whose plants are alike.
     pub(super) fn individual(&self, desc: &SpeciesDesc) -> Option<Individual> {
-        // By name, so that a species that stands in two places of a page is one all the same.
+        // By name, so that a species that stands in two places of a scene file is one all the same.
         let key = desc.name.bytes().fold(0, |key, byte| mix(key ^ u64::from(byte)));
         let stream = |index| Stream::of(self.seed, index, Purpose::Plant, key);
         desc.alike.then(|| Individual { age: stream(self.index).child(Purpose::Page, 0), shape: stream(0) })

@@ -9,7 +9,7 @@ use crate::scene::PlantRecord;
 use crate::scene::record::{CropRecord, SpeciesRecord, WeedRecord};
 
 impl Builder<'_> {
-    /// Every species that the page can draw: crops, weeds, plants, models, in the page's order and each once. The same for
+    /// Every species that the scene file can draw: crops, weeds, plants, models, in the scene file's order and each once. The same for
     /// every index, also where a field has no plant of it.
     pub(super) fn species(&mut self) -> Result<Vec<SpeciesRecord>> {
         let (page, desc) = (self.page, self.desc);

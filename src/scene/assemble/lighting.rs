@@ -1,4 +1,4 @@
-//! The lights of a field: those that its page lists, and where it has lists side by side, those of the list that the field draws.
+//! The lights of a field: those that its scene file lists, and where it has lists side by side, those of the list that the field draws.
 
 use crate::light::{LightDesc, one_of_inside};
 use crate::ron_file::RonFile;
@@ -7,10 +7,10 @@ use crate::sampling::Stream;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
-/// What a field drew where its page has lists of lights side by side: `OneOf([[…], […]])`.
+/// What a field drew where its scene file has lists of lights side by side: `OneOf([[…], […]])`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Lighting {
-    /// Its place among the page's lights, from 0.
+    /// Its place among the scene file's lights, from 0.
     pub place: usize,
     /// Which of its lists, from 0.
     pub drawn: usize,
@@ -18,7 +18,7 @@ pub struct Lighting {
     pub of: usize,
 }
 
-/// A light of the field and the way to it in the page.
+/// A light of the field and the way to it in the scene file.
 pub(super) struct Listed<'a> {
     pub(super) desc: &'a LightDesc,
     pub(super) at: Vec<Step<'static>>,
@@ -26,7 +26,7 @@ pub(super) struct Listed<'a> {
 
 impl Lighting {
     /// Draws one list of each `OneOf`, from the stream of its place, and puts its lights in its stead; refuses what nothing can be
-    /// drawn from, where it stands in the page.
+    /// drawn from, where it stands in the scene file.
     pub(super) fn draw<'a>(
         page: &RonFile,
         lights: &'a [LightDesc],
@@ -91,7 +91,7 @@ mod tests {
         assemble::field_of(&text(lights), &Options { index, ..Options::default() })
     }
 
-    /// Expected: each list as often as the others, two places of a page independent of each other, the record as drawn. Source: the
+    /// Expected: each list as often as the others, two places of a scene file independent of each other, the record as drawn. Source: the
     /// binomial law; bounds of four standard deviations.
     #[test]
     fn each_list_is_drawn_as_often_as_the_others() {
@@ -116,7 +116,7 @@ mod tests {
         *radiance_w_m2_sr_nm
     }
 
-    /// Expected: the numbers of the drawn list and of what stands behind it are those of a page with that list alone, and a page without
+    /// Expected: the numbers of the drawn list and of what stands behind it are those of a scene file with that list alone, and a scene file without
     /// lists draws its lights from the streams that it always had.
     #[test]
     fn the_lights_stand_there_as_if_written_so() {

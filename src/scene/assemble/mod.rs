@@ -1,4 +1,4 @@
-//! Page + seed + index → one field.
+//! Scene file + seed + index → one field.
 
 mod builder;
 mod census;
@@ -44,10 +44,10 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use view::View;
 
-/// What the command line adds to a page.
+/// What the command line adds to a scene file.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Options {
-    /// Instead of the page's seed.
+    /// Instead of the scene file's seed.
     pub seed: Option<u64>,
     /// Which field.
     pub index: u64,
@@ -63,24 +63,24 @@ const PLANT_MARGIN: f32 = 0.35;
 const SHADOW: f32 = 2.75;
 /// Address of the season's stream, behind those of any number of lights.
 const SEASON: u64 = 1 << 32;
-/// Address of the first of the streams from which lists of lights are drawn, one for each place among the page's lights.
+/// Address of the first of the streams from which lists of lights are drawn, one for each place among the scene file's lights.
 const LIGHTING: u64 = 2 << 32;
 /// Most pixels of an image.
 const MOST_PIXELS: u64 = 1 << 28;
 /// About the most texels of the ground's maps: a larger view has larger ones.
 const MOST_TEXELS: f32 = 2.4e8;
 
-/// Builds field `options.index` of the page at `path`.
+/// Builds field `options.index` of the scene file at `path`.
 pub fn field(path: &Path, options: &Options) -> Result<Field> {
     Source::open(path)?.field(options)
 }
 
-/// Builds a field from a page's text; paths are relative to the working directory.
+/// Builds a field from a scene file's text; paths are relative to the working directory.
 pub fn field_of(text: &str, options: &Options) -> Result<Field> {
     Source::of(RonFile::of(text), Library::default())?.field(options)
 }
 
-/// A page and what its fields have read so far, so that the next field need not read it again. Several may be built at once.
+/// A scene file and what its fields have read so far, so that the next field need not read it again. Several may be built at once.
 pub struct Source {
     page: RonFile,
     desc: FieldDesc,
@@ -88,7 +88,7 @@ pub struct Source {
 }
 
 impl Source {
-    /// Reads a page.
+    /// Reads a scene file.
     pub fn open(path: &Path) -> Result<Self> {
         let mut library = Library::default();
         let page = library.page(path)?;
@@ -100,7 +100,7 @@ impl Source {
         Ok(Self { page, desc, library: Mutex::new(library) })
     }
 
-    /// The same page with its fields grown otherwise.
+    /// The same scene file with its fields grown otherwise.
     #[must_use]
     pub fn growing(mut self, growing: Growing) -> Self {
         if let Some(change) = growing.page {
@@ -141,7 +141,7 @@ struct Seedling {
 }
 
 impl Seedling {
-    /// The same as vigorous as its entry on the page says, and in the entry's condition, if it has one.
+    /// The same as vigorous as its entry on the scene file says, and in the entry's condition, if it has one.
     fn tended(self, vigour: &Vary<Positive>, condition: Option<&ConditionDesc>) -> Self {
         let condition = condition.cloned().or(self.condition);
         Self { vigour: vigour.clone(), condition, ..self }

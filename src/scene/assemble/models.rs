@@ -99,7 +99,7 @@ impl Builder<'_> {
             all.positions.extend_from_slice(&part.mesh.positions);
         }
         let (lo, hi) = all.bounds().unwrap_or((foot, foot));
-        // A plant alone stands where the page says; of several, each stands in the middle of itself.
+        // A plant alone stands where the scene file says; of several, each stands in the middle of itself.
         let position = if parts.len() == model.parts.len() { foot } else { ((lo + hi) * 0.5).with_z(lo.z) };
         let across = all.positions.iter().map(|p| (p - position).truncate().length()).fold(0.0, f32::max);
         PlantRecord {
@@ -134,7 +134,7 @@ fn known(label: Option<&Label>) -> Option<(Class, &Label)> {
     label.and_then(|l| Class::named(&l.class).map(|class| (class, l)))
 }
 
-/// The tag of a part: the page's class, else the file's; `None` where plants run out of numbers.
+/// The tag of a part: the scene file's class, else the file's; `None` where plants run out of numbers.
 fn tag(class: Option<Class>, label: Option<&Label>, numbered: usize) -> Option<Tag> {
     let number = |n: usize| u16::try_from(numbered + n).ok();
     let label = known(label);

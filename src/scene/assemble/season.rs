@@ -1,4 +1,4 @@
-//! The season of a field: which of the growths that a page lists side by side all its plants have.
+//! The season of a field: which of the growths that a scene file lists side by side all its plants have.
 
 use crate::ron_file::RonFile;
 use crate::ron_file::Step;
@@ -7,17 +7,17 @@ use crate::scene::desc::{FieldDesc, Growth};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
-/// What a field drew where its page lists growths: `growth: Either([…, …])`.
+/// What a field drew where its scene file lists growths: `growth: Either([…, …])`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Season {
-    /// Place in the lists, from 0; none where the page has no such list.
+    /// Place in the lists, from 0; none where the scene file has no such list.
     pub drawn: Option<usize>,
     /// How long the lists are.
     pub of: usize,
 }
 
 impl Season {
-    /// Draws the place; refuses lists that do not fit together, where they stand in the page.
+    /// Draws the place; refuses lists that do not fit together, where they stand in the scene file.
     pub(super) fn draw(page: &RonFile, desc: &FieldDesc, stream: &mut Stream) -> Result<Self> {
         let mut of = 0;
         for (room, k, growth) in growths(desc) {
@@ -32,8 +32,8 @@ impl Season {
                 return fault(&at, "an Either inside an Either", "write all growths side by side in one list");
             }
             if of > 0 && list.len() != of {
-                let words = format!("this list has {} growths, an earlier one of this page {of}", list.len());
-                let help = "one place is drawn for all lists of a page, so give all of them the same length; a growth may be \
+                let words = format!("this list has {} growths, an earlier one of this scene file {of}", list.len());
+                let help = "one place is drawn for all lists of a scene file, so give all of them the same length; a growth may be \
                             written twice";
                 return fault(&at, &words, help);
             }
@@ -48,7 +48,7 @@ impl Season {
     }
 }
 
-/// Every growth of a page, with the list that it stands in and its place there.
+/// Every growth of a scene file, with the list that it stands in and its place there.
 fn growths(desc: &FieldDesc) -> impl Iterator<Item = (&'static str, usize, &Growth)> {
     let crops = desc.crops.iter().enumerate().map(|(k, c)| ("crops", k, &c.growth));
     let weeds = desc.weeds.iter().enumerate().map(|(k, w)| ("weeds", k, &w.growth));

@@ -2,7 +2,7 @@
 //!
 //! The model is EMVA 1288's (release 4.0, §2). A pixel counts μ = (1 + PRNU) · light + dark current · exposure, with the variance of a
 //! Poisson number, up to its full well; reading adds a normal error and the pixel's own offset (DSNU). Both non-uniformities are normal
-//! and belong to the camera's body: they are drawn from its number and a pixel's place, so all images and all pages of one body share them.
+//! and belong to the camera's body: they are drawn from its number and a pixel's place, so all images and all scene files of one body share them.
 
 use super::level::CLIP;
 use crate::math::Spectrum;

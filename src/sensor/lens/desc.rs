@@ -1,4 +1,4 @@
-//! A camera as a page writes it.
+//! A camera as a scene file writes it.
 
 use super::aperture::{Aperture, ApertureDesc};
 use super::bare;
@@ -13,7 +13,7 @@ use crate::sampling::rng::Stream;
 use serde::{Deserialize, Serialize};
 
 /// Writes [`CameraDesc`]. Cameras with a name all look down and are written alike, each with defaults, pixels and a shutter of its own; a
-/// struct of their fields inside the variants would give the page's errors another name, and every camera the same defaults.
+/// struct of their fields inside the variants would give the scene file's errors another name, and every camera the same defaults.
 macro_rules! cameras {
     (
         $(#[$about:meta])*
@@ -104,8 +104,8 @@ cameras! {
     /// ```
     /// use furrow::sampling::{Purpose, Stream};
     /// use furrow::sensor::CameraDesc;
-    /// let mut stream = Stream::of(1, 0, Purpose::Page, 0);
-    /// for page in [
+    /// let mut stream = Stream::of(1, 0, Purpose::Scene file, 0);
+    /// for scene file in [
     ///     "JaiAd130()",
     ///     "JaiAd130(focal_mm: 15, height_m: Normal(mean: 0.85, sd: 0.03), roll_deg: Uniform(-2, 2), f_number: 4)",
     ///     "Pinhole(
@@ -124,7 +124,7 @@ cameras! {
     ///     "MachineVision(focal_mm: 8, f_number: 4)",
     ///     "Pinhole(size: (640, 480), intrinsics: FieldOfView(horizontal_deg: 60), pose: Nadir(height_m: 2))",
     /// ] {
-    ///     let desc: CameraDesc = ron::from_str(page)?;
+    ///     let desc: CameraDesc = ron::from_str(text)?;
     ///     desc.build(&mut stream)?;
     /// }
     /// # Ok::<(), Box<dyn std::error::Error>>(())

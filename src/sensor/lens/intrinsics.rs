@@ -1,4 +1,4 @@
-//! Focal length, centre and aperture of a camera, as a page writes them.
+//! Focal length, centre and aperture of a camera, as a scene file writes them.
 
 use crate::ron_file::{Finite, Positive, Vary};
 use crate::sampling::rng::Stream;
@@ -36,7 +36,7 @@ pub enum IntrinsicsDesc {
 }
 
 impl IntrinsicsDesc {
-    /// Draws focal lengths and centre, pixels, and the focal length in millimetres where the page has it.
+    /// Draws focal lengths and centre, pixels, and the focal length in millimetres where the scene file has it.
     pub(super) fn draw(&self, size: (u32, u32), stream: &mut Stream) -> Result<([f64; 2], [f64; 2], Option<f64>)> {
         let middle = middle(size);
         Ok(match self {

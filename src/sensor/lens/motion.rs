@@ -54,7 +54,7 @@ impl MotionDesc {
     }
 }
 
-/// How long a row gathers light unless a page says so: the JAI AD-130 at f/4 under the sun.
+/// How long a row gathers light unless a scene file says so: the JAI AD-130 at f/4 under the sun.
 const EXPOSURE_MS: f64 = 1.0;
 
 /// Motion and shutter of a camera.

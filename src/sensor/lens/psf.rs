@@ -1,6 +1,6 @@
 //! The point spread of the optics: a normal blur of what falls on the sensor, and colours that lie beside each other towards the corners.
 //!
-//! It works on the image, so it costs nothing a sample, and it comes on top of the page's `filter`, with which the samples are drawn:
+//! It works on the image, so it costs nothing a sample, and it comes on top of the scene file's `filter`, with which the samples are drawn:
 //! their variances add up. Labels know nothing of it. Beyond the window's edge the outermost pixels go on.
 
 use crate::math::Spectrum;

@@ -29,7 +29,7 @@ pub struct LeafRecipe {
     pub length_mm: Num<Positive>,
     /// Width over length.
     pub aspect: Num<Positive>,
-    /// The outline; the species' page names the same.
+    /// The outline; the species file names the same.
     pub outline: Outline,
     /// Teeth or lobes.
     #[serde(default)]

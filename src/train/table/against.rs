@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Most pixels across and down that a page shows of an image.
+/// Most pixels across and down that an experiment file shows of an image.
 const SHOWN: (u32, u32) = (240, 180);
 
 /// Columns between the two halves of a picture.
@@ -30,19 +30,19 @@ const GAP: u32 = 4;
 /// Most images of a dataset that are measured: means over them are known to a few per cent.
 const MEASURED: usize = 20;
 
-/// What the page says of it all.
+/// What the experiment file says of it all.
 pub(super) const LEAD: &str = "What each change of the training set does: the mean difference over seeds, and the standard deviation of \
                                that difference. A change that is not beyond it may be chance. Pictures show the unchanged field on the left \
                                and the changed one on the right.";
 
-/// Both training sets, where the page names one to compare with and it was not left out.
+/// Both training sets, where the experiment file names one to compare with and it was not left out.
 fn others(experiment: &Experiment) -> Option<(usize, Vec<usize>)> {
     let name = experiment.against.as_ref()?;
     let base = experiment.train.iter().position(|t| t.name == *name)?;
     Some((base, (0..experiment.train.len()).filter(|i| *i != base).collect()))
 }
 
-/// The table; none where the page does not ask for it.
+/// The table; none where the experiment file does not ask for it.
 pub(super) fn table(bound: &Bound, seen: &[Seen], out: &Path) -> Result<Option<Table>> {
     let experiment = &bound.experiment;
     let Some((base, others)) = others(experiment) else { return Ok(None) };

@@ -10,7 +10,7 @@ use std::marker::PhantomData;
 ///
 /// ```
 /// use furrow::train::table::ExperimentDesc;
-/// let page = furrow::ron_file::RonFile::of(r#"Experiment(
+/// let file = furrow::ron_file::RonFile::of(r#"Experiment(
 ///     networks: ["basic-segnet", "unet"],
 ///     seeds: [1, 2],
 ///     hyperparameters: (size: (240, 180), steps: 400, batch: 4),
@@ -26,7 +26,7 @@ use std::marker::PhantomData;
 ///     test: [(name: "Test A", set: "jai", images: "12..20")],
 ///     scales: {"paper": (count: 1300, hyperparameters: (size: (480, 360), steps: 20000))},
 /// )"#);
-/// let experiment: ExperimentDesc = page.parse().unwrap();
+/// let experiment: ExperimentDesc = file.parse().unwrap();
 /// assert_eq!(experiment.train.len(), 3);
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -86,7 +86,7 @@ pub enum SetDesc {
     },
     /// A dataset that is there already, such as `trace ablate` makes.
     Dataset {
-        /// Its folder; counts from the folder of this page.
+        /// Its folder; counts from the folder of this experiment file.
         path: String,
     },
     /// Real images with labels, which `train table --real NAME=DIR` leads to: a dataset that `trace dataset import` made, or a

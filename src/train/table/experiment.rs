@@ -44,7 +44,7 @@ pub struct Experiment {
 pub enum Source {
     /// Rendered.
     Scene {
-        /// The scene's page.
+        /// The scene file.
         page: PathBuf,
         /// Images.
         count: u64,
@@ -109,12 +109,12 @@ pub struct TestSet {
 }
 
 impl Experiment {
-    /// Reads a page, at one of its scales.
+    /// Reads an experiment file, at one of its scales.
     pub fn read(path: &Path, scale: Option<&str>) -> Result<Self> {
         Self::of(&RonFile::read(path)?, scale)
     }
 
-    /// The same of a page that was read before.
+    /// The same of an experiment file that was read before.
     pub fn of(page: &RonFile, scale: Option<&str>) -> Result<Self> {
         let desc: ExperimentDesc = page.parse()?;
         Checker { page, desc: &desc }.experiment(scale)
@@ -134,7 +134,7 @@ struct Checker<'a> {
     desc: &'a ExperimentDesc,
 }
 
-/// Where a value of the page is: the steps to it.
+/// Where a value of the experiment file is: the steps to it.
 type At<'a> = &'a [Step<'a>];
 
 impl Checker<'_> {

@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 /// Where a real set lies: `NAME=DIR` on the command line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Real {
-    /// The set's name in the page.
+    /// The set's name in the experiment file.
     pub name: String,
     /// A dataset, or a folder with `images/` and `labels/`.
     pub folder: PathBuf,

@@ -42,10 +42,10 @@ pub(crate) struct Args {
     /// Folder for the sheets and for catalogue.html.
     #[arg(long, value_name = "DIR", default_value = "out/catalogue")]
     out: PathBuf,
-    /// Only these, by the names of their pages: sugar_beet,galium.
+    /// Only these, by the names of their scene files: sugar_beet,galium.
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     species: Vec<String>,
-    /// Folder of the species pages.
+    /// Folder of the species files.
     #[arg(long, value_name = "DIR", default_value = "scenes/species")]
     pages: PathBuf,
     /// Samples a pixel.
@@ -65,7 +65,7 @@ pub(crate) struct Args {
     quiet: bool,
 }
 
-/// Draws the sheets that are missing or would differ, then the page; returns their paths.
+/// Draws the sheets that are missing or would differ, then the scene file; returns their paths.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     cli::check_folder(&args.out)?;
     let pages = args.pages()?;
@@ -83,7 +83,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
 }
 
 impl Args {
-    /// The species pages that are asked for, in order of their names.
+    /// The species files that are asked for, in order of their names.
     fn pages(&self) -> Result<Vec<PathBuf>> {
         if !self.species.is_empty() {
             let pages: Vec<PathBuf> = self.species.iter().map(|s| self.pages.join(s).with_extension("ron")).collect();
@@ -97,7 +97,7 @@ impl Args {
         Ok(pages)
     }
 
-    /// One species: its sheet's path, and its entry in the page.
+    /// One species: its sheet's path, and its entry in the scene file.
     fn species(&self, page: &Path, signals: &Signals) -> Result<(PathBuf, Entry)> {
         let file = RonFile::read(page)?;
         for warning in file.renamed(RENAMED) {
@@ -211,7 +211,7 @@ impl View {
         Self { distance, angle_deg: 2.0 * (half / distance).atan().to_degrees(), elevation_deg, target }
     }
 
-    /// Its camera's pose, as a page writes it.
+    /// Its camera's pose, as a scene file writes it.
     fn pose(&self) -> String {
         if self.elevation_deg >= 90.0 {
             return format!("Nadir(height_m: {})", self.distance);

@@ -13,9 +13,9 @@ use furrow::Result;
 use furrow::cli::signal::Signals;
 use std::path::PathBuf;
 
-/// Makes a dataset from a page, or goes on with one: `plan`, `render` and `finish` in one go.
+/// Makes a dataset from a scene file, or goes on with one: `plan`, `render` and `finish` in one go.
 ///
-/// Image k is field k of the page and nothing else decides its bytes. Stopped, killed or damaged, the same command makes what is
+/// Image k is field k of the scene file and nothing else decides its bytes. Stopped, killed or damaged, the same command makes what is
 /// missing and ends with the same files.
 #[derive(Parser)]
 #[command(args_conflicts_with_subcommands = true, arg_required_else_help = true, after_help = AFTER)]
@@ -41,7 +41,7 @@ On several machines that share a folder:
 
 #[derive(Subcommand)]
 enum Verb {
-    /// Begin a dataset: check the page, take all that it reads into the folder, write the recipe.
+    /// Begin a dataset: check the scene file, take all that it reads into the folder, write the recipe.
     Plan(order::Args),
     /// Render the images of a shard that are missing.
     Render(render::Args),
