@@ -46,7 +46,7 @@ const PAGE: &str = r#"Experiment(
     hyperparameters: (size: (48, 36), steps: 10, batch: 2),
     sets: {
         "frames": Real(about: "eight frames"),
-        "small": Scene(page: "tests/ref/small.ron", count: 6, size: (48, 36), spp: 1),
+        "small": Scene(file: "tests/ref/small.ron", count: 6, size: (48, 36), spp: 1),
     },
     train: [
         (name: "Few", from: [(set: "frames", images: "0..2")]),

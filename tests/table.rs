@@ -21,7 +21,7 @@ const PAGE: &str = r#"Experiment(
     seeds: [1, 2],
     hyperparameters: (size: (48, 32), steps: 2, batch: 2, validate_every: 1),
     sets: {
-        "small": Scene(page: "SMALL", count: 6, size: (48, 36), spp: 2, seed: 5, split: (4, 2, 0)),
+        "small": Scene(file: "SMALL", count: 6, size: (48, 36), spp: 2, seed: 5, split: (4, 2, 0)),
         "frames": Real(about: "a few frames"),
     },
     train: [
@@ -248,7 +248,7 @@ fn wrong_input_is_one_clear_error_and_leaves_nothing() {
 fn a_set_that_cannot_be_made_is_told_with_its_reason() {
     let (_keep, out) = scratch();
     let page = std::fs::read_to_string(desk().join("page.ron")).expect("the page");
-    let (at, end) = (page.find("page: \"").expect("a scene") + 7, page.find("\", count").expect("a scene"));
+    let (at, end) = (page.find("file: \"").expect("a scene") + 7, page.find("\", count").expect("a scene"));
     std::fs::write(desk().join("scene.ron"), "Field(seeed: 1)").expect("a page");
     std::fs::write(desk().join("broken.ron"), format!("{}scene.ron{}", &page[..at], &page[end..])).expect("a page");
     let said = fail(renamed(&table(&out, &[]), "broken.ron"), 2);

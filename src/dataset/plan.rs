@@ -80,7 +80,7 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
             field.species.len()
         ))
         .in_file(&order.scene)
-        .help("make two pages of it"));
+        .help("make two scene files of it"));
     }
     let Gathered { files, scene, rewritten } = gather(&field.files, &order.scene)?;
     let scene_sha256 = if rewritten { hash_of_copies(order, &files, &scene)? } else { field.hash.clone() };

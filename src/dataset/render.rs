@@ -82,7 +82,7 @@ pub fn render(
     let field = scene_file.field(index)?;
     if field.grown().hash != rendering.scene_sha256 {
         let help = format!("restore {}/scene/, or begin another dataset", folder.display());
-        return Err(Error::misuse("the page or something that it names was changed since the dataset was begun")
+        return Err(Error::misuse("the scene file or something that it names was changed since the dataset was begun")
             .help(help)
             .in_file(folder.join(&rendering.scene)));
     }

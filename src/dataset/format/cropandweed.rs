@@ -179,7 +179,7 @@ impl Labels {
 }
 
 fn too_many() -> Error {
-    Error::input(format!("the page has more than {} species that CropAndWeed has no labels for, more than 8 bits number", OWN.len())).help(format!("make two pages of it, or \
+    Error::input(format!("the scene file has more than {} species that CropAndWeed has no labels for, more than 8 bits number", OWN.len())).help(format!("make two scene files of it, or \
          leave out --format {FOLDER}"))
 }
 

@@ -391,7 +391,7 @@ impl<'a> Builder<'a> {
                         "{}: plant {number}, a {species}, grew a broken mesh: {fault}",
                         self.page.path.display()
                     ))
-                    .help("look for extreme sizes in its page"));
+                    .help("look for extreme sizes in its species file"));
                 }
                 let same = |m: &&(String, usize, u32)| !organ.own && m.0 == organ.key && m.1 == organ.choice;
                 let known = made.iter().find(same).map(|m| m.2);

@@ -15,7 +15,7 @@ use std::marker::PhantomData;
 ///     seeds: [1, 2],
 ///     hyperparameters: (size: (240, 180), steps: 400, batch: 4),
 ///     sets: {
-///         "synthetic-d": Scene(page: "../synthetic-d.ron", count: 100, size: (480, 360)),
+///         "synthetic-d": Scene(file: "../synthetic-d.ron", count: 100, size: (480, 360)),
 ///         "jai": Real(about: "20 frames of SugarBeets2016"),
 ///     },
 ///     train: [
@@ -68,7 +68,8 @@ pub enum SetDesc {
     /// Rendered from a scene by `trace dataset`, into `sets/NAME` of the experiment's folder.
     Scene {
         /// The scene file; its path counts from the folder of this file.
-        page: String,
+        #[serde(alias = "page")]
+        file: String,
         /// Images, 1 or more.
         count: u64,
         /// Pixels of an image: width, height. As large as networks see them unless given.

@@ -45,7 +45,7 @@ pub enum Source {
     /// Rendered.
     Scene {
         /// The scene file.
-        page: PathBuf,
+        file: PathBuf,
         /// Images.
         count: u64,
         /// Pixels across and down.
@@ -306,14 +306,13 @@ impl Checker<'_> {
                 SetDesc::Dataset { path } => {
                     let folder = self.page.resolve(path);
                     if !folder.join(recipe::FILE).is_file() {
-                        let help =
-                            "its path counts from the page's folder; `trace ablate` and `trace dataset` make some";
+                        let help = "its path counts from the folder of the experiment file; `trace ablate` and `trace dataset` make some";
                         return Err(self.fault(&at("path"), format!("there is no dataset in `{path}`"), help));
                     }
                     Source::Dataset { count: Recipe::read(&folder)?.count, folder }
                 }
-                SetDesc::Scene { page, count, size, spp, seed, split: (train, val, test) } => {
-                    self.page.need_file(page)?;
+                SetDesc::Scene { file, count, size, spp, seed, split: (train, val, test) } => {
+                    self.page.need_file(file)?;
                     self.count(*count, &at("count"))?;
                     self.spp(*spp, &at("spp"))?;
                     let split = Shares::parse(&format!("{train},{val},{test}"))
@@ -324,7 +323,7 @@ impl Checker<'_> {
                     let size = scale.and_then(|s| s.size).or(*size).unwrap_or(seen);
                     let (count, spp) =
                         (scale.and_then(|s| s.count).unwrap_or(*count), scale.and_then(|s| s.spp).unwrap_or(*spp));
-                    Source::Scene { page: self.page.resolve(page), count, size, spp, seed: *seed, split }
+                    Source::Scene { file: self.page.resolve(file), count, size, spp, seed: *seed, split }
                 }
             };
             sets.push((name.clone(), source));

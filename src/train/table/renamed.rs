@@ -16,6 +16,7 @@ const CLASS_WEIGHTS: Keyword = Keyword::Text(&["balance", "class_weights"]);
 pub const RENAMED: &[Renamed] = &[
     Renamed::field("learn", "hyperparameters"),
     Renamed::field("watch", "validation"),
+    Renamed::field("page", "file"),
     Renamed::field("margin_px", "dilate_px"),
     Renamed::field("window", "crop_size"),
     Renamed::field("rare", "rare_crops"),

@@ -34,7 +34,9 @@ impl Real {
             Some((name, folder)) if !name.is_empty() && !folder.is_empty() => {
                 Ok(Self { name: name.into(), folder: folder.into() })
             }
-            _ => Err("write the set's name in the page and its folder, such as jai=real/sugarbeet_jai".into()),
+            _ => {
+                Err("write the set's name in the experiment file and its folder, such as jai=real/sugarbeet_jai".into())
+            }
         }
     }
 }
@@ -160,14 +162,14 @@ impl Bound {
         }
         let progress = Progress::new(name, tell);
         let made = match (source, origin) {
-            (Source::Scene { page, count, size, spp, seed, split }, _) => {
+            (Source::Scene { file, count, size, spp, seed, split }, _) => {
                 let order = dataset::Order {
                     seed: *seed,
                     width: Some(size.0),
                     height: Some(size.1),
                     split: *split,
                     options: RenderOptions::path_traced(Quality::spp(*spp)),
-                    ..dataset::Order::new(page, *count)
+                    ..dataset::Order::new(file, *count)
                 };
                 let callbacks = Callbacks {
                     begin: &|total| progress.expect(total),
