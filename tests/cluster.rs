@@ -40,7 +40,7 @@ fn emit(folder: &Path, engine: &str, shards: u64, more: &[&str]) -> PathBuf {
     succeed(verb(
         "emit",
         folder,
-        &[&["--engine", engine, "--shards", &shards.to_string(), "--cpus", "1"], more].concat(),
+        &[&["--scheduler", engine, "--shards", &shards.to_string(), "--cpus", "1"], more].concat(),
     ));
     folder.join("jobs")
 }
@@ -158,17 +158,17 @@ fn orders_that_make_no_sense_are_refused() {
     let (_keep, folder) = scratch();
     plan(&folder, 4);
     for (more, words) in [
-        (&["--engine", "slurm", "--shards", "5"][..], "some would be empty"),
-        (&["--engine", "slurm", "--shards", "0"], "1.."),
-        (&["--engine", "slurm", "--shards", "2", "--time", "5m"], "--grace 300"),
-        (&["--engine", "slurm", "--shards", "2", "--time", "soon"], "4h"),
-        (&["--engine", "pbs", "--shards", "2"], "slurm, kubernetes, parallel"),
+        (&["--scheduler", "slurm", "--shards", "5"][..], "some would be empty"),
+        (&["--scheduler", "slurm", "--shards", "0"], "1.."),
+        (&["--scheduler", "slurm", "--shards", "2", "--time", "5m"], "--grace 300"),
+        (&["--scheduler", "slurm", "--shards", "2", "--time", "soon"], "4h"),
+        (&["--scheduler", "pbs", "--shards", "2"], "slurm, kubernetes, parallel"),
     ] {
         let said = fail(verb("emit", &folder, more), 2);
         assert!(said.contains(words), "{more:?}: no `{words}` in\n{said}");
     }
     assert!(!folder.join("jobs").exists());
-    let said = fail(verb("emit", folder.parent().unwrap(), &["--engine", "slurm", "--shards", "2"]), 2);
+    let said = fail(verb("emit", folder.parent().unwrap(), &["--scheduler", "slurm", "--shards", "2"]), 2);
     assert!(said.contains("dataset.json"), "{said}");
 }
 

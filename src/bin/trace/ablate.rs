@@ -55,7 +55,7 @@ On several machines that share a folder, each with the same arguments:
   trace ablate … --out ab --plan                        begin all datasets
   trace ablate … --out ab --shard 0/8                   … to 7/8, each anywhere, as often as needed
   trace ablate … --out ab                               what is missing, and what belongs to all images
-or one dataset at a time: trace dataset emit ab/no-sky --engine slurm --shards 8
+or one dataset at a time: trace dataset emit ab/no-sky --scheduler slurm --shards 8
 
 What it all means to a network, learnt from each and judged on real images:
   train table ab/ablation.ron --out ab/answer --real real=DIR

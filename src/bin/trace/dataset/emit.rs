@@ -13,7 +13,7 @@ pub(crate) struct Args {
     /// Folder of the dataset, as `plan` began it; all machines must see it there.
     dir: PathBuf,
     /// Who starts the shards.
-    #[arg(long, value_enum)]
+    #[arg(long, alias = "engine", value_enum)]
     scheduler: SchedulerName,
     /// Into how many parts the dataset is cut; each should last minutes to hours.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]

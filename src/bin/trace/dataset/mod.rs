@@ -37,7 +37,7 @@ On several machines that share a folder:
   trace dataset plan --scene scenes/synthetic-d.ron --count 100000 --out data/d --spp 32
   trace dataset render data/d --shard 0/64              … to 63/64, each anywhere, in any order, as often as needed
   trace dataset finish data/d
-  trace dataset emit data/d --engine slurm --shards 64  job files that do the last two, for `bash data/d/jobs/submit.sh`";
+  trace dataset emit data/d --scheduler slurm --shards 64  job files that do the last two, for `bash data/d/jobs/submit.sh`";
 
 #[derive(Subcommand)]
 enum Verb {
