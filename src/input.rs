@@ -3,11 +3,11 @@
 //! A folder, a pipe, a socket or a device is refused before it is opened: opening a pipe waits until somebody writes into it, and
 //! a device may never end.
 
-use crate::Error;
+use crate::{Error, Result};
 use std::fmt;
 use std::fs::{File, Metadata};
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Component, Path, PathBuf};
 
 /// Largest file of any kind that is read whole, bytes.
 pub const LARGEST: u64 = 4 << 30;
@@ -48,7 +48,7 @@ impl Refusal {
 }
 
 /// Opens a regular file.
-pub fn open(path: &Path) -> Result<File, Refusal> {
+pub fn open(path: &Path) -> std::result::Result<File, Refusal> {
     check(&std::fs::metadata(path).map_err(Refusal::Io)?)?;
     let file = File::open(path).map_err(Refusal::Io)?;
     // Once more: another thing may have taken the name in between.
@@ -56,7 +56,7 @@ pub fn open(path: &Path) -> Result<File, Refusal> {
     Ok(file)
 }
 
-fn check(about: &Metadata) -> Result<(), Refusal> {
+fn check(about: &Metadata) -> std::result::Result<(), Refusal> {
     if about.is_dir() {
         return Err(Refusal::Folder);
     }
@@ -64,7 +64,7 @@ fn check(about: &Metadata) -> Result<(), Refusal> {
 }
 
 /// The bytes of a regular file that has at most `most` of them.
-pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, Refusal> {
+pub fn read(path: &Path, most: u64) -> std::result::Result<Vec<u8>, Refusal> {
     let file = open(path)?;
     let len = file.metadata().map_err(Refusal::Io)?.len();
     if len > most {
@@ -74,6 +74,19 @@ pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, Refusal> {
     // A file may grow while it is read.
     file.take(most + 1).read_to_end(&mut bytes).map_err(Refusal::Io)?;
     if bytes.len() as u64 > most { Err(Refusal::TooLarge(most)) } else { Ok(bytes) }
+}
+
+/// Where a path leads that a file of `folder` names, as datasets and model cards do: below that folder, whoever wrote the file. An
+/// absolute path and one with `..` are refused. Scene files are a user's own, and may name files anywhere.
+pub fn below(folder: &Path, path: &str) -> Result<PathBuf> {
+    let inner = Path::new(path);
+    let is_name = |component: Component<'_>| matches!(component, Component::Normal(_));
+    if path.is_empty() || !inner.components().all(is_name) {
+        return Err(Error::input(format!("a file in this folder names `{path}`, which does not lie in it"))
+            .help("such a file may name files in its folder and below; use one that you trust")
+            .in_file(folder));
+    }
+    Ok(folder.join(inner))
 }
 
 #[cfg(test)]
@@ -90,6 +103,17 @@ mod tests {
         assert!(matches!(read(folder.path(), 9), Err(Refusal::Folder)));
         let missing = folder.path().join("none");
         assert_eq!(read(&missing, 9).unwrap_err().into_error(&missing).exit_code(), 2);
+    }
+
+    #[test]
+    fn nothing_leads_out_of_a_folder() {
+        let folder = Path::new("data");
+        assert_eq!(below(folder, "images/000001/rgb.png").unwrap(), Path::new("data/images/000001/rgb.png"));
+        for path in ["", "../x", "/etc/passwd", "images/../../x", "..", "./x"] {
+            let error = below(folder, path).unwrap_err();
+            assert_eq!(error.exit_code(), 2, "{path}");
+            assert!(error.to_string().contains(&format!("`{path}`")), "{error}");
+        }
     }
 
     #[cfg(unix)]

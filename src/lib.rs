@@ -64,6 +64,8 @@
 //! | 2 | `sampling`, `geometry`, `input` |
 //! | 1 | `math`, [`error`] |
 
+#![warn(clippy::print_stderr)]
+
 #[doc(hidden)]
 pub mod ablation;
 #[doc(hidden)]

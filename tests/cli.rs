@@ -245,3 +245,26 @@ fn a_catalogue_shows_species_and_keeps_what_would_come_out_the_same() {
     assert_eq!(missing.status.code(), Some(2));
     assert!(text(&missing.stderr).contains("did you mean"), "{}", text(&missing.stderr));
 }
+
+/// Rationale: logs fill disks, and readers die. Expected: what cannot be said ends no work and changes no exit code; paths that are lost
+/// are a failure, told on stderr, with the files there; a reader that wants no more is none.
+#[test]
+fn full_and_closed_streams_end_no_work() {
+    let full = || std::process::Stdio::from(std::fs::File::create("/dev/full").expect("Linux"));
+    let folder = folder();
+    let command = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_trace"));
+        command.current_dir(folder.path()).args(["--scene", "page.ron", "--spp", "1"]).args(arguments);
+        command
+    };
+    let files = |name: &str| std::fs::read_dir(folder.path().join(name)).unwrap().count();
+    assert_eq!(command(&["--out", "a"]).stderr(full()).output().unwrap().status.code(), Some(0));
+    assert_eq!(command(&["--crop", "0,0,99,99"]).stderr(full()).output().unwrap().status.code(), Some(2));
+    let lost = command(&["--out", "b"]).stdout(full()).output().unwrap();
+    let said = text(&lost.stderr);
+    assert!(lost.status.code() == Some(1) && said.contains("cannot be written to stdout"), "{said}");
+    assert_eq!((files("a"), files("b")), (7, 7));
+    let mut closed = command(&["--out", "c"]).stdout(std::process::Stdio::piped()).spawn().unwrap();
+    drop(closed.stdout.take());
+    assert_eq!(closed.wait().unwrap().code(), Some(0));
+}

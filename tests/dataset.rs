@@ -130,6 +130,61 @@ fn a_lying_label_is_found_though_its_hash_is_right() {
     assert!(said.contains("rendered again, these come out otherwise"), "{said}");
 }
 
+/// Rationale: datasets come from other people. Expected: a record, a list of checksums or a recipe that names a path elsewhere is a fault
+/// to `verify` and an error to what would read or write there, though all checksums are right; nothing appears beside the folder.
+#[test]
+fn a_forged_dataset_leads_nowhere_else() {
+    let (_keep, around) = scratch();
+    let data = around.join("data");
+    succeed(make(&data, 2, &[]));
+    let whole = tree(&data);
+    let secret = around.join("secret.ron");
+    fs::write(&secret, "a secret of this machine").unwrap();
+    let beside = || fs::read_dir(&around).unwrap().count();
+    let seal = |path: &str, bytes: &[u8]| {
+        let mut seal = furrow::dataset::checksum_record::ChecksumRecord::read(&data, 1).unwrap();
+        seal.files.insert(path.to_owned(), furrow::dataset::checksum::Checksum::of(bytes));
+        seal.write(&data).unwrap();
+    };
+    let restore = || {
+        for (name, bytes) in &whole {
+            fs::write(data.join(name), bytes).unwrap();
+        }
+    };
+    // Its name.
+    let record = data.join("images/000001/record.json");
+    for name in ["../../x", "/tmp/x", "000000"] {
+        let forged = fs::read_to_string(&record).unwrap().replacen("\"000001\"", &format!("\"{name}\""), 1);
+        fs::write(&record, &forged).unwrap();
+        seal("images/000001/record.json", forged.as_bytes());
+        let said = fail(verb("verify", &data, &[]), 1);
+        assert!(said.contains("record of image") && said.contains(name), "{said}");
+        let said = fail(verb("finish", &data, &["--format", "phenobench"]), 1);
+        assert!(said.contains("record of image") && said.contains("image 000001"), "{said}");
+        assert_eq!(beside(), 2, "{name}");
+        restore();
+    }
+    // Another file among its checksums.
+    seal("../secret.ron", b"a secret of this machine");
+    let said = fail(verb("verify", &data, &[]), 1);
+    assert!(said.contains("../secret.ron does not lie in the dataset's folder"), "{said}");
+    restore();
+    // The scene file.
+    let recipe = data.join("dataset.json");
+    let text = fs::read_to_string(&recipe).unwrap();
+    let scene = text.split("\"scene\": \"").nth(1).and_then(|rest| rest.split('"').next()).unwrap();
+    for other in [secret.to_str().unwrap(), "../secret.ron"] {
+        fs::write(&recipe, text.replace(&format!("\"scene\": \"{scene}\""), &format!("\"scene\": \"{other}\"")))
+            .unwrap();
+        for what in [verb("verify", &data, &["--rerender", "1"]), verb("finish", &data, &[])] {
+            let output = { what }.output().unwrap();
+            let said = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert!(matches!(output.status.code(), Some(1 | 2)), "{said}");
+            assert!(said.contains("does not lie in it") && !said.contains("a secret"), "{said}");
+        }
+    }
+}
+
 #[test]
 fn samples_come_back_from_their_files() {
     let (_keep, data) = scratch();

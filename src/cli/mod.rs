@@ -1,4 +1,4 @@
-//! What the command lines share: how an error looks, how a crop is written, what a signal does.
+//! What the command lines share: how a line is told, how a run ends, how an error looks, how a crop is written, what a signal does.
 
 pub mod signal;
 
@@ -6,13 +6,46 @@ use crate::error::Kind;
 use crate::geometry::Window;
 use crate::ron_file::nearest;
 use crate::{Error, Result};
-use std::path::Path;
+use std::fmt;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+
+/// Writes a line to stderr as `eprintln!` does, and goes on where that fails: a full disk or a reader that is gone must not end hours of
+/// work.
+#[macro_export]
+#[doc(hidden)]
+macro_rules! tell {
+    ($($words:tt)*) => { $crate::cli::tell(format_args!($($words)*)) };
+}
+
+/// What [`tell!`](crate::tell) does.
+pub fn tell(words: fmt::Arguments<'_>) {
+    // One write a line, so that the lines of several threads do not mix.
+    let _ = io::stderr().write_all(format!("{words}\n").as_bytes());
+}
+
+/// Ends a program: the paths that it wrote go to stdout, one a line, for the next program; an error goes to stderr. Where stdout is
+/// closed, nobody wants them; where it is full, they are lost, and that is a failure.
+pub fn end(done: Result<Vec<PathBuf>>) -> ExitCode {
+    let paths = match done {
+        Ok(paths) => paths,
+        Err(e) => return fail(&e),
+    };
+    let mut out = io::stdout().lock();
+    let written = paths.iter().try_for_each(|path| writeln!(out, "{}", path.display())).and_then(|()| out.flush());
+    match written {
+        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
+            fail(&Error::failed(format!("the files are there, but their paths cannot be written to stdout: {e}")))
+        }
+        _ => ExitCode::SUCCESS,
+    }
+}
 
 /// Prints an error to stderr and returns its exit code: 1 failed, 2 misused, 75 stopped cleanly, which is called no error.
 pub fn fail(error: &Error) -> ExitCode {
     let title = if error.kind() == Kind::Interrupted { "" } else { "error: " };
-    eprintln!("{title}{error}");
+    crate::tell!("{title}{error}");
     ExitCode::from(error.exit_code())
 }
 

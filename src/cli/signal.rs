@@ -33,7 +33,7 @@ impl Signals {
     pub fn watch() -> Self {
         let signals = Self { stop: Arc::default(), urgent: Arc::default(), unheeded: Arc::new(AtomicBool::new(true)) };
         if let Err(e) = signals.install() {
-            eprintln!("warning: cannot watch for signals: {e}");
+            crate::tell!("warning: cannot watch for signals: {e}");
         }
         signals
     }

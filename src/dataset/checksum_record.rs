@@ -6,6 +6,7 @@ use super::File;
 use super::checksum::Checksum;
 use super::recipe::{Recipe, compact};
 use super::set::Set;
+use crate::input::below;
 use crate::output::{link_atomically, write_atomically};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -73,7 +74,10 @@ impl ChecksumRecord {
 
     /// The files that are missing or changed, each with what is wrong with it.
     pub fn faults(&self, folder: &Path) -> Vec<(String, String)> {
-        let fault = |(path, print): (&String, &Checksum)| Some((path.clone(), print.fault(&folder.join(path))?));
+        let fault = |(path, print): (&String, &Checksum)| match below(folder, path) {
+            Ok(full) => Some((path.clone(), print.fault(&full)?)),
+            Err(_) => Some((path.clone(), "does not lie in the dataset's folder".into())),
+        };
         self.files.iter().filter_map(fault).collect()
     }
 }
@@ -89,7 +93,7 @@ pub(super) fn write_files(folder: &Path, files: &[File]) -> Result<()> {
         if file.bytes.is_empty() {
             return Err(Error::failed(format!("{}: refused to write an empty file", file.path)));
         }
-        let path = folder.join(&file.path);
+        let path = below(folder, &file.path)?;
         if let Some(there) = large.get(file.bytes.as_slice()) {
             link_atomically(there, &path, &file.bytes)?;
             continue;

@@ -98,9 +98,9 @@ fn manifest(set: &Set, files: &BTreeMap<String, Checksum>, out: &mut Stream<'_>)
     out.put("{\n\"recipe\": ")?;
     out.json(recipe)?;
     if let Ok(rendering) = recipe.rendering() {
-        let page = folder.join(&rendering.scene);
+        let scene = rendering.scene_in(folder)?;
         out.put(",\n\"scene_text\": ")?;
-        out.json(&std::fs::read_to_string(&page).map_err(Error::reading(&page))?)?;
+        out.json(&std::fs::read_to_string(&scene).map_err(Error::reading(&scene))?)?;
         out.put(",\n\"times\": \"ledger/*.jsonl\"")?;
     }
     out.put(",\n\"files\": {")?;

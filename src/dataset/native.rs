@@ -19,6 +19,11 @@ use crate::scene::tag::Class;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
+/// The name of an image: its number.
+pub fn image_name(index: u64) -> String {
+    format!("{index:06}")
+}
+
 /// The folder of an image, below that of the dataset.
 pub fn folder(name: &str) -> String {
     format!("images/{name}")
@@ -113,7 +118,15 @@ pub fn read(dataset: &Path, name: &str) -> Result<Sample> {
 pub fn read_record(dataset: &Path, name: &str) -> Result<Record> {
     let path = dataset.join(folder(name)).join("record.json");
     let bytes = std::fs::read(&path).map_err(Error::reading(&path))?;
-    serde_json::from_slice(&bytes).map_err(|e| Error::damaged(format!("this is no record: {e}")).in_file(path))
+    let record: Record = serde_json::from_slice(&bytes)
+        .map_err(|e| Error::damaged(format!("this is no record: {e}")).in_file(path.clone()))?;
+    // Formats name their files by it.
+    if record.name != name || image_name(record.index) != name {
+        return Err(Error::damaged(format!("this is the record of image `{}`, number {}", record.name, record.index))
+            .help(format!("restore the one of image {name}, or render it again"))
+            .in_file(path));
+    }
+    Ok(record)
 }
 
 fn check(path: &Path, expected: (u32, u32), found: (u32, u32)) -> Result<()> {

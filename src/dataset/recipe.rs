@@ -5,12 +5,13 @@
 
 use super::split::Shares;
 use crate::ablation::{self, Edit};
+use crate::input::below;
 use crate::scene::record::SpeciesRecord;
 use crate::settings::{Engine, Quality, RenderOptions, Technique, Techniques};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A dataset's recipe.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -79,6 +80,11 @@ pub struct Rendering {
 }
 
 impl Rendering {
+    /// The scene file below the dataset's folder; an error where the recipe names one elsewhere.
+    pub fn scene_in(&self, folder: &Path) -> Result<PathBuf> {
+        below(folder, &self.scene)
+    }
+
     /// The edit; [`ablation::FULL`] where nothing was changed.
     pub fn edit(&self) -> Result<&'static Edit> {
         self.edit.as_deref().map_or(Ok(&ablation::FULL), Edit::named)

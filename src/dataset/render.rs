@@ -38,7 +38,7 @@ pub struct RenderedSample {
 /// The scene file that a dataset is rendered from.
 pub fn scene_file(set: &Set) -> Result<SceneFile> {
     let rendering = set.recipe.rendering()?;
-    let scene = SceneFile::edited(set.folder.join(&rendering.scene), rendering.edit()?)?;
+    let scene = SceneFile::edited(rendering.scene_in(&set.folder)?, rendering.edit()?)?;
     Ok(scene.seed(rendering.seed).width(rendering.width).height(rendering.height))
 }
 

@@ -5,6 +5,7 @@ use super::native;
 use super::recipe::Recipe;
 use super::record::Record;
 use super::split::Split;
+use crate::input::below;
 use crate::output::stream_atomically;
 use crate::{Error, Result};
 use serde::Serialize;
@@ -30,7 +31,7 @@ impl Set {
 
     /// The name of an image: its number in six digits or more.
     pub fn name(index: u64) -> String {
-        format!("{index:06}")
+        native::image_name(index)
     }
 
     /// The names of a split's images, in the order of their numbers.
@@ -64,7 +65,7 @@ impl<'a> Whole<'a> {
 
     /// Writes a file piece by piece, so that it may be larger than memory; it appears whole or not at all.
     pub fn file(&mut self, path: &str, write: impl FnOnce(&mut Stream<'_>) -> Result<()>) -> Result<()> {
-        let full = self.folder.join(path);
+        let full = below(self.folder, path)?;
         let mut print = None;
         stream_atomically(&full, |file| {
             let mut stream = Stream { path: &full, file, hash: Sha256::new(), bytes: 0 };

@@ -8,6 +8,7 @@ use super::render::{render, scene_file};
 use super::set::Set;
 use super::split::Split;
 use super::{File, format, generate, invariants, native, timing_log};
+use crate::input::below;
 use crate::job::{Renderer, SceneFile, Threads};
 use crate::render::Watch;
 use crate::sampling::rng::mix;
@@ -184,7 +185,10 @@ fn listed(set: &Set) -> Result<Vec<String>> {
             // Looked at with its image.
             Some(checksums) if checksums == *print => {}
             Some(_) => faults.push(format!("{path} is another file than {MANIFEST} lists")),
-            None => faults.extend(print.fault(&set.folder.join(path)).map(|fault| format!("{path} {fault}"))),
+            None => match below(&set.folder, path) {
+                Ok(full) => faults.extend(print.fault(&full).map(|fault| format!("{path} {fault}"))),
+                Err(_) => faults.push(format!("{path} does not lie in the dataset's folder")),
+            },
         }
     }
     if !sealed.is_empty() {

@@ -14,6 +14,7 @@ use super::fit::Plan;
 use super::fit::checkpoint::History;
 use super::net::Network;
 use super::weights::{self, Array};
+use crate::input::below;
 use crate::output::write_atomically;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -147,7 +148,7 @@ impl TrainedModel {
             return Err(error.in_file(folder));
         }
         let card: ModelCard = read_json(&path)?;
-        let path = folder.join(&card.weights);
+        let path = below(folder, &card.weights)?;
         let (values, _) = weights::read(&path)?;
         if weights::hash(&values) != card.weights_sha256 {
             return Err(
@@ -160,7 +161,7 @@ impl TrainedModel {
     /// Writes weights and card.
     pub fn write(&self, folder: &Path) -> Result<()> {
         let text = serde_json::to_string(&self.card).map_err(|e| failed(&e))?;
-        weights::write(&folder.join(&self.card.weights), &self.values, &text)?;
+        weights::write(&below(folder, &self.card.weights)?, &self.values, &text)?;
         write_json(&folder.join(MODEL), &self.card)
     }
 }

@@ -74,7 +74,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     cli::check_folder(out)?;
     let say = |text: String| {
         if !args.work.quiet {
-            eprintln!("{text}");
+            furrow::tell!("{text}");
         }
     };
     let mut sets: Vec<Set> = Vec::new();
@@ -134,10 +134,10 @@ fn chosen(args: &Args) -> Result<Vec<&'static Edit>> {
                 .help("leave it out, or give other arguments"));
             }
             if !args.work.quiet {
-                eprintln!("{} is left out: the full dataset is drawn like that", edit.name);
+                furrow::tell!("{} is left out: the full dataset is drawn like that", edit.name);
             }
         } else if let (false, Err(e)) = (named, possible(&options, &full)) {
-            eprintln!("warning: {} is left out: {e}", edit.name);
+            furrow::tell!("warning: {} is left out: {e}", edit.name);
         } else {
             all.push(edit);
         }

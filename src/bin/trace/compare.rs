@@ -65,11 +65,11 @@ fn sets(args: &Args, real: &Path, synthetic: &Path) -> Result<Vec<PathBuf>> {
     let gap = pool.install(|| gap::Gap::of(real, synthetic, &options, &start, &|| progress.add()))?;
     progress.finish();
     for warning in &gap.warnings {
-        eprintln!("warning: {warning}");
+        furrow::tell!("warning: {warning}");
     }
     let paths = gap.write(&args.out)?;
     if !args.quiet {
-        eprint!("{}", gap.table());
+        furrow::tell!("{}", gap.table().trim_end());
     }
     Ok(paths)
 }
@@ -77,7 +77,7 @@ fn sets(args: &Args, real: &Path, synthetic: &Path) -> Result<Vec<PathBuf>> {
 fn pairs(args: &Args, a: &Path, b: &Path) -> Result<Vec<PathBuf>> {
     let found = Pairs::find(a, b, args.labels.as_deref())?;
     for warning in found.warnings() {
-        eprintln!("warning: {warning}");
+        furrow::tell!("warning: {warning}");
     }
     let progress = Progress::new(Instant::now(), args.quiet);
     progress.expect(found.pairs.len() as u64);
@@ -87,7 +87,7 @@ fn pairs(args: &Args, a: &Path, b: &Path) -> Result<Vec<PathBuf>> {
     progress.finish();
     let paths = comparison.write(&args.out)?;
     if !args.quiet {
-        eprint!("{}", comparison.table());
+        furrow::tell!("{}", comparison.table().trim_end());
     }
     Ok(paths)
 }

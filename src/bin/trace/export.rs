@@ -56,9 +56,9 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     let export = field.threads().install(|| args.format.write(&out, field.grown()))?;
     if !args.quiet {
         for warning in field.grown().warnings.iter().chain(&export.warnings) {
-            eprintln!("warning: {warning}");
+            furrow::tell!("warning: {warning}");
         }
-        eprintln!("{}: {} files in {}", args.field.path().display(), export.paths.len(), out.display());
+        furrow::tell!("{}: {} files in {}", args.field.path().display(), export.paths.len(), out.display());
     }
     Ok(export.paths)
 }

@@ -1,5 +1,7 @@
 //! `trace`: grows a field, path traces it, labels it, writes it.
 
+#![warn(clippy::print_stderr)]
+
 mod ablate;
 mod catalogue;
 mod compare;
@@ -12,8 +14,6 @@ mod texture;
 
 use clap::{Parser, Subcommand};
 use furrow::cli::{self, signal};
-use std::io::Write;
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Grows a procedural crop field, path traces it, and labels every pixel exactly.
@@ -57,7 +57,7 @@ Files of an image:
   *_denoised.png, denoised.exr   with --denoise
 
 More samples make less noise: twice the --spp takes twice the time and leaves 0.7 of it.
-The pages scenes/01-one-leaf.ron to 07 teach how a scene is written.
+The scene files scenes/01-one-leaf.ron to 08 teach how a scene is written.
 Paths go to stdout, everything else to stderr.
 Exit codes: 0 done, 1 failed, 2 wrong input, 75 stopped cleanly (Ctrl-C, TERM, HUP, USR1).";
 
@@ -89,19 +89,5 @@ fn main() -> ExitCode {
         Some(Verb::Texture(args)) => texture::run(&args),
         None => render::run(&cli.render, &signals),
     };
-    match done {
-        Ok(paths) => print_paths(&paths),
-        Err(e) => cli::fail(&e),
-    }
-}
-
-/// Paths go to stdout, one a line, for the next program; a closed pipe is no failure.
-fn print_paths(paths: &[PathBuf]) -> ExitCode {
-    let mut out = std::io::stdout().lock();
-    for path in paths {
-        if writeln!(out, "{}", path.display()).is_err() {
-            break;
-        }
-    }
-    ExitCode::SUCCESS
+    cli::end(done)
 }

@@ -119,7 +119,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
 impl Args {
     fn say(&self, text: &str) {
         if !self.quiet {
-            eprintln!("{text}");
+            furrow::tell!("{text}");
         }
     }
 }

@@ -17,7 +17,7 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     let mut paths = Vec::new();
     for recipe in &args.recipes {
         for warning in RonFile::read(recipe)?.renamed(RENAMED) {
-            eprintln!("warning: {warning}");
+            furrow::tell!("warning: {warning}");
         }
         paths.extend(texture::draw::write(recipe)?);
     }

@@ -54,6 +54,6 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let lead = "The score of an ExG threshold; a network that scores lower has learned nothing about shape.";
     let mut paths = report::write(&args.out, &title, lead, &report, &shots.kept, &Classes::default().colors())?;
     paths.push(json);
-    eprint!("{}", report.summary().markdown());
+    furrow::tell!("{}", report.summary().markdown().trim_end());
     Ok(paths)
 }

@@ -51,6 +51,6 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         size.1
     );
     let paths = report::write(&out, &title, &lead, &report, &shots.kept, &card.classes.colors())?;
-    eprint!("{}", report.summary().markdown());
+    furrow::tell!("{}", report.summary().markdown().trim_end());
     Ok(paths)
 }

@@ -85,7 +85,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         let plan = args.plan(*seed, &folder)?;
         let results = fit(&plan, args.init.as_deref(), &args.machine, &folder, args.quiet, signals)?;
         if !args.quiet {
-            eprintln!("{}: {}", folder.display(), in_words(&results));
+            furrow::tell!("{}: {}", folder.display(), in_words(&results));
         }
         paths.extend([folder.join(run::WEIGHTS), folder.join(run::MODEL)]);
         paths.extend(write_page(&folder)?);
@@ -131,7 +131,7 @@ pub(crate) fn fit(
             iou.join(", ")
         );
         if !quiet {
-            bar.suspend(|| eprintln!("{line}"));
+            bar.suspend(|| furrow::tell!("{line}"));
         }
     };
     let callbacks = Callbacks { step: &step, validation: &validation, stop: signals.heed() };

@@ -1,5 +1,7 @@
 //! `train`: trains networks to tell crop from weed, evaluates them and predicts with them.
 
+#![warn(clippy::print_stderr)]
+
 mod baseline;
 mod calibrate;
 mod eval;
@@ -13,8 +15,6 @@ mod table;
 
 use clap::{Parser, Subcommand};
 use furrow::cli::{self, signal};
-use std::io::Write;
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Trains segmentation networks on datasets, rendered or real, and evaluates them on real images.
@@ -78,19 +78,5 @@ fn main() -> ExitCode {
         Verb::Baseline(args) => baseline::run(&args, &signals),
         Verb::Table(args) => table::run(&args, &signals),
     };
-    match done {
-        Ok(paths) => print_paths(&paths),
-        Err(e) => cli::fail(&e),
-    }
-}
-
-/// Paths go to stdout, one a line, for the next program; a closed pipe is no failure.
-fn print_paths(paths: &[PathBuf]) -> ExitCode {
-    let mut out = std::io::stdout().lock();
-    for path in paths {
-        if writeln!(out, "{}", path.display()).is_err() {
-            break;
-        }
-    }
-    ExitCode::SUCCESS
+    cli::end(done)
 }

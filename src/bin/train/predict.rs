@@ -63,7 +63,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let predicted = predicted?;
     if !args.quiet && predicted.done > 0 {
         let each = predicted.seconds / predicted.done as f64;
-        eprintln!("{} pictures, {each:.3} s of the network for each", predicted.done);
+        furrow::tell!("{} pictures, {each:.3} s of the network for each", predicted.done);
     }
     outcome(predicted, pictures.len())
 }

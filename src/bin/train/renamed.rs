@@ -7,7 +7,7 @@ use std::ffi::OsString;
 /// Warns about each old name in a command line.
 pub(crate) fn warn(arguments: impl Iterator<Item = OsString>) {
     for warning in warnings(arguments.filter_map(|argument| argument.into_string().ok())) {
-        eprintln!("warning: {warning}");
+        furrow::tell!("warning: {warning}");
     }
 }
 

@@ -81,21 +81,21 @@ enum Part {
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let page = RonFile::read(&args.page)?;
     for warning in page.renamed(table::RENAMED) {
-        eprintln!("warning: {warning}");
+        furrow::tell!("warning: {warning}");
     }
     let experiment = Experiment::of(&page, args.scale.as_deref())?;
     let out = args.out.clone().unwrap_or_else(|| usual_folder(&args.page, args.scale.as_deref()));
     cli::check_folder(&out)?;
     let bound = Bound::new(experiment, &args.real, &args.without, &out)?;
     for name in &bound.left_out {
-        eprintln!("warning: `{name}` is left out: --without {}", args.without.join(" --without "));
+        furrow::tell!("warning: `{name}` is left out: --without {}", args.without.join(" --without "));
     }
     if args.dry_run {
-        eprint!("{}", table::listing(&bound, &out)?.markdown());
+        furrow::tell!("{}", table::listing(&bound, &out)?.markdown().trim_end());
         return Ok(Vec::new());
     }
     if args.trace.is_some() {
-        eprintln!("warning: --trace says nothing any more: this program renders the sets itself");
+        furrow::tell!("warning: --trace says nothing any more: this program renders the sets itself");
     }
     let machine = args.machine.machine();
     // First of all: for a GPU the program replaces itself.
@@ -124,22 +124,22 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
             evaluate: &|predictor, on, picture| evaluate(predictor, on, picture, &machine, stop),
             training: &|row: &str, state: &State| {
                 if !args.quiet {
-                    eprintln!("training {} of {}: {row}{}", state.number, state.of, left(state.left));
+                    furrow::tell!("training {} of {}: {row}{}", state.number, state.of, left(state.left));
                 }
             },
             tell: &|words| {
                 if !args.quiet {
-                    eprintln!("{words}");
+                    furrow::tell!("{words}");
                 }
             },
-            warn: &|words| eprintln!("warning: {words}"),
+            warn: &|words| furrow::tell!("warning: {words}"),
             stop,
         },
     )?;
     if !args.quiet {
         let (tables, _) = table::tables(&bound, &out)?;
         for (_, table) in tables.0.iter().filter(|(name, _)| *name != table::RUNS && args.only != Some(Part::Sets)) {
-            eprintln!("\n{}", table.markdown().trim_end());
+            furrow::tell!("\n{}", table.markdown().trim_end());
         }
     }
     Ok(paths)

@@ -101,7 +101,7 @@ impl Args {
     fn species(&self, page: &Path, signals: &Signals) -> Result<(PathBuf, Entry)> {
         let file = RonFile::read(page)?;
         for warning in file.renamed(RENAMED) {
-            eprintln!("warning: {warning}");
+            furrow::tell!("warning: {warning}");
         }
         let desc: SpeciesDesc = file.parse()?;
         let mut stages = Vec::new();
@@ -130,7 +130,7 @@ impl Args {
             output::write_png(&path, width, height, &Picture::Rgb(&sheet.pixels), &from)?;
         }
         if !self.quiet {
-            eprintln!("{}: {} stages{}", page.display(), stages.len(), if kept { ", kept" } else { "" });
+            furrow::tell!("{}: {} stages{}", page.display(), stages.len(), if kept { ", kept" } else { "" });
         }
         let (width, height, pixels) = output::read_rgb(&path)?;
         let stages = stages.into_iter().map(|(plant, _)| plant).collect();

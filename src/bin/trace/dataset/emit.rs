@@ -85,7 +85,7 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     };
     let (paths, warnings) = cluster::emit(&set, &job, &out)?;
     for warning in warnings {
-        eprintln!("warning: {warning}");
+        furrow::tell!("warning: {warning}");
     }
     Ok(paths)
 }

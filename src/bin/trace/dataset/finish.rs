@@ -28,7 +28,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let mut set = Set::open(&args.dir)?;
     if !args.format.is_empty() {
         for warning in plan::add_formats(&mut set, &args.format)? {
-            eprintln!("warning: {warning}");
+            furrow::tell!("warning: {warning}");
         }
         generate(&set, &args.work, Shard::ALL, signals)?;
     }

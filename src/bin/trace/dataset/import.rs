@@ -93,7 +93,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     cli::check_folder(&args.out)?;
     let source = source(args)?;
     for warning in source.warnings() {
-        eprintln!("warning: {warning}");
+        furrow::tell!("warning: {warning}");
     }
     let progress = Progress::new(Instant::now(), args.quiet);
     progress.expect(source.images().len() as u64);

@@ -73,7 +73,7 @@ pub(crate) fn begin(folder: &Path, order: &Order) -> Result<Set> {
     cli::check_folder(folder)?;
     let (set, warnings) = plan::plan(folder, order)?;
     for warning in warnings {
-        eprintln!("warning: {warning}");
+        furrow::tell!("warning: {warning}");
     }
     Ok(set)
 }

@@ -46,7 +46,7 @@ impl Progress {
         let mut last = log.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if last.elapsed() >= EVERY {
             *last = Instant::now();
-            eprintln!("{done} of {} images; {}", self.total.load(Ordering::Relaxed), self.rate(done));
+            furrow::tell!("{done} of {} images; {}", self.total.load(Ordering::Relaxed), self.rate(done));
         }
     }
 

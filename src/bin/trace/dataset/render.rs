@@ -49,14 +49,14 @@ pub(crate) fn generate(set: &Set, args: &WorkArgs, shard: Shard, signals: &Signa
     let progress = Progress::new(begin, args.quiet);
     let total = |n: usize| progress.expect(n as u64);
     let done = |_| progress.add();
-    let warn = |words: &str| eprintln!("warning: {words}");
+    let warn = |words: &str| furrow::tell!("warning: {words}");
     let callbacks = Callbacks { begin: &total, warn: &warn, done: &done, soon, now };
     let work = Work { shard, threads: args.threads, at_once: args.at_once };
     let made = generate::generate(set, &work, &callbacks);
     let (images, rate) = progress.finish();
     if !args.quiet {
         let rate = if images > 0 { format!(": {rate:.0} images an hour") } else { String::new() };
-        eprintln!("{}: {images} images in {:.1} s{rate}", set.folder.display(), begin.elapsed().as_secs_f64());
+        furrow::tell!("{}: {images} images in {:.1} s{rate}", set.folder.display(), begin.elapsed().as_secs_f64());
     }
     made
 }

@@ -39,7 +39,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let found = verify::verify(&set, args.rerender, renderer.as_ref(), &threads, &done, signals.heed())?;
     progress.finish();
     if !args.quiet {
-        eprintln!(
+        furrow::tell!(
             "{}: {} of {} images checked, {} rendered again and the same; {} faults",
             set.folder.display(),
             found.checked,
