@@ -71,11 +71,13 @@ struct Inner {
     help: Option<String>,
     place: Option<Place>,
     source: Option<std::io::Error>,
+    /// Whether the cause stays whatever field is made.
+    lasting: bool,
 }
 
 impl Error {
     fn new(kind: Kind, message: impl Into<String>) -> Self {
-        Self(Box::new(Inner { kind, message: message.into(), help: None, place: None, source: None }))
+        Self(Box::new(Inner { kind, message: message.into(), help: None, place: None, source: None, lasting: false }))
     }
 
     /// Arguments that cannot be: [`Kind::Misuse`].
@@ -195,11 +197,18 @@ impl Error {
         }
     }
 
+    /// The same, said of all fields of a scene: a file that is missing or wrong is so for each of them.
+    #[must_use]
+    pub fn lasting(mut self) -> Self {
+        self.0.lasting = true;
+        self
+    }
+
     /// Whether it is about the one field that was being made, so that a dataset can go on with the others: values that this field
-    /// drew, or files of this image. Not so a file that cannot be used as a whole, for all fields need it, nor any cause that lasts.
+    /// drew, or files of this image. Not so a file that is missing or wrong, for all fields need it, nor any cause that lasts.
     pub fn is_of_one_field(&self) -> bool {
         match self.kind() {
-            Kind::Input => self.place().is_none_or(|place| place.span.is_some()),
+            Kind::Input => !self.0.lasting && self.place().is_none_or(|place| place.span.is_some()),
             Kind::Damaged => true,
             Kind::Misuse | Kind::Io | Kind::Missing | Kind::Interrupted => false,
         }
@@ -288,6 +297,7 @@ mod tests {
             (Error::misuse("a"), 2, false),
             (Error::input("a"), 2, true),
             (spanned(Error::input("a")), 2, true),
+            (spanned(Error::input("a")).lasting(), 2, false),
             (Error::input("a").in_file("b.png"), 2, false),
             (Error::failed("a"), 1, false),
             (Error::io("a".as_ref())(ErrorKind::StorageFull.into()), 1, false),

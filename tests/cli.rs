@@ -226,7 +226,7 @@ fn a_catalogue_shows_species_and_keeps_what_would_come_out_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let pages = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/species");
     let catalogue = |species: &str| {
-        let rest = ["--size", "64", "--spp", "1", "--pages", pages.to_str().unwrap()];
+        let rest = ["--size", "64", "--spp", "1", "--species-dir", pages.to_str().unwrap()];
         run(folder.path(), &[&["catalogue", "--species", species], rest.as_slice()].concat())
     };
     let first = catalogue("echinochloa");
@@ -248,6 +248,25 @@ fn a_catalogue_shows_species_and_keeps_what_would_come_out_the_same() {
 
 /// Rationale: logs fill disks, and readers die. Expected: what cannot be said ends no work and changes no exit code; paths that are lost
 /// are a failure, told on stderr, with the files there; a reader that wants no more is none.
+/// Rationale: hours of work want a place to go. Expected: what is no folder and what nothing can be written into is told before anything grows.
+#[test]
+fn a_folder_that_cannot_be_is_told_first() {
+    let folder = folder();
+    let at = folder.path();
+    std::os::unix::fs::symlink("loop", at.join("loop")).unwrap();
+    std::os::unix::fs::symlink("nowhere", at.join("dangling")).unwrap();
+    for (out, words) in [
+        ("loop", "this link leads to no folder"),
+        ("dangling/x", "this link leads to no folder"),
+        ("page.ron/x", "this is a file"),
+    ] {
+        let done = run(at, &["--scene", "page.ron", "--spp", "65536", "--out", out]);
+        assert!(done.status.code() == Some(2) && text(&done.stderr).contains(words), "{out}: {}", text(&done.stderr));
+    }
+    let done = run(at, &["--scene", "page.ron", "--spp", "65536", "--out", "/proc/x"]);
+    assert_eq!(done.status.code(), Some(1), "{}", text(&done.stderr));
+}
+
 #[test]
 fn full_and_closed_streams_end_no_work() {
     let full = || std::process::Stdio::from(std::fs::File::create("/dev/full").expect("Linux"));

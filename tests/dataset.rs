@@ -176,6 +176,15 @@ fn a_forged_dataset_leads_nowhere_else() {
     for other in [secret.to_str().unwrap(), "../secret.ron"] {
         fs::write(&recipe, text.replace(&format!("\"scene\": \"{scene}\""), &format!("\"scene\": \"{other}\"")))
             .unwrap();
+        // With all hashes made again.
+        let recipe = Set::open(&data).unwrap().recipe.fingerprint().unwrap();
+        for index in 0..2 {
+            let path = data.join(format!("seals/{index:06}.json"));
+            fs::write(&path, &whole[&format!("seals/{index:06}.json")]).unwrap();
+            let mut seal = furrow::dataset::checksum_record::ChecksumRecord::read(&data, index).unwrap();
+            seal.recipe.clone_from(&recipe);
+            seal.write(&data).unwrap();
+        }
         for what in [verb("verify", &data, &["--rerender", "1"]), verb("finish", &data, &[])] {
             let output = { what }.output().unwrap();
             let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -183,6 +192,31 @@ fn a_forged_dataset_leads_nowhere_else() {
             assert!(said.contains("does not lie in it") && !said.contains("a secret"), "{said}");
         }
     }
+}
+
+/// Rationale: a file that all fields need is missing for all of them. Expected: one error, and no image is tried after it.
+#[test]
+fn a_file_that_is_gone_ends_a_dataset_at_once() {
+    let (_keep, data) = scratch();
+    succeed(trace(&[
+        "dataset",
+        "plan",
+        "--scene",
+        SMALL,
+        "--out",
+        path(&data),
+        "--count",
+        "40",
+        "--width",
+        "48",
+        "--spp",
+        "1",
+    ]));
+    let gone: Vec<String> = tree(&data).into_keys().filter(|name| name.ends_with("sugar_beet.ron")).collect();
+    fs::remove_file(data.join(&gone[0])).unwrap();
+    let said = fail(verb("render", &data, &[]), 2);
+    assert_eq!(said.matches("there is no file").count(), 1, "{said}");
+    assert!(!data.join("seals").exists(), "{said}");
 }
 
 #[test]

@@ -9,7 +9,7 @@ use crate::{Error, Result};
 
 /// No edit: what all others are compared with.
 pub static FULL: Edit =
-    Edit { name: "full", about: "the field as its page says", keeps_labels: true, change: Change::Nothing };
+    Edit { name: "full", about: "the field as its scene file says", keeps_labels: true, change: Change::Nothing };
 
 impl Edit {
     /// The edit of this name; the error lists all names.

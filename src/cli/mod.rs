@@ -71,16 +71,29 @@ pub fn crop(text: &str) -> Result<Window, String> {
 
 /// Checks that files can be written into `folder`, before hours are spent on what would go there.
 pub fn check_folder(folder: &Path) -> Result<()> {
-    match folder.ancestors().find(|f| f.exists()) {
-        Some(there) if !there.is_dir() => Err(Error::misuse("this is a file, so no files can be written into it")
-            .in_file(there)
-            .help("give --out a folder; it is made where it is missing")),
-        _ => Ok(()),
+    let help = "give --out a folder; it is made where it is missing";
+    // A link that leads nowhere is there, but is no folder.
+    let there = folder.ancestors().find(|f| f.symlink_metadata().is_ok()).unwrap_or(Path::new("."));
+    match there.metadata() {
+        Ok(about) if about.is_dir() => {}
+        Ok(_) => {
+            return Err(Error::misuse("this is a file, so no files can be written into it").in_file(there).help(help));
+        }
+        Err(e) => {
+            return Err(Error::misuse(format!("this link leads to no folder: {e}")).in_file(there).help(help));
+        }
     }
+    // Not by its permissions: root may write where they say no, and nobody on a file system that is read-only.
+    tempfile::tempfile_in(there).map_err(Error::io(there)).map(drop)
 }
 
 /// Checks that a scene file is there, and says which scene files are where it is not.
 pub fn check_scene(file: &Path) -> Result<()> {
+    check_ron(file, "scene file")
+}
+
+/// The same of any RON file; `what` it is, such as `species file`.
+pub fn check_ron(file: &Path, what: &str) -> Result<()> {
     if file.exists() {
         return Ok(());
     }
@@ -93,10 +106,10 @@ pub fn check_scene(file: &Path) -> Result<()> {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
     let help = match (nearest(&files, &name), files.is_empty()) {
         (Some(near), _) => format!("did you mean {}?", folder.join(near).display()),
-        (None, false) => format!("scene files in {} are {}", folder.display(), files.join(", ")),
+        (None, false) => format!("{what}s in {} are {}", folder.display(), files.join(", ")),
         (None, true) => "the main scene is scenes/field.ron in the project's folder".to_owned(),
     };
-    Err(Error::input("there is no such scene file").in_file(file).help(help))
+    Err(Error::input(format!("there is no such {what}")).in_file(file).help(help))
 }
 
 /// Checks that a crop lies in the image.

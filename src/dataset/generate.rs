@@ -165,9 +165,13 @@ pub(super) fn interrupted(folder: &Path, there: usize, wanted: usize) -> Error {
         .in_file(folder)
 }
 
+/// Images whose faults are told one by one.
+const MOST_TOLD: usize = 20;
+
 /// What went wrong in a run, by image: the whole run's failure alone, or those of single images in one.
 fn together(failures: BTreeMap<u64, Error>) -> Error {
     let mut words = Vec::new();
+    let more = failures.len().saturating_sub(MOST_TOLD);
     let mut input = true;
     for (index, error) in failures {
         let image = format!("image {}", Set::name(index));
@@ -180,6 +184,10 @@ fn together(failures: BTreeMap<u64, Error>) -> Error {
         } else {
             words.push(format!("{image}: {error}"));
         }
+    }
+    words.truncate(MOST_TOLD);
+    if more > 0 {
+        words.push(format!("{more} images more were not made; correct these and run the same command again"));
     }
     let words = words.join("\nerror: ");
     if input { Error::input(words) } else { Error::damaged(words) }
@@ -205,7 +213,7 @@ pub fn task(set: &Set, index: u64) -> Result<Task> {
     Ok(if broken.iter().any(wanted) { Task::Formats } else { task })
 }
 
-/// What a sealed image owes its recipe, whatever has become of its files: it may be of another recipe, or lack a format.
+/// What remains to be done of an image whose checksums are there, whatever has become of its files: it may be of another recipe, or lack a format.
 pub(super) fn remaining(set: &Set, checksums: &ChecksumRecord) -> Result<Task> {
     if checksums.recipe != set.recipe.fingerprint()? {
         return Ok(Task::All);

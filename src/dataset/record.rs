@@ -106,7 +106,7 @@ pub struct Plant {
 /// What is known of a plant beyond its pixels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grown {
-    /// Scientific name, or the name of the model.
+    /// Common name as the species file has it, or the name of the model.
     pub species: String,
     /// EPPO code; empty for a model.
     pub eppo: String,

@@ -70,18 +70,14 @@ impl RonFile {
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T> {
         if self.text.trim().is_empty() {
             let help = "it begins with a name and a bracket, as scenes/field.ron with `Field(`".to_owned();
-            return Err(self.fault(&Fault {
-                raw_len: 0,
-                start: 0,
-                end: 0,
-                message: "this file is empty".to_owned(),
-                help,
-            }));
+            return Err(self
+                .fault(&Fault { raw_len: 0, start: 0, end: 0, message: "this file is empty".to_owned(), help })
+                .lasting());
         }
         options().from_str(&self.text).map_err(|e| {
             let fault = locate(&self.text, &e);
             let help = decimal_comma(&self.text, &fault).unwrap_or(fault.help.clone());
-            self.fault(&Fault { help, ..fault })
+            self.fault(&Fault { help, ..fault }).lasting()
         })
     }
 
@@ -111,7 +107,7 @@ impl RonFile {
             quoted(&self.text).into_iter().find(|at| unquoted(&self.text[at.clone()]).as_deref() == Some(literal));
         let at = found.unwrap_or(0..1);
         let (message, help) = (message.into(), help.into());
-        self.fault(&Fault { raw_len: self.text.len(), start: at.start, end: at.end, message, help })
+        self.fault(&Fault { raw_len: self.text.len(), start: at.start, end: at.end, message, help }).lasting()
     }
 
     /// The text with some of its quoted texts, outside comments, replaced: `with` gets what stands in the quotes and says what

@@ -148,6 +148,13 @@ impl<B: Bound> Vary<B> {
                     "min is the smallest value that may be drawn, max the largest",
                 );
             }
+            if B::WHOLE && min.ceil() > max.floor() {
+                return wrong(
+                    &[Field("min")],
+                    format!("no whole number lies between min {min} and max {max}"),
+                    "write whole numbers that are apart",
+                );
+            }
             if (min..=max).contains(&centre) {
                 return Ok(());
             }
@@ -224,10 +231,12 @@ type Wrong = (Vec<Step<'static>>, String, String);
 fn cut<B: Bound>(min: f64, max: f64, mut draw: impl FnMut() -> f64) -> f64 {
     for _ in 0..100 {
         let x = draw();
-        if x >= min && x <= max && (B::holds(x) || (B::WHOLE && B::holds(x.round()))) {
+        let within = |x: f64| x >= min && x <= max && B::holds(x);
+        if if B::WHOLE { x >= min && x <= max && within(x.round()) } else { within(x) } {
             return x;
         }
     }
+    let (min, max) = if B::WHOLE { (min.ceil(), max.floor()) } else { (min, max) };
     draw().clamp(min, max).clamp(B::MIN, B::MAX)
 }
 
@@ -392,7 +401,12 @@ mod tests {
         let v: Vary<Count> = Vary::uniform(1.0, 6.0);
         let mut s = stream();
         assert!((0..50).all(|_| v.draw(&mut s).fract() == 0.0));
+        // Bounds hold what is drawn, not what is rounded; between these there is one whole number, and between the others none.
+        let v: Vary<Count> = ron::from_str("Normal(mean: 13, sd: 5, min: 12.4, max: 13.6)").unwrap();
+        assert!((0..500).all(|_| v.draw(&mut s) == 13.0));
+        assert!(ron::from_str::<Vary<Count>>("Normal(mean: 13.5, sd: 1, min: 13.2, max: 13.8)").is_err());
     }
+
     /// Method: frequencies. Expected: each face of a die within five standard deviations of a sixth; a continuous draw that is
     /// rounded would show 1 and 6 half as often. The stream goes on as behind any other uniform number.
     #[test]

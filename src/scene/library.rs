@@ -117,7 +117,7 @@ impl Library {
                 return Err(if own.text.contains(&format!("\"{key}\"")) {
                     own.about(&key, message, help)
                 } else {
-                    own.blame(&[Step::Field("materials")], Error::input(message).help(help))
+                    own.blame(&[Step::Field("materials")], Error::input(message).help(help)).lasting()
                 });
             }
         }

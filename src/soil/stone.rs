@@ -132,7 +132,7 @@ mod tests {
         for cover in [0.01, 0.1] {
             let desc = StonesDesc { cover: Vary::fixed(cover), ..StonesDesc::default() };
             let area = Rect::new(0.0, 0.0, 5.0, 5.0);
-            let all = sizes(&desc, area, &Stream::of(3, 0, Purpose::Test, 0));
+            let all = sizes(&desc, area, &Stream::of(3, seed, Purpose::Test, 0));
             let sum: f32 = all.iter().map(|(_, mm, _)| disc_m2(*mm)).sum();
             let covered = 1.0 - (-sum / area.area()).exp();
             assert!((f64::from(covered) / cover - 1.0).abs() < 0.12, "{covered} for {cover}");
@@ -145,7 +145,7 @@ mod tests {
     #[test]
     fn pieces_lie_together() {
         let area = Rect::new(0.0, 0.0, 4.0, 4.0);
-        let lay = |together: f64| {
+        let lay = |together: f64, seed: u64| {
             let desc =
                 StonesDesc { cover: Vary::fixed(0.01), together: Vary::fixed(together), ..StonesDesc::default() };
             sizes(&desc, area, &Stream::of(3, 0, Purpose::Test, 0))
@@ -161,8 +161,11 @@ mod tests {
         };
         let covered =
             |all: &[(Vec2, f32, Stream)]| all.iter().map(|(_, mm, _)| disc_m2(*mm)).sum::<f32>() / area.area();
-        let (alone, grouped) = (lay(1.0), lay(4.0));
-        assert!((covered(&grouped) / covered(&alone) - 1.0).abs() < 0.15, "{} {}", covered(&grouped), covered(&alone));
+        // One field's cover strays by a tenth where stones lie in groups.
+        let cover = |together: f64| (0..16).map(|seed| covered(&lay(together, seed))).sum::<f32>() / 16.0;
+        let (even, clustered) = (cover(1.0), cover(4.0));
+        assert!((clustered / even - 1.0).abs() < 0.12, "{clustered} {even}");
+        let (alone, grouped) = (lay(1.0, 0), lay(4.0, 0));
         let (a, b) = (nearest(&alone), nearest(&grouped));
         assert!(b[b.len() / 2] < a[a.len() / 5], "{} {}", b[b.len() / 2], a[a.len() / 5]);
     }

@@ -32,7 +32,7 @@ pub(crate) struct Args {
     /// Tell the edits, one a line, and make nothing.
     #[arg(long, exclusive = true)]
     list: bool,
-    /// Names of the sets of real images that DIR/ablation.ron, the scene file for `train table`, asks for.
+    /// Names of the sets of real images that DIR/ablation.ron, the experiment file for `train table`, asks for.
     #[arg(long, value_name = "NAMES", value_delimiter = ',', default_value = "real", value_parser = set_name)]
     real: Vec<String>,
     /// Begin the datasets and render nothing: for shards, and for a cluster.

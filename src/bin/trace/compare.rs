@@ -31,7 +31,7 @@ pub(crate) struct Args {
     /// Pixels in a degree of the view of the eye that FLIP imagines; 67 is a 4K screen of 0.7 m at 0.7 m.
     #[arg(long, value_name = "N", default_value_t = PIXELS_PER_DEGREE, value_parser = pixels_per_degree)]
     ppd: f32,
-    /// Most pairs that the scene file shows, those of the largest FLIP; of sets, pictures of each.
+    /// Most pairs that the report shows, those of the largest FLIP; of sets, pictures of each.
     #[arg(long, value_name = "N", default_value_t = 12)]
     show: usize,
     /// Threads; 0 for one on each core.

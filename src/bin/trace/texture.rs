@@ -7,7 +7,7 @@ use std::path::PathBuf;
 /// What to draw.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Recipe scene files, for example textures/leaf/sugar_beet.ron.
+    /// Texture recipes, for example textures/leaf/sugar_beet.ron.
     #[arg(required = true)]
     recipes: Vec<PathBuf>,
 }

@@ -215,7 +215,7 @@ pub(super) fn limits(recipe: &Recipe, found: &Statistics) -> Markup {
             } else {
                 format!("The photographs hold the noise of {} samples a pixel, beside the sensor's.", made.spp)
             });
-            all.push("No disease, no damage by insects, no wind, no motion blur.".into());
+            all.push("Wind and diseases are not modelled. Damage by insects, dead tissue and motion blur are there where the scene file says so.".into());
         }
         Made::Imported { .. } => {
             all.push("The labels are those of the source, as exact as whoever drew them.".into());

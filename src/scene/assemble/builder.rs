@@ -11,6 +11,8 @@ use crate::scene::library::Library;
 use crate::scene::{Part, Scene};
 use crate::soil::Ground;
 
+/// Farthest that a model or a camera may be from the world's origin along an axis, metres: single precision tells 0.06 mm apart there.
+pub(super) const FARTHEST: f32 = 1000.0;
 /// Most plants that a field can number.
 pub(super) const MOST_PLANTS: usize = u16::MAX as usize;
 

@@ -1,6 +1,6 @@
 //! Models from disk, stood on the ground and labelled.
 
-use super::builder::{Builder, Floor, MOST_PLANTS};
+use super::builder::{Builder, FARTHEST, Floor, MOST_PLANTS};
 use super::identity;
 use crate::geometry::Mesh;
 use crate::material::{Material, Painted, Repaint};
@@ -14,9 +14,6 @@ use crate::scene::{Part, PlantRecord};
 use crate::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
-
-/// Farthest that a model may reach from the world's origin along an axis, metres.
-const FARTHEST: f32 = 1000.0;
 
 impl Builder<'_> {
     /// Places every model; `numbered` plants have their numbers already. Returns the plants among the models.

@@ -4,7 +4,7 @@
 //! One that sees the horizon, or ground further away, gets bare ground there: its pixels are then labelled soil, so the field says
 //! so in its warnings, with the share of the ground in view that this is. Where it is more than half, the scene is refused.
 
-use super::builder::Builder;
+use super::builder::{Builder, FARTHEST};
 use crate::math::{Vec2, Vec3, vec2};
 use crate::ron_file::Step;
 use crate::soil::Rect;
@@ -45,6 +45,11 @@ impl Builder<'_> {
         let camera = &self.scene.camera;
         let (w, h) = (camera.width() as f32, camera.height() as f32);
         let below = camera.pose().position.truncate();
+        if below.abs().max_element() > FARTHEST {
+            let words = format!("the camera stands more than {FARTHEST} m from the field's origin");
+            let error = Error::input(words).help("move it near the origin: a field has no end, and is as good there");
+            return Err(self.page.blame(&[Step::Field("camera")], error));
+        }
         let mut seen: Vec<Vec2> = Vec::new();
         let mut level: Vec<Vec2> = Vec::new();
         // The corners and the middles of the sides: a barrel distortion bulges between corners.

@@ -241,7 +241,9 @@ mod tests {
         let picture = picture();
         let lost = [95, 75, 30].map(|quality| differ(&pass(quality, false, &picture), &picture).0);
         assert!(lost.is_sorted() && lost[2] > 1.4 * lost[0], "{lost:?}");
-        assert!(differ(&pass(100, true, &picture), &picture).1 <= 3);
+        // Coefficients, then values, are rounded to whole numbers: an error of 0.3 in each of Y, Cb and Cr and of 0.3 more makes one of up to
+        // 0.7 in blue, of which the largest of ten thousand values is six times as much at most.
+        assert!(differ(&pass(100, true, &picture), &picture).1 <= 4);
         for full_color in [true, false] {
             let once = pass(80, full_color, &picture);
             let again = differ(&pass(80, full_color, &once), &once).0;

@@ -42,12 +42,12 @@ pub(crate) struct Args {
     /// Folder for the sheets and for catalogue.html.
     #[arg(long, value_name = "DIR", default_value = "out/catalogue")]
     out: PathBuf,
-    /// Only these, by the names of their scene files: sugar_beet,galium.
+    /// Only these, by the names of their species files: sugar_beet,galium.
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     species: Vec<String>,
     /// Folder of the species files.
-    #[arg(long, value_name = "DIR", default_value = "scenes/species")]
-    pages: PathBuf,
+    #[arg(long, alias = "pages", value_name = "DIR", default_value = "scenes/species")]
+    species_dir: PathBuf,
     /// Samples a pixel.
     #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..=4096))]
     spp: u32,
@@ -86,14 +86,20 @@ impl Args {
     /// The species files that are asked for, in order of their names.
     fn pages(&self) -> Result<Vec<PathBuf>> {
         if !self.species.is_empty() {
-            let pages: Vec<PathBuf> = self.species.iter().map(|s| self.pages.join(s).with_extension("ron")).collect();
-            pages.iter().try_for_each(|page| cli::check_scene(page))?;
+            let pages: Vec<PathBuf> =
+                self.species.iter().map(|s| self.species_dir.join(s).with_extension("ron")).collect();
+            pages.iter().try_for_each(|page| cli::check_ron(page, "species file"))?;
             return Ok(pages);
         }
-        let entries = std::fs::read_dir(&self.pages).map_err(Error::reading(&self.pages))?;
+        let entries = std::fs::read_dir(&self.species_dir).map_err(Error::reading(&self.species_dir))?;
         let mut pages: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
         pages.retain(|p| p.extension().is_some_and(|e| e == "ron"));
         pages.sort();
+        if pages.is_empty() {
+            let error =
+                Error::input("there is no species file in this folder").help("those that ship lie in scenes/species");
+            return Err(error.in_file(&self.species_dir));
+        }
         Ok(pages)
     }
 

@@ -31,7 +31,7 @@ pub(super) fn html(entries: &[Entry]) -> String {
         }
     };
     let lead = html! {
-        "Every species page at every growth stage: above as a camera sees it that looks straight down, below from about 30° above the \
+        "Every species at every growth stage: above as a camera sees it that looks straight down, below from about 30° above the \
          ground. It is one plant in all of its pictures; bars are to scale where it stands. Grown and rendered by "
         code { "trace catalogue" } "."
     };

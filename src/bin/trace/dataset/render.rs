@@ -30,7 +30,7 @@ pub(crate) struct WorkArgs {
     /// Images under way at once, which share the threads; each takes the memory of a field. 0 for one a thread, 16 at most.
     #[arg(long, default_value_t = 0, value_parser = threads)]
     at_once: usize,
-    /// Print nothing but errors and the paths of the files.
+    /// Print nothing but errors, warnings and the paths of the files.
     #[arg(long)]
     pub(crate) quiet: bool,
 }
