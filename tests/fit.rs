@@ -247,6 +247,30 @@ fn weights_of_other_classes_and_damaged_ones_are_refused() {
     let error =
         refuse(&mut fit(&set, &folder.join("on"), &format!("--network unet --steps 1 --init {}", two.display())), 2);
     assert!(error.contains("not those of unet with 3 bands and 3 classes") && error.contains("head.conv"), "{error}");
+    // Cards that would take all memory, divide by nothing or lead elsewhere.
+    let card = two.join(run::MODEL);
+    let text = fs::read_to_string(&card).unwrap();
+    let forged = [
+        ("width", "\"width\": 64", "\"width\": 1000000000", "networks do not see 1000000000"),
+        ("height", "\"height\": 48", "\"height\": 0", "networks do not see"),
+        ("bands", "\"green\"", "\"red\"", "are no bands of an image"),
+        (
+            "weights",
+            "\"weights.safetensors\"",
+            "\"../w.safetensors\"",
+            "names `../w.safetensors`, which does not lie in it",
+        ),
+    ];
+    for (what, good, bad, words) in forged {
+        let compact = |s: &str| s.replace(": ", ":");
+        let changed =
+            if text.contains(good) { text.replace(good, bad) } else { text.replace(&compact(good), &compact(bad)) };
+        assert_ne!(changed, text, "{what}: {text}");
+        fs::write(&card, changed).unwrap();
+        let error = refuse(&mut eval(&two), 2);
+        assert!(error.contains(words), "{what}: {error}");
+    }
+    fs::write(&card, &text).unwrap();
     let path = two.join(run::WEIGHTS);
     let mut bytes = fs::read(&path).unwrap();
     let last = bytes.len() - 1;

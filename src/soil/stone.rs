@@ -132,7 +132,7 @@ mod tests {
         for cover in [0.01, 0.1] {
             let desc = StonesDesc { cover: Vary::fixed(cover), ..StonesDesc::default() };
             let area = Rect::new(0.0, 0.0, 5.0, 5.0);
-            let all = sizes(&desc, area, &Stream::of(3, seed, Purpose::Test, 0));
+            let all = sizes(&desc, area, &Stream::of(3, 0, Purpose::Test, 0));
             let sum: f32 = all.iter().map(|(_, mm, _)| disc_m2(*mm)).sum();
             let covered = 1.0 - (-sum / area.area()).exp();
             assert!((f64::from(covered) / cover - 1.0).abs() < 0.12, "{covered} for {cover}");
@@ -148,7 +148,7 @@ mod tests {
         let lay = |together: f64, seed: u64| {
             let desc =
                 StonesDesc { cover: Vary::fixed(0.01), together: Vary::fixed(together), ..StonesDesc::default() };
-            sizes(&desc, area, &Stream::of(3, 0, Purpose::Test, 0))
+            sizes(&desc, area, &Stream::of(3, seed, Purpose::Test, 0))
         };
         let nearest = |all: &[(Vec2, f32, Stream)]| {
             let of = |(i, (p, ..)): (usize, &(Vec2, f32, Stream))| {

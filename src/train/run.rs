@@ -9,9 +9,10 @@
 //! ```
 
 use super::classes::Classes;
-use super::data::{Normalization, Shape, Store};
+use super::data::{Band, Normalization, Shape, Store};
 use super::fit::Plan;
 use super::fit::checkpoint::History;
+use super::fit::hyper::SIDES;
 use super::net::Network;
 use super::weights::{self, Array};
 use crate::input::below;
@@ -109,6 +110,29 @@ pub struct ModelCard {
     pub plan_sha256: String,
 }
 
+impl ModelCard {
+    /// What `train fit` would not accept, in words: sizes decide how much memory is taken.
+    fn check(&self) -> Result<(), String> {
+        let Shape { bands, width, height } = &self.input;
+        if !SIDES.contains(width) || !SIDES.contains(height) {
+            return Err(format!("networks do not see {width} × {height} pixels"));
+        }
+        let names: Vec<&str> = bands.iter().map(Band::name).collect();
+        if Band::list(&names.join(",")).as_ref() != Ok(bands) {
+            return Err(format!("`{}` are no bands of an image", names.join(",")));
+        }
+        if let Normalization::Fixed { mean, sd } = &self.normalization
+            && (mean.len() != bands.len()
+                || sd.len() != bands.len()
+                || !mean.iter().all(|m| m.is_finite())
+                || !sd.iter().all(|s| s.is_finite() && *s > 0.0))
+        {
+            return Err(format!("its normalization is not one of {} bands", bands.len()));
+        }
+        Ok(())
+    }
+}
+
 /// Results of a training.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Results {
@@ -148,12 +172,19 @@ impl TrainedModel {
             return Err(error.in_file(folder));
         }
         let card: ModelCard = read_json(&path)?;
+        card.check().map_err(|what| {
+            Error::input(what).help("no `train fit` writes such a card: take one that you trust").in_file(path)
+        })?;
         let path = below(folder, &card.weights)?;
         let (values, _) = weights::read(&path)?;
         if weights::hash(&values) != card.weights_sha256 {
             return Err(
                 Error::input(format!("these are not the weights that {MODEL} beside them is about")).in_file(path)
             );
+        }
+        if let Some(array) = values.iter().find(|a| !a.values.iter().all(|v| v.is_finite())) {
+            let what = format!("`{}` holds values that are not finite numbers", array.name);
+            return Err(Error::input(what).help("train again, with a lower --rate").in_file(path));
         }
         Ok(Self { card, values })
     }
