@@ -92,6 +92,7 @@ pub struct PlantDesc {
 #[serde(deny_unknown_fields, rename = "PlantDesc")]
 struct Written {
     form: Form,
+    #[serde(deserialize_with = "ron_file::entries")]
     kinds: BTreeMap<String, LeafKind>,
     stages: Vec<StageDesc>,
     #[serde(default)]

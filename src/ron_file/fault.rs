@@ -4,6 +4,7 @@
 //! text here. A [`Fault`] carries its place outward through serde's string-only errors, between control characters that no
 //! file's text can bring in by itself.
 
+use super::entries::TWICE;
 use super::place::{Step, mismatch, offset_of, place, token};
 use super::renamed::{Keyword, is_old};
 use super::suggest::choose;
@@ -173,6 +174,7 @@ fn explain(code: &Ron) -> (String, String) {
             let help = format!("write all {wanted}, separated by commas: {name}(…, …)");
             return (format!("{found} {verb} here, where {wanted} belong"), help);
         }
+        Ron::Message(text) if text.ends_with(TWICE) => return (text.clone(), "keep one of them".to_owned()),
         Ron::Message(text) => return (text.clone(), String::new()),
         Ron::UnexpectedChar(c) => {
             return (format!("{c:?} has no place here"), "is a quote or a comma missing before it?".to_owned());

@@ -7,6 +7,7 @@
 //! Types that read themselves from raw text use [`from_raw`]; what they refuse is a [`Fault`], which keeps its place.
 
 mod bound;
+mod entries;
 mod fault;
 mod file;
 mod num;
@@ -16,6 +17,7 @@ mod suggest;
 mod vary;
 
 pub use bound::{Bound, Count, Elevation, Finite, Fraction, NonNegative, Positive, PositiveCount};
+pub use entries::entries;
 pub use fault::{Fault, from_raw, inside, parse_in, whole};
 pub use file::RonFile;
 pub use num::Num;

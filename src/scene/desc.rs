@@ -5,7 +5,7 @@ use crate::light::LightDesc;
 use crate::material::LeafDesc;
 use crate::model::Up;
 use crate::plant::{ConditionDesc, PlantDesc, Stage};
-use crate::ron_file::{Finite, Fraction, NonNegative, Num, Pick, Positive, PositiveCount, Vary};
+use crate::ron_file::{self, Finite, Fraction, NonNegative, Num, Pick, Positive, PositiveCount, Vary};
 use crate::sampling::Stream;
 use crate::scatter::{RowsDesc, WeedsDesc};
 use crate::scene::tag::Class;
@@ -232,7 +232,7 @@ pub struct SpeciesDesc {
     /// Crop or weed.
     pub role: Role,
     /// What its organs look like, by the names that the plant uses.
-    #[serde(alias = "skins")]
+    #[serde(alias = "skins", deserialize_with = "ron_file::entries")]
     pub materials: BTreeMap<String, LeafDesc>,
     /// How it grows.
     pub plant: PlantDesc,
