@@ -23,8 +23,8 @@
 //! ```
 //!
 //! A scene file is a distribution over fields; file, seed and index are one field, and always the same bits, whatever the number of threads.
-//! Plants are grown as skinned meshes and stand on displaced ground. The path tracer fills a film of four bands (red, green, blue, near infrared) with mean and
-//! variance; a sensor turns it into a photograph. Labels come from one unfiltered ray through each pixel's centre, so they are exact.
+//! Plants are grown as meshes, bent leaf by leaf by linear blend skinning, and stand on displaced ground. The path tracer fills a film of
+//! four bands (red, green, blue, near infrared) with mean and variance; a sensor turns it into a photograph. Labels come from one unfiltered ray through each pixel's centre, so they are exact.
 //!
 //! # Where to look
 //!
@@ -45,6 +45,8 @@
 //!
 //! The modules that documentation does not list are public for the programs and tests of this repository alone; they may change with any
 //! version. Modules import only modules of lower layers; `tests/architecture.rs` reads this table and holds them to it.
+//!
+//! `scatter` says where plants stand, `accel` holds the BVH, `cli` is what the two programs share.
 //!
 //! | layer | modules |
 //! |---|---|

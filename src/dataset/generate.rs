@@ -88,9 +88,9 @@ pub enum Task {
 /// Images under way at once unless said otherwise: more would take more memory than they save time.
 const MOST_AT_ONCE: usize = 16;
 
-/// Threads of a lane, of all that are shared out among so many; at least one.
-fn share(threads: usize, lanes: usize, lane: usize) -> usize {
-    (threads / lanes + usize::from(lane < threads % lanes)).max(1)
+/// Threads of one worker, of all that are shared out among so many workers; at least one.
+fn share(threads: usize, workers: usize, worker: usize) -> usize {
+    (threads / workers + usize::from(worker < threads % workers)).max(1)
 }
 
 /// Makes what is missing of a shard. Stopped, it returns [`Kind::Interrupted`] with the number of images that are there, and the same
@@ -108,8 +108,8 @@ pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()>
     let tasks: Vec<(u64, Task)> = tasks.into_iter().filter(|(_, t)| *t != Task::Done).collect();
     (callbacks.begin)(tasks.len());
     let at_once = if work.at_once == 0 { threads.min(MOST_AT_ONCE) } else { work.at_once }.min(tasks.len()).max(1);
-    let lanes: Vec<Threads> =
-        (0..at_once).map(|lane| Threads::new(share(threads, at_once, lane))).collect::<Result<_>>()?;
+    let workers: Vec<Threads> =
+        (0..at_once).map(|worker| Threads::new(share(threads, at_once, worker))).collect::<Result<_>>()?;
     let run = Run {
         set,
         source: renderer
@@ -133,11 +133,11 @@ pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()>
     };
     let stopped = || callbacks.soon.load(Ordering::Relaxed) || callbacks.now.load(Ordering::Relaxed);
     std::thread::scope(|scope| {
-        for lane in &lanes {
+        for worker in &workers {
             scope.spawn(|| {
                 while !stopped() && !failed.load(Ordering::Relaxed) {
                     let Some((index, task)) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
-                    match lane.install(|| run.image(*index, *task, lane)) {
+                    match worker.install(|| run.image(*index, *task, worker)) {
                         Ok(()) => {
                             made.fetch_add(1, Ordering::Relaxed);
                             (callbacks.done)(*index);
@@ -312,8 +312,8 @@ mod tests {
 
     #[test]
     fn threads_are_shared_out_whole() {
-        for (threads, lanes) in [(1, 1), (2, 2), (7, 3), (64, 16), (5, 4)] {
-            let shares: Vec<usize> = (0..lanes).map(|lane| share(threads, lanes, lane)).collect();
+        for (threads, workers) in [(1, 1), (2, 2), (7, 3), (64, 16), (5, 4)] {
+            let shares: Vec<usize> = (0..workers).map(|worker| share(threads, workers, worker)).collect();
             assert_eq!(shares.iter().sum::<usize>(), threads);
             assert!(shares.iter().max().unwrap() - shares.iter().min().unwrap() <= 1);
         }

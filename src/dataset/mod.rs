@@ -8,8 +8,8 @@
 //! scene/                the scene file and everything that it reads, so that the folder stands alone
 //! images/000123/        one image: photographs, label maps, record.json
 //! coco/ phenobench/ …   the same for other people's tools
-//! seals/000123.json     SHA-256 of each of its files; written last
-//! ledger/               how long each image took, one file a run: the only place with clock times
+//! seals/000123.json     checksums: SHA-256 of each of its files; written last
+//! ledger/               timing log: how long each image took, one file a run: the only place with clock times
 //! jobs/                 what `emit` wrote for a scheduler, and its logs; belongs to no image
 //! manifest.json         everything above in one list, written when all images are there
 //! report.html           what is in it, for people
@@ -20,10 +20,10 @@
 //! | `recipe`, `split` | what makes a dataset; which image is for what |
 //! | `render` | an image from its field, by [`crate::job`] |
 //! | `sample`, `record`, `annotate`, `rle` | one image and all that is known of it |
-//! | `native`, `format` | as files, ours and other people's |
-//! | `checksum`, `checksum_record`, `set` | what tells a file; which files make an image; the dataset on disk |
+//! | `native`, `format` | as files: ours (`images/`), and those of other tools |
+//! | `checksum`, `checksum_record`, `set` | SHA-256 of a file; those of an image's files; the dataset on disk |
 //! | `make` | all of it in one call |
-//! | `plan`, `gather`, `generate`, `timing_log`, `finish` | from a scene file to files; what remains to be done is found by looking at the disk |
+//! | `plan`, `gather`, `generate`, `timing_log`, `finish` | from a scene file, copied with all that it names, to images and a manifest; what remains to be done is found by looking at the disk |
 //! | `cluster` | the same on many machines: job files for schedulers |
 //! | `invariants`, `verify` | what must hold of every image, and whether it does |
 //! | `import` | other people's images and labels |

@@ -12,7 +12,7 @@ use crate::settings::RenderOptions;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
-/// A dataset that is asked for.
+/// What a dataset is to be: scene file, number of images, size, formats, render options.
 #[derive(Clone, Debug)]
 pub struct Order {
     /// The scene file.

@@ -124,7 +124,7 @@ pub struct Grown {
     pub radius_m: f32,
     /// Number of its leaves, seed leaves included, seen or not.
     pub leaves: u16,
-    /// How far it was from flawless, where its scene file said so.
+    /// Its condition (holes, dead tissue, dust, wilting), where its scene file gave one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub condition: Option<Condition>,
 }

@@ -32,14 +32,14 @@ pub struct Sample {
     pub film: Option<Rendered>,
 }
 
-/// What formats for film people want beyond a photograph.
+/// What formats for compositing (layers, Cryptomattes) hold beyond a photograph.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rendered {
     /// Linear radiance, its variance, what each sample met.
     pub film: Film,
     /// Which part lies at each pixel's centre, and who that is.
     pub labels: LabelMap,
-    /// Who each part is: one tag a part.
+    /// Class, plant and leaf of each part.
     pub tags: Vec<crate::scene::tag::Tag>,
 }
 
