@@ -50,9 +50,10 @@ pub(super) fn is_old(keyword: Keyword, name: &str) -> bool {
     RENAMED.iter().any(|r| r.keyword == keyword && r.old == name)
 }
 
-/// A warning for each old name of a table in a file's text, in their order; `file` is what the file is called.
+/// A warning for each old name of a table in a file's text, where it first stands, in their order; `file` is what the file is called.
 pub(super) fn warnings(file: &str, text: &str, table: &[Renamed]) -> Vec<String> {
     let mut field = "";
+    let mut seen: Vec<&str> = Vec::new();
     let told = |word: Word| {
         let name = &text[word.at.clone()];
         if word.colon && !word.quoted {
@@ -64,6 +65,10 @@ pub(super) fn warnings(file: &str, text: &str, table: &[Renamed]) -> Vec<String>
             Keyword::Text(fields) => word.quoted && fields.contains(&field),
         };
         let Renamed { old, new, .. } = table.iter().find(|r| r.old == name && stands(r.keyword))?;
+        if seen.contains(old) {
+            return None;
+        }
+        seen.push(*old);
         let line = text[..word.at.start].matches('\n').count() + 1;
         let column = text[offset_of(text, line, 1)..word.at.start].chars().count() + 1;
         Some(format!(
