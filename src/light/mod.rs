@@ -148,7 +148,7 @@ impl Light {
 /// ```
 /// use furrow::light::LightDesc;
 /// use furrow::sampling::{Purpose, Stream};
-/// let mut stream = Stream::of(1, 0, Purpose::Scene file, 0);
+/// let mut stream = Stream::of(1, 0, Purpose::Page, 0);
 /// for (text, count) in [
 ///     (r#"Daylight(sun: At(latitude_deg: 50.6, longitude_deg: 7, utc: "2016-05-27T11:30:00Z"), turbidity: 3)"#, 2),
 ///     ("Daylight(sun: Angles(elevation_deg: Uniform(20, 65), azimuth_deg: Uniform(0, 360)), cloud: 0.4)", 2),

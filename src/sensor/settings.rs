@@ -16,7 +16,7 @@ layered! {
     /// ```
     /// use furrow::sampling::{Purpose, Stream};
     /// use furrow::sensor::SensorDesc;
-    /// for scene file in [
+    /// for text in [
     ///     "(
     ///         exposure: Auto(level: Uniform(0.15, 0.21)),
     ///         nir_exposure: White(level: 0.8),

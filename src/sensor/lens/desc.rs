@@ -104,8 +104,8 @@ cameras! {
     /// ```
     /// use furrow::sampling::{Purpose, Stream};
     /// use furrow::sensor::CameraDesc;
-    /// let mut stream = Stream::of(1, 0, Purpose::Scene file, 0);
-    /// for scene file in [
+    /// let mut stream = Stream::of(1, 0, Purpose::Page, 0);
+    /// for text in [
     ///     "JaiAd130()",
     ///     "JaiAd130(focal_mm: 15, height_m: Normal(mean: 0.85, sd: 0.03), roll_deg: Uniform(-2, 2), f_number: 4)",
     ///     "Pinhole(
