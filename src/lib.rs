@@ -24,7 +24,8 @@
 //!
 //! A scene file is a distribution over fields; file, seed and index are one field, and always the same bits, whatever the number of threads.
 //! Plants are grown as meshes, bent leaf by leaf by linear blend skinning, and stand on displaced ground. The path tracer fills a film of
-//! four bands (red, green, blue, near infrared) with mean and variance; a sensor turns it into a photograph. Labels come from one unfiltered ray through each pixel's centre, so they are exact.
+//! four bands (red, green, blue, near infrared) with mean and variance; a sensor turns it into a photograph.
+//! Labels come from one unfiltered ray through each pixel's centre, so they are exact.
 //!
 //! # Where to look
 //!

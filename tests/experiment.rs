@@ -537,6 +537,7 @@ fn old_names_are_read_with_a_warning() {
         ("hyperparameters:", "learn:"),
         ("validation:", "watch:"),
         ("crop_size:", "window:"),
+        ("Scene(file:", "Scene(page:"),
         ("rare_crops:", "rare:"),
         ("class_weights: \"annealed\"", "balance: \"fading\""),
     ];

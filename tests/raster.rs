@@ -17,12 +17,13 @@ use furrow::geometry::{Intersect, Ray, Window};
 use furrow::light::{Constant, Light, Sun};
 use furrow::material::Material;
 use furrow::math::{Spectrum, Vec2, Vec3, vec2, vec3};
-use furrow::raster::{Drawn, Effect, Rasterizer, Settings};
+use furrow::raster::{Drawn, Rasterizer};
 use furrow::render::{LabelMap, label};
 use furrow::scene::assemble::{self, Options};
 use furrow::scene::tag::{Class, Tag};
 use furrow::scene::{Part, Scene};
 use furrow::sensor::{Camera, Distortion, Pose};
+use furrow::settings::{Engine, Technique, Techniques};
 use std::f32::consts::PI;
 use std::fs::File;
 use std::io::BufReader;
@@ -35,8 +36,8 @@ fn card() -> &'static Rasterizer {
     CARD.get_or_init(|| Rasterizer::new().expect("a Vulkan driver: apt-get install mesa-vulkan-drivers libvulkan1"))
 }
 
-fn draw(scene: &Scene, without: &[Effect]) -> Drawn {
-    card().draw(scene, &Settings { without: without.to_vec() }).expect("a picture")
+fn draw(scene: &Scene, without: &[Technique]) -> Drawn {
+    card().draw(scene, &Techniques::without(without)).expect("a picture")
 }
 
 fn rays(scene: &Scene) -> LabelMap {
@@ -140,7 +141,7 @@ fn light_from_behind_comes_through_a_leaf() {
     let below = plane(bsdf, vec![Light::Sun(Sun::uniform(-Vec3::Z, irradiance))], Distortion::default());
     // Wrapped by a half, light from straight behind counts (1 + ½) / (1 + ½)².
     expect(&below, passed * (1.5 / 2.25 / PI), "from below");
-    let dark = draw(&below, &[Effect::Foliage]).film;
+    let dark = draw(&below, &[Technique::Foliage]).film;
     assert!(dark.pixels.iter().all(|p| p.mean.max() == 0.0), "without the effect nothing comes through");
 }
 
@@ -172,7 +173,8 @@ fn each_effect_changes_the_picture_and_no_label() {
     let whole = draw(&field.scene, &[]);
     let again = draw(&field.scene, &[]);
     assert!(whole.film == again.film && whole.labels == again.labels, "equal input makes equal bits");
-    for (name, effect) in Effect::ALL {
+    for (effect, _) in Technique::ALL.into_iter().filter(|(t, _)| t.engine() == Engine::Raster) {
+        let name = effect.name();
         let less = draw(&field.scene, &[effect]);
         assert!(less.labels == whole.labels, "{name}");
         let changed = less.film.pixels.iter().zip(&whole.film.pixels).filter(|(a, b)| a.mean != b.mean).count();

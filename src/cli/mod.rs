@@ -107,7 +107,7 @@ pub fn check_ron(file: &Path, what: &str) -> Result<()> {
     let help = match (nearest(&files, &name), files.is_empty()) {
         (Some(near), _) => format!("did you mean {}?", folder.join(near).display()),
         (None, false) => format!("{what}s in {} are {}", folder.display(), files.join(", ")),
-        (None, true) => "the main scene is scenes/field.ron in the project's folder".to_owned(),
+        (None, true) => format!("there is none in {}; those that ship lie in scenes/", folder.display()),
     };
     Err(Error::input(format!("there is no such {what}")).in_file(file).help(help))
 }

@@ -105,21 +105,21 @@ fn manifest(set: &Set, files: &BTreeMap<String, Checksum>, out: &mut Stream<'_>)
     }
     out.put(",\n\"files\": {")?;
     let mut first = true;
-    let mut add = |out: &mut Stream<'_>, path: &str, print: &Checksum| -> Result<()> {
-        content.update(format!("{} {path}\n", print.sha256));
+    let mut add = |out: &mut Stream<'_>, path: &str, sum: &Checksum| -> Result<()> {
+        content.update(format!("{} {path}\n", sum.sha256));
         out.put(if std::mem::take(&mut first) { "\n" } else { ",\n" })?;
         out.json(&path)?;
         out.put(": ")?;
-        out.json(print)
+        out.json(sum)
     };
-    for (path, print) in files {
-        add(out, path, print)?;
+    for (path, sum) in files {
+        add(out, path, sum)?;
     }
     let mut seals = Vec::new();
     for index in 0..recipe.count {
         let Some(checksums) = ChecksumRecord::read(folder, index) else { continue };
-        for (path, print) in &checksums.files {
-            add(out, path, print)?;
+        for (path, sum) in &checksums.files {
+            add(out, path, sum)?;
         }
         seals.push((index, checksums.hash()?));
     }

@@ -52,7 +52,7 @@ pub enum Made {
 pub struct Rendering {
     /// The scene file, below the dataset's folder.
     pub scene: String,
-    /// SHA-256 of the scene file and every scene file, texture and table that it names.
+    /// SHA-256 of the scene file and every species file, texture and table that it names.
     pub scene_sha256: String,
     /// Seed; image k is field k of the scene file with this seed.
     pub seed: u64,

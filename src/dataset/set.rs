@@ -66,14 +66,14 @@ impl<'a> Whole<'a> {
     /// Writes a file piece by piece, so that it may be larger than memory; it appears whole or not at all.
     pub fn file(&mut self, path: &str, write: impl FnOnce(&mut Stream<'_>) -> Result<()>) -> Result<()> {
         let full = below(self.folder, path)?;
-        let mut print = None;
+        let mut sum = None;
         stream_atomically(&full, |file| {
             let mut stream = Stream { path: &full, file, hash: Sha256::new(), bytes: 0 };
             write(&mut stream)?;
-            print = Some(Checksum { sha256: hex::encode(stream.hash.finalize()), bytes: stream.bytes });
+            sum = Some(Checksum { sha256: hex::encode(stream.hash.finalize()), bytes: stream.bytes });
             Ok(())
         })?;
-        self.files.extend(print.map(|print| (path.to_owned(), print)));
+        self.files.extend(sum.map(|sum| (path.to_owned(), sum)));
         Ok(())
     }
 }

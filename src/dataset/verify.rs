@@ -180,13 +180,13 @@ fn listed(set: &Set) -> Result<Vec<String>> {
         sealed.extend(ChecksumRecord::read(&set.folder, index).map(|s| s.files).unwrap_or_default());
     }
     let mut faults = Vec::new();
-    for (path, print) in &listed.files {
+    for (path, sum) in &listed.files {
         match sealed.remove(path) {
             // Looked at with its image.
-            Some(checksums) if checksums == *print => {}
+            Some(checksums) if checksums == *sum => {}
             Some(_) => faults.push(format!("{path} is another file than {MANIFEST} lists")),
             None => match below(&set.folder, path) {
-                Ok(full) => faults.extend(print.fault(&full).map(|fault| format!("{path} {fault}"))),
+                Ok(full) => faults.extend(sum.fault(&full).map(|fault| format!("{path} {fault}"))),
                 Err(_) => faults.push(format!("{path} does not lie in the dataset's folder")),
             },
         }

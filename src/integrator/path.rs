@@ -3,7 +3,7 @@
 //! The surface that the eye sees asks every light; the surfaces behind it ask one, chosen by what it can give there. The same
 //! emission is also found by scattered rays, and multiple importance sampling (Veach & Guibas 1995, the balance heuristic)
 //! weighs the two. How many rays go on from the first surface, and which paths end, follows from what they can still bring
-//! beside what was found ([`RouletteSplitting`]). Unbiased: every choice is paid back by its chance.
+//! beside what was found ([`RouletteSplitting`]). Unbiased: every contribution is divided by its sampling probability.
 
 use super::roulette::RouletteSplitting;
 use super::vertex::Vertex;
@@ -169,7 +169,7 @@ impl PathTracer {
                 if u[2] >= chance {
                     continue;
                 }
-                // The weight of the other technique knows nothing of this chance, so it is paid back outside.
+                // The weight of the other technique knows nothing of this probability, so the division by it stands outside.
                 if let Some((light, ray)) = self.ask(vertex, light, 1.0, [u[0], u[1]]) {
                     brings[i] = light * (1.0 / chance);
                     rays[i] = Some(ray);

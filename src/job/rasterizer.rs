@@ -15,7 +15,7 @@ pub(super) fn left_out(scene: &Scene) -> Option<&'static str> {
 #[cfg(feature = "raster")]
 pub(super) struct Card {
     rasterizer: crate::raster::Rasterizer,
-    settings: crate::raster::Settings,
+    techniques: Techniques,
 }
 
 /// There is none.
@@ -26,9 +26,7 @@ pub(super) enum Card {}
 impl Card {
     /// The fastest there is.
     pub(super) fn open(techniques: &Techniques) -> Result<Self> {
-        let effects = techniques.left_out().iter().filter_map(|t| crate::raster::Effect::named(t.name()));
-        let settings = crate::raster::Settings { without: effects.collect() };
-        Ok(Self { rasterizer: crate::raster::Rasterizer::new()?, settings })
+        Ok(Self { rasterizer: crate::raster::Rasterizer::new()?, techniques: techniques.clone() })
     }
 
     /// Its name and driver.
@@ -38,7 +36,7 @@ impl Card {
 
     /// The whole image and its labels.
     pub(super) fn draw(&self, scene: &Scene) -> Result<(Film, LabelMap)> {
-        self.rasterizer.draw(scene, &self.settings).map(|drawn| (drawn.film, drawn.labels))
+        self.rasterizer.draw(scene, &self.techniques).map(|drawn| (drawn.film, drawn.labels))
     }
 }
 

@@ -1,6 +1,6 @@
-//! What models from disk condition: a base colour and picture under a smooth or rough coat, opaque or a sheet that lets light through.
+//! How models from disk look: a base colour and picture under a smooth or rough coat, opaque or a sheet that lets light through.
 //!
-//! A file knows three bands. Near infrared is the species file's, or what the program wrote into the file, or an estimate: a sheet that
+//! A file knows three bands. Near infrared is the scene file's, or what the program wrote into the file, or an estimate: a sheet that
 //! lets light through is taken for a leaf, which returns and passes 0.45 each (the plateau of PROSPECT-D's green leaves);
 //! what is opaque returns as much as in red, as dry soil, stone and paint roughly do. Where the near infrared
 //! of something opaque is known, it is that of the picture's mean and follows the picture's red.
@@ -25,7 +25,7 @@ const SIGMA: f32 = 0.3;
 /// Reflectance and transmittance of a leaf in near infrared.
 const LEAF_NIR: f32 = 0.45;
 
-/// What a species file says about a model's surfaces in place of the file.
+/// What a scene file says about a model's surfaces in place of the file.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Repaint {
     /// GGX roughness α, 0–1.
@@ -66,7 +66,7 @@ struct Sheet {
 }
 
 impl Painted {
-    /// From a file's surface, as the species file changes it.
+    /// From a file's surface, as the scene file changes it.
     pub fn new(surface: &Surface, page: &Repaint) -> Self {
         let own = |t: &Transmission| Sheet {
             transmittance: Spectrum(Vec3::from(t.color).extend(surface.nir_transmission.unwrap_or(LEAF_NIR))),
@@ -136,7 +136,7 @@ impl Painted {
         };
         let size = (picture.width(), picture.height());
         let texel = move |x, y| self.tone(|picture| rgb(picture.sample(centre(size, x, y), 0.0)));
-        // What a species file repaints does not share the file's picture.
+        // What a scene file repaints does not share the file's picture.
         let swatch = Swatch::pictured([std::ptr::from_ref(self) as usize, 1], size, texel, mean, roughness);
         match &self.relief {
             Some(NormalTexture { normals, strength }) => {

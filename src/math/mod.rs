@@ -1,4 +1,4 @@
-//! Vectors, frames and the four-band spectrum. Everything else stands on this room.
+//! Vectors, frames and the four-band spectrum. All other modules use this one.
 
 mod frame;
 mod spectrum;

@@ -1,4 +1,4 @@
-//! What a leaf is made of, as a scene file says it.
+//! What a leaf is made of, as a species file says it.
 
 use super::bands;
 use super::prospect::{self, Inputs};

@@ -59,7 +59,7 @@ pub struct Export {
 /// Where an image came from: what its files say about themselves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Provenance {
-    /// SHA-256 of the scene file and every scene file, texture and table that it names, in hex.
+    /// SHA-256 of the scene file and every species file, texture and table that it names, in hex.
     pub scene_hash: String,
     /// Seed.
     pub seed: u64,

@@ -1,4 +1,4 @@
-//! Photographs of other people, in whatever shape they come; and ours made small, for scene files that people look at.
+//! Photographs that people bring, in whatever form they come; and ours made small, for HTML pages.
 
 use crate::{Error, Result};
 use image::codecs::jpeg::JpegEncoder;

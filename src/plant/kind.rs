@@ -1,4 +1,4 @@
-//! Kinds of leaves: what all leaves of a kind share on the species file, whatever their size.
+//! Kinds of leaves: what all leaves of a kind share in the species file, whatever their size.
 
 use super::organ::OrganKind;
 use crate::geometry::outline::Outline;

@@ -1,11 +1,11 @@
 //! One scene, one picture: shadow maps, ids, ambient occlusion, light, and back.
 
+use super::Drawn;
 use super::gpu::{Gpu, view};
 use super::lights::{Lights, SHADOW_SIZE};
 use super::pipelines::{AMBIENT_OCCLUSION, DEPTH, NORMALS, PARTS, POSITIONS, Pipelines, RADIANCE, SAMPLES};
 use super::sheets::Sheets;
 use super::vertices::Vertices;
-use super::{Drawn, Effect, Settings};
 use crate::film::{Accumulator, Film};
 use crate::geometry::Window;
 use crate::light::Light;
@@ -13,6 +13,7 @@ use crate::math::{Spectrum, Vec3, Vec4};
 use crate::render::{LabelMap, label};
 use crate::scene::Scene;
 use crate::scene::tag::Tag;
+use crate::settings::{Technique, Techniques};
 use crate::{Error, Result};
 use wgpu::{
     AddressMode, BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindingResource, Buffer,
@@ -41,7 +42,7 @@ struct Stage<'a> {
 }
 
 /// Draws a scene.
-pub(super) fn draw(gpu: &Gpu, pipelines: &Pipelines, scene: &Scene, settings: &Settings) -> Result<Drawn> {
+pub(super) fn draw(gpu: &Gpu, pipelines: &Pipelines, scene: &Scene, techniques: &Techniques) -> Result<Drawn> {
     let limits = gpu.device.limits();
     let size = (scene.camera.width(), scene.camera.height());
     if size.0.max(size.1) > limits.max_texture_dimension_2d {
@@ -50,7 +51,7 @@ pub(super) fn draw(gpu: &Gpu, pipelines: &Pipelines, scene: &Scene, settings: &S
     }
     let sheets = Sheets::new(scene, gpu, limits.max_texture_dimension_2d);
     let vertices = Vertices::new(scene, &sheets.worn, sheets.all.len());
-    let lights = Lights::new(scene, &vertices.corners, settings);
+    let lights = Lights::new(scene, &vertices.corners, techniques);
     let corners = bytemuck::cast_slice(&vertices.corners);
     let most = limits.max_buffer_size.min(u64::from(u32::MAX));
     if corners.len() as u64 > most {
@@ -62,7 +63,7 @@ pub(super) fn draw(gpu: &Gpu, pipelines: &Pipelines, scene: &Scene, settings: &S
         gpu,
         &pipelines.frame,
         &[
-            gpu.buffer(BufferUsages::UNIFORM, bytemuck::cast_slice(&seen(scene, &lights, settings, scale)))
+            gpu.buffer(BufferUsages::UNIFORM, bytemuck::cast_slice(&seen(scene, &lights, techniques, scale)))
                 .as_entire_binding(),
             storage(bytemuck::cast_slice(&sheets.wears)).as_entire_binding(),
             storage(bytemuck::cast_slice(&lights.each)).as_entire_binding(),
@@ -85,7 +86,7 @@ pub(super) fn draw(gpu: &Gpu, pipelines: &Pipelines, scene: &Scene, settings: &S
         vertices: &vertices,
     };
     let mut encoder = gpu.device.create_command_encoder(&CommandEncoderDescriptor::default());
-    let shadows = stage.shadows(&mut encoder, &lights, settings.has(Effect::Shadows));
+    let shadows = stage.shadows(&mut encoder, &lights, techniques.has(Technique::Shadows));
     let [parts, positions, normals] = stage.labels(&mut encoder, size);
     let ambient_occlusion = stage.ambient_occlusion(&mut encoder, size, &positions, &normals);
     // Which pixels see the sky is known when the labels are.
@@ -93,8 +94,12 @@ pub(super) fn draw(gpu: &Gpu, pipelines: &Pipelines, scene: &Scene, settings: &S
     let labels = read_labels(gpu, scene, &parts, &positions, &normals)?;
     let sky = sky(gpu, scene, &labels);
     let mut encoder = gpu.device.create_command_encoder(&CommandEncoderDescriptor::default());
-    let picture =
-        stage.picture(&mut encoder, size, &[&shadows, &view(&ambient_occlusion), &sky], settings.has(Effect::Msaa));
+    let picture = stage.picture(
+        &mut encoder,
+        size,
+        &[&shadows, &view(&ambient_occlusion), &sky],
+        techniques.has(Technique::Msaa),
+    );
     gpu.queue.submit([encoder.finish()]);
     let radiance = gpu.read(&picture)?;
     gpu.check()?;
@@ -113,15 +118,15 @@ fn scale(scene: &Scene) -> f32 {
 }
 
 /// The view as the shaders read it.
-fn seen(scene: &Scene, lights: &Lights, settings: &Settings, scale: f32) -> [f32; VIEW] {
+fn seen(scene: &Scene, lights: &Lights, techniques: &Techniques, scale: f32) -> [f32; VIEW] {
     let camera = &scene.camera;
     let mut all = [0.0; VIEW];
     all[..4].copy_from_slice(&camera.pose().position.extend(scale).to_array());
     for (to, from) in all[4..40].chunks_mut(4).zip(&lights.ambient) {
         to.copy_from_slice(&from.to_array());
     }
-    let shown = [Effect::Shadows, Effect::Ssao, Effect::NormalMaps, Effect::Foliage];
-    let effects = (0..).zip(shown).map(|(bit, effect)| u32::from(settings.has(effect)) << bit).sum();
+    let shown = [Technique::Shadows, Technique::Ssao, Technique::NormalMaps, Technique::Foliage];
+    let effects = (0..).zip(shown).map(|(bit, effect)| u32::from(techniques.has(effect)) << bit).sum();
     let counts = [camera.width(), camera.height(), lights.each.len() as u32, effects];
     all[40..44].copy_from_slice(&counts.map(f32::from_bits));
     all[44..46].copy_from_slice(&[camera.intrinsics()[0] as f32, OCCLUSION_RADIUS]);

@@ -3,11 +3,11 @@
 //! Harmonics: Ramamoorthi & Hanrahan 2001, "An Efficient Representation for Irradiance Environment Maps": nine numbers a band hold the
 //! irradiance under any smooth sky within a few per cent.
 
-use super::Settings;
 use super::vertices::STRIDE;
 use crate::light::Light;
 use crate::math::{Frame, Spectrum, Vec3, Vec4, vec3};
 use crate::scene::Scene;
+use crate::settings::{Technique, Techniques};
 use std::f32::consts::PI;
 
 /// Texels across a shadow map.
@@ -31,7 +31,7 @@ pub(super) struct Lights {
 
 impl Lights {
     /// The scene's lights around what its picture shows.
-    pub(super) fn new(scene: &Scene, corners: &[[f32; STRIDE]], settings: &Settings) -> Self {
+    pub(super) fn new(scene: &Scene, corners: &[[f32; STRIDE]], techniques: &Techniques) -> Self {
         let mut each = Vec::new();
         let mut ambient = [Vec4::ZERO; 9];
         for light in &scene.lights {
@@ -41,7 +41,7 @@ impl Lights {
                     each.push(lamplight(lamp.centre(), lamp.frame(), lamp.radiance() * lamp.area()));
                 }
                 Light::Sky(_) | Light::Constant(_) | Light::EnvironmentMap(_) => {
-                    let of = if settings.has(super::Effect::Harmonics) { harmonics(light) } else { even(light) };
+                    let of = if techniques.has(Technique::Harmonics) { harmonics(light) } else { even(light) };
                     for (sum, add) in ambient.iter_mut().zip(of) {
                         *sum += add;
                     }

@@ -4,7 +4,7 @@
 //! has it: a coat of GGX over Lambert (Karis 2013), leaves cut by alpha test with mip maps, normal maps, ambient occlusion from the height maps,
 //! gloss where soil is wet; a shadow map of 2048² with percentage-closer filtering for each sun and lamp; an even
 //! surrounding in spherical harmonics for the sky; screen-space ambient occlusion; light from behind through leaves; four
-//! samples a pixel on edges (MSAA). No light bounces. [`Effect`]s can be left out one at a time.
+//! samples a pixel on edges (MSAA). No light bounces. [`Technique`](crate::settings::Technique)s can be left out one at a time.
 //!
 //! Same [`Scene`], same camera, same four bands, same film: exposure, noise and tone curve are the sensor's, as for the path tracer.
 //! Labels come from a target of ids of one sample a pixel, cut by the masks' own bits: they are those of the rays but for pixels whose
@@ -15,17 +15,18 @@
 //!
 //! What a thin lens blurs is not blurred here, and the filter of the path tracer's pixels is MSAA's box.
 
+mod drawn;
 mod frame;
 mod gpu;
 mod lights;
 mod pipelines;
-mod settings;
 mod sheets;
 mod vertices;
 
 use crate::Result;
 use crate::scene::Scene;
-pub use settings::{Drawn, Effect, Settings};
+use crate::settings::Techniques;
+pub use drawn::Drawn;
 
 use gpu::Gpu;
 use pipelines::Pipelines;
@@ -50,7 +51,7 @@ impl Rasterizer {
     }
 
     /// Draws the whole of what the camera sees. A [`Kind::Missing`](crate::error::Kind::Missing) where the picture is larger than the card can hold.
-    pub fn draw(&self, scene: &Scene, settings: &Settings) -> Result<Drawn> {
-        frame::draw(&self.gpu, &self.pipelines, scene, settings)
+    pub fn draw(&self, scene: &Scene, techniques: &Techniques) -> Result<Drawn> {
+        frame::draw(&self.gpu, &self.pipelines, scene, techniques)
     }
 }

@@ -231,8 +231,8 @@ type Wrong = (Vec<Step<'static>>, String, String);
 fn cut<B: Bound>(min: f64, max: f64, mut draw: impl FnMut() -> f64) -> f64 {
     for _ in 0..100 {
         let x = draw();
-        let within = |x: f64| x >= min && x <= max && B::holds(x);
-        if if B::WHOLE { x >= min && x <= max && within(x.round()) } else { within(x) } {
+        let value = if B::WHOLE { x.round() } else { x };
+        if [x, value].iter().all(|x| (min..=max).contains(x)) && B::holds(value) {
             return x;
         }
     }

@@ -65,7 +65,7 @@ pub(super) struct Library {
     environment_maps: BTreeMap<(PathBuf, Infrared), Arc<Table>>,
     /// Keywords of species files that were renamed, by file.
     renamed: BTreeMap<PathBuf, Vec<String>>,
-    /// How species grow otherwise than their scene files say.
+    /// How species grow otherwise than their files say.
     pub(super) growing: Growing,
 }
 

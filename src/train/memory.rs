@@ -1,7 +1,7 @@
 //! Memory that is kept for the next step.
 //!
 //! A step needs the same buffers as the one before, some of a hundred megabytes. The C library hands such ones back to the system
-//! when they are freed and gets them anew, scene file by scene file and zeroed, which takes a tenth to a fifth of a step. It can be told to keep them, but
+//! when they are freed and gets them anew, page by page and zeroed, which takes a tenth to a fifth of a step. It can be told to keep them, but
 //! only by the environment that a process begins with: so the process begins once more.
 
 use std::os::unix::process::CommandExt;

@@ -154,7 +154,7 @@ fn possible(options: &RenderOptions, full: &RenderOptions) -> Result<()> {
     Renderer::open(&RenderOptions { techniques: Techniques::default(), ..options.clone() }).map(drop)
 }
 
-/// Writes the scene file of an experiment on all datasets that lie in the folder. Networks learn from red, green and blue: where only near
+/// Writes the experiment file for all datasets that lie in the folder. Networks learn from red, green and blue: where only near
 /// infrared differs there is nothing to learn.
 fn page(out: &Path, reals: &[String]) -> Result<PathBuf> {
     let mut sets = Vec::new();

@@ -1,7 +1,7 @@
 //! Flags that have another name since version 0.1: the old ones are read, with a warning, for one more version.
 
-use furrow::train::fit::class_weights::ClassWeights;
-use furrow::train::fit::settings::RENAMED;
+use furrow::ron_file::Keyword;
+use furrow::train::table::RENAMED;
 use std::ffi::OsString;
 
 /// Warns about each old name in a command line.
@@ -23,15 +23,14 @@ fn warnings(arguments: impl Iterator<Item = String>) -> Vec<String> {
         };
         if let Some(name) = name {
             let field = name.trim_start_matches('-').replace('-', "_");
-            if let Some((_, new)) = RENAMED.iter().find(|(old, _)| *old == field) {
-                warnings.push(words(name, &format!("--{}", new.replace('_', "-"))));
+            if let Some(renamed) = RENAMED.iter().find(|r| r.keyword == Keyword::Field && r.old == field) {
+                warnings.push(words(name, &format!("--{}", renamed.new.replace('_', "-"))));
             }
             flag = field;
         }
-        if ["balance", "class_weights"].contains(&flag.as_str())
-            && let Some((old, new)) = ClassWeights::RENAMED.iter().find(|(old, _)| Some(*old) == value)
-        {
-            warnings.push(words(&format!("class weights `{old}`"), &format!("`{new}`")));
+        let stands = |keyword| matches!(keyword, Keyword::Text(fields) if fields.contains(&flag.as_str()));
+        if let Some(renamed) = RENAMED.iter().find(|r| Some(r.old) == value && stands(r.keyword)) {
+            warnings.push(words(&format!("class weights `{}`", renamed.old), &format!("`{}`", renamed.new)));
         }
     }
     warnings

@@ -20,9 +20,9 @@ impl Season {
     /// Draws the place; refuses lists that do not fit together, where they stand in the scene file.
     pub(super) fn draw(page: &RonFile, desc: &FieldDesc, stream: &mut Stream) -> Result<Self> {
         let mut of = 0;
-        for (room, k, growth) in growths(desc) {
+        for (list_of, k, growth) in growths(desc) {
             let Growth::Either(list) = growth else { continue };
-            let at = [Step::Field(room), Step::Item(k), Step::Field("growth"), Step::Item(0)];
+            let at = [Step::Field(list_of), Step::Item(k), Step::Field("growth"), Step::Item(0)];
             let fault = |at: &[Step<'_>], words: &str, help: &str| Err(page.blame(at, Error::input(words).help(help)));
             if list.is_empty() {
                 return fault(&at, "an empty list: there is nothing to draw", "Either([AgeDays(12), AgeDays(40)])");

@@ -1,6 +1,6 @@
 //! Textures drawn by the program from a recipe: `trace texture RECIPE.ron` writes the PNG beside it.
 //!
-//! A recipe is a scene file like any other. The same recipe gives the same bytes.
+//! A recipe is a RON file like a scene file. The same recipe gives the same bytes.
 
 mod canvas;
 mod cells;

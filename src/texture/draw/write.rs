@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 /// Who may use a drawn texture, and how.
 const LICENCE: &str = "CC0-1.0 OR MIT OR Apache-2.0";
 
-/// Draws the recipe in a scene file and writes, beside it, `NAME.png`, `NAME.height.png` where it has relief, and
+/// Draws the recipe in a file and writes, beside it, `NAME.png`, `NAME.height.png` where it has relief, and
 /// `NAME.source.md` unless a `SOURCE.md` in its folder or the one above names it. Returns what was written.
 pub fn write(recipe_path: &Path) -> Result<Vec<PathBuf>> {
     let recipe = read(recipe_path)?;

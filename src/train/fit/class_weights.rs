@@ -25,9 +25,6 @@ pub enum ClassWeights {
 }
 
 impl ClassWeights {
-    /// Values that had another name, in version 0.1: old, then new. Both are read.
-    pub const RENAMED: [(&str, &str); 2] = [("root", "sqrt"), ("fading", "annealed")];
-
     /// Reads `median`, `sqrt`, `annealed` or `none`.
     pub fn parse(text: &str) -> Result<Self, String> {
         match text {

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Most pixels across and down that an experiment file shows of an image.
+/// Most pixels across and down that the report shows of an image.
 const SHOWN: (u32, u32) = (240, 180);
 
 /// Columns between the two halves of a picture.

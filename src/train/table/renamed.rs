@@ -4,7 +4,7 @@ use crate::ron_file::{Keyword, Renamed};
 
 const CLASS_WEIGHTS: Keyword = Keyword::Text(&["balance", "class_weights"]);
 
-/// All renamed keywords of experiment files that are still read; those of hyper-parameters are flags of `train fit` as well.
+/// All renamed keywords of experiment files that are still read; those of hyper-parameters are flags of `train fit` as well, with `-` for `_`.
 ///
 /// ```
 /// use furrow::{ron_file::RonFile, train::table::RENAMED};
@@ -36,8 +36,6 @@ pub(super) fn old_name(field: &str) -> Option<&'static str> {
 mod tests {
     use super::*;
     use crate::ron_file::RonFile;
-    use crate::train::fit::class_weights::ClassWeights;
-    use crate::train::fit::settings;
 
     #[test]
     fn old_names_are_found_where_they_stand_and_nowhere_else() {
@@ -51,13 +49,5 @@ mod tests {
         assert!(old.iter().zip(expected).all(|(words, name)| words.contains(&format!("`{name}` is now"))), "{old:?}");
         assert!(old[3].starts_with("page.ron:3:2: ") && old[3].contains("called `class_weights`"), "{old:?}");
         assert_eq!((old_name("crop_size"), old_name("steps")), (Some("window"), None));
-    }
-
-    /// Flags warn by lists of their own, which name the same words.
-    #[test]
-    fn flags_and_files_know_the_same_old_names() {
-        for (old, new) in settings::RENAMED.iter().chain(&ClassWeights::RENAMED) {
-            assert!(RENAMED.iter().any(|r| r.old == *old && r.new == *new), "{old}");
-        }
     }
 }

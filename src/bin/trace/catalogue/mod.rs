@@ -65,7 +65,7 @@ pub(crate) struct Args {
     quiet: bool,
 }
 
-/// Draws the sheets that are missing or would differ, then the scene file; returns their paths.
+/// Draws the sheets that are missing or would differ, then the page that shows them; returns their paths.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     cli::check_folder(&args.out)?;
     let pages = args.pages()?;
@@ -103,7 +103,7 @@ impl Args {
         Ok(pages)
     }
 
-    /// One species: its sheet's path, and its entry in the scene file.
+    /// One species: its sheet's path, and its entry on the page.
     fn species(&self, page: &Path, signals: &Signals) -> Result<(PathBuf, Entry)> {
         let file = RonFile::read(page)?;
         for warning in file.renamed(RENAMED) {

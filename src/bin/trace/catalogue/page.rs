@@ -1,16 +1,16 @@
-//! The scene file that shows all sheets, in one file.
+//! The HTML page that shows all sheets, in one file.
 
 use furrow::report::{Cell, Page, Table, data_url, number, section};
 use furrow::scene::PlantRecord;
 use furrow::scene::desc::{Role, SpeciesDesc};
 use maud::html;
 
-/// Rules beyond those of every scene file.
+/// Style rules beyond those of every page.
 const STYLE: &str = ".sheet-wide { width: 100%; height: auto; border-radius: 6px; margin-bottom: .8rem; }\n";
 
 /// One species.
 pub(super) struct Entry {
-    /// Its scene file.
+    /// Its species file.
     pub(super) desc: SpeciesDesc,
     /// The plant that the sheet shows, at each stage.
     pub(super) stages: Vec<PlantRecord>,
@@ -18,7 +18,7 @@ pub(super) struct Entry {
     pub(super) picture: Vec<u8>,
 }
 
-/// The scene file.
+/// The page.
 pub(super) fn html(entries: &[Entry]) -> String {
     let body = html! {
         @for entry in entries {
