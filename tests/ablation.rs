@@ -39,7 +39,7 @@ const DRIVING: &str = "tests/ref/driving.ron";
 
 fn grow(edit: &Edit) -> Field {
     let options = Options { width: Some(72), ..Options::default() };
-    let source = edit.open(Path::new(DRIVING)).unwrap();
+    let source = edit.open(Path::new(DRIVING), furrow::input::Scope::Anywhere).unwrap();
     render::pool(2).unwrap().install(|| edit.field(&source, &options)).unwrap()
 }
 

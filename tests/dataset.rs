@@ -194,6 +194,100 @@ fn a_forged_dataset_leads_nowhere_else() {
     }
 }
 
+/// Rationale: the scene of a dataset from elsewhere is read when it is rendered again. Expected: neither the scene nor a species file nor a
+/// model nor a link in it leads out of the dataset's folder, and nothing that lies there is told; a scene that stays inside by `..` is fine.
+#[test]
+fn the_scene_of_a_dataset_reads_nothing_outside_its_folder() {
+    let (_keep, around) = scratch();
+    let data = around.join("data");
+    succeed(make(&data, 1, &[]));
+    let whole = tree(&data);
+    fs::write(around.join("secret.ron"), "a secret of this machine").unwrap();
+    fs::copy("textures/soil/dirt.png", around.join("secret.png")).unwrap();
+    let scene = "scene/tests/ref/small.ron";
+    let text = String::from_utf8(whole[scene].clone()).unwrap();
+    let species = whole.keys().find(|name| name.ends_with("sugar_beet.ron")).unwrap();
+    let named = |text: &str, ending: &str| {
+        let end = text.find(ending).unwrap() + ending.len();
+        text[text[..end].rfind('"').unwrap() + 1..end].to_owned()
+    };
+    let of_species = String::from_utf8(whole[species].clone()).unwrap();
+    let secret = around.join("secret.png");
+    let absolute = path(&secret);
+    let beet = named(&text, "sugar_beet.ron");
+    let replaced = |from: &str, to: &str| (scene, text.replace(&format!("\"{from}\""), &format!("\"{to}\"")));
+    let placed = |model: &str| (scene, text.replacen("Field(", &format!("Field(models: [{model}], "), 1));
+    let model = "o a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\nmtllib ";
+    fs::write(data.join("scene/tests/ref/a.obj"), format!("{model}../../../../secret.ron\n")).unwrap();
+    fs::write(data.join("scene/tests/ref/b.obj"), format!("{model}{absolute}\n")).unwrap();
+    let forged = [
+        replaced(&beet, "../../../../secret.ron"),
+        replaced(&beet, absolute),
+        (species.as_str(), of_species.replacen(&named(&of_species, ".png"), "../../../../secret.png", 1)),
+        placed("(file: \"../../../../a.obj\", class: Weed)"),
+        placed("(file: \"a.obj\", class: Weed)"),
+        placed("(file: \"a.obj\", class: Weed, allow_outside: true)"),
+        placed("(file: \"b.obj\", class: Weed, allow_outside: true)"),
+    ];
+    let refused = || {
+        let said = fail(verb("verify", &data, &["--rerender", "1"]), 2);
+        assert!(said.contains("does not lie in the folder"), "{said}");
+        assert!(!said.contains("a secret") && !said.contains("there is no file"), "{said}");
+    };
+    for (file, text) in forged {
+        assert!(text.as_bytes() != whole[file], "{file}");
+        fs::write(data.join(file), text).unwrap();
+        refused();
+        fs::write(data.join(file), &whole[file]).unwrap();
+    }
+    #[cfg(unix)]
+    for file in [scene, species.as_str()] {
+        fs::remove_file(data.join(file)).unwrap();
+        std::os::unix::fs::symlink(around.join("secret.ron"), data.join(file)).unwrap();
+        refused();
+        fs::remove_file(data.join(file)).unwrap();
+        fs::write(data.join(file), &whole[file]).unwrap();
+    }
+    succeed(verb("verify", &data, &["--rerender", "1"]));
+}
+
+/// Rationale: a model of one's own may name pictures elsewhere. Expected: the dataset takes them in and is rendered again where they
+/// are gone; a path that cannot be rewritten, in a file that is no RON file, is refused at once.
+#[test]
+fn a_model_that_may_name_files_outside_is_taken_into_the_dataset() {
+    let (_keep, around) = scratch();
+    let write = |name: &str, text: &str| {
+        let at = around.join(name);
+        fs::create_dir_all(at.parent().unwrap()).unwrap();
+        fs::write(at, text).unwrap();
+    };
+    let square = "v -1 0 0\nv 1 0 0\nv 1 0 -1\no a\nusemtl leaf\nf 1 2 3\n";
+    write("materials/leaf.mtl", "newmtl leaf\nKd 0.1 0.3 0.05\n");
+    write("models/plant.obj", &format!("mtllib ../materials/leaf.mtl\n{square}"));
+    let scene = |model: &str| {
+        format!(
+            "Field(seed: 1, camera: Pinhole(size: (32, 24), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 1)),
+             lights: [Constant(radiance: (1, 1, 1, 1))], models: [(file: \"{model}\", class: Weed, scale: 0.1, allow_outside: true)])"
+        )
+    };
+    write("scenes/a.ron", &scene("../models/plant.obj"));
+    let (page, data) = (around.join("scenes/a.ron"), around.join("data"));
+    let order = |data: &Path| {
+        trace(&["dataset", "--scene", path(&page), "--out", path(data), "--count", "1", "--spp", "1", "--quiet"])
+    };
+    succeed(order(&data));
+    assert!(data.join("scene/materials/leaf.mtl").is_file());
+    fs::remove_dir_all(around.join("materials")).unwrap();
+    succeed(verb("verify", &data, &["--rerender", "1"]));
+    // By an absolute path.
+    write("elsewhere/leaf.mtl", "newmtl leaf\nKd 0.1 0.3 0.05\n");
+    write("models/plant.obj", &format!("mtllib {}\n{square}", path(&around.join("elsewhere/leaf.mtl"))));
+    let other = around.join("other");
+    let said = fail(order(&other), 2);
+    assert!(said.contains("named by an absolute path in a file that is not a RON file"), "{said}");
+    assert!(!other.exists(), "{said}");
+}
+
 /// Rationale: a file that all fields need is missing for all of them. Expected: one error, and no image is tried after it.
 #[test]
 fn a_file_that_is_gone_ends_a_dataset_at_once() {

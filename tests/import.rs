@@ -325,6 +325,19 @@ fn coco_of_others_comes_in_with_polygons_runs_and_crowds() {
     let another = root.join("another");
     let words = refused(&another, &["--format", "coco", "--from", text(&file)]);
     assert!(words.contains("`maize`") && words.contains("--classes"), "{words}");
+    // What it names lies below the folder of its images.
+    let inner = root.join("inner");
+    std::fs::create_dir_all(&inner).unwrap();
+    for name in ["../x.png", text(&root.join("x.png")), "../no such.png"] {
+        let mut elsewhere = document("maize");
+        elsewhere["images"][0]["file_name"] = name.into();
+        write(elsewhere);
+        let words = refused(&another, &[&arguments[..], &["--images", text(&inner)]].concat());
+        assert!(
+            words.contains(&format!("`{name}` does not lie in the folder")) && words.contains("--images"),
+            "{words}"
+        );
+    }
     let mut boxes = document("maize");
     boxes["annotations"][0]["segmentation"] = Value::Null;
     write(boxes);

@@ -473,6 +473,63 @@ fn broken_models_get_one_clear_error_at_the_place_that_names_them() {
     }
 }
 
+/// Rationale: models come from other people, and what they name is read into images and datasets. Expected: a path out of the model's
+/// folder is refused in every spelling, before what lies there is looked at; `allow_outside` lifts that for a model of one's own.
+#[test]
+fn a_model_names_no_file_outside_its_folder_unless_that_is_allowed() {
+    let (_keep, around) = scratch();
+    let folder = around.join("models");
+    std::fs::create_dir_all(&folder).unwrap();
+    picture(&around, "leaf.png");
+    write(&around, "square.mtl", "newmtl leaf\nKd 0.1 0.3 0.05\n");
+    let secret = around.join("leaf.png");
+    let absolute = secret.to_str().unwrap();
+    let pictured = |uri: &str| {
+        let (document, bytes) = triangle(|d| {
+            d["materials"] = json!([{ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }]);
+            d["textures"] = json!([{ "source": 0 }]);
+            d["images"] = json!([{ "uri": uri }]);
+        });
+        write(&folder, "the bytes.bin", bytes);
+        write(&folder, "model.gltf", document.to_string());
+        "model.gltf"
+    };
+    let lettered = |library: &str, map: &str| {
+        write(&folder, "square.obj", SQUARE.replace("square.mtl", library));
+        write(&folder, "square.mtl", format!("newmtl leaf\nmap_Kd {map}\n"));
+        "square.obj"
+    };
+    let outside: [(&str, &dyn Fn() -> &'static str); 8] = [
+        ("../leaf.png", &|| pictured("../leaf.png")),
+        ("../leaf.png", &|| pictured("%2e%2e/leaf.png")),
+        (absolute, &|| pictured(absolute)),
+        (absolute, &|| pictured(&absolute.replace('/', "%2F"))),
+        ("../square.mtl", &|| lettered("../square.mtl", "leaf.png")),
+        ("../square.mtl", &|| lettered("..\\square.mtl", "leaf.png")),
+        ("../leaf.png", &|| lettered("square.mtl", "..\\leaf.png")),
+        (absolute, &|| lettered("square.mtl", absolute)),
+    ];
+    for (path, make) in outside {
+        let model = make();
+        let words = refused(&folder, model);
+        assert!(words.contains(&format!("`{path}` does not lie in the folder")), "{words}");
+        assert!(words.contains("allow_outside: true"), "{words}");
+        let allowed = placed(&folder, &format!("(file: \"{model}\", class: Weed, allow_outside: true)"));
+        assert!(allowed.is_ok_and(|field| {
+            field.files.iter().any(|file| file.ends_with("leaf.png") || file.ends_with("square.mtl"))
+        }));
+    }
+    // Not even whether it is there is told.
+    let words = refused(&folder, pictured("../no such.png"));
+    assert!(words.contains("does not lie in the folder") && !words.contains("is not there"), "{words}");
+    // Below its folder, also by a detour.
+    std::fs::create_dir_all(folder.join("textures")).unwrap();
+    picture(&folder.join("textures"), "leaf.png");
+    for uri in ["textures/leaf.png", "./textures/../textures/leaf.png"] {
+        assert!(placed(&folder, &format!("(file: \"{}\", class: Weed)", pictured(uri))).is_ok(), "{uri}");
+    }
+}
+
 /// What reads a file of these bytes: a model, or an error that says something.
 fn read_as(name: &str, bytes: &[u8]) -> Result<(), TestCaseError> {
     let folder = tempfile::tempdir().unwrap();

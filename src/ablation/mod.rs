@@ -19,6 +19,7 @@ mod picture;
 
 use crate::Result;
 use crate::film::{Film, Footprint};
+use crate::input::Scope;
 use crate::light::Light;
 use crate::material::Feature;
 use crate::render::LabelMap;
@@ -73,10 +74,10 @@ impl Edit {
         (!matches!(self.change, Change::Nothing)).then(|| self.name.to_owned())
     }
 
-    /// Opens a scene file for [`Edit::field`].
-    pub fn open(&self, page: &Path) -> Result<Source> {
+    /// Opens a scene file for [`Edit::field`]; neither it nor what it names may lie outside the scope.
+    pub fn open(&self, page: &Path, scope: Scope) -> Result<Source> {
         let growing = if let Change::Growth(growing) = self.change { growing } else { Growing::default() };
-        Ok(Source::open(page)?.growing(growing))
+        Ok(Source::open_within(page, scope)?.growing(growing))
     }
 
     /// Builds a field of a scene file that this edit has opened. Call it inside a pool.

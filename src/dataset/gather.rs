@@ -4,6 +4,7 @@
 //! leads to goes to `scene/external/`, and where a path no longer leads to its file, the copied RON file gets a relative one.
 
 use super::File;
+use crate::input::tidy;
 use crate::ron_file::RonFile;
 use crate::{Error, Result};
 use std::collections::BTreeMap;
@@ -90,19 +91,6 @@ fn relative(folder: &Path, file: &Path) -> PathBuf {
 /// An absolute path without `.` and `..`.
 fn absolute(path: &Path) -> Result<PathBuf> {
     std::path::absolute(path).map(|full| tidy(&full)).map_err(Error::reading(path))
-}
-
-/// A path without `.` and without `..` behind other folders.
-fn tidy(path: &Path) -> PathBuf {
-    let mut plain = PathBuf::new();
-    for part in path.components() {
-        match (part, plain.components().next_back()) {
-            (Component::ParentDir, Some(Component::Normal(_))) => drop(plain.pop()),
-            (Component::CurDir, _) | (Component::ParentDir, Some(Component::RootDir)) => {}
-            (part, _) => plain.push(part),
-        }
-    }
-    plain
 }
 
 /// A relative path with `/` between its names.

@@ -6,7 +6,7 @@ use super::set::Set;
 use super::split::Shares;
 use super::{File, checksum_record, format};
 use crate::ablation::{Edit, FULL};
-use crate::job::{Field, Renderer, SceneFile};
+use crate::job::{Renderer, SceneFile};
 use crate::output::is_unfinished;
 use crate::settings::RenderOptions;
 use crate::{Error, Result};
@@ -72,7 +72,8 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
     }
     // Before anything grows: what could not be rendered here.
     let kernels = Renderer::open(&options)?.kernels().to_owned();
-    let first = first_field(&order.scene, order)?;
+    let source = opened(&order.scene, order)?;
+    let first = source.field(0)?;
     let field = first.grown();
     if field.species.len() > MOST_SPECIES {
         return Err(Error::input(format!(
@@ -83,7 +84,8 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
         .help("make two scene files of it"));
     }
     let Gathered { files, scene, rewritten } = gather(&field.files, &order.scene)?;
-    let scene_sha256 = if rewritten { hash_of_copies(order, &files, &scene)? } else { field.hash.clone() };
+    let elsewhere = rewritten || source.allows_outside();
+    let scene_sha256 = if elsewhere { hash_of_copies(order, &files, &scene)? } else { field.hash.clone() };
     let camera = &field.scene.camera;
     let mut recipe = Recipe {
         furrow: env!("CARGO_PKG_VERSION").into(),
@@ -127,17 +129,18 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
     Ok((Set { folder: folder.into(), recipe }, told))
 }
 
-/// The first field of a scene file, as an order asks for it.
-fn first_field(scene: &Path, order: &Order) -> Result<Field> {
-    SceneFile::edited(scene, order.edit)?.seed(order.seed).width(order.width).height(order.height).field(0)
+/// A scene file as an order asks for it.
+fn opened(scene: &Path, order: &Order) -> Result<SceneFile> {
+    let scene = SceneFile::edited(scene, order.edit)?;
+    Ok(scene.seed(order.seed).width(order.width).height(order.height))
 }
 
-/// SHA-256 of a scene whose copies name their files otherwise than the originals do, found by growing the first field from them in
+/// SHA-256 of a scene whose copies may name other files than the originals do, found by growing the first field from them in
 /// a folder of their own; an error where it still reads something outside.
 fn hash_of_copies(order: &Order, files: &[File], scene: &str) -> Result<String> {
     let folder = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir()))?;
     checksum_record::write_files(folder.path(), files)?;
-    let first = first_field(&folder.path().join(scene), order)?;
+    let first = opened(&folder.path().join(scene), order)?.field(0)?;
     let field = first.grown();
     match field.files.iter().find(|file| !file.starts_with(folder.path())) {
         None => Ok(field.hash.clone()),

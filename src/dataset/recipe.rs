@@ -5,7 +5,7 @@
 
 use super::split::Shares;
 use crate::ablation::{self, Edit};
-use crate::input::below;
+use crate::input::{Scope, below};
 use crate::scene::record::SpeciesRecord;
 use crate::settings::{Engine, Quality, RenderOptions, Technique, Techniques};
 use crate::{Error, Result};
@@ -82,7 +82,7 @@ pub struct Rendering {
 impl Rendering {
     /// The scene file below the dataset's folder; an error where the recipe names one elsewhere.
     pub fn scene_in(&self, folder: &Path) -> Result<PathBuf> {
-        below(folder, &self.scene)
+        Ok(scope(folder).check(below(folder, &self.scene)?)?)
     }
 
     /// The edit; [`ablation::FULL`] where nothing was changed.
@@ -99,6 +99,12 @@ impl Rendering {
             techniques,
         }
     }
+}
+
+/// Where everything lies that the scene of a dataset names, whoever made it: in the dataset's folder.
+pub(super) fn scope(folder: &Path) -> Scope {
+    let help = "a dataset holds all that its scene names: restore it, or begin another from a scene file of your own";
+    Scope::Below { folder: folder.into(), help }
 }
 
 /// The recipe's file, below the dataset's folder.

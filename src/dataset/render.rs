@@ -1,7 +1,7 @@
 //! Renders field k: a [`Sample`].
 
 use super::annotate::{self, keypoint, of_255};
-use super::recipe::Recipe;
+use super::recipe::{self, Recipe};
 use super::record::{Exposure, Grown, Leaf, Plant, Record, Seen};
 use super::sample::{Rendered, Sample};
 use super::set::Set;
@@ -38,7 +38,8 @@ pub struct RenderedSample {
 /// The scene file that a dataset is rendered from.
 pub fn scene_file(set: &Set) -> Result<SceneFile> {
     let rendering = set.recipe.rendering()?;
-    let scene = SceneFile::edited(rendering.scene_in(&set.folder)?, rendering.edit()?)?;
+    let (folder, edit) = (&set.folder, rendering.edit()?);
+    let scene = SceneFile::open_within(rendering.scene_in(folder)?, edit, recipe::scope(folder))?;
     Ok(scene.seed(rendering.seed).width(rendering.width).height(rendering.height))
 }
 

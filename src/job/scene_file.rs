@@ -4,6 +4,7 @@ use super::field::Field;
 use super::threads::Threads;
 use crate::Result;
 use crate::ablation::{Edit, FULL};
+use crate::input::Scope;
 use crate::scene::assemble::{Options, Source};
 use std::path::Path;
 use std::sync::Arc;
@@ -26,8 +27,19 @@ impl SceneFile {
 
     /// Opens a scene file with one thing changed, for an ablation.
     pub fn edited(path: impl AsRef<Path>, edit: &'static Edit) -> Result<Self> {
-        let source = Arc::new(edit.open(path.as_ref())?);
+        Self::open_within(path, edit, Scope::Anywhere)
+    }
+
+    /// Opens a scene file from elsewhere: neither it nor what it names may lie outside the scope.
+    #[doc(hidden)]
+    pub fn open_within(path: impl AsRef<Path>, edit: &'static Edit, scope: Scope) -> Result<Self> {
+        let source = Arc::new(edit.open(path.as_ref(), scope)?);
         Ok(Self { source, edit, options: Options::default(), threads: Threads::all()? })
+    }
+
+    /// Whether a model of it may name files outside its own folder.
+    pub(crate) fn allows_outside(&self) -> bool {
+        self.source.allows_outside()
     }
 
     /// With this seed instead of the file's; `None` keeps it.

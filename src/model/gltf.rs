@@ -7,16 +7,16 @@ use super::document::{
     CLAMP_TO_EDGE, DIFFUSE_TRANSMISSION, DiffuseTransmission, Document, FLOAT, LIGHTS, Material, Primitive, REPEAT,
     TEXTURE_TRANSFORM, TextureInfo, TextureTransform, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT,
 };
+use super::files::Files;
 use super::glb;
 use super::parts::{Label, MOST_TRIANGLES, Model, NormalTexture, Part, Surface, Transmission, Up};
-use super::settle::{Wrong, bytes, faceted, fraction, into_one_tile, settle, too_many_triangles};
+use super::settle::{Wrong, faceted, fraction, into_one_tile, settle, too_many_triangles};
 use super::uri::{Target, follow};
 use crate::geometry::{AlphaMask, Mesh};
 use crate::math::{DMat4, DQuat, DVec3, Vec2, Vec3, vec2};
 use crate::texture::{ColorSpace, NormalMap, Texture, Wrap};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Extensions that may be required: those that are read, and those that a look at the surface can do without.
@@ -33,9 +33,8 @@ const KNOWN: [&str; 9] = [
 ];
 
 /// Reads a file; in words what is wrong with it.
-pub(super) fn read(path: &Path, up: Up) -> Result<Model, Wrong> {
-    let mut files = Vec::new();
-    let file = bytes(path, &mut files)?;
+pub(super) fn read(mut files: Files<'_>, up: Up) -> Result<Model, Wrong> {
+    let file = files.own()?;
     let (json, own) = if glb::is_glb(&file) { glb::split(&file)? } else { (&file[..], None) };
     let document: Document = serde_json::from_slice(json).map_err(|e| format!("its JSON cannot be read: {e}"))?;
     if !document.asset.version.starts_with("2.") {
@@ -45,12 +44,10 @@ pub(super) fn read(path: &Path, up: Up) -> Result<Model, Wrong> {
         let what = format!("it requires the extension {name}, which cannot be read");
         return Err(Wrong { what, help: "export it without compression and extensions" });
     }
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let buffers = buffers(&document, own, folder, &mut files)?;
+    let buffers = buffers(&document, own, &mut files)?;
     let mut reader = Reader {
         document: &document,
         buffers,
-        folder,
         files,
         textures: BTreeMap::new(),
         masks: BTreeMap::new(),
@@ -61,17 +58,12 @@ pub(super) fn read(path: &Path, up: Up) -> Result<Model, Wrong> {
     // The last is for pieces without a material.
     model.surfaces.push(Surface::default());
     reader.walk(up, &looks, &mut model)?;
-    model.files = reader.files;
+    model.files = reader.files.read;
     Ok(model)
 }
 
 /// The bytes of all buffers.
-fn buffers<'a>(
-    document: &Document,
-    own: Option<&'a [u8]>,
-    folder: &Path,
-    files: &mut Vec<PathBuf>,
-) -> Result<Vec<Cow<'a, [u8]>>, Wrong> {
+fn buffers<'a>(document: &Document, own: Option<&'a [u8]>, files: &mut Files<'_>) -> Result<Vec<Cow<'a, [u8]>>, Wrong> {
     let mut all = Vec::new();
     for (i, buffer) in document.buffers.iter().enumerate() {
         let data: Cow<'a, [u8]> = match &buffer.uri {
@@ -81,7 +73,7 @@ fn buffers<'a>(
             },
             Some(uri) => match follow(uri)? {
                 Target::Bytes(data) => data.into(),
-                Target::File(name) => bytes(&folder.join(name), files)?.into(),
+                Target::File(name) => files.named(&name)?.into(),
             },
         };
         if data.len() < buffer.byte_length {
@@ -107,8 +99,7 @@ struct Look {
 struct Reader<'a> {
     document: &'a Document,
     buffers: Vec<Cow<'a, [u8]>>,
-    folder: &'a Path,
-    files: Vec<PathBuf>,
+    files: Files<'a>,
     /// By image and whether it repeats.
     textures: BTreeMap<(usize, bool), Arc<Texture>>,
     /// By image and whether it repeats.
@@ -380,7 +371,7 @@ impl Reader<'_> {
         let data: Cow<'_, [u8]> = match (&source.uri, source.buffer_view) {
             (Some(uri), _) => match follow(uri)? {
                 Target::Bytes(data) => data.into(),
-                Target::File(name) => bytes(&self.folder.join(name), &mut self.files)?.into(),
+                Target::File(name) => self.files.named(&name)?.into(),
             },
             (None, Some(view)) => {
                 let view = item(&self.document.buffer_views, view, "buffer view")?;

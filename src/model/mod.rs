@@ -9,6 +9,7 @@
 //! No optics here: near infrared and scattering are the materials' business.
 
 pub mod document;
+mod files;
 pub mod glb;
 mod gltf;
 mod obj;
@@ -18,18 +19,27 @@ mod uri;
 
 pub use parts::{Label, Model, NormalTexture, Part, Surface, Transmission, Up};
 
+use crate::input::Scope;
 use crate::{Error, Result};
+use files::Files;
 use settle::Wrong;
 use std::path::Path;
 
 impl Model {
     /// Reads a model. Formats are told by the name: `.glb`, `.gltf`, `.obj`. An [`Error`] about the file says what is wrong with it.
+    /// The files that it names must lie in its folder or below.
     pub fn load(path: &Path, up: Up) -> Result<Self> {
+        Self::load_within(path, up, None)
+    }
+
+    /// The same of a model whose files may lie in this scope instead of its folder.
+    pub fn load_within(path: &Path, up: Up, lifted: Option<&Scope>) -> Result<Self> {
         let wrong = |Wrong { what, help }: Wrong| Error::input(what).help(help).in_file(path);
         let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        let files = Files::of(path, lifted);
         let model = match extension.as_str() {
-            "glb" | "gltf" => gltf::read(path, up).map_err(wrong)?,
-            "obj" => obj::read(path, up).map_err(wrong)?,
+            "glb" | "gltf" => gltf::read(files, up).map_err(wrong)?,
+            "obj" => obj::read(files, up).map_err(wrong)?,
             _ => {
                 let help = "export it as glTF binary (.glb) from your program";
                 return Err(Error::input("models are .glb, .gltf or .obj files").help(help).in_file(path));

@@ -3,14 +3,15 @@
 //! Of materials: `Kd`, `map_Kd`, `d`, `map_d`, `Ns`. A picture's own opacity cuts the surface as `map_d` does; `map_d` counts
 //! by its opacity where it has one, else by its brightness. v runs up in OBJ and down here.
 
+use super::files::Files;
 use super::parts::{MOST_TRIANGLES, Model, Part, Surface, Up};
-use super::settle::{Wrong, bytes, faceted, fraction, into_one_tile, settle, too_many_triangles};
+use super::settle::{Wrong, faceted, fraction, into_one_tile, settle, too_many_triangles};
 use crate::geometry::{AlphaMask, Mesh};
 use crate::math::{Vec3, vec2};
 use crate::texture::{ColorSpace, Texture, Wrap};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 /// One corner has one position, normal and texture coordinate; polygons become fans.
@@ -18,18 +19,16 @@ const OPTIONS: tobj::LoadOptions =
     tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
 
 /// Reads a file; in words what is wrong with it.
-pub(super) fn read(path: &Path, up: Up) -> Result<Model, Wrong> {
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let mut files = Vec::new();
-    let text = bytes(path, &mut files)?;
-    // The loader of materials is asked in the middle of reading: it leaves its files and its fault here.
-    let asked: RefCell<(Vec<PathBuf>, Option<String>)> = RefCell::default();
+pub(super) fn read(mut files: Files<'_>, up: Up) -> Result<Model, Wrong> {
+    let text = files.own()?;
+    // The loader of materials is asked in the middle of reading: it leaves its fault here.
+    let asked: RefCell<(&mut Files<'_>, Option<Wrong>)> = RefCell::new((&mut files, None));
     let materials = |name: &Path| {
         let mut asked = asked.borrow_mut();
         let (files, fault) = &mut *asked;
-        let read = bytes(&folder.join(name), files);
-        let read = read.and_then(|t| {
-            tobj::load_mtl_buf(&mut t.as_slice()).map_err(|e| format!("its materials {}: {e}", name.display()))
+        let name = slashed(&name.to_string_lossy());
+        let read = files.named(&name).and_then(|t| {
+            tobj::load_mtl_buf(&mut t.as_slice()).map_err(|e| format!("its materials {name}: {e}").into())
         });
         read.map_err(|e| {
             *fault = Some(e);
@@ -37,15 +36,13 @@ pub(super) fn read(path: &Path, up: Up) -> Result<Model, Wrong> {
         })
     };
     let read = tobj::load_obj_buf(&mut text.as_slice(), &OPTIONS, materials);
-    let (more, fault) = asked.into_inner();
-    files.extend(more);
-    if let Some(fault) = fault {
-        return Err(fault.into());
+    if let (_, Some(fault)) = asked.into_inner() {
+        return Err(fault);
     }
     let (objects, materials) = read.map_err(|e| format!("it cannot be read: {e}"))?;
     let materials = materials.map_err(|e| format!("its materials cannot be read: {e}"))?;
 
-    let mut pictures = Pictures { folder, files, known: BTreeMap::new() };
+    let mut pictures = Pictures { files, known: BTreeMap::new() };
     let mut model = Model::default();
     for material in &materials {
         model.surfaces.push(pictures.surface(material)?);
@@ -73,7 +70,7 @@ pub(super) fn read(path: &Path, up: Up) -> Result<Model, Wrong> {
         settle(&mut mesh, &up.rotation(), &name)?;
         model.parts.push(Part { name, mesh, surface, label: None });
     }
-    model.files = pictures.files;
+    model.files = pictures.files.read;
     Ok(model)
 }
 
@@ -103,13 +100,12 @@ fn mesh(of: &tobj::Mesh, name: &str) -> Result<Mesh, String> {
 
 /// Pictures beside the file, each decoded once.
 struct Pictures<'a> {
-    folder: &'a Path,
-    files: Vec<PathBuf>,
+    files: Files<'a>,
     known: BTreeMap<String, Arc<Texture>>,
 }
 
 impl Pictures<'_> {
-    fn surface(&mut self, material: &tobj::Material) -> Result<Surface, String> {
+    fn surface(&mut self, material: &tobj::Material) -> Result<Surface, Wrong> {
         let picture = material.diffuse_texture.as_deref().map(|name| self.picture(name)).transpose()?;
         let cut = material.dissolve_texture.as_deref().map(|name| self.picture(name)).transpose()?;
         let mask = match (&cut, &picture) {
@@ -133,18 +129,22 @@ impl Pictures<'_> {
         })
     }
 
-    fn picture(&mut self, name: &str) -> Result<Arc<Texture>, String> {
+    fn picture(&mut self, name: &str) -> Result<Arc<Texture>, Wrong> {
         if let Some(known) = self.known.get(name) {
             return Ok(known.clone());
         }
-        // Some writers use the other kind of slash.
-        let data = bytes(&self.folder.join(name.replace('\\', "/")), &mut self.files)?;
+        let data = self.files.named(&slashed(name))?;
         let picture =
             Texture::decode(&data, ColorSpace::Srgb).map_err(|what| format!("its picture `{name}`: {what}"))?;
         let picture = Arc::new(picture.wrapped(Wrap::Repeat));
         self.known.insert(name.to_owned(), picture.clone());
         Ok(picture)
     }
+}
+
+/// A path with the kind of slash that is meant: some writers use the other.
+fn slashed(path: &str) -> String {
+    path.replace('\\', "/")
 }
 
 /// Where a grey picture is brighter than half; `None` where it is so all over.

@@ -1,24 +1,8 @@
-//! What both formats need: a file's bytes, and meshes that can be rendered.
+//! What both formats need: meshes that can be rendered, and words for what is wrong.
 
 use super::parts::MOST_TRIANGLES;
 use crate::geometry::Mesh;
-use crate::input::{self, Refusal};
 use crate::math::{DMat4, Vec2, Vec3};
-use std::path::{Path, PathBuf};
-
-/// A file's bytes, noted in `files`; in words why there are none.
-pub(super) fn bytes(path: &Path, files: &mut Vec<PathBuf>) -> Result<Vec<u8>, String> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let bytes = input::read(path, input::LARGEST).map_err(|refusal| match refusal {
-        Refusal::Io(e) if e.kind() == std::io::ErrorKind::NotFound => {
-            format!("it needs a file `{name}`, which is not there")
-        }
-        Refusal::Folder => format!("it needs a file `{name}`, which is a folder"),
-        other => format!("{name}: {other}"),
-    })?;
-    files.push(path.into());
-    Ok(bytes)
-}
 
 /// Held to 0..1; what is not a number is 0.
 pub(super) fn fraction(x: f32) -> f32 {

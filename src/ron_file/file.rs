@@ -149,7 +149,7 @@ impl RonFile {
             let what = if full.is_dir() { "a folder" } else { "a pipe, a socket or a device" };
             return Err(self.about(path, format!("`{path}` is {what}, not a file"), "name a file"));
         }
-        let folder = tidy(full.parent().unwrap_or(Path::new("")));
+        let folder = named(full.parent().unwrap_or(Path::new("")));
         let name = full.file_name().unwrap_or_default().to_string_lossy();
         let mut files: Vec<String> = std::fs::read_dir(&folder)
             .map(|entries| entries.filter_map(|e| e.ok()?.file_name().into_string().ok()).collect())
@@ -188,18 +188,8 @@ fn unquoted(text: &str) -> Option<String> {
 }
 
 /// A folder without `..` behind other folders, as a reader would name it.
-fn tidy(folder: &Path) -> PathBuf {
-    use std::path::Component;
-    let mut short = PathBuf::new();
-    for part in folder.components() {
-        match (part, short.components().next_back()) {
-            (Component::ParentDir, Some(Component::Normal(_))) => {
-                short.pop();
-            }
-            (Component::CurDir, _) => {}
-            _ => short.push(part),
-        }
-    }
+fn named(folder: &Path) -> PathBuf {
+    let short = input::tidy(folder);
     if short.as_os_str().is_empty() { ".".into() } else { short }
 }
 

@@ -173,6 +173,10 @@ pub struct PlacedDesc {
 pub struct ModelDesc {
     /// glTF (`.glb`, `.gltf`) or Wavefront OBJ with its materials; lengths in metres.
     pub file: String,
+    /// Whether the file may name pictures and other parts outside its own folder, by absolute paths or by `..`: for a model of your own.
+    /// In a dataset they stay within the dataset's folder in any case.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub allow_outside: bool,
     /// What its pixels are. Not needed where the file carries labels, as those that `trace export` writes do.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub class: Option<Class>,

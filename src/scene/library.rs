@@ -1,10 +1,10 @@
 //! Everything that scene files name, read once: species, pictures, soil layers.
 
-use super::desc::SpeciesDesc;
+use super::desc::{ModelDesc, SpeciesDesc};
 use super::growing::Growing;
 use crate::error::{Kind, Place};
 use crate::geometry::{AlphaMask, Margin};
-use crate::input;
+use crate::input::{self, Outside, Scope};
 use crate::light::{Infrared, Table};
 use crate::material::{LeafMaterial, Picture, Tones};
 use crate::math::{Spectrum, Vec2};
@@ -56,11 +56,14 @@ pub(super) struct Species {
 /// What was read so far. Every file's bytes go into the hash in the order of their paths.
 #[derive(Clone, Default)]
 pub(super) struct Library {
+    /// Where files may lie.
+    scope: Scope,
     files: BTreeMap<PathBuf, [u8; 32]>,
     /// By file and by the bits of `relief_range`, which scales the height map beside it.
     pictures: BTreeMap<(PathBuf, u32), Cut>,
     species: BTreeMap<PathBuf, Arc<Species>>,
-    models: BTreeMap<(PathBuf, bool), Arc<Model>>,
+    /// By file, by whether z points up in it, and by whether it may name files outside its folder.
+    models: BTreeMap<(PathBuf, bool, bool), Arc<Model>>,
     layers: BTreeMap<(PathBuf, PathBuf), Arc<Layer>>,
     environment_maps: BTreeMap<(PathBuf, Infrared), Arc<Table>>,
     /// Keywords of species files that were renamed, by file.
@@ -70,6 +73,18 @@ pub(super) struct Library {
 }
 
 impl Library {
+    /// One that reads nothing outside a scope, whatever its files name.
+    pub(super) fn within(scope: Scope) -> Self {
+        Self { scope, ..Self::default() }
+    }
+
+    /// Where a file lies that `page` names; an error about the page where it is not there or may not be read.
+    fn need(&self, page: &RonFile, path: &str) -> Result<PathBuf> {
+        let folder = page.path.parent().unwrap_or(Path::new(""));
+        self.scope.resolve(folder, path).map_err(outside(page, path))?;
+        page.need_file(path)
+    }
+
     /// The scene file itself.
     pub(super) fn page(&mut self, path: &Path) -> Result<RonFile> {
         let page = RonFile::read(path)?;
@@ -98,7 +113,7 @@ impl Library {
 
     /// The species file that `page` names.
     pub(super) fn species(&mut self, page: &RonFile, path: &str) -> Result<Arc<Species>> {
-        let full = page.need_file(path)?;
+        let full = self.need(page, path)?;
         if let Some(known) = self.species.get(&full) {
             return Ok(known.clone());
         }
@@ -149,7 +164,7 @@ impl Library {
     }
 
     fn picture(&mut self, page: &RonFile, path: &str, relief_range: f32) -> Result<Cut> {
-        let full = page.need_file(path)?;
+        let full = self.need(page, path)?;
         let key = (full.clone(), relief_range.to_bits());
         if let Some(known) = self.pictures.get(&key) {
             return Ok(known.clone());
@@ -157,7 +172,7 @@ impl Library {
         self.note(&full)?;
         let color = Texture::load(&full, ColorSpace::Srgb).map_err(|e| at_its_place(page, path, IMAGE_HELP, e))?;
         // A height map drawn or measured for the picture lies beside it; without one the relief is read off the colours.
-        let beside = full.with_extension("height.png");
+        let beside = self.scope.check(full.with_extension("height.png")).map_err(outside(page, path))?;
         let maps = if beside.is_file() {
             self.note(&beside)?;
             Maps::from_height(Height::load(&beside, relief_range).map_err(|e| at_its_place(page, path, IMAGE_HELP, e))?)
@@ -172,13 +187,16 @@ impl Library {
     }
 
     /// The model that `page` names, with the files that it needs.
-    pub(super) fn model(&mut self, page: &RonFile, path: &str, up: Up) -> Result<Arc<Model>> {
-        let full = page.need_file(path)?;
-        let key = (full.clone(), up == Up::Z);
+    pub(super) fn model(&mut self, page: &RonFile, desc: &ModelDesc) -> Result<Arc<Model>> {
+        let path = desc.file.as_str();
+        let full = self.need(page, path)?;
+        let key = (full.clone(), desc.up == Up::Z, desc.allow_outside);
         if let Some(known) = self.models.get(&key) {
             return Ok(known.clone());
         }
-        let model = Arc::new(Model::load(&full, up).map_err(|e| at_its_place(page, path, MODEL_HELP, e))?);
+        let lifted = desc.allow_outside.then_some(&self.scope);
+        let model = Model::load_within(&full, desc.up, lifted).map_err(|e| at_its_place(page, path, MODEL_HELP, e))?;
+        let model = Arc::new(model);
         for file in &model.files {
             self.note(file)?;
         }
@@ -188,13 +206,13 @@ impl Library {
 
     /// The file of an environment map that `page` names, whether or not a field draws it.
     pub(super) fn environment_map_file(&mut self, page: &RonFile, path: &str) -> Result<()> {
-        let full = page.need_file(path)?;
+        let full = self.need(page, path)?;
         if self.files.contains_key(&full) { Ok(()) } else { self.note(&full) }
     }
 
     /// The environment map that `page` names.
     pub(super) fn environment_map(&mut self, page: &RonFile, path: &str, infrared: Infrared) -> Result<Arc<Table>> {
-        let full = page.need_file(path)?;
+        let full = self.need(page, path)?;
         let key = (full.clone(), infrared);
         if let Some(known) = self.environment_maps.get(&key) {
             return Ok(known.clone());
@@ -216,7 +234,7 @@ impl Library {
         }
         let mut need = |path: &Path| -> Result<(PathBuf, String)> {
             let text = path.to_string_lossy().into_owned();
-            let full = page.need_file(&text)?;
+            let full = self.need(page, &text)?;
             self.note(&full)?;
             Ok((full, text))
         };
@@ -240,6 +258,11 @@ impl Library {
         self.files.insert(path.into(), Sha256::digest(&bytes).into());
         Ok(())
     }
+}
+
+/// A file that `page` names where none may lie.
+fn outside(page: &RonFile, literal: &str) -> impl FnOnce(Outside) -> Error {
+    move |outside| page.about(literal, outside.to_string(), outside.help)
 }
 
 /// Heights 0 to 1 read off a soil's brightness, for a photograph without a height map.

@@ -11,6 +11,7 @@ use super::{Labelled, Listed, Source};
 use crate::dataset::record::{Keypoint, PointState};
 use crate::dataset::rle::Rle;
 use crate::dataset::split::Split;
+use crate::input::Scope;
 use crate::output;
 use crate::scene::tag::Class;
 use crate::{Error, Result};
@@ -151,9 +152,13 @@ impl Coco {
             }
         }
         let mut found: BTreeMap<u64, (Listed, Annotated)> = BTreeMap::new();
+        let scope =
+            Scope::Below { folder: folder.into(), help: "name images by their paths below the folder of --images" };
         for Image { id, file_name, width, height } in images {
-            let of_split = split.map(|s| folder.join(s.name()).join(&file_name)).filter(|p| p.is_file());
-            let image = of_split.unwrap_or_else(|| folder.join(&file_name));
+            let named =
+                |folder: &Path| scope.resolve(folder, &file_name).map_err(|outside| Error::from(outside).in_file(path));
+            let of_split = split.map(|s| named(&folder.join(s.name()))).transpose()?.filter(|p| p.is_file());
+            let image = of_split.map_or_else(|| named(folder), Ok)?;
             if !image.is_file() {
                 let what = format!("its image {} is missing", image.display());
                 return Err(wrong(what).help("say where images lie with --images"));

@@ -27,7 +27,7 @@ impl Builder<'_> {
             add(SpeciesRecord { name: desc.name.clone(), eppo: desc.eppo.clone(), class: desc.role.class() });
         }
         for desc in &desc.models {
-            let model = self.library.model(page, &desc.file, desc.up)?;
+            let model = self.library.model(page, desc)?;
             for class in models::classes(desc, &model) {
                 add(SpeciesRecord { name: model_name(&desc.file), eppo: String::new(), class });
             }

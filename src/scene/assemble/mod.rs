@@ -20,6 +20,7 @@ use super::record::Conditions;
 use super::tag::Tag;
 use super::{Part, PlantRecord, Scene};
 use crate::geometry::Mesh;
+use crate::input::Scope;
 use crate::light::LightDesc;
 use crate::material::{BakedGround, Material};
 use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3, vec2};
@@ -88,11 +89,22 @@ pub struct Source {
 }
 
 impl Source {
-    /// Reads a scene file.
+    /// Reads a scene file, which may name files anywhere.
     pub fn open(path: &Path) -> Result<Self> {
-        let mut library = Library::default();
-        let page = library.page(path)?;
+        Self::open_within(path, Scope::Anywhere)
+    }
+
+    /// Reads a scene file of which neither itself nor what it names may lie outside a scope.
+    pub fn open_within(path: &Path, scope: Scope) -> Result<Self> {
+        let path = scope.check(path.into())?;
+        let mut library = Library::within(scope);
+        let page = library.page(&path)?;
         Self::of(page, library)
+    }
+
+    /// Whether a model of it may name files outside its own folder.
+    pub fn allows_outside(&self) -> bool {
+        self.desc.models.iter().any(|model| model.allow_outside)
     }
 
     fn of(page: RonFile, library: Library) -> Result<Self> {

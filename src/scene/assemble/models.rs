@@ -36,7 +36,7 @@ impl Builder<'_> {
         floor: Option<Floor<'_>>,
     ) -> Result<Vec<PlantRecord>> {
         let at = [Step::Field("models"), Step::Item(k)];
-        let model = self.library.model(self.page, &desc.file, desc.up)?;
+        let model = self.library.model(self.page, desc)?;
         if desc.class.is_none() && !model.parts.iter().any(|p| known(p.label.as_ref()).is_some()) {
             let fault = Error::input("this model's file says no class")
                 .help("add class: Crop, class: Weed, or class: Soil for whatever is no plant");

@@ -1,7 +1,11 @@
-//! Files that users name: opened and read with limits.
+//! Files that users name: opened and read with limits, and where those may lie that a file names.
 //!
 //! A folder, a pipe, a socket or a device is refused before it is opened: opening a pipe waits until somebody writes into it, and
 //! a device may never end.
+
+mod scope;
+
+pub use scope::{Outside, Scope, tidy};
 
 use crate::{Error, Result};
 use std::fmt;
@@ -76,8 +80,8 @@ pub fn read(path: &Path, most: u64) -> std::result::Result<Vec<u8>, Refusal> {
     if bytes.len() as u64 > most { Err(Refusal::TooLarge(most)) } else { Ok(bytes) }
 }
 
-/// Where a path leads that a file of `folder` names, as datasets and model cards do: below that folder, whoever wrote the file. An
-/// absolute path and one with `..` are refused. Scene files are a user's own, and may name files anywhere.
+/// Where a path leads that a file of `folder` names by which files are told apart or written, as datasets and model cards do: below
+/// that folder, whoever wrote the file, and written plainly, without `.` and `..`. [`Scope`] is the rule for what is only read.
 pub fn below(folder: &Path, path: &str) -> Result<PathBuf> {
     let inner = Path::new(path);
     let is_name = |component: Component<'_>| matches!(component, Component::Normal(_));
