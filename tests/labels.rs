@@ -414,7 +414,7 @@ fn label_files_read_back_as_the_label_map() {
         kernels: "none".into(),
     };
     let (_keep, out) = program::scratch();
-    output::write_image(&out, &film, &map, &photograph, &provenance).unwrap();
+    output::write_files(&out, &output::image_files(&film, &map, &photograph, &provenance).unwrap()).unwrap();
     let (sw, sh, classes) = output::read_indexed(&out.join("semantics.png")).unwrap();
     assert_eq!((sw, sh), (w, h));
     let of = |f: fn(&Tag) -> u16| map.tags.iter().map(f).collect::<Vec<u16>>();

@@ -35,7 +35,8 @@ fn written() -> (tempfile::TempDir, std::path::PathBuf, Film, LabelMap, Provenan
     let (film, labels) = shoot(&field, 3, 2);
     let provenance = provenance(&field.hash);
     let (keep, out) = scratch();
-    output::write_image(&out, &film, &labels, &field.photograph(&film), &provenance).unwrap();
+    output::write_files(&out, &output::image_files(&film, &labels, &field.photograph(&film), &provenance).unwrap())
+        .unwrap();
     (keep, out, film, labels, provenance)
 }
 
@@ -171,31 +172,34 @@ fn a_folder_that_cannot_be_made_is_a_clear_error() {
 }
 
 /// Rationale: disks fill up in the middle of a file. The shell's limit on a file's size fails a write in the same way. Expected:
-/// an error about the file, exit code 1; the files before it are whole, the others absent, no temporary file stays.
+/// an error about the file, exit code 1; an image that was there before stays as it was, none of its files is replaced; where there was
+/// none there is none, and no temporary file stays.
 #[cfg(unix)]
 #[test]
 fn a_full_disk_leaves_no_half_written_file() {
-    let (_keep, whole) = scratch();
-    run(&whole, &["--width", "64"]);
-    let (_keep_too, out) = scratch();
+    let (_keep, out) = scratch();
     let program = env!("CARGO_BIN_EXE_trace");
     // Blocks of 512 or 1024 bytes: enough for the pictures of 64 × 48 pixels, not for the radiance.
     let script = format!(
         "trap '' XFSZ; ulimit -f 24; exec '{program}' --scene {SMALL} --spp 1 --width 64 --out '{}'",
         out.display()
     );
-    let output = std::process::Command::new("sh").args(["-c", &script]).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{said}");
-    let error = said.lines().find(|l| l.starts_with("error: ")).unwrap_or_else(|| panic!("no error in {said}"));
-    assert!(error.contains("radiance.exr") && error.contains("File too large"), "{error}");
-    assert_eq!(names(&out), ["nir.png", "rgb.png"], "what was done before, and no temporary file");
-    for name in names(&out) {
-        assert!(
-            std::fs::read(out.join(&name)).unwrap() == std::fs::read(whole.join(&name)).unwrap(),
-            "{name} is not whole"
-        );
-    }
+    let refused = || {
+        let output = std::process::Command::new("sh").args(["-c", &script]).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        let error = said.lines().find(|l| l.starts_with("error: ")).unwrap_or_else(|| panic!("no error in {said}"));
+        assert!(error.contains("radiance.exr") && error.contains("File too large"), "{error}");
+    };
+    refused();
+    assert_eq!(names(&out), [""; 0]);
+    // Another field in the same folder.
+    run(&out, &["--width", "64", "--index", "1"]);
+    let read = || names(&out).into_iter().map(|name| std::fs::read(out.join(name)).unwrap()).collect::<Vec<_>>();
+    let before = read();
+    refused();
+    assert_eq!(names(&out), FILES);
+    assert!(read() == before, "two fields are mixed in one folder");
 }
 
 #[test]

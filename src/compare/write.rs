@@ -17,10 +17,7 @@ impl Comparison {
     /// Writes [`FILES`] into `folder` and returns their paths.
     pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>> {
         let texts = [table::json(self)?, table::csv(self), table::markdown(self), page::html(self)];
-        let paths = FILES.map(|name| folder.join(name));
-        for (path, text) in paths.iter().zip(&texts) {
-            output::write_atomically(path, text.as_bytes())?;
-        }
-        Ok(paths.to_vec())
+        let files: Vec<_> = FILES.into_iter().zip(texts.map(String::into_bytes)).collect();
+        output::write_files(folder, &files)
     }
 }

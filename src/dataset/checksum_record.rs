@@ -7,7 +7,7 @@ use super::checksum::Checksum;
 use super::recipe::{Recipe, compact};
 use super::set::Set;
 use crate::input::below;
-use crate::output::{link_atomically, write_atomically};
+use crate::output::{Together, write_atomically, write_together};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -85,23 +85,25 @@ impl ChecksumRecord {
 /// Bytes from which on a file takes more than one block of a disk.
 const BLOCK: usize = 4096;
 
-/// Writes files, each whole or not at all. Those of the same bytes, such as the photograph in several formats, are one file with several
+/// Writes files, all of them or none. Those of the same bytes, such as the photograph in several formats, are one file with several
 /// names.
 pub(super) fn write_files(folder: &Path, files: &[File]) -> Result<()> {
-    let mut large: BTreeMap<&[u8], PathBuf> = BTreeMap::new();
-    for file in files {
-        if file.bytes.is_empty() {
-            return Err(Error::failed(format!("{}: refused to write an empty file", file.path)));
+    let add_all = |together: &mut Together| {
+        let mut large: BTreeMap<&[u8], PathBuf> = BTreeMap::new();
+        for file in files {
+            if file.bytes.is_empty() {
+                return Err(Error::failed(format!("{}: refused to write an empty file", file.path)));
+            }
+            let path = below(folder, &file.path)?;
+            match large.get(file.bytes.as_slice()) {
+                Some(there) => together.add_equal(there, &path, &file.bytes)?,
+                None => together.add(&path, &file.bytes)?,
+            }
+            if file.bytes.len() > BLOCK {
+                large.entry(&file.bytes).or_insert(path);
+            }
         }
-        let path = below(folder, &file.path)?;
-        if let Some(there) = large.get(file.bytes.as_slice()) {
-            link_atomically(there, &path, &file.bytes)?;
-            continue;
-        }
-        write_atomically(&path, &file.bytes)?;
-        if file.bytes.len() > BLOCK {
-            large.insert(&file.bytes, path);
-        }
-    }
-    Ok(())
+        Ok(())
+    };
+    write_together(folder, add_all).map(drop)
 }

@@ -74,7 +74,8 @@ impl<'f> Image<'f> {
         self.expose(self.denoised.as_ref().unwrap_or(&self.film))
     }
 
-    /// Writes all files into a folder, which is made where it is missing, and returns their paths. Each appears whole or not at all.
+    /// Writes all files into a folder, which is made where it is missing, and returns their paths. All appear,
+    /// or none.
     ///
     /// `rgb.png`, `nir.png` (and `rgb16.png`, `nir16.png` of a sensor with more than 8 bits), `radiance.exr`, `semantics.png`,
     /// `plants.png`, `leaves.png`, `overlay.png`; with denoising `rgb_denoised.png`, `nir_denoised.png` and `denoised.exr` beside them. Where the
@@ -83,10 +84,11 @@ impl<'f> Image<'f> {
         let Self { film, labels, provenance, .. } = self;
         let folder = folder.as_ref();
         self.field.threads().install(|| {
-            let mut paths = output::write_image(folder, film, labels, &self.expose(film), provenance)?;
+            let mut files = output::image_files(film, labels, &self.expose(film), provenance)?;
             if let Some(clean) = &self.denoised {
-                paths.extend(output::write_denoised(folder, clean, &self.expose(clean), provenance)?);
+                files.extend(output::denoised_files(clean, &self.expose(clean), provenance)?);
             }
+            let paths = output::write_files(folder, &files)?;
             self.check_denoised()?;
             Ok(paths)
         })

@@ -1,6 +1,7 @@
 //! Files: pictures for people, radiance for programs, labels for both. Each appears whole or not at all, and holds neither
 //! clock times nor paths, so equal runs write equal bytes.
 
+mod atomic;
 mod denoise;
 mod exr;
 pub mod gltf;
@@ -9,14 +10,17 @@ mod overlay;
 mod photo;
 mod png;
 
+use crate::Result;
 use crate::film::Film;
 use crate::render::LabelMap;
 use crate::scene::tag::Class;
 use crate::sensor::{Deep, Photograph};
-use crate::{Error, Result};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
+pub use self::atomic::{
+    Together, create_atomically, is_unfinished, place_atomically, remove_unfinished, remove_unfinished_in,
+    stream_atomically, write_atomically, write_together,
+};
 pub use self::exr::{Geometry, encode_geometry, encode_layers, half, read_geometry};
 pub use self::png::{Map, Picture, encode as encode_png, read_gray, read_gray16, read_indexed, read_map, read_rgb};
 pub use denoise::Denoiser;
@@ -97,109 +101,17 @@ impl Provenance {
     }
 }
 
-/// Prefix of the names that files have until they are whole.
-const UNFINISHED: &str = ".furrow-";
-
-/// Whether a file of this name was never made whole: a killed program has left it.
-pub fn is_unfinished(name: &std::ffi::OsStr) -> bool {
-    name.to_string_lossy().starts_with(UNFINISHED)
-}
-
-/// Writes a file under a temporary name beside its target, flushes it, then renames: a reader never sees half a file.
-pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
-    stream_atomically(path, |file| file.write_all(bytes).map_err(Error::io(path)))
-}
-
 /// Writes a picture to a file, atomically.
 pub fn write_png(path: &Path, width: u32, height: u32, picture: &Picture<'_>, text: &str) -> Result<()> {
     write_atomically(path, &png::encode(width, height, picture, text)?)
 }
 
-/// Writes a file piece by piece, whole or not at all, as [`write_atomically`] does.
-pub fn stream_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
-    let folder = parent(path);
-    std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(UNFINISHED);
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // As any other new file: the umask takes its part.
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let file = builder.tempfile_in(folder).map_err(Error::io(path))?;
-    let mut buffer = std::io::BufWriter::with_capacity(1 << 16, file);
-    write(&mut buffer)?;
-    let file = buffer.into_inner().map_err(|e| Error::io(path)(e.into_error()))?;
-    file.as_file().sync_all().map_err(Error::io(path))?;
-    file.persist(path).map_err(|e| Error::io(path)(e.error))?;
-    Ok(())
-}
+/// Files by their names, to be written together.
+pub type Files = Vec<(&'static str, Vec<u8>)>;
 
-/// The same for a file that somebody else writes, who is told where. The file has its own name there, in a temporary folder beside
-/// its target: some formats keep the name.
-pub fn place_atomically(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
-    let folder = parent(path);
-    std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
-    let within = tempfile::Builder::new().prefix(UNFINISHED).tempdir_in(folder).map_err(Error::io(path))?;
-    let unfinished = within.path().join(path.file_name().unwrap_or_default());
-    write(&unfinished)?;
-    std::fs::File::open(&unfinished).and_then(|file| file.sync_all()).map_err(Error::io(path))?;
-    std::fs::rename(&unfinished, path).map_err(Error::io(path))
-}
-
-/// The folder of a file.
-fn parent(path: &Path) -> &Path {
-    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
-/// Removes what a killed program has left half-written in a folder and below; nobody else may be writing there.
-pub fn remove_unfinished(folder: &Path) -> Result<()> {
-    let mut todo = vec![folder.to_path_buf()];
-    while let Some(folder) = todo.pop() {
-        todo.extend(remove_unfinished_in(&folder)?);
-    }
-    Ok(())
-}
-
-/// The same in the folder alone; returns the folders within.
-pub fn remove_unfinished_in(folder: &Path) -> Result<Vec<PathBuf>> {
-    let mut within = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(Error::io(folder))? {
-        let entry = entry.map_err(Error::io(folder))?;
-        let path = entry.path();
-        let unfinished = is_unfinished(&entry.file_name());
-        match (entry.file_type().map_err(Error::io(&path))?.is_dir(), unfinished) {
-            (true, true) => std::fs::remove_dir_all(&path).map_err(Error::io(&path))?,
-            (true, false) => within.push(path),
-            (false, true) => std::fs::remove_file(&path).map_err(Error::io(&path))?,
-            (false, false) => {}
-        }
-    }
-    Ok(within)
-}
-
-/// Gives a file that is there a second name, so that equal files take space once; `bytes` are what it holds, written anew where the file
-/// system has no links.
-pub fn link_atomically(there: &Path, path: &Path, bytes: &[u8]) -> Result<()> {
-    let folder = parent(path);
-    std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
-    let link = tempfile::Builder::new().prefix(UNFINISHED).make_in(folder, |name| std::fs::hard_link(there, name));
-    match link {
-        Ok(link) => link.into_temp_path().persist(path).map_err(|e| Error::io(path)(e.error)),
-        Err(_) => write_atomically(path, bytes),
-    }
-}
-
-/// Writes every file of one image into `folder` and returns their paths: `rgb.png`, `nir.png`, `radiance.exr`,
-/// `semantics.png`, `plants.png`, `leaves.png`, `overlay.png`; `rgb16.png` and `nir16.png` of a sensor with more than 8 bits.
-pub fn write_image(
-    folder: &Path,
-    film: &Film,
-    labels: &LabelMap,
-    photograph: &Photograph,
-    provenance: &Provenance,
-) -> Result<Vec<PathBuf>> {
+/// Every file of one image: `rgb.png`, `nir.png`, `radiance.exr`, `semantics.png`, `plants.png`, `leaves.png`, `overlay.png`;
+/// `rgb16.png` and `nir16.png` of a sensor with more than 8 bits.
+pub fn image_files(film: &Film, labels: &LabelMap, photograph: &Photograph, provenance: &Provenance) -> Result<Files> {
     let (w, h) = (film.window.width(), film.window.height());
     let text = provenance.text();
     let classes: Vec<u8> = labels.tags.iter().map(|t| t.class as u8).collect();
@@ -208,7 +120,7 @@ pub fn write_image(
     let leaves: Vec<u16> = labels.tags.iter().map(|t| t.leaf).collect();
     let rgb = photograph.rgb.as_chunks::<3>().0;
     let overlay = overlay::draw(rgb, labels);
-    let files: [(&str, Vec<u8>); 7] = [
+    let mut files = vec![
         ("rgb.png", png::encode(w, h, &Picture::Rgb(rgb), &text)?),
         ("nir.png", png::encode(w, h, &Picture::Gray(&photograph.nir), &text)?),
         ("radiance.exr", exr::encode(film, labels, matches!(provenance.spp, Spp::Adaptive { .. }), &text)?),
@@ -217,45 +129,28 @@ pub fn write_image(
         ("leaves.png", png::encode(w, h, &Picture::Gray16(&leaves), &text)?),
         ("overlay.png", png::encode(w, h, &Picture::Rgb(&overlay), &text)?),
     ];
-    let mut paths = write_all(folder, files)?;
     if let Some(Deep { rgb, nir }) = &photograph.deep {
-        let files = [
-            ("rgb16.png", png::encode(w, h, &Picture::Rgb16(rgb.as_chunks::<3>().0), &text)?),
-            ("nir16.png", png::encode(w, h, &Picture::Gray16(nir), &text)?),
-        ];
-        paths.extend(write_all(folder, files)?);
+        files.push(("rgb16.png", png::encode(w, h, &Picture::Rgb16(rgb.as_chunks::<3>().0), &text)?));
+        files.push(("nir16.png", png::encode(w, h, &Picture::Gray16(nir), &text)?));
     }
-    Ok(paths)
+    Ok(files)
 }
 
-/// Writes what a denoiser made of an image beside it, and returns the paths: `rgb_denoised.png`, `nir_denoised.png`,
-/// `denoised.exr` (R, G, B, NIR alone).
-pub fn write_denoised(
-    folder: &Path,
-    film: &Film,
-    photograph: &Photograph,
-    provenance: &Provenance,
-) -> Result<Vec<PathBuf>> {
+/// What a denoiser made of an image: `rgb_denoised.png`, `nir_denoised.png`, `denoised.exr` (R, G, B, NIR alone).
+pub fn denoised_files(film: &Film, photograph: &Photograph, provenance: &Provenance) -> Result<Files> {
     let (w, h) = (film.window.width(), film.window.height());
     let text = provenance.photograph_text(true);
     let rgb = photograph.rgb.as_chunks::<3>().0;
-    write_all(
-        folder,
-        [
-            ("rgb_denoised.png", png::encode(w, h, &Picture::Rgb(rgb), &text)?),
-            ("nir_denoised.png", png::encode(w, h, &Picture::Gray(&photograph.nir), &text)?),
-            ("denoised.exr", exr::encode_radiance(film, &text)?),
-        ],
-    )
+    Ok(vec![
+        ("rgb_denoised.png", png::encode(w, h, &Picture::Rgb(rgb), &text)?),
+        ("nir_denoised.png", png::encode(w, h, &Picture::Gray(&photograph.nir), &text)?),
+        ("denoised.exr", exr::encode_radiance(film, &text)?),
+    ])
 }
 
-fn write_all<const N: usize>(folder: &Path, files: [(&str, Vec<u8>); N]) -> Result<Vec<PathBuf>> {
-    files
-        .into_iter()
-        .map(|(name, bytes)| {
-            let path = folder.join(name);
-            write_atomically(&path, &bytes)?;
-            Ok(path)
-        })
-        .collect()
+/// Writes files into `folder`, all of them or none, and returns their paths.
+pub fn write_files(folder: &Path, files: &[(&str, Vec<u8>)]) -> Result<Vec<PathBuf>> {
+    write_together(folder, |together| {
+        files.iter().try_for_each(|(name, bytes)| together.add(&folder.join(name), bytes))
+    })
 }

@@ -16,7 +16,7 @@ use super::fit::hyper::SIDES;
 use super::net::Network;
 use super::weights::{self, Array};
 use crate::input::below;
-use crate::output::write_atomically;
+use crate::output::{Together, write_atomically, write_together};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -189,11 +189,16 @@ impl TrainedModel {
         Ok(Self { card, values })
     }
 
-    /// Writes weights and card.
+    /// Writes weights and card, both or neither.
     pub fn write(&self, folder: &Path) -> Result<()> {
         let text = serde_json::to_string(&self.card).map_err(|e| failed(&e))?;
-        weights::write(&below(folder, &self.card.weights)?, &self.values, &text)?;
-        write_json(&folder.join(MODEL), &self.card)
+        let path = below(folder, &self.card.weights)?;
+        let (values, card) = (weights::encode(&path, &self.values, &text)?, json(&self.card)?);
+        let add_both = |files: &mut Together| {
+            files.add(&path, &values)?;
+            files.add(&folder.join(MODEL), &card)
+        };
+        write_together(folder, add_both).map(drop)
     }
 }
 
@@ -214,9 +219,14 @@ pub fn read_json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T> {
 
 /// Writes a JSON file, atomically.
 pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
+    write_atomically(path, &json(value)?)
+}
+
+/// Readable JSON with a line's end.
+pub fn json(value: &impl Serialize) -> Result<Vec<u8>> {
     let mut bytes = serde_json::to_vec_pretty(value).map_err(|e| failed(&e))?;
     bytes.push(b'\n');
-    write_atomically(path, &bytes)
+    Ok(bytes)
 }
 
 fn failed(e: &serde_json::Error) -> Error {

@@ -23,6 +23,11 @@ const KEY: &str = "furrow";
 
 /// Writes arrays with a text, atomically; equal content gives equal bytes.
 pub fn write(path: &Path, arrays: &[Array], text: &str) -> Result<()> {
+    write_atomically(path, &encode(path, arrays, text)?)
+}
+
+/// The bytes of the file at `path` that holds these.
+pub fn encode(path: &Path, arrays: &[Array], text: &str) -> Result<Vec<u8>> {
     let bytes: Vec<Vec<u8>> = arrays.iter().map(|a| a.values.iter().flat_map(|v| v.to_le_bytes()).collect()).collect();
     let fault = |e: &dyn std::fmt::Display| unusable(path, &format!("it cannot be written: {e}"));
     let mut views = Vec::new();
@@ -31,7 +36,7 @@ pub fn write(path: &Path, arrays: &[Array], text: &str) -> Result<()> {
         views.push((array.name.as_str(), view));
     }
     let header = HashMap::from([(KEY.to_owned(), format!("{}\n{text}", checksum(arrays, text)))]);
-    write_atomically(path, &safetensors::serialize(views, &Some(header)).map_err(|e| fault(&e))?)
+    safetensors::serialize(views, &Some(header)).map_err(|e| fault(&e))
 }
 
 /// Reads arrays, in the order of their names, and the text. An error where the file is damaged or is not ours.

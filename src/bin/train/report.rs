@@ -1,7 +1,7 @@
 //! Reports of evaluations and trainings: tables, figure, page.
 
 use furrow::Result;
-use furrow::output::write_atomically;
+use furrow::output::write_files;
 use furrow::report::chart::{Chart, Curve};
 use furrow::report::{Lines, csv};
 use furrow::train::data::Example;
@@ -55,8 +55,6 @@ pub(crate) fn write(
     shots: &[Shot],
     palette: &[[u8; 3]],
 ) -> Result<Vec<PathBuf>> {
-    let [html, figure, json, markdown] =
-        ["report.html", "figure.png", "report.json", "report.md"].map(|name| out.join(name));
     let tables: String = report.tables().iter().map(|t| t.markdown() + "\n").collect();
     let page = Page {
         kind: "Evaluation",
@@ -68,11 +66,13 @@ pub(crate) fn write(
         classes: &report.classes,
         ..Page::default()
     };
-    write_atomically(&html, page.html()?.as_bytes())?;
-    write_atomically(&figure, &sheet(shots, palette, true).png()?)?;
-    write_atomically(&markdown, tables.as_bytes())?;
-    run::write_json(&json, report)?;
-    Ok(vec![html, figure, json, markdown])
+    let files = [
+        ("report.html", page.html()?.into_bytes()),
+        ("figure.png", sheet(shots, palette, true).png()?),
+        ("report.json", run::json(report)?),
+        ("report.md", tables.into_bytes()),
+    ];
+    write_files(out, &files)
 }
 
 /// The curves of a training: its loss, and its validation passes.
@@ -112,7 +112,6 @@ pub(crate) fn write_training(
     facts: &[(String, String)],
 ) -> Result<Vec<PathBuf>> {
     let charts = curves(&results.history, classes);
-    let [html, svg, log] = ["report.html", "loss.svg", "log.csv"].map(|name| out.join(name));
     let page = Page {
         kind: "Training",
         title: &out.display().to_string(),
@@ -121,14 +120,16 @@ pub(crate) fn write_training(
         classes,
         ..Page::default()
     };
-    write_atomically(&html, page.html()?.as_bytes())?;
-    write_atomically(&svg, charts[0].svg().as_bytes())?;
     let rows = results.history.losses.iter().map(|loss| {
         let pass = results.history.validation.iter().find(|pass| pass.step == loss.step);
         let miou = pass.map_or(String::new(), |pass| pass.miou.to_string());
         vec![loss.step.to_string(), loss.loss.to_string(), loss.rate.to_string(), miou]
     });
     let lines = csv(&["step", "loss", "rate", "validation_mean_iou"], rows, Lines::Lf);
-    write_atomically(&log, lines.as_bytes())?;
-    Ok(vec![html, svg, log])
+    let files = [
+        ("report.html", page.html()?.into_bytes()),
+        ("loss.svg", charts[0].svg().into_bytes()),
+        ("log.csv", lines.into_bytes()),
+    ];
+    write_files(out, &files)
 }

@@ -3,8 +3,8 @@
 use super::xml::Element;
 use crate::Result;
 use crate::math::{Spectrum, Vec3};
-use crate::output::{exr, write_atomically};
-use std::path::{Path, PathBuf};
+use crate::output::{Together, exr};
+use std::path::Path;
 
 /// Units of length to a metre.
 pub(super) const SCALE: f32 = 100.0;
@@ -47,18 +47,15 @@ pub(super) enum Plugins {
     Own,
 }
 
-/// The files of the folder as they are written.
+/// The files of the folder: written as they come, and there when all are.
 pub(super) struct Files<'a> {
     pub(super) folder: &'a Path,
-    pub(super) paths: Vec<PathBuf>,
+    pub(super) together: Together,
 }
 
 impl Files<'_> {
     pub(super) fn write(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
-        let path = self.folder.join(name);
-        write_atomically(&path, bytes)?;
-        self.paths.push(path);
-        Ok(())
+        self.together.add(&self.folder.join(name), bytes)
     }
 
     /// Plain numbers, one vector a channel.

@@ -29,15 +29,15 @@ mod ply;
 mod surface;
 mod xml;
 
-use super::Export;
 use super::png::{self, Picture};
-use crate::Result;
+use super::{Export, Together};
 use crate::film::Filter;
 use crate::geometry::{AlphaMask, Mesh};
 use crate::integrator::PathTracer;
 use crate::material::Varies;
 use crate::math::Spectrum;
 use crate::scene::{Part, Scene};
+use crate::{Error, Result};
 use files::{Band, Files, Plugins, SCALE, matrix};
 use level::Leveled;
 pub use level::fix_levels;
@@ -74,7 +74,7 @@ struct Key {
 /// Writes `scene` into `folder`; `text` goes into the files as their provenance. `scene.xml` is written last: where it is,
 /// everything is.
 pub fn write(folder: &Path, scene: &Scene, text: &str) -> Result<Export> {
-    let mut files = Files { folder, paths: Vec::new() };
+    let mut files = Files { folder, together: Together::default() };
     let mut warnings = camera_warnings(scene);
     let leveled = Leveled::of(scene);
     let groups = groups(scene, &leveled)?;
@@ -104,7 +104,10 @@ pub fn write(folder: &Path, scene: &Scene, text: &str) -> Result<Export> {
     files.write("scene-exact.xml", whole.document(Band::Color, Plugins::Own).as_bytes())?;
     files.write("scene-nir.xml", whole.document(Band::Nir, Plugins::BuiltIn).as_bytes())?;
     files.write("scene.xml", whole.document(Band::Color, Plugins::BuiltIn).as_bytes())?;
-    Ok(Export { paths: files.paths, warnings })
+    let paths = files.together.finish()?;
+    let paths =
+        paths.ok_or_else(|| Error::failed("its temporary files were removed while it was written").in_file(folder))?;
+    Ok(Export { paths, warnings })
 }
 
 /// One warning for each thing that is lost, with one surface's name and the number of others.

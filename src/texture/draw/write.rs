@@ -4,6 +4,7 @@ use super::{Drawn, Grey, Recipe, draw, read};
 use crate::error::{Error, Result};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
 
 /// Who may use a drawn texture, and how.
 const LICENCE: &str = "CC0-1.0 OR MIT OR Apache-2.0";
@@ -15,18 +16,19 @@ pub fn write(recipe_path: &Path) -> Result<Vec<PathBuf>> {
     let drawn = draw(&recipe)?;
     let name = recipe_path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let source = source(&recipe, &name);
-    let mut written = Vec::new();
-    let path = recipe_path.with_extension("png");
-    put(&path, &encode(&drawn, &source))?;
-    written.push(path);
+    let mut files = vec![(recipe_path.with_extension("png"), encode(&drawn, &source))];
     if let Some(relief) = &drawn.relief {
-        let path = recipe_path.with_extension("height.png");
-        put(&path, &encode_height(relief, &source))?;
-        written.push(path);
+        files.push((recipe_path.with_extension("height.png"), encode_height(relief, &source)));
     }
     if !named_above(recipe_path, &name) {
-        let path = recipe_path.with_extension("source.md");
-        put(&path, format!("`{name}.png`: {source}. Licence: {LICENCE}.\n").as_bytes())?;
+        let words = format!("`{name}.png`: {source}. Licence: {LICENCE}.\n");
+        files.push((recipe_path.with_extension("source.md"), words.into_bytes()));
+    }
+    // All of them before the first gets its name: a picture does not stand beside the relief of another.
+    let whole = files.iter().map(|(path, bytes)| unfinished(path, bytes)).collect::<Result<Vec<_>>>()?;
+    let mut written = Vec::new();
+    for (file, (path, _)) in whole.into_iter().zip(files) {
+        file.persist(&path).map_err(|e| Error::io(&path)(e.error))?;
         written.push(path);
     }
     Ok(written)
@@ -93,7 +95,8 @@ fn png_file(
 }
 
 /// A file that is whole or not there: written under another name, flushed, renamed.
-fn put(path: &Path, bytes: &[u8]) -> Result<()> {
+/// A whole file under a temporary name beside its own.
+fn unfinished(path: &Path, bytes: &[u8]) -> Result<NamedTempFile> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
     // Temporary files are private by default; a texture is as public as any file its user makes.
@@ -103,8 +106,7 @@ fn put(path: &Path, bytes: &[u8]) -> Result<()> {
     builder.permissions(public);
     let mut file = builder.prefix(".furrow-").tempfile_in(folder).map_err(Error::io(path))?;
     file.write_all(bytes).and_then(|()| file.as_file().sync_all()).map_err(Error::io(path))?;
-    file.persist(path).map_err(|e| Error::io(path)(e.error))?;
-    Ok(())
+    Ok(file)
 }
 
 fn named_above(recipe_path: &Path, name: &str) -> bool {

@@ -206,7 +206,11 @@ fn draw(card: &ModelCard, out: &Path, ready: &Ready<'_>, scores: &[f32]) -> Resu
         card.classes.names().join("; ")
     );
     let paths = files(&ready.picture.name).map(|file| out.join(file));
-    output::write_png(&paths[0], width, height, &Png::Indexed(&classes, &colors), &text)?;
-    output::write_png(&paths[1], width, height, &Png::Rgb(&over), &text)?;
+    let labels = output::encode_png(width, height, &Png::Indexed(&classes, &colors), &text)?;
+    let over = output::encode_png(width, height, &Png::Rgb(&over), &text)?;
+    output::write_together(out, |files| {
+        files.add(&paths[0], &labels)?;
+        files.add(&paths[1], &over)
+    })?;
     Ok(paths)
 }

@@ -7,7 +7,7 @@ use super::rows::{self, Learner, Row};
 use super::seen::{PERCENT, Seen, mean, median, scale, see, spread};
 use super::sets::Bound;
 use crate::Result;
-use crate::output::write_atomically;
+use crate::output::{write_atomically, write_together};
 use crate::report::{Cell, Table};
 use crate::train::classes::Classes;
 use crate::train::figure;
@@ -29,17 +29,16 @@ const AGAINST: &str = "against";
 pub struct Tables(pub Vec<(&'static str, Table)>);
 
 impl Tables {
-    /// Writes each as Markdown, CSV and JSON; returns the paths.
+    /// Writes each as Markdown, CSV and JSON, all tables or none; returns the paths.
     pub fn write(&self, out: &Path) -> Result<Vec<PathBuf>> {
-        let mut paths = Vec::new();
-        for (name, table) in &self.0 {
-            for (ending, text) in [("md", table.markdown()), ("csv", table.csv()), ("json", table.json())] {
-                let path = out.join(format!("{name}.{ending}"));
-                write_atomically(&path, text.as_bytes())?;
-                paths.push(path);
+        write_together(out, |files| {
+            for (name, table) in &self.0 {
+                for (ending, text) in [("md", table.markdown()), ("csv", table.csv()), ("json", table.json())] {
+                    files.add(&out.join(format!("{name}.{ending}")), text.as_bytes())?;
+                }
             }
-        }
-        Ok(paths)
+            Ok(())
+        })
     }
 }
 

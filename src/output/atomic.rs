@@ -1,0 +1,295 @@
+//! Files that appear whole or not at all: written under a temporary name beside their target, flushed, then renamed.
+//!
+//! Several programs may write into one folder, and one of them may clear away what killed ones have left there. So a temporary file
+//! that is gone when it is to be renamed is no failure: it is made once more.
+
+use crate::{Error, Result};
+use std::fs::{self, File};
+use std::io::{self, ErrorKind, Seek, Write};
+use std::path::{Path, PathBuf};
+use tempfile::{NamedTempFile, TempPath};
+
+/// Prefix of the names that files have until they are whole.
+const UNFINISHED: &str = ".furrow-";
+
+/// How often a file is made once more that somebody else clears away; whoever clears does so once.
+const MOST_AGAIN: usize = 32;
+
+/// Whether a file of this name was never made whole: a killed program has left it, or one that runs is about to rename it.
+pub fn is_unfinished(name: &std::ffi::OsStr) -> bool {
+    name.to_string_lossy().starts_with(UNFINISHED)
+}
+
+/// Writes a file under a temporary name beside its target, flushes it, then renames: a reader never sees half a file.
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
+    stream_atomically(path, |file| file.write_all(bytes).map_err(Error::io(path)))
+}
+
+/// Writes a file piece by piece, whole or not at all, as [`write_atomically`] does.
+pub fn stream_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
+    let mut file = unfinished(path, write)?;
+    for _ in 0..MOST_AGAIN {
+        match file.persist(path) {
+            Ok(_) => return Ok(()),
+            Err(e) if e.error.kind() == ErrorKind::NotFound => file = copied(e.file, path)?,
+            Err(e) => return Err(Error::io(path)(e.error)),
+        }
+    }
+    Err(cleared(path))
+}
+
+/// The same for a file that somebody else writes, who is told where. The file has its own name there, in a temporary folder beside
+/// its target: some formats keep the name.
+pub fn place_atomically(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+    let folder = parent(path);
+    fs::create_dir_all(folder).map_err(Error::io(folder))?;
+    let within = tempfile::Builder::new().prefix(UNFINISHED).tempdir_in(folder).map_err(Error::io(path))?;
+    let unfinished = within.path().join(path.file_name().unwrap_or_default());
+    write(&unfinished)?;
+    File::open(&unfinished).and_then(|file| file.sync_all()).map_err(Error::io(path))?;
+    fs::rename(&unfinished, path).map_err(Error::io(path))
+}
+
+/// Writes a file that must not be there yet; whether it was not. Of several programs that do so at once, one is told that it was.
+pub fn create_atomically(path: &Path, bytes: &[u8]) -> Result<bool> {
+    for _ in 0..MOST_AGAIN {
+        let file = unfinished(path, |file| file.write_all(bytes).map_err(Error::io(path)))?;
+        match file.persist_noclobber(path) {
+            Ok(_) => return Ok(true),
+            Err(e) if e.error.kind() == ErrorKind::AlreadyExists => return Ok(false),
+            Err(e) if e.error.kind() == ErrorKind::NotFound => {}
+            Err(e) => return Err(Error::io(path)(e.error)),
+        }
+    }
+    Err(cleared(path))
+}
+
+/// Files that belong together: all are whole under temporary names before the first is renamed. So where the disk gets full, those
+/// that were there before stay, and never stand beside some of the new ones.
+#[derive(Default)]
+pub struct Together {
+    waiting: Vec<(TempPath, PathBuf)>,
+}
+
+impl Together {
+    /// Adds a file.
+    pub fn add(&mut self, path: &Path, bytes: &[u8]) -> Result<()> {
+        if path.is_dir() {
+            return Err(Error::io(path)(ErrorKind::IsADirectory.into()));
+        }
+        let file = unfinished(path, |file| file.write_all(bytes).map_err(Error::io(path)))?;
+        self.waiting.push((file.into_temp_path(), path.into()));
+        Ok(())
+    }
+
+    /// Adds a file that holds the same bytes as one that was added before: as a second name of it, so that they take space once;
+    /// written anew where the file system has no links.
+    pub fn add_equal(&mut self, to: &Path, path: &Path, bytes: &[u8]) -> Result<()> {
+        let folder = parent(path);
+        fs::create_dir_all(folder).map_err(Error::io(folder))?;
+        let there = self.waiting.iter().find(|(_, target)| target == to).map(|(there, _)| there);
+        let link = there.map(|there| {
+            tempfile::Builder::new().prefix(UNFINISHED).make_in(folder, |name| fs::hard_link(there, name))
+        });
+        match link {
+            Some(Ok(link)) => self.waiting.push((link.into_temp_path(), path.into())),
+            _ => self.add(path, bytes)?,
+        }
+        Ok(())
+    }
+
+    /// Gives all files their names; returns their paths in the order in which they were added. `None` where somebody has cleared a
+    /// temporary file away: then all are to be added once more.
+    pub fn finish(self) -> Result<Option<Vec<PathBuf>>> {
+        let mut paths = Vec::new();
+        for (temporary, path) in self.waiting {
+            let name = temporary.to_path_buf();
+            match temporary.persist(&path) {
+                Ok(()) => {}
+                Err(e) if e.error.kind() == ErrorKind::NotFound => return Ok(None),
+                Err(e) => return Err(Error::io(&path)(e.error)),
+            }
+            // Two names of one file: POSIX leaves both.
+            let _ = fs::remove_file(name);
+            paths.push(path);
+        }
+        Ok(Some(paths))
+    }
+}
+
+/// Writes files that belong together, as [`Together`] does; `add` adds them, once more where somebody clears temporary files away.
+/// Returns their paths.
+pub fn write_together(folder: &Path, add: impl Fn(&mut Together) -> Result<()>) -> Result<Vec<PathBuf>> {
+    for _ in 0..MOST_AGAIN {
+        let mut files = Together::default();
+        add(&mut files)?;
+        if let Some(paths) = files.finish()? {
+            return Ok(paths);
+        }
+    }
+    Err(cleared(folder))
+}
+
+/// A whole file under a temporary name beside its target.
+fn unfinished(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<NamedTempFile> {
+    let mut buffer = io::BufWriter::with_capacity(1 << 16, temporary(path)?);
+    write(&mut buffer)?;
+    let file = buffer.into_inner().map_err(|e| Error::io(path)(e.into_error()))?;
+    file.as_file().sync_all().map_err(Error::io(path))?;
+    Ok(file)
+}
+
+fn temporary(path: &Path) -> Result<NamedTempFile> {
+    let folder = parent(path);
+    fs::create_dir_all(folder).map_err(Error::io(folder))?;
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(UNFINISHED);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // As any other new file: the umask takes its part.
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(folder).map_err(Error::io(path))
+}
+
+/// The same file under another temporary name: what it holds is there as long as it is open.
+fn copied(mut from: NamedTempFile, path: &Path) -> Result<NamedTempFile> {
+    let mut to = temporary(path)?;
+    let from = from.as_file_mut();
+    from.rewind().and_then(|()| io::copy(from, to.as_file_mut())).map_err(Error::io(path))?;
+    to.as_file().sync_all().map_err(Error::io(path))?;
+    Ok(to)
+}
+
+fn cleared(path: &Path) -> Error {
+    Error::failed("something clears away the temporary files beside this one as they are written").in_file(path)
+}
+
+/// The folder of a file.
+fn parent(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Removes what a killed program has left half-written in a folder and below.
+pub fn remove_unfinished(folder: &Path) -> Result<()> {
+    let mut todo = vec![folder.to_path_buf()];
+    while let Some(folder) = todo.pop() {
+        todo.extend(remove_unfinished_in(&folder)?);
+    }
+    Ok(())
+}
+
+/// The same in the folder alone; returns the folders within.
+pub fn remove_unfinished_in(folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut within = Vec::new();
+    for entry in fs::read_dir(folder).map_err(Error::io(folder))? {
+        let entry = entry.map_err(Error::io(folder))?;
+        let path = entry.path();
+        let unfinished = is_unfinished(&entry.file_name());
+        let Some(kind) = unless_gone(entry.file_type()).map_err(Error::io(&path))? else { continue };
+        let removed = match (kind.is_dir(), unfinished) {
+            (true, true) => unless_gone(fs::remove_dir_all(&path)),
+            (false, true) => unless_gone(fs::remove_file(&path)),
+            (true, false) => {
+                within.push(path);
+                continue;
+            }
+            (false, false) => continue,
+        };
+        removed.map_err(Error::io(&path))?;
+    }
+    Ok(within)
+}
+
+/// `None` where it is gone: renamed by whoever wrote it, or cleared away by another.
+fn unless_gone<T>(done: io::Result<T>) -> io::Result<Option<T>> {
+    match done {
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
+        other => other.map(Some),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut all: Vec<String> =
+            fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect();
+        all.sort();
+        all
+    }
+
+    #[test]
+    fn a_file_whose_temporary_name_is_cleared_away_appears_all_the_same() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a/b");
+        stream_atomically(&path, |file| {
+            file.write_all(&vec![7; 100_000]).unwrap();
+            remove_unfinished(folder.path()).unwrap();
+            Ok(())
+        })
+        .unwrap();
+        assert_eq!(fs::read(&path).unwrap(), vec![7; 100_000]);
+        let times = std::cell::Cell::new(0);
+        let (first, second) = (folder.path().join("c"), folder.path().join("d"));
+        let paths = write_together(folder.path(), |files| {
+            files.add(&first, b"one")?;
+            files.add_equal(&first, &second, b"one")?;
+            times.set(times.get() + 1);
+            if times.get() == 1 { remove_unfinished(folder.path()) } else { Ok(()) }
+        });
+        assert_eq!(paths.unwrap(), [first.clone(), second.clone()]);
+        assert_eq!((fs::read(first).unwrap(), fs::read(second).unwrap()), (b"one".to_vec(), b"one".to_vec()));
+        assert_eq!(names(folder.path()), ["a", "c", "d"]);
+        assert_eq!(times.get(), 2);
+    }
+
+    /// Expected: where one file of several cannot be written, none is replaced and nothing is left beside them.
+    #[test]
+    fn files_that_belong_together_are_replaced_together() {
+        let folder = tempfile::tempdir().unwrap();
+        let [a, b, c] = ["a", "b", "c"].map(|name| folder.path().join(name));
+        let write = |text: &[u8], last: &Path| {
+            write_together(folder.path(), |files| {
+                files.add(&a, text)?;
+                files.add(&b, text)?;
+                files.add(last, text)
+            })
+        };
+        write(b"old", &c).unwrap();
+        fs::remove_file(&c).unwrap();
+        fs::create_dir(&c).unwrap();
+        // A folder that stands in the way, and one that cannot be made because a file does.
+        for last in [c.clone(), a.join("x")] {
+            assert_eq!(write(b"new", &last).unwrap_err().exit_code(), 1);
+            assert_eq!((fs::read(&a).unwrap(), fs::read(&b).unwrap()), (b"old".to_vec(), b"old".to_vec()));
+            assert_eq!(names(folder.path()), ["a", "b", "c"]);
+        }
+    }
+
+    #[test]
+    fn two_names_of_one_file_leave_nothing_beside_them() {
+        let folder = tempfile::tempdir().unwrap();
+        let [a, b] = ["a", "b"].map(|name| folder.path().join(name));
+        let mut files = Together::default();
+        files.add(&a, b"x").unwrap();
+        files.add_equal(&a, &b, b"x").unwrap();
+        // Another program has given the same file its second name.
+        let there = files.waiting[0].0.to_path_buf();
+        fs::hard_link(&there, &b).unwrap();
+        assert_eq!(files.finish().unwrap().unwrap(), [a, b]);
+        assert_eq!(names(folder.path()), ["a", "b"]);
+    }
+
+    #[test]
+    fn what_must_be_new_is_made_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        assert!(create_atomically(&path, b"mine").unwrap());
+        assert!(!create_atomically(&path, b"theirs").unwrap());
+        assert_eq!(fs::read(&path).unwrap(), b"mine");
+        assert_eq!(names(folder.path()), ["a"]);
+    }
+}
