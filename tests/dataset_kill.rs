@@ -49,6 +49,41 @@ fn killed_twenty_times_it_ends_as_if_never_killed() {
     assert!(made(&data).len() as u64 >= COUNT);
 }
 
+/// Rationale: the same command is started twice, by hand or by a scheduler that lost sight of the first. Expected: both end well,
+/// whatever the second finds of the first, and what is there is what one alone makes.
+#[test]
+fn two_that_make_one_dataset_at_once_make_what_one_makes() {
+    const COUNT: u64 = 3;
+    let scene = "tests/data/dataset/scene/field.ron";
+    let make = |data: &Path| {
+        let mut command = trace(&["dataset", "--scene", scene, "--quiet", "--out", path(data), "--spp", "1"]);
+        command.args(["--count", &COUNT.to_string(), "--format", "imagefolder,coco", "--threads", "2"]);
+        command
+    };
+    let (_keep, whole) = scratch();
+    let begin = Instant::now();
+    succeed(make(&whole));
+    let once = begin.elapsed();
+    let whole = tree(&whole);
+    let mut next = moments();
+    for pair in 0..20 {
+        let (_keep, data) = scratch();
+        let start = || make(&data).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("the program");
+        let first = start();
+        // Also at the same moment: two that begin one dataset.
+        if pair % 4 > 0 {
+            std::thread::sleep(once.mul_f64((next() % 1000) as f64 / 1000.0));
+        }
+        let second = start();
+        for one in [first, second] {
+            let output = one.wait_with_output().expect("an end");
+            let said = String::from_utf8_lossy(&output.stderr);
+            assert!(output.status.success(), "pair {pair}: {:?}: {said}", output.status);
+        }
+        same(&tree(&data), &whole);
+    }
+}
+
 /// A file system of its own, so small that it gets full: tmpfs, in a mount namespace of its own where this user may not mount.
 fn on_a_small_disk(folder: &Path, kilobytes: u32, script: &str) -> Option<std::process::Output> {
     std::fs::create_dir_all(folder).expect("a folder");

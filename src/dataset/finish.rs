@@ -6,7 +6,7 @@ use super::generate::{self, Task};
 use super::recipe::{FILE, Recipe};
 use super::set::{Set, Stream, Whole};
 use super::{format, report};
-use crate::output::remove_unfinished;
+use crate::output::{is_unfinished, remove_unfinished};
 use crate::{Error, Result};
 use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, BTreeSet};
@@ -80,10 +80,12 @@ fn own_files(folder: &Path, recipe: &Recipe) -> Result<BTreeMap<String, Checksum
     let mut files = BTreeMap::new();
     while let Some(path) = todo.pop() {
         if path.is_dir() {
-            let entries = std::fs::read_dir(&path).map_err(Error::reading(&path))?;
-            todo.extend(entries.filter_map(|e| Some(e.ok()?.path())));
+            let entries = std::fs::read_dir(&path).map_err(Error::io(&path))?;
+            // Another program may be about to write what is there already.
+            let whole = entries.filter_map(std::io::Result::ok).filter(|entry| !is_unfinished(&entry.file_name()));
+            todo.extend(whole.map(|entry| entry.path()));
         } else {
-            let bytes = std::fs::read(&path).map_err(Error::reading(&path))?;
+            let bytes = std::fs::read(&path).map_err(Error::io(&path))?;
             let name = path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().replace('\\', "/");
             files.insert(name, Checksum::of(&bytes));
         }
@@ -100,7 +102,7 @@ fn manifest(set: &Set, files: &BTreeMap<String, Checksum>, out: &mut Stream<'_>)
     if let Ok(rendering) = recipe.rendering() {
         let scene = rendering.scene_in(folder)?;
         out.put(",\n\"scene_text\": ")?;
-        out.json(&std::fs::read_to_string(&scene).map_err(Error::reading(&scene))?)?;
+        out.json(&std::fs::read_to_string(&scene).map_err(Error::io(&scene))?)?;
         out.put(",\n\"times\": \"ledger/*.jsonl\"")?;
     }
     out.put(",\n\"files\": {")?;

@@ -251,6 +251,10 @@ impl Run<'_> {
     fn image(&self, index: u64, task: Task, threads: &Threads) -> Result<()> {
         let begin = Instant::now();
         let Set { folder, recipe } = self.set;
+        // Another run may have made it meanwhile.
+        if ChecksumRecord::path(folder, index).exists() && self::task(self.set, index)? == Task::Done {
+            return Ok(());
+        }
         let (files, times) = if task == Task::Formats {
             (derived(self.set, index)?, Times::default())
         } else {

@@ -23,7 +23,7 @@
 //! | `native`, `format` | as files: ours (`images/`), and those of other tools |
 //! | `checksum`, `checksum_record`, `set` | SHA-256 of a file; those of an image's files; the dataset on disk |
 //! | `make` | all of it in one call |
-//! | `plan`, `gather`, `generate`, `timing_log`, `finish` | from a scene file, copied with all that it names, to images and a manifest; what remains to be done is found by looking at the disk |
+//! | `plan`, `gather`, `begin`, `generate`, `timing_log`, `finish` | from a scene file, copied with all that it names, to images and a manifest; what remains to be done is found by looking at the disk |
 //! | `cluster` | the same on many machines: job files for schedulers |
 //! | `invariants`, `verify` | what must hold of every image, and whether it does |
 //! | `import` | other people's images and labels |
@@ -31,6 +31,7 @@
 
 #[doc(hidden)]
 pub mod annotate;
+mod begin;
 #[doc(hidden)]
 pub mod checksum;
 #[doc(hidden)]

@@ -1,5 +1,6 @@
 //! Begins a dataset: checks the scene file by growing its first field, takes everything that it reads into the folder, writes the recipe.
 
+use super::begin::begin;
 use super::gather::{Gathered, gather};
 use super::recipe::{FILE, Made, Recipe, Rendering};
 use super::set::Set;
@@ -7,7 +8,6 @@ use super::split::Shares;
 use super::{File, checksum_record, format};
 use crate::ablation::{Edit, FULL};
 use crate::job::{Renderer, SceneFile};
-use crate::output::is_unfinished;
 use crate::settings::RenderOptions;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -87,7 +87,7 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
     let elsewhere = rewritten || source.allows_outside();
     let scene_sha256 = if elsewhere { hash_of_copies(order, &files, &scene)? } else { field.hash.clone() };
     let camera = &field.scene.camera;
-    let mut recipe = Recipe {
+    let recipe = Recipe {
         furrow: env!("CARGO_PKG_VERSION").into(),
         made: Made::Rendered(Rendering {
             scene,
@@ -112,20 +112,7 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
     };
     let mut told = field.warnings.clone();
     told.extend(warnings(&recipe)?);
-    if folder.join(FILE).exists() {
-        let before = Recipe::read(folder)?;
-        before.check_goes_on(folder, &recipe)?;
-        // Formats that are there stay.
-        let more: Vec<String> = recipe.formats.iter().filter(|f| !before.formats.contains(f)).cloned().collect();
-        recipe.formats = before.formats.into_iter().chain(more).collect();
-        // In whatever order they were asked for, it is one dataset.
-        recipe.formats.sort();
-    } else {
-        refuse_full(folder)?;
-    }
-    checksum_record::write_files(folder, &files)?;
-    // Last: a folder with a recipe has its scene.
-    checksum_record::write_files(folder, &[File { path: FILE.into(), bytes: recipe.text()? }])?;
+    let recipe = begin(folder, recipe, &files)?;
     Ok((Set { folder: folder.into(), recipe }, told))
 }
 
@@ -160,20 +147,6 @@ fn warnings(recipe: &Recipe) -> Result<Vec<String>> {
         all.extend(format.warnings(recipe).into_iter().map(|words| format!("{name}: {words}")));
     }
     Ok(all)
-}
-
-/// Refuses a folder in which other things lie: nothing of the user's may be overwritten.
-pub(super) fn refuse_full(folder: &Path) -> Result<()> {
-    let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
-    // A dataset that was stopped while it began has left its scene, and perhaps half a file.
-    let mut names = entries.filter_map(|e| Some(e.ok()?.file_name()));
-    let other = names.find(|name| name != "scene" && !is_unfinished(name));
-    match other {
-        None => Ok(()),
-        Some(name) => Err(Error::misuse(format!("other things lie in this folder, {} among them", name.display()))
-            .in_file(folder)
-            .help("give --out a folder that is empty or not there yet")),
-    }
 }
 
 /// Adds formats to a dataset; their files are made by the next run. Returns what the user should know.

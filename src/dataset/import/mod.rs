@@ -18,15 +18,15 @@ mod instances;
 pub mod masks;
 pub mod phenobench;
 
+use super::begin::{self, refuse_full};
 use super::checksum_record::{ChecksumRecord, write_files};
 use super::generate::{self, Task};
-use super::plan::refuse_full;
 use super::recipe::{FILE, Made, Recipe};
 use super::record::{Keypoint, Record};
 use super::sample::Sample;
 use super::set::Set;
 use super::split::{Shares, Split};
-use super::{File, annotate, invariants, native};
+use super::{annotate, invariants, native};
 use crate::Result;
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
@@ -133,7 +133,7 @@ fn begin(folder: &Path, source: &dyn Source, order: &Order) -> Result<Set> {
     images.iter().filter_map(|i| i.split).for_each(|split| counts[split as usize] += 1);
     // As many for training as there are, then as many for validation: the pattern of splits goes once over all images.
     let split = if counts == [0; 3] { order.split } else { Shares(counts) };
-    let mut recipe = Recipe {
+    let recipe = Recipe {
         furrow: env!("CARGO_PKG_VERSION").into(),
         made: Made::Imported { from: source.name().into(), source_sha256: hex::encode(Sha256::digest(source.words())) },
         count: images.len() as u64,
@@ -142,13 +142,7 @@ fn begin(folder: &Path, source: &dyn Source, order: &Order) -> Result<Set> {
         licence: order.licence.clone(),
         species: Vec::new(),
     };
-    if folder.join(FILE).exists() {
-        let before = Recipe::read(folder)?;
-        before.check_goes_on(folder, &recipe)?;
-        recipe.formats = before.formats;
-    }
-    write_files(folder, &[File { path: FILE.into(), bytes: recipe.text()? }])?;
-    Ok(Set { folder: folder.into(), recipe })
+    Ok(Set { folder: folder.into(), recipe: begin::begin(folder, recipe, &[])? })
 }
 
 /// Brings in one image, where it is not there yet.

@@ -1,0 +1,57 @@
+//! Writes a dataset's recipe, or finds it written: several programs may begin one dataset at once.
+
+use super::File;
+use super::checksum_record::write_files;
+use super::recipe::{FILE, Recipe};
+use crate::output::{create_atomically, is_unfinished};
+use crate::{Error, Result};
+use std::path::Path;
+
+/// Begins a dataset of this recipe in `folder`, whose scene is `files`, or goes on with the same one: it may get longer and get more
+/// formats. Returns the recipe that is there then. Of two programs that begin different ones at once, one is refused.
+pub(super) fn begin(folder: &Path, recipe: Recipe, files: &[File]) -> Result<Recipe> {
+    let path = folder.join(FILE);
+    if path.exists() {
+        return go_on(folder, recipe, files);
+    }
+    refuse_full(folder)?;
+    write_changed(folder, files)?;
+    // Last: a folder with a recipe has its scene.
+    if create_atomically(&path, &recipe.text()?)? { Ok(recipe) } else { go_on(folder, recipe, files) }
+}
+
+fn go_on(folder: &Path, mut recipe: Recipe, files: &[File]) -> Result<Recipe> {
+    let before = Recipe::read(folder)?;
+    before.check_goes_on(folder, &recipe)?;
+    // Formats that are there stay.
+    recipe.formats.extend(before.formats);
+    // In whatever order they were asked for, it is one dataset.
+    recipe.formats.sort();
+    recipe.formats.dedup();
+    write_changed(folder, files)?;
+    write_changed(folder, &[File { path: FILE.into(), bytes: recipe.text()? }])?;
+    Ok(recipe)
+}
+
+/// Writes the files that are not there as they are to be: others may be reading them.
+fn write_changed(folder: &Path, files: &[File]) -> Result<()> {
+    let changed = |file: &&File| !std::fs::read(folder.join(&file.path)).is_ok_and(|there| there == file.bytes);
+    let changed: Vec<File> = files.iter().filter(changed).cloned().collect();
+    write_files(folder, &changed)
+}
+
+/// Refuses a folder in which other things lie: nothing of the user's may be overwritten.
+pub(super) fn refuse_full(folder: &Path) -> Result<()> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
+    // A dataset that was stopped while it began has left its scene, and perhaps half a file.
+    let mut names = entries.filter_map(|e| Some(e.ok()?.file_name()));
+    let other = names.find(|name| name != "scene" && !is_unfinished(name));
+    match other {
+        // Another program has begun the dataset meanwhile.
+        Some(_) if folder.join(FILE).exists() => Ok(()),
+        Some(name) => Err(Error::misuse(format!("other things lie in this folder, {} among them", name.display()))
+            .in_file(folder)
+            .help("give --out a folder that is empty or not there yet")),
+        None => Ok(()),
+    }
+}
