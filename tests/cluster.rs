@@ -134,6 +134,28 @@ fn job_files_are_complete_and_can_be_read_by_bash() {
     }
 }
 
+/// Rationale: folders have any names, also those of a template's places. Expected: the script's words are the folder's name, letter by
+/// letter, wherever they stand.
+#[test]
+fn a_folder_named_as_a_place_of_the_template_stays_a_name() {
+    let (_keep, folder) = scratch();
+    for name in ["@TRACE@", "it's @DIR_QUOTED@ $(exit 9)", "@SHARDS@"] {
+        let folder = folder.join(name);
+        plan(&folder, 2);
+        for (engine, file) in [("slurm", "render.sbatch"), ("parallel", "render.sh")] {
+            let jobs = folder.join("jobs").join(engine);
+            emit(&folder, engine, 2, &["--out", path(&jobs), "--program", "/a b/@DIR@/trace"]);
+            let text = std::fs::read_to_string(jobs.join(file)).unwrap();
+            let lines =
+                text.lines().filter(|l| l.starts_with("trace=") || l.starts_with("dir=") || l.starts_with("shards="));
+            let script = lines.collect::<Vec<_>>().join("\n") + "\nprintf '%s\\n' \"$trace\" \"$dir\" \"$shards\"";
+            let said = Command::new("bash").args(["-c", &script]).output().unwrap();
+            let said = String::from_utf8(said.stdout).unwrap();
+            assert_eq!(said, format!("/a b/@DIR@/trace\n{}\n2\n", path(&folder)));
+        }
+    }
+}
+
 #[test]
 fn edited_job_files_are_never_overwritten() {
     let (_keep, folder) = scratch();
@@ -163,6 +185,11 @@ fn orders_that_make_no_sense_are_refused() {
         (&["--scheduler", "slurm", "--shards", "2", "--time", "5m"], "--grace 300"),
         (&["--scheduler", "slurm", "--shards", "2", "--time", "soon"], "4h"),
         (&["--scheduler", "pbs", "--shards", "2"], "slurm, kubernetes, parallel"),
+        (
+            &["--scheduler", "kubernetes", "--shards", "2", "--claim", "a\nevil: b"],
+            "--claim \"a\\nevil: b\" is no name",
+        ),
+        (&["--scheduler", "kubernetes", "--shards", "2", "--image", "a b"], "no name of a container image"),
     ] {
         let said = fail(verb("emit", &folder, more), 2);
         assert!(said.contains(words), "{more:?}: no `{words}` in\n{said}");

@@ -6,7 +6,7 @@
 //!
 //! | file | idea |
 //! |---|---|
-//! | `text` | numbers and plurals in words |
+//! | `text`, `markdown` | numbers and plurals in words; text of other people in Markdown |
 //! | `csv`, `table` | rows of values; a table as Markdown, CSV, JSON and HTML |
 //! | `histogram`, `tally` | counts in bins; the same with exact mean and range |
 //! | `axis` | ticks of an axis |
@@ -17,6 +17,7 @@ mod axis;
 pub mod chart;
 mod csv;
 mod histogram;
+pub mod markdown;
 mod page;
 mod table;
 mod tally;

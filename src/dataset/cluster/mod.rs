@@ -16,7 +16,7 @@ mod slurm;
 pub use request::{Job, Pod, Scheduler};
 
 use super::Set;
-use crate::output::write_atomically;
+use crate::output::write_together;
 use crate::{Error, Result};
 use script::plain;
 use std::path::{Path, PathBuf};
@@ -43,12 +43,9 @@ pub fn emit(set: &Set, job: &Job, folder: &Path) -> Result<(Vec<PathBuf>, Vec<St
                 .help("remove it, or give another --out"));
         }
     }
-    let mut paths = Vec::new();
-    for file in &files {
-        let path = folder.join(&file.path);
-        write_atomically(&path, &file.bytes)?;
-        paths.push(path);
-    }
+    let paths = write_together(folder, |together| {
+        files.iter().try_for_each(|file| together.add(&folder.join(&file.path), &file.bytes))
+    })?;
     let mut told = Vec::new();
     if job.scheduler == Scheduler::Slurm && job.shards > SLURM_ARRAY {
         told.push(format!(
@@ -65,6 +62,9 @@ fn check(set: &Set, job: &Job) -> Result<()> {
     if job.shards > set.recipe.count {
         let words = format!("{} shards of {} images: some would be empty", job.shards, set.recipe.count);
         return fault(words, "give fewer --shards; a shard should last minutes");
+    }
+    if let Scheduler::Kubernetes(pod) = &job.scheduler {
+        pod.check()?;
     }
     if job.grace >= job.time {
         let words = format!("--grace {} leaves nothing of --time {} s", job.grace.as_secs(), job.time.as_secs());

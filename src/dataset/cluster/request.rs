@@ -1,5 +1,6 @@
 //! What is asked of a scheduler.
 
+use crate::{Error, Result};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -23,6 +24,29 @@ pub struct Pod {
     pub claim: String,
 }
 
+/// Longest name of a Kubernetes object. Source: Kubernetes documentation, "Object Names and IDs", DNS subdomain names.
+const LONGEST_NAME: usize = 253;
+
+impl Pod {
+    /// Refuses what Kubernetes would, and what would end a line of the files.
+    pub(super) fn check(&self) -> Result<()> {
+        let letter = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit();
+        let part = |part: &str| {
+            part.starts_with(letter) && part.ends_with(letter) && part.chars().all(|c| letter(c) || c == '-')
+        };
+        if self.claim.len() > LONGEST_NAME || !self.claim.split('.').all(part) {
+            return Err(Error::misuse(format!("--claim {:?} is no name of a volume claim", self.claim)).help(format!(
+                "such a name has up to {LONGEST_NAME} lower-case letters, digits, `-` and `.`, as `furrow-data`"
+            )));
+        }
+        if self.image.is_empty() || self.image.contains(|c: char| c.is_whitespace() || c.is_control()) {
+            return Err(Error::misuse(format!("--image {:?} is no name of a container image", self.image))
+                .help("such a name has no spaces, as `registry.example.org/furrow:0.1.0`"));
+        }
+        Ok(())
+    }
+}
+
 /// What is asked of a scheduler.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Job {
@@ -42,4 +66,20 @@ pub struct Job {
     pub again: u64,
     /// The program, as the machines see it.
     pub program: PathBuf,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_that_kubernetes_would_refuse_are_refused() {
+        let check = |image: &str, claim: &str| Pod { image: image.into(), claim: claim.into() }.check();
+        assert!(check("a.b:5000/c@sha256:0", "furrow-data.v2").is_ok());
+        for claim in ["", "a\nb", "A", "-a", "a.", "a b", &"a".repeat(254)] {
+            let error = check("a", claim).unwrap_err();
+            assert!(error.exit_code() == 2 && error.to_string().lines().count() == 2, "{error}");
+        }
+        assert!(check("a\nb", "c").is_err() && check("", "c").is_err());
+    }
 }

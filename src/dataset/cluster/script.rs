@@ -6,7 +6,9 @@ use std::path::Path;
 
 /// A path as it may stand in a script, comments included.
 pub(super) fn plain(path: &Path) -> Result<String> {
-    path.to_str().filter(|p| !p.contains(char::is_control)).map(str::to_owned).ok_or_else(|| {
+    // YAML knows two more ends of a line.
+    let breaks = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
+    path.to_str().filter(|p| !p.contains(breaks)).map(str::to_owned).ok_or_else(|| {
         Error::misuse("this path cannot be written into a script")
             .in_file(path)
             .help("use a folder whose name has no control characters and is UTF-8")
@@ -30,9 +32,25 @@ pub(super) fn quoted(word: &str) -> String {
     format!("'{}'", word.replace('\'', r"'\''"))
 }
 
-/// A template with its names filled in.
+/// A template with its names filled in, in one pass: what is filled in may hold names between @ signs itself.
 pub(super) fn fill(path: &str, template: &str, names: &[(&str, String)]) -> File {
-    let text = names.iter().fold(template.to_owned(), |text, (name, value)| text.replace(&format!("@{name}@"), value));
+    let mut text = String::with_capacity(2 * template.len());
+    let mut rest = template;
+    while let Some((before, after)) = rest.split_once('@') {
+        text.push_str(before);
+        let value = after.split_once('@').and_then(|(name, after)| {
+            let (_, value) = names.iter().find(|(known, _)| *known == name)?;
+            Some((value, after))
+        });
+        rest = if let Some((value, after)) = value {
+            text.push_str(value);
+            after
+        } else {
+            text.push('@');
+            after
+        };
+    }
+    text.push_str(rest);
     File { path: path.into(), bytes: text.into_bytes() }
 }
 
@@ -46,6 +64,13 @@ mod tests {
             let said = std::process::Command::new("sh").arg("-c").arg(format!("printf %s {}", quoted(word))).output();
             assert_eq!(String::from_utf8(said.unwrap().stdout).unwrap(), word);
         }
+    }
+
+    #[test]
+    fn templates_are_filled_in_one_pass() {
+        let names = [("A", "@B@".to_owned()), ("B", "it's".to_owned())];
+        let filled = fill("x", "@A@ @B@ a@b.c @C@B@ @", &names);
+        assert_eq!(String::from_utf8(filled.bytes).unwrap(), "@B@ it's a@b.c @Cit's @");
     }
 
     #[test]

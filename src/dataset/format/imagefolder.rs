@@ -17,6 +17,7 @@ use crate::dataset::sample::Sample;
 use crate::dataset::set::{Set, Stream};
 use crate::dataset::split::Split;
 use crate::output::Picture;
+use crate::report::markdown::{code, plain};
 use crate::scene::tag::Class;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
@@ -157,18 +158,20 @@ fn card(set: &Set, splits: &[Split], w: &mut Stream<'_>) -> Result<()> {
         w.put(format!("  - split: {}\n    path: {}/**\n", split_name(*split), split.name()))?;
     }
     w.put("---\n\n# Crop fields, rendered and labelled exactly\n\n")?;
-    w.put(format!("{} images, made by Furrow {}. Licence: {}.\n\n", recipe.count, recipe.furrow, recipe.licence))?;
+    let (version, licence) = (plain(&recipe.furrow), plain(&recipe.licence));
+    w.put(format!("{} images, made by Furrow {version}. Licence: {licence}.\n\n", recipe.count))?;
     if let Ok(rendering) = recipe.rendering() {
         let line = format!(
-            "Scene `{}` (SHA-256 `{}`), seed {}, {} × {} pixels, {} samples a pixel.\n\n",
-            rendering.scene, rendering.scene_sha256, rendering.seed, rendering.width, rendering.height, rendering.spp
+            "Scene {} (SHA-256 {}), seed {}, {} × {} pixels, {} samples a pixel.\n\n",
+            code(&rendering.scene), code(&rendering.scene_sha256), rendering.seed, rendering.width, rendering.height, rendering.spp
         );
         w.put(line)?;
     }
     w.put(COLUMNS)?;
     w.put("\n`species` numbers:\n\n| number | species | EPPO code | class |\n|---|---|---|---|\n| 0 | none | | |\n")?;
     for (i, species) in recipe.species.iter().enumerate() {
-        w.put(format!("| {} | {} | {} | {} |\n", i + 1, species.name, species.eppo, species.class.name()))?;
+        let (name, eppo) = (plain(&species.name), plain(&species.eppo));
+        w.put(format!("| {} | {name} | {eppo} | {} |\n", i + 1, species.class.name()))?;
     }
     Ok(())
 }
