@@ -57,6 +57,51 @@ fn a_list_of_growths_moves_nothing_else() {
     assert_ne!(of(&plain, "GALAP"), of(&other, "GALAP"));
 }
 
+/// Rationale: one scene file for the fields of many farms must not sow them over each other. Expected: with `sown: One` each field has one of
+/// the crops, as it would be sown among all of them, and its record and its rows are that crop's; every crop comes; all fields are of
+/// one table of species; weeds stay where they are. Source: what `Sown` says.
+#[test]
+fn a_field_has_one_of_the_crops_where_the_scene_file_says_so() {
+    let sow = |sown: &str, index: u64| {
+        let text = format!(
+            r#"Field(
+                seed: 4,
+                camera: Pinhole(size: (32, 24), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.8)),
+                lights: [Constant(radiance: (1, 1, 1, 1))],
+                {sown}
+                crops: [
+                    (species: "scenes/species/sugar_beet.ron", growth: Bbch(12), rows: (in_row_m: 0.15)),
+                    (species: "scenes/species/maize.ron", growth: Bbch(12), rows: (in_row_m: 0.2, azimuth_deg: 30)),
+                    (species: "scenes/species/peanut.ron", growth: Bbch(12), rows: (in_row_m: 0.1)),
+                ],
+                weeds: [(species: "scenes/species/galium.ron", growth: Bbch(11), spread: (per_m2: 40))],
+            )"#
+        );
+        field(&text, &Options { index, ..Options::default() })
+    };
+    let mut seen = std::collections::BTreeSet::new();
+    for index in 0..16 {
+        let (all, one) = (sow("", index), sow("sown: One,", index));
+        assert_eq!((all.conditions.crops.len(), one.conditions.crops.len()), (3, 1));
+        let crop = &one.conditions.crops[0];
+        assert!(all.conditions.crops.contains(crop) && one.species == all.species);
+        let places = |field: &Field, species: &str| {
+            let of_it = field.plants.iter().filter(|p| p.species == species);
+            of_it.map(|p| (p.id, p.kind, p.position, p.height)).collect::<Vec<_>>()
+        };
+        for species in &all.species {
+            let here = places(&one, &species.name);
+            if species.class == Class::Weed || species.name == crop.species {
+                assert_eq!(here, places(&all, &species.name), "{} of field {index}", species.name);
+            } else {
+                assert!(here.is_empty(), "{} of field {index}", species.name);
+            }
+        }
+        seen.insert(crop.species.clone());
+    }
+    assert_eq!(seen.len(), 3, "{seen:?}");
+}
+
 /// Rationale: numbers are dense, so the same beet is 10 in one image and 8 in the next; whoever follows a plant through images needs
 /// what does not change. Expected: with the camera 5 cm further, and with another resolution, plants at the same place have the same
 /// identity, so have their leaves, and no two of a field are equal; another field has others. Source: what `PlantRecord::id` says.

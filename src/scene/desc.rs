@@ -1,4 +1,4 @@
-//! What a scene file says: the field and the species, composed of what each room can read.
+//! What a scene file says: the field and the species, composed of what each module can read.
 
 use crate::film::Filter;
 use crate::light::LightDesc;
@@ -49,6 +49,9 @@ pub struct FieldDesc {
     /// Sown in rows.
     #[serde(default)]
     pub crops: Vec<CropDesc>,
+    /// Which of the crops a field has; all of them unless given.
+    #[serde(default, skip_serializing_if = "Sown::is_all")]
+    pub sown: Sown,
     /// What came by itself.
     #[serde(default)]
     pub weeds: Vec<WeedDesc>,
@@ -58,6 +61,44 @@ pub struct FieldDesc {
     /// Models from disk in their places.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub models: Vec<ModelDesc>,
+}
+
+/// Which of a scene file's crops a field has.
+///
+/// ```
+/// use furrow::scene::desc::{FieldDesc, Sown};
+/// let text = r#"Field(camera: JaiAd130(), sown: One, crops: [
+///     (species: "species/maize.ron", growth: Bbch(14), rows: (spacing_m: 0.75)),
+///     (species: "species/carrot.ron", growth: AgeDays(30), rows: (spacing_m: 0.3)),
+/// ])"#;
+/// let field: FieldDesc = ron::from_str(text).unwrap();
+/// assert_eq!(field.sown, Sown::One);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Sown {
+    /// All of them, each in its rows.
+    #[default]
+    All,
+    /// One of them, drawn for every field with equal probabilities: one scene file for the fields of many farms.
+    One,
+}
+
+impl Sown {
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
+    fn is_all(&self) -> bool {
+        *self == Self::All
+    }
+
+    /// Places of the crops that a field has, of so many that its scene file lists.
+    pub fn draw(self, crops: usize, stream: &mut Stream) -> std::ops::Range<usize> {
+        match self {
+            Self::One if crops > 1 => {
+                let k = stream.index(crops);
+                k..k + 1
+            }
+            _ => 0..crops,
+        }
+    }
 }
 
 /// A good lens on small pixels: about half a pixel of blur.
@@ -225,7 +266,7 @@ fn no_turn() -> Vary<Finite> {
     Vary::fixed(0.0)
 }
 
-/// A species, as its scene file writes it.
+/// A species, as its file writes it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename = "Species")]
 pub struct SpeciesDesc {

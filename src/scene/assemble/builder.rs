@@ -24,6 +24,8 @@ pub(super) struct Builder<'a> {
     pub(super) seed: u64,
     pub(super) index: u64,
     pub(super) season: Season,
+    /// Places of the crops that this field has.
+    pub(super) sown: std::ops::Range<usize>,
     /// The lights as they were drawn.
     pub(super) lights: Vec<LightRecord>,
     pub(super) lighting: Vec<Lighting>,

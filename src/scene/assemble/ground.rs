@@ -58,8 +58,8 @@ impl Builder<'_> {
             maps.push(self.library.layer(self.page, layer)?);
         }
         let pixel = self.ground_pixel();
-        let rows = self.desc.crops.first().map(|c| {
-            let rows = Rows::draw(&c.rows, &self.stream(Purpose::Scatter, 0));
+        let rows = self.sown.clone().next().map(|k| {
+            let rows = Rows::draw(&self.desc.crops[k].rows, &self.stream(Purpose::Scatter, k as u64));
             SeedRows { spacing_m: rows.spacing_m, azimuth: rows.azimuth, offset_m: rows.offset_m }
         });
         let site = Site {

@@ -38,7 +38,8 @@ impl Builder<'_> {
     /// The crops as they were drawn.
     pub(super) fn crop_records(&mut self) -> Result<Vec<CropRecord>> {
         let mut all = Vec::new();
-        for (k, crop) in self.desc.crops.iter().enumerate() {
+        for k in self.sown.clone() {
+            let crop = &self.desc.crops[k];
             let species = self.library.species(self.page, &crop.species)?.desc.name.clone();
             let rows = Rows::draw(&crop.rows, &self.stream(Purpose::Scatter, k as u64)).record();
             all.push(CropRecord { species, rows });

@@ -66,6 +66,8 @@ const SHADOW: f32 = 2.75;
 const SEASON: u64 = 1 << 32;
 /// Address of the first of the streams from which lists of lights are drawn, one for each place among the scene file's lights.
 const LIGHTING: u64 = 2 << 32;
+/// Address of the stream from which the crop that is sown is drawn.
+const SOWN: u64 = 3 << 32;
 /// Most pixels of an image.
 const MOST_PIXELS: u64 = 1 << 28;
 /// About the most texels of the ground's maps: a larger view has larger ones.
@@ -153,7 +155,7 @@ struct Seedling {
 }
 
 impl Seedling {
-    /// The same as vigorous as its entry on the scene file says, and in the entry's condition, if it has one.
+    /// The same as vigorous as its entry in the scene file says, and in the entry's condition, if it has one.
     fn tended(self, vigour: &Vary<Positive>, condition: Option<&ConditionDesc>) -> Self {
         let condition = condition.cloned().or(self.condition);
         Self { vigour: vigour.clone(), condition, ..self }
@@ -201,7 +203,8 @@ impl<'a> Builder<'a> {
         }
         let scene = Scene { parts: Vec::new(), materials: Vec::new(), lights, camera, filter: desc.filter.footprint() };
         let season = Season::draw(page, desc, &mut Stream::of(seed, index, Purpose::Page, SEASON))?;
-        Ok(Self { page, desc, library, seed, index, season, lights: light_records, lighting, scene, warnings })
+        let sown = desc.sown.draw(desc.crops.len(), &mut Stream::of(seed, index, Purpose::Page, SOWN));
+        Ok(Self { page, desc, library, seed, index, season, sown, lights: light_records, lighting, scene, warnings })
     }
 
     fn stream(&self, purpose: Purpose, index: u64) -> Stream {
@@ -309,7 +312,8 @@ impl<'a> Builder<'a> {
         let area = area.corners();
         let (desc, page) = (self.desc, self.page);
         let mut census = Census::new(page);
-        for (k, crop) in desc.crops.iter().enumerate() {
+        for k in self.sown.clone() {
+            let crop = &desc.crops[k];
             let species = self.library.species(page, &crop.species)?;
             let places = scatter::rows_looked_at(&crop.rows, area, &self.stream(Purpose::Scatter, k as u64));
             census.open(Population::Crop(k), places, all.len())?;

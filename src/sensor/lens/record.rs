@@ -42,6 +42,15 @@ pub struct CameraRecord {
     pub motion: Option<MotionRecord>,
 }
 
+impl CameraRecord {
+    /// Side of a pixel on the plane z = 0 in the image's middle, metres; none where the camera does not look down.
+    pub fn pixel_m(&self) -> Option<f64> {
+        let down = -self.world_to_camera[2][2];
+        let along = self.position_m[2] / down;
+        (along.is_finite() && along > 0.0 && down > 0.0).then(|| along / self.fx_px)
+    }
+}
+
 /// A driving camera as it was drawn: row y of h is in the middle of its exposure at (y/h − ½) · readout.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MotionRecord {
