@@ -61,6 +61,8 @@ const ALLOWED: &[(&str, &str)] = &[
     ("bytemuck", "raster/"),
     // Command lines; hyper-parameters are read from flags and from files alike.
     ("clap", "bin/ train/fit/settings.rs"),
+    // Checksums of TensorBoard's records.
+    ("crc32c", "train/fit/log/events.rs"),
     // Tables: measured spectra in; boxes of plants and numbers of reports out.
     ("csv", "optics/prospect.rs dataset/format/cropandweed.rs report/csv.rs"),
     ("embree3", "accel/embree.rs"),
@@ -85,7 +87,7 @@ const ALLOWED: &[(&str, &str)] = &[
     ("png", "output/png.rs texture/draw/"),
     ("pollster", "raster/gpu.rs"),
     // ONNX files.
-    ("prost", "train/deploy/onnx/"),
+    ("prost", "train/deploy/onnx/ train/fit/log/events.rs"),
     // Documents of Mitsuba.
     ("quick_xml", "output/mitsuba/xml.rs"),
     ("rand", "sampling/rng.rs"),

@@ -13,7 +13,7 @@ use furrow::error::Kind;
 use furrow::ron_file::RonFile;
 use furrow::train::baseline::files;
 use furrow::train::classes::Classes;
-use furrow::train::data::{Normalization, Pick, Selection, Shape, Store};
+use furrow::train::data::{Normalization, Pick, Resize, Selection, Shape, Store};
 use furrow::train::fit::checkpoint::History;
 use furrow::train::fit::{Hyperparameters, Plan};
 use furrow::train::measure::{Evaluation, Prediction, Report};
@@ -96,6 +96,8 @@ impl Players {
             parameters: 1,
             input: plan.shape.clone(),
             normalization: Normalization::Image,
+            resize: Resize::default(),
+            pixel_mm: None,
             classes: plan.classes.clone(),
             weights: run::WEIGHTS.into(),
             weights_sha256: weights::hash(&values),

@@ -4,6 +4,9 @@
 //! taken for its own, would falsify every table made of it. Expected: equal bytes of `weights.safetensors` stopped or not, killed or not,
 //! with any number of loading threads; one clear error, exit code 2, for what cannot be gone on with. Source: what `train fit --help` says.
 
+mod common;
+
+use common::python::{ask, python};
 use furrow::output::{Picture, write_png};
 use furrow::ron_file::RonFile;
 use furrow::sampling::{Purpose, Stream};
@@ -96,7 +99,9 @@ fn eight_images_are_learnt_by_every_network_and_judged_so() {
     let scratch = tempfile::tempdir().unwrap();
     let folder = scratch.path();
     let set = set(folder, 8);
-    for (network, steps, rate) in [("basic-segnet", 60, "0.003"), ("unet", 80, "0.003"), ("segnet", 40, "0.001")] {
+    for (network, steps, rate) in
+        [("basic-segnet", 60, "0.003"), ("unet", 80, "0.003"), ("segnet", 40, "0.001"), ("lite-unet", 100, "0.003")]
+    {
         let out = folder.join(network);
         let more = format!(
             "--network {network} --steps {steps} --rate {rate} --augment none --class-weights none --validate-every 1000"
@@ -151,6 +156,8 @@ fn a_training_that_is_stopped_or_killed_ends_with_the_same_bytes() {
             succeed(&mut fit(&set, &out, &more));
             assert_eq!(weights(&out), weights(&whole), "{method} {name}");
             assert_eq!(results(&out).history, results(&whole).history);
+            let log = |run: &Path| fs::read_to_string(run.join("log.csv")).unwrap();
+            assert_eq!(log(&out), log(&whole));
             let again = succeed(&mut fit(&set, &out, &more));
             assert!(again.status.success());
             assert_eq!(weights(&out), weights(&whole));
@@ -473,6 +480,33 @@ fn outlines_are_learnt_where_people_draw_them() {
             let expected = if *before > 0 { before == after } else { (*after > 0) == near(i, 2.5) };
             assert!(expected, "{i}: {before} {after}");
         }
+    }
+}
+
+/// Rationale: whoever trains for a night wants to see in its first hour whether anything is learnt. Expected: a row of the log stands there
+/// while the training still runs; stopped and gone on with, both logs hold each step once; TensorBoard's own reader finds the
+/// same numbers, and pictures of validation images. Source: PyPI's tensorboard 2.20.0, `tests/train/check_events.py`.
+#[test]
+fn logs_grow_while_it_trains_and_tensorboard_reads_them() {
+    let scratch = tempfile::tempdir().unwrap();
+    let set = set(scratch.path(), 6);
+    let out = scratch.path().join("run");
+    let more =
+        format!("--network basic-segnet --steps 40 --patience 99 --val {}@0..2 --validate-every 4", set.display());
+    let mut child = fit(&set, &out, &more).stderr(Stdio::null()).spawn().unwrap();
+    let begin = Instant::now();
+    let rows = || fs::read_to_string(out.join("log.csv")).unwrap_or_default().lines().count();
+    while rows() < 5 {
+        assert!(begin.elapsed() < Duration::from_secs(120));
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    assert!(!out.join(run::RESULT).exists());
+    let _ = Command::new("sh").arg("-c").arg(format!("kill -INT {}", child.id())).status();
+    child.wait().unwrap();
+    succeed(&mut fit(&set, &out, &more));
+    assert_eq!(rows(), 1 + 40);
+    if let Some(python) = python("import tensorboard, PIL") {
+        ask(&python, "train/check_events.py", &[out.to_str().unwrap()]);
     }
 }
 

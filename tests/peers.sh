@@ -19,10 +19,12 @@ if ! cmp -s tests/requirements.txt target/venv/installed; then
   cp tests/requirements.txt target/venv/installed
 fi
 # PyPI's torch for Linux needs three gigabytes of CUDA. Debian's is for the CPU, and is found by Debian's Python only.
-safetensors=$(grep '^safetensors==' tests/requirements.txt)
-if [ "$(cat target/venv-torch/installed 2>/dev/null || true)" != "$safetensors" ]; then
+beside_torch="$(grep '^safetensors==' tests/requirements.txt) efficientnet-lite-pytorch==0.1.0"
+if [ "$(cat target/venv-torch/installed 2>/dev/null || true)" != "$beside_torch" ]; then
   /usr/bin/python3 -m venv --system-site-packages target/venv-torch
-  target/venv-torch/bin/pip install -q "$safetensors"
-  echo "$safetensors" > target/venv-torch/installed
+  # shellcheck disable=SC2086 # two packages
+  target/venv-torch/bin/pip install -q --no-deps $beside_torch
+  echo "$beside_torch" > target/venv-torch/installed
 fi
 sh .libtorch/get.sh
+sh .libtorch/imagenet.sh

@@ -85,7 +85,9 @@ fn files(out: &Path) -> BTreeMap<String, Vec<u8>> {
             || name.contains("/ledger/")
             || name.starts_with("times.")
             || name.starts_with("runs/")
-                && ["/plan.json", "/result.json", "/report.html"].iter().any(|n| name.ends_with(n))
+                && ["/plan.json", "/result.json", "/report.html", "/training.tfevents"]
+                    .iter()
+                    .any(|n| name.ends_with(n))
     };
     tree(out).into_iter().filter(|(name, _)| !free(name)).collect()
 }

@@ -9,11 +9,11 @@
 //! ```
 
 use super::classes::Classes;
-use super::data::{Band, Normalization, Shape, Store};
+use super::data::{Band, Normalization, Resize, Shape, Store};
 use super::fit::Plan;
 use super::fit::checkpoint::History;
 use super::fit::hyper::SIDES;
-use super::net::Network;
+use super::net::{Network, Pretrained};
 use super::weights::{self, Array};
 use crate::input::below;
 use crate::output::{Together, write_atomically, write_together};
@@ -53,6 +53,9 @@ impl Identity {
         let mut plan = Plan { seconds: None, ..self.plan.clone() };
         for selection in plan.train.iter_mut().chain(&mut plan.val) {
             selection.folder = "".into();
+        }
+        if let Pretrained::File(path) = &mut plan.hyper.pretrained {
+            path.clear();
         }
         let text = serde_json::to_string(&Self { plan, ..self.clone() }).map_err(|e| failed(&e))?;
         Ok(hex::encode(Sha256::digest(text)))
@@ -100,6 +103,12 @@ pub struct ModelCard {
     /// Input normalization, of values from 0 to 1, 8 bits divided by 255; `normalisation` in JSON.
     #[serde(rename = "normalisation")]
     pub normalization: Normalization,
+    /// The sizes that pictures are brought to.
+    #[serde(default, skip_serializing_if = "Resize::is_stretch")]
+    pub resize: Resize,
+    /// Side of a pixel on the ground, millimetres: the median of the training set, where it tells its cameras.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pixel_mm: Option<f64>,
     /// Its classes, in the order of its outputs.
     pub classes: Classes,
     /// The file of the weights, beside this one.
@@ -120,6 +129,10 @@ impl ModelCard {
         let names: Vec<&str> = bands.iter().map(Band::name).collect();
         if Band::list(&names.join(",")).as_ref() != Ok(bands) {
             return Err(format!("`{}` are no bands of an image", names.join(",")));
+        }
+        self.resize.check()?;
+        if self.pixel_mm.is_some_and(|mm| !(mm.is_finite() && mm > 0.0)) {
+            return Err("its pixels have no size".into());
         }
         if let Normalization::Fixed { mean, sd } = &self.normalization
             && (mean.len() != bands.len()

@@ -1,17 +1,19 @@
 //! Training, calibration and evaluation, from files to files.
 
-use super::data::{Pick, Selection, Store, augment};
+use super::data::{Pick, Resize, Selection, Store, resize};
+use super::deploy::enlarge::classes_at;
 use super::fit::calibrate::calibrate;
 use super::fit::checkpoint::Checkpoint;
 use super::fit::{self, Callbacks, Data, Plan};
 use super::measure::{Evaluation, Prediction, Report};
 use super::net::{Parameter, parameters};
 use super::run::{self, Identity, ModelCard, Results, TrainedModel};
-use super::torch::{Model, Precision, Where, device};
+use super::torch::{Model, Precision, Where, device, multiscale};
 use super::weights;
 use crate::dataset::split::Split;
 use crate::output::remove_unfinished;
 use crate::{Error, Result};
+use std::borrow::Cow;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -64,7 +66,14 @@ pub fn fit(
         return Err(Error::misuse("there is no training image")
             .help("name sets with --set DIR, or other images of them with DIR@all"));
     }
-    let begin = begin.map(TrainedModel::open).transpose()?.map(|trained| trained.values).unwrap_or_default();
+    let begin = match begin {
+        Some(_) if !plan.hyper.pretrained.is_none() => {
+            return Err(Error::misuse("a run to begin with and pretrained weights exclude each other")
+                .help("--init goes on with all weights of a run, --pretrained begins an encoder: give one"));
+        }
+        Some(run) => TrainedModel::open(run)?.values,
+        None => plan.hyper.pretrained.begin(plan.network, plan.shape.bands.len(), plan.classes.len(), plan.seed)?,
+    };
     let plan = Plan { begin_with: (!begin.is_empty()).then(|| weights::hash(&begin)), ..plan.clone() };
     let identity = Identity::of(&plan, &train, &val)?;
     // A set without the bands is told before a folder is taken for it.
@@ -91,6 +100,8 @@ pub fn fit(
         parameters: list.iter().filter(|p| p.role.is_trainable()).map(Parameter::len).sum(),
         input: plan.shape.clone(),
         normalization: outcome.normalization,
+        resize: plan.hyper.resize.clone(),
+        pixel_mm: data.train.pixel_mm()?,
         classes: plan.classes.clone(),
         weights: run::WEIGHTS.into(),
         weights_sha256: weights::hash(&outcome.values),
@@ -136,8 +147,10 @@ pub fn calibrated(
 pub struct Predicted<'a> {
     /// Its place in the selection.
     pub place: usize,
-    /// The image at the network's size, before normalization.
+    /// The image, before normalization.
     pub example: &'a super::data::Example,
+    /// Its width and height, pixels: the network's where pictures are stretched to that, its own otherwise.
+    pub size: (u32, u32),
     /// Predicted class of each pixel.
     pub predicted: &'a [u8],
 }
@@ -157,22 +170,26 @@ pub fn evaluate(
     device::set_threads(threads);
     let model = Model::with(card.network, card.input.bands.len(), card.classes.len(), &trained.values, place)?;
     let store = Store::open(std::slice::from_ref(on), Pick::All, 0, &card.classes, &card.input, true, 0)?;
-    let (width, height) = (card.input.width, card.input.height);
+    let trained_at = (card.input.width, card.input.height);
     let mut evaluation = Evaluation::new(card.classes.names());
     for place in 0..store.len() {
         if stop.load(Ordering::Relaxed) {
             return Err(Error::interrupted());
         }
-        let example = store.get(place)?;
-        let mut pixels = augment::interleave(&example, 1);
-        card.normalization.apply(&mut pixels, card.input.bands.len());
+        let (size, example) = match card.resize {
+            Resize::Stretch => (trained_at, store.get(place)?),
+            _ => store.whole(place).map(|(size, example)| (size, Cow::Owned(example)))?,
+        };
+        let inputs = resize::inputs(&example.planes, size, &card.resize.sizes(trained_at, size), &card.normalization);
         let begun = Instant::now();
-        let predicted = model.predict(&pixels, (width, height))?;
+        let scores = multiscale::scores(&model, &inputs)?;
         let seconds = Some(begun.elapsed().as_secs_f64());
+        let predicted = classes_at(&scores.values, scores.size, size);
+        let (width, height) = size;
         let plants = example.plants.iter().any(|p| *p > 0).then_some(example.plants.as_slice());
         let (name, truth) = (example.name.as_str(), example.labels.as_slice());
         evaluation.add(&Prediction { name, width, height, truth, predicted: &predicted, plants, seconds })?;
-        seen(&Predicted { place, example: &example, predicted: &predicted })?;
+        seen(&Predicted { place, example: &example, size, predicted: &predicted })?;
     }
     Ok(evaluation.finish())
 }

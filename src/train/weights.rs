@@ -18,6 +18,15 @@ pub struct Array {
     pub values: Vec<f32>,
 }
 
+impl Array {
+    /// A tensor of a file; none where it is not of single precision.
+    fn of(name: String, view: &TensorView<'_>) -> Option<Self> {
+        let values =
+            |view: &TensorView<'_>| view.data().as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
+        (view.dtype() == Dtype::F32).then(|| Self { name, shape: view.shape().to_vec(), values: values(view) })
+    }
+}
+
 /// The only key of the header's words: with several, their order in the file would be that of a hash map.
 const KEY: &str = "furrow";
 
@@ -49,19 +58,34 @@ pub fn read(path: &Path) -> Result<(Vec<Array>, String)> {
     let text =
         header.metadata().as_ref().and_then(|m| m.get(KEY)).ok_or_else(|| damaged(&"words of ours are missing"))?;
     let (sum, text) = text.split_once('\n').ok_or_else(|| damaged(&"its checksum is missing"))?;
-    let mut arrays = Vec::new();
-    for (name, view) in SafeTensors::deserialize(&bytes).map_err(|e| damaged(&e))?.tensors() {
-        if view.dtype() != Dtype::F32 {
-            return Err(damaged(&format!("`{name}` is not of single precision")));
-        }
-        let values = view.data().as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
-        arrays.push(Array { name, shape: view.shape().to_vec(), values });
-    }
-    arrays.sort_by(|a, b| a.name.cmp(&b.name));
+    let arrays = arrays(&bytes).map_err(|what| damaged(&what))?;
     if sum != checksum(&arrays, text) {
         return Err(damaged(&"its weights do not match their checksum"));
     }
     Ok((arrays, text.to_owned()))
+}
+
+/// Reads arrays that another program wrote, in the order of their names; those that are not of single precision are left out.
+pub fn read_foreign(path: &Path) -> Result<Vec<Array>> {
+    let bytes = std::fs::read(path).map_err(Error::reading(path))?;
+    let all = SafeTensors::deserialize(&bytes);
+    let fault = |e: &dyn std::fmt::Display| unusable(path, &format!("this is no safetensors file: {e}"));
+    let all = all.map_err(|e| fault(&e))?;
+    let mut arrays: Vec<Array> = all.tensors().into_iter().filter_map(|(name, view)| Array::of(name, &view)).collect();
+    arrays.sort_by(|a, b| a.name.cmp(&b.name));
+    Ok(arrays)
+}
+
+/// All arrays of a file, in the order of their names; what is wrong with it otherwise.
+fn arrays(bytes: &[u8]) -> Result<Vec<Array>, String> {
+    let all = SafeTensors::deserialize(bytes).map_err(|e| e.to_string())?;
+    let array = |(name, view): (String, TensorView<'_>)| {
+        let words = format!("`{name}` is not of single precision");
+        Array::of(name, &view).ok_or(words)
+    };
+    let mut arrays = all.tensors().into_iter().map(array).collect::<Result<Vec<_>, _>>()?;
+    arrays.sort_by(|a, b| a.name.cmp(&b.name));
+    Ok(arrays)
 }
 
 /// SHA-256 over names, shapes and values, whatever the order of the arrays.

@@ -38,7 +38,7 @@ fn first(before: impl Iterator<Item = PathBuf>, probe: &str) -> Option<PathBuf> 
 pub fn torch() -> Option<PathBuf> {
     let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/venv-torch/bin/python");
     let named = std::env::var_os("FURROW_TORCH_PYTHON").map(PathBuf::from);
-    first(named.into_iter().chain([own]), "import torch, numpy, safetensors")
+    first(named.into_iter().chain([own]), "import torch, numpy, safetensors, efficientnet_lite_pytorch")
 }
 
 /// Runs a script of `tests/` and expects it to be content; shows what it says.

@@ -37,16 +37,17 @@ pub fn set(name: &str) -> PathBuf {
 
 /// Trains a network for six steps on a set.
 pub fn learn(network: Network, bands: &str, normalization: NormalizationMode, set: &Path, out: &Path) -> TrainedModel {
-    let selection = Selection { pick: Some(Pick::All), ..Selection::of(set) };
     let shape = Shape { bands: Band::list(bands).expect("bands"), width: SIZE.0, height: SIZE.1 };
-    let plan = Plan {
-        network,
-        shape,
-        classes: Classes::default(),
-        train: vec![selection],
-        hyper: Hyperparameters { steps: 6, batch: 2, normalization, ..Hyperparameters::default() },
-        ..Plan::default()
-    };
+    let plan = Plan { network, shape, ..Plan::default() };
+    learn_with(set, out, plan, Hyperparameters { normalization, ..Hyperparameters::default() })
+}
+
+/// Trains a plan for six steps of two images on a set.
+pub fn learn_with(set: &Path, out: &Path, plan: Plan, hyper: Hyperparameters) -> TrainedModel {
+    let selection = Selection { pick: Some(Pick::All), ..Selection::of(set) };
+    let shape = Shape { width: SIZE.0, height: SIZE.1, ..plan.shape };
+    let hyper = Hyperparameters { steps: 6, batch: 2, ..hyper };
+    let plan = Plan { shape, classes: Classes::default(), train: vec![selection], hyper, ..plan };
     let callbacks = Callbacks { step: &|_, _| (), validation: &|_, _| (), stop: &AtomicBool::new(false) };
     session::fit(&plan, None, &machine(), out, &callbacks).expect("a training");
     TrainedModel::open(out).expect("what was learnt")

@@ -7,7 +7,8 @@ height x width, normalised) and `scores`, what the program makes of them. Two en
 
 numpy   convolutions as sums over shifted pictures, everything in double precision.
 torch   `torch.nn` modules named as in the papers' public implementations (SegNet's encoder as torchvision's `vgg16_bn`, the
-        U-Net's as torchvision's `resnet18`, its decoder as segmentation_models_pytorch's `UnetDecoder`), in double precision.
+        U-Net's as torchvision's `resnet18`, its decoder as segmentation_models_pytorch's `UnetDecoder`), in double precision; the
+        encoder of `lite-unet` is that of PyPI's `efficientnet-lite-pytorch`, other people's code.
 
 A pooling that puts maxima back where they lay is discontinuous: where the two largest of four values are nearly equal, rounding
 decides. Images in which that happens (a gap below GAP of the layer's deviation, in double precision) decide nothing and are counted
@@ -37,23 +38,27 @@ class Arrays:
         self.used[name] = self.weights[name].size
         return self.weights[name].astype(np.float64)
 
-    def conv(self, x, name, stride=1, bias=True):
+    def conv(self, x, name, stride=1, bias=True, pad=None):
         w = self.get(name + ".weight")
         k = w.shape[2]
-        x = np.pad(x, [(0, 0), (0, 0), (k // 2, k // 2), (k // 2, k // 2)])
+        pad = pad or (k // 2, k // 2)
+        x = np.pad(x, [(0, 0), (0, 0), pad, pad])
         h, v = (x.shape[2] - k) // stride + 1, (x.shape[3] - k) // stride + 1
         y = np.zeros((x.shape[0], w.shape[0], h, v))
         for i in range(k):
             for j in range(k):
                 part = x[:, :, i : i + stride * h : stride, j : j + stride * v : stride]
-                y += np.einsum("oc,nchw->nohw", w[:, :, i, j], part, optimize=True)
+                if w.shape[1] == 1 and x.shape[1] > 1:
+                    y += w[:, 0, i, j, None, None] * part
+                else:
+                    y += np.einsum("oc,nchw->nohw", w[:, :, i, j], part, optimize=True)
         return y + self.get(name + ".bias")[:, None, None] if bias else y
 
-    def norm(self, x, name):
+    def norm(self, x, name, epsilon=1e-5):
         gain, shift, mean, variance = (
             self.get(f"{name}.{part}")[:, None, None] for part in ("weight", "bias", "running_mean", "running_var")
         )
-        return gain * (x - mean) / np.sqrt(variance + 1e-5) + shift
+        return gain * (x - mean) / np.sqrt(variance + epsilon) + shift
 
     def unit(self, x, name, relu=True, **conv):
         y = self.norm(self.conv(x, name + ".conv", **conv), name + ".bn")
@@ -138,9 +143,44 @@ def numpy_unet(o, x):
     return o.conv(x, "head.conv")
 
 
+# EfficientNet-B0's table 1, as Lite has it: blocks, kernel, stride, expansion.
+LITE = [(1, 3, 1, 1), (2, 3, 2, 6), (2, 5, 2, 6), (3, 3, 2, 6), (3, 5, 1, 6), (4, 5, 2, 6), (1, 3, 1, 6)]
+
+
+def numpy_lite_unet(o, x):
+    size = x.shape[2:]
+
+    def unit(x, name, relu=True, stride=1, kernel=1):
+        before = (kernel - stride) // 2
+        y = o.conv(x, name + ".conv", stride=stride, bias=False, pad=(before, kernel - stride - before))
+        y = o.norm(y, name + ".bn", epsilon=1e-3)
+        return np.clip(y, 0, 6) if relu else y
+
+    x = unit(x, "stem", stride=2, kernel=3)
+    skips = []
+    for stage, (blocks, kernel, stride, expansion) in enumerate(LITE):
+        for block in range(blocks):
+            name, step = f"enc{stage}_{block}", stride if block == 0 else 1
+            if step == 2:
+                skips.append(x)
+            y = x if expansion == 1 else unit(x, name + ".expand")
+            y = unit(y, name + ".depthwise", stride=step, kernel=kernel)
+            y = unit(y, name + ".project", relu=False)
+            x = x + y if block > 0 else y
+    for level in range(5):
+        skip = skips.pop() if skips else None
+        x = o.nearest(x, *(size if skip is None else skip.shape[2:]))
+        if skip is not None:
+            x = np.concatenate([x, skip], axis=1)
+        for i in range(2):
+            x = o.unit(x, f"dec{level}_{i}", bias=False)
+    return o.conv(x, "head.conv")
+
+
 def run_numpy(network, weights, images, classes):
     o = Arrays(weights)
-    walk = {"segnet": numpy_segnet, "basic-segnet": numpy_basic_segnet, "unet": numpy_unet}[network]
+    walk = {"segnet": numpy_segnet, "basic-segnet": numpy_basic_segnet, "unet": numpy_unet}
+    walk = (walk | {"lite-unet": numpy_lite_unet})[network]
     scores = walk(o, images.astype(np.float64))
     learnt = sum(size for name, size in o.used.items() if "running" not in name)
     return scores, learnt, o.doubt, set(o.used)
@@ -301,7 +341,42 @@ def torch_networks():
             names += [f"dec{d}_{i}.{what}" for d in range(5) for i in range(2) for what in ("conv", "bn")]
             return names + ["head.conv"]
 
-    return {"segnet": SegNet, "basic-segnet": BasicSegNet, "unet": UNet}
+    class LiteUNet(Base):
+        """The encoder is the public one, of the package whose weights it begins with."""
+
+        def __init__(self, bands, classes):
+            super().__init__()
+            from efficientnet_lite_pytorch import EfficientNet
+
+            self.encoder = EfficientNet.from_name("efficientnet-lite0", in_channels=bands)
+            del self.encoder._conv_head, self.encoder._bn1, self.encoder._fc
+            decoder, skips, inputs = [128, 64, 48, 32, 16], [112, 40, 24, 16, 0], [320, 128, 64, 48, 32]
+            self.decoder = nn.ModuleList(DecoderBlock(*sizes) for sizes in zip(inputs, skips, decoder))
+            self.segmentation_head = nn.Conv2d(16, classes, 3, padding=1)
+
+        def forward(self, x):
+            size = x.shape[2:]
+            x = self.encoder._swish(self.encoder._bn0(self.encoder._conv_stem(x)))
+            features = []
+            for block in self.encoder._blocks:
+                if block._depthwise_conv.stride[0] == 2:
+                    features.append(x)
+                x = block(x)
+            features = features[::-1] + [None]
+            for block, skip in zip(self.decoder, features):
+                x = block(x, skip, size if skip is None else skip.shape[2:])
+            return self.segmentation_head(x)
+
+        def names(self):
+            names = ["stem.conv", "stem.bn"]
+            for s, (blocks, _, _, expansion) in enumerate(LITE):
+                for b in range(blocks):
+                    parts = (["expand"] if expansion > 1 else []) + ["depthwise", "project"]
+                    names += [f"enc{s}_{b}.{part}.{what}" for part in parts for what in ("conv", "bn")]
+            names += [f"dec{d}_{i}.{what}" for d in range(5) for i in range(2) for what in ("conv", "bn")]
+            return names + ["head.conv"]
+
+    return {"segnet": SegNet, "basic-segnet": BasicSegNet, "unet": UNet, "lite-unet": LiteUNet}
 
 
 def run_torch(network, weights, images, classes):

@@ -2,8 +2,9 @@
 
 use crate::machine::MachineArgs;
 use crate::report::{self, Shots};
+use crate::sizes::SizeArgs;
 use furrow::cli::signal::Signals;
-use furrow::train::data::{Band, Pick, Selection};
+use furrow::train::data::{Band, Pick, Resize, Selection};
 use furrow::train::run::TrainedModel;
 use furrow::train::session;
 use furrow::{Result, cli};
@@ -21,12 +22,15 @@ pub(crate) struct Args {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
+    sizes: SizeArgs,
+    #[command(flatten)]
     machine: MachineArgs,
 }
 
 /// Evaluates, and writes the report.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
-    let trained = TrainedModel::open(&args.run)?;
+    let mut trained = TrainedModel::open(&args.run)?;
+    args.sizes.apply(&mut trained.card)?;
     let set = args.set.folder.file_name().unwrap_or_default();
     let out = args.out.clone().unwrap_or_else(|| args.run.join("eval").join(set));
     cli::check_folder(&out)?;
@@ -35,20 +39,22 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let bands: Vec<&str> = card.input.bands.iter().map(Band::name).collect();
     let (_, images) = args.set.open(Pick::All, 0)?;
     let mut shots = Shots::new(images.len(), &bands);
-    let size = (card.input.width, card.input.height);
     let mut see = |seen: &session::Predicted<'_>| {
-        shots.see(seen.example, size, seen.predicted);
+        shots.see(seen.example, seen.size, seen.predicted);
         Ok(())
     };
     let report =
         session::evaluate(&trained, &args.set, &args.machine.precision, threads, &machine, signals.heed(), &mut see)?;
     let title = format!("{} on {}", args.run.display(), args.set.folder.display());
     let lead = format!(
-        "{}, {} parameters, at {} × {} pixels.",
+        "{}, {} parameters, {}.",
         card.network.about().trim_end_matches('.'),
         card.parameters,
-        size.0,
-        size.1
+        match card.resize {
+            Resize::Stretch => format!("at {} × {} pixels", card.input.width, card.input.height),
+            Resize::LongSides(_) => format!("at long sides of {} pixels", card.resize.name()),
+            Resize::Scale(_) => format!("at the images' size {}", card.resize.name()),
+        }
     );
     let paths = report::write(&out, &title, &lead, &report, &shots.kept, &card.classes.colors())?;
     furrow::tell!("{}", report.summary().markdown().trim_end());

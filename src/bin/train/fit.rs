@@ -160,7 +160,7 @@ fn in_words(results: &Results) -> String {
 pub(crate) fn write_page(folder: &Path) -> Result<Vec<PathBuf>> {
     let Identity { plan, .. } = run::read_json(&folder.join(run::PLAN))?;
     let results: Results = run::read_json(&folder.join(run::RESULT))?;
-    report::write_training(folder, &results, &plan.classes.names(), &facts(&plan, &results))
+    report::write_training(folder, &results, plan.hyper.loss.in_words(), &plan.classes.names(), &facts(&plan, &results))
 }
 
 /// What the report says of the plan.

@@ -11,6 +11,7 @@ mod machine;
 mod predict;
 mod renamed;
 mod report;
+mod sizes;
 mod table;
 
 use clap::{Parser, Subcommand};

@@ -3,10 +3,10 @@
 use furrow::Result;
 use furrow::output::write_files;
 use furrow::report::chart::{Chart, Curve};
-use furrow::report::{Lines, csv};
 use furrow::train::data::Example;
 use furrow::train::figure::{Page, Shot, sheet, spread};
 use furrow::train::fit::checkpoint::History;
+use furrow::train::fit::log;
 use furrow::train::measure::Report;
 use furrow::train::run;
 use std::path::{Path, PathBuf};
@@ -75,8 +75,8 @@ pub(crate) fn write(
     write_files(out, &files)
 }
 
-/// The curves of a training: its loss, and its validation passes.
-pub(crate) fn curves(history: &History, classes: &[String]) -> Vec<Chart> {
+/// The curves of a training: its loss, which has a name, and its validation passes.
+pub(crate) fn curves(history: &History, loss: &str, classes: &[String]) -> Vec<Chart> {
     let chart = |title: &str, upwards: &str, curves: Vec<Curve>, logarithmic| Chart {
         title: title.into(),
         across: "steps".into(),
@@ -85,8 +85,13 @@ pub(crate) fn curves(history: &History, classes: &[String]) -> Vec<Chart> {
         logarithmic,
     };
     let losses = history.losses.iter().map(|l| (l.step as f64, l.loss)).collect();
-    let mut charts =
-        vec![chart("Loss", "cross entropy", vec![Curve { name: "training".into(), points: losses }], true)];
+    let validation: Vec<(f64, f64)> =
+        history.validation.iter().filter_map(|pass| Some((pass.step as f64, pass.loss?))).collect();
+    let mut losses = vec![Curve { name: "training".into(), points: losses }];
+    if !validation.is_empty() {
+        losses.push(Curve { name: "validation".into(), points: validation });
+    }
+    let mut charts = vec![chart("Loss", loss, losses, true)];
     if !history.validation.is_empty() {
         let of = |name: &str, value: &dyn Fn(usize) -> Option<f64>| Curve {
             name: name.into(),
@@ -108,10 +113,11 @@ pub(crate) fn curves(history: &History, classes: &[String]) -> Vec<Chart> {
 pub(crate) fn write_training(
     out: &Path,
     results: &run::Results,
+    loss: &str,
     classes: &[String],
     facts: &[(String, String)],
 ) -> Result<Vec<PathBuf>> {
-    let charts = curves(&results.history, classes);
+    let charts = curves(&results.history, loss, classes);
     let page = Page {
         kind: "Training",
         title: &out.display().to_string(),
@@ -120,16 +126,10 @@ pub(crate) fn write_training(
         classes,
         ..Page::default()
     };
-    let rows = results.history.losses.iter().map(|loss| {
-        let pass = results.history.validation.iter().find(|pass| pass.step == loss.step);
-        let miou = pass.map_or(String::new(), |pass| pass.miou.to_string());
-        vec![loss.step.to_string(), loss.loss.to_string(), loss.rate.to_string(), miou]
-    });
-    let lines = csv(&["step", "loss", "rate", "validation_mean_iou"], rows, Lines::Lf);
     let files = [
         ("report.html", page.html()?.into_bytes()),
         ("loss.svg", charts[0].svg().into_bytes()),
-        ("log.csv", lines.into_bytes()),
+        (log::CSV, log::table(&results.history, classes).into_bytes()),
     ];
     write_files(out, &files)
 }

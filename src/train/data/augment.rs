@@ -5,6 +5,7 @@
 //! change what is drawn.
 
 use super::crop::{self, Crop, Moves, Placement};
+use super::erase;
 use super::example::Example;
 use super::normalise::{self, Normalization};
 use crate::sampling::Stream;
@@ -13,7 +14,7 @@ use std::fmt;
 
 /// Data augmentation; each part may be left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[serde(from = "Recorded", deny_unknown_fields)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a switch of its own, none a state")]
 pub struct Augment {
     /// Mirrored left to right, half of the time.
@@ -29,19 +30,54 @@ pub struct Augment {
     pub colour: bool,
     /// Half of the images blurred by a Gaussian of up to 1.2 pixels.
     pub blur: bool,
-    /// Gaussian noise of up to 0.03.
+    /// Gaussian noise of up to 0.03, in half of the images blurred like the picture, as that of cameras that compress and scale is.
     pub noise: bool,
+    /// Random erasing: patches of one colour, labelled as soil; see [`super::erase`].
+    #[serde(skip_serializing_if = "is_off")]
+    pub erase: bool,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
+fn is_off(part: &bool) -> bool {
+    !part
+}
+
+/// An augmentation as a run recorded it. Runs of version 0.1 knew no erasing, and did none.
+#[derive(Deserialize)]
+#[serde(default, deny_unknown_fields)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of its own, none a state")]
+struct Recorded {
+    flip: bool,
+    rotate: bool,
+    scale: bool,
+    crop: bool,
+    colour: bool,
+    blur: bool,
+    noise: bool,
+    erase: bool,
+}
+
+impl Default for Recorded {
+    fn default() -> Self {
+        Self { flip: true, rotate: true, scale: true, crop: true, colour: true, blur: true, noise: true, erase: false }
+    }
+}
+
+impl From<Recorded> for Augment {
+    fn from(Recorded { flip, rotate, scale, crop, colour, blur, noise, erase }: Recorded) -> Self {
+        Self { flip, rotate, scale, crop, colour, blur, noise, erase }
+    }
 }
 
 impl Default for Augment {
     fn default() -> Self {
-        Self { flip: true, rotate: true, scale: true, crop: true, colour: true, blur: true, noise: true }
+        Self { flip: true, rotate: true, scale: true, crop: true, colour: true, blur: true, noise: true, erase: true }
     }
 }
 
 impl fmt::Display for Augment {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { flip, rotate, scale, crop, colour, blur, noise } = *self;
+        let Self { flip, rotate, scale, crop, colour, blur, noise, erase } = *self;
         let parts = [
             (flip, "flip"),
             (rotate, "rotate"),
@@ -50,6 +86,7 @@ impl fmt::Display for Augment {
             (colour, "colour"),
             (blur, "blur"),
             (noise, "noise"),
+            (erase, "erase"),
         ];
         let names: Vec<&str> = parts.iter().filter(|(on, _)| *on).map(|(_, name)| *name).collect();
         match names.len() {
@@ -62,8 +99,16 @@ impl fmt::Display for Augment {
 
 impl Augment {
     /// No augmentation.
-    pub const NONE: Self =
-        Self { flip: false, rotate: false, scale: false, crop: false, colour: false, blur: false, noise: false };
+    pub const NONE: Self = Self {
+        flip: false,
+        rotate: false,
+        scale: false,
+        crop: false,
+        colour: false,
+        blur: false,
+        noise: false,
+        erase: false,
+    };
 
     /// The parts of it that move a crop.
     fn moves(self) -> Moves {
@@ -84,9 +129,10 @@ impl Augment {
                 "colour" => augment.colour = true,
                 "blur" => augment.blur = true,
                 "noise" => augment.noise = true,
+                "erase" => augment.erase = true,
                 _ => {
                     return Err(format!(
-                        "there is no augmentation `{name}`: write all, none, or some of flip, rotate, scale, crop, colour, blur, noise"
+                        "there is no augmentation `{name}`: write all, none, or some of flip, rotate, scale, crop, colour, blur, noise, erase"
                     ));
                 }
             }
@@ -108,10 +154,13 @@ impl Augment {
         let anywhere = size == image || rare == 0.0 || !stream.chance(rare);
         let about = if anywhere { None } else { crop::rare_pixel(&example.labels, image, stream) };
         let placement = Placement::draw(self.moves(), crop, about, stream);
-        let (mut pixels, labels) = match &placement {
+        let (mut pixels, mut labels) = match &placement {
             Some(placement) => placement.read(example, crop),
             None => (interleave(example, 1), example.labels.clone()),
         };
+        if self.erase {
+            erase::erase(&mut pixels, &mut labels, size, stream);
+        }
         let light = self.colour.then(|| Light::draw(colour, stream));
         let centred = |i: usize, (w, h): (u32, u32)| {
             let (x, y) = (i as u32 % w, i as u32 / w);
@@ -121,11 +170,16 @@ impl Augment {
             let at = |i| placement.as_ref().map_or_else(|| centred(i, image), |p| p.map(centred(i, size)));
             light.apply(&mut pixels, colour, image, at);
         }
-        if self.blur && stream.chance(0.5) {
+        let noise = self.noise.then(|| stream.range32(0.0, 0.03));
+        let before = noise.filter(|_| self.blur && stream.chance(0.5));
+        if let Some(sd) = before {
+            // A blur of a pixel leaves a third of it.
+            add_noise(&mut pixels, 3.0 * sd, stream);
+        }
+        if before.is_some() || self.blur && stream.chance(0.5) {
             blur(&mut pixels, colour.len(), size, stream.range32(0.3, 1.2));
         }
-        if self.noise {
-            let sd = stream.range32(0.0, 0.03);
+        if let Some(sd) = noise.filter(|_| before.is_none()) {
             add_noise(&mut pixels, sd, stream);
         }
         let scales = if size == image {
@@ -270,7 +324,7 @@ mod tests {
     #[test]
     fn labels_move_with_the_picture() {
         let (w, h) = (40, 30);
-        let augment = Augment { colour: false, blur: false, noise: false, ..Augment::default() };
+        let augment = Augment { colour: false, blur: false, noise: false, erase: false, ..Augment::default() };
         for seed in 0..50 {
             let mut stream = Stream::of(seed, 0, Purpose::Test, 0);
             for window in [(w, h), (17, 21)] {

@@ -43,8 +43,21 @@ pub struct Example {
 }
 
 impl Example {
-    /// Reads an image of a set; `margin` pixels of it lie between leaves and their outlines, see [`margin`].
+    /// Reads an image of a set at a network's size; `margin` pixels of it lie between leaves and their outlines, see [`margin`].
     pub fn read(set: &Set, number: u64, map: &Map, margin: f32, shape: &Shape, with_plants: bool) -> Result<Self> {
+        let (size, whole) = Self::read_whole(set, number, map, margin, &shape.bands, with_plants)?;
+        Ok(whole.resized(size, (shape.width, shape.height)))
+    }
+
+    /// The same at its own size: width and height, pixels.
+    pub fn read_whole(
+        set: &Set,
+        number: u64,
+        map: &Map,
+        margin: f32,
+        of: &[Band],
+        with_plants: bool,
+    ) -> Result<((u32, u32), Self)> {
         let name = Set::name(number);
         let folder = set.folder.join(native::folder(&name));
         if !folder.is_dir() {
@@ -52,7 +65,7 @@ impl Example {
                 .in_file(folder)
                 .help("`trace dataset verify` tells what the set lacks, the command that began it makes it"));
         }
-        let (w, h, planes) = bands::read(&folder, &shape.bands)?;
+        let (w, h, planes) = bands::read(&folder, of)?;
         let same = |path: &Path, found: (u32, u32)| {
             let what = || format!("it is {} × {} pixels, the photograph {w} × {h}", found.0, found.1);
             if found == (w, h) { Ok(()) } else { Err(Error::input(what()).in_file(path)) }
@@ -72,19 +85,23 @@ impl Example {
             let path = folder.join("plants.png");
             let (lw, lh, numbers) = output::read_gray16(&path)?;
             same(&path, (lw, lh))?;
-            plants = nearest((w, h), &numbers, (shape.width, shape.height));
+            plants = numbers;
         }
         let mut labels = map.labels(&semantics, &species);
         if margin != 0.0 {
             labels = margin::moved(&labels, (w, h), margin);
         }
-        let to = (shape.width, shape.height);
-        Ok(Self {
-            name,
-            planes: planes.iter().map(|plane| output::resize_gray(w, h, plane, to)).collect(),
-            labels: nearest((w, h), &labels, to),
-            plants,
-        })
+        Ok(((w, h), Self { name, planes, labels, plants }))
+    }
+
+    /// The same at another size.
+    fn resized(self, (w, h): (u32, u32), to: (u32, u32)) -> Self {
+        Self {
+            planes: self.planes.iter().map(|plane| output::resize_gray(w, h, plane, to)).collect(),
+            labels: nearest((w, h), &self.labels, to),
+            plants: if self.plants.is_empty() { Vec::new() } else { nearest((w, h), &self.plants, to) },
+            name: self.name,
+        }
     }
 
     /// Bytes that it takes in memory.

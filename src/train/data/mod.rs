@@ -8,17 +8,21 @@
 //! | `example` | one image at the network's size, with its labels |
 //! | `store` | the selected images, decoded once and cached within a memory budget |
 //! | `augment` | data augmentation |
+//! | `erase` | random erasing |
 //! | `crop` | random crops, some centred on rare-class pixels |
 //! | `normalise` | input normalization |
+//! | `resize` | how a picture of any size is brought to a network |
 //! | `loader` | threads that are ahead of the network, in an order that the seed alone decides |
 
 pub mod augment;
 pub mod bands;
 pub mod crop;
+mod erase;
 pub mod example;
 pub mod loader;
 pub mod margin;
 pub mod normalise;
+pub mod resize;
 pub mod select;
 pub mod store;
 
@@ -28,5 +32,6 @@ pub use crop::Crop;
 pub use example::{Example, Shape};
 pub use loader::{Batch, Loader, Order};
 pub use normalise::Normalization;
+pub use resize::Resize;
 pub use select::{Pick, Selection};
 pub use store::Store;

@@ -3,7 +3,7 @@
 use super::example::{Example, Shape};
 use super::select::{Pick, Selection};
 use crate::Result;
-use crate::dataset::Set;
+use crate::dataset::{Set, native};
 use crate::train::classes::{Classes, Map};
 use std::borrow::Cow;
 use std::sync::OnceLock;
@@ -72,6 +72,28 @@ impl Store {
         let (set, map, margin) = &self.sets[set];
         let example = Example::read(set, number, map, *margin, &self.shape, self.with_plants)?;
         Ok(self.keep(place, example))
+    }
+
+    /// The image at a place at its own size, which is told: read afresh, and not kept.
+    pub fn whole(&self, place: usize) -> Result<((u32, u32), Example)> {
+        let (set, number) = self.images[place];
+        let (set, map, margin) = &self.sets[set];
+        Example::read_whole(set, number, map, *margin, &self.shape.bands, self.with_plants)
+    }
+
+    /// Side of a pixel on the ground at the network's size, millimetres: the median of the images whose records tell their cameras.
+    pub fn pixel_mm(&self) -> Result<Option<f64>> {
+        let mut sizes = Vec::new();
+        for (i, (set, number)) in self.images.iter().enumerate() {
+            if self.same[i] != i {
+                continue;
+            }
+            let record = native::read_record(&self.sets[*set].0.folder, &Set::name(*number))?;
+            let across = record.conditions.as_ref().and_then(|conditions| conditions.camera.pixel_m());
+            sizes.extend(across.map(|m| 1e3 * m * f64::from(record.width) / f64::from(self.shape.width)));
+        }
+        sizes.sort_by(f64::total_cmp);
+        Ok(sizes.get(sizes.len() / 2).copied())
     }
 
     /// Keeps an image that was read, where the budget allows it.

@@ -53,16 +53,6 @@ pub struct Pixels {
     pub planes: Vec<Vec<u8>>,
 }
 
-impl Pixels {
-    /// At a network's size, antialiased: bands side by side, values from 0 to 1.
-    pub fn at(&self, (width, height): (u32, u32)) -> Vec<f32> {
-        let resized = self.planes.iter().map(|p| output::resize_gray(self.width, self.height, p, (width, height)));
-        let planes: Vec<Vec<u8>> = resized.collect();
-        let pixels = width as usize * height as usize;
-        (0..pixels).flat_map(|i| planes.iter().map(move |p| f32::from(p[i]) / 255.0)).collect()
-    }
-}
-
 impl Picture {
     /// Reads it. An error where it is no picture, is gray to a network that sees colours, or where bands differ in size.
     pub fn read(&self) -> Result<Pixels> {

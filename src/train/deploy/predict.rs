@@ -6,8 +6,10 @@
 use super::pictures::{PREDICTION, Picture, Prediction, files};
 use super::{enlarge, overlay};
 use crate::output::{self, Picture as Png};
+use crate::train::data::resize::{self, Input};
 use crate::train::run::{ModelCard, TrainedModel};
 use crate::train::session::Machine;
+use crate::train::torch::multiscale::{self, Scores};
 use crate::train::torch::{Model, device};
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -49,8 +51,8 @@ struct Ready<'a> {
     width: u32,
     height: u32,
     rgb: Vec<[u8; 3]>,
-    /// Normalised.
-    pixels: Vec<f32>,
+    /// What the network takes: one or several sizes of it.
+    inputs: Vec<Input>,
 }
 
 /// Pictures that each thread may be ahead, or behind.
@@ -93,7 +95,7 @@ pub fn predict(
                 Err(_) => break,
             }
             if batch.len() == options.batch || number + 1 == pictures.len() {
-                made.seconds += infer(&model, card, std::mem::take(&mut batch), &writers)?;
+                made.seconds += infer(&model, std::mem::take(&mut batch), &writers)?;
                 (options.done)(number + 1);
             }
         }
@@ -128,9 +130,10 @@ fn read<'s, 'a: 's>(
     scope.spawn(move || {
         for picture in pictures {
             let ready = picture.read().map(|found| {
-                let mut pixels = found.at((card.input.width, card.input.height));
-                card.normalization.apply(&mut pixels, card.input.bands.len());
-                Ready { picture, width: found.width, height: found.height, rgb: found.rgb, pixels }
+                let (size, trained) = ((found.width, found.height), (card.input.width, card.input.height));
+                let inputs =
+                    resize::inputs(&found.planes, size, &card.resize.sizes(trained, size), &card.normalization);
+                Ready { picture, width: found.width, height: found.height, rgb: found.rgb, inputs }
             });
             // Nobody listens any more: it was stopped.
             if sender.send(ready).is_err() {
@@ -142,7 +145,7 @@ fn read<'s, 'a: 's>(
 }
 
 /// Number, picture, and the values of its classes.
-type Scored<'a> = (usize, Ready<'a>, Vec<f32>);
+type Scored<'a> = (usize, Ready<'a>, Scores);
 /// Number and files of each picture.
 type Written = Result<Vec<(usize, [PathBuf; 2])>>;
 
@@ -171,32 +174,39 @@ fn write<'s, 'a: 's>(
 }
 
 /// Runs the network on a batch and hands the scores on; seconds of the network.
-fn infer<'a>(
-    model: &Model,
-    card: &ModelCard,
-    batch: Vec<(usize, Ready<'a>)>,
-    writers: &[SyncSender<Scored<'a>>],
-) -> Result<f64> {
-    if batch.is_empty() {
-        return Ok(0.0);
-    }
-    let pixels: Vec<f32> = batch.iter().flat_map(|(_, ready)| &ready.pixels).copied().collect();
+fn infer<'a>(model: &Model, batch: Vec<(usize, Ready<'a>)>, writers: &[SyncSender<Scored<'a>>]) -> Result<f64> {
     let begun = Instant::now();
-    let scores = model.scores(&pixels, (card.input.width, card.input.height))?;
+    // Pictures that the network takes at one size, and at the same, go through it together.
+    let alike = |a: &(usize, Ready<'_>), b: &(usize, Ready<'_>)| match (a.1.inputs.as_slice(), b.1.inputs.as_slice()) {
+        ([a], [b]) => a.size == b.size,
+        _ => false,
+    };
+    let mut all = Vec::new();
+    for group in batch.chunk_by(alike) {
+        match group {
+            [(_, ready)] => all.push(multiscale::scores(model, &ready.inputs)?),
+            several => {
+                let size = several[0].1.inputs[0].size;
+                let pixels: Vec<f32> = several.iter().flat_map(|(_, ready)| &ready.inputs[0].pixels).copied().collect();
+                let values = model.scores(&pixels, size)?;
+                let each = values.chunks_exact(values.len() / several.len());
+                all.extend(each.map(|values| Scores { values: values.to_vec(), size }));
+            }
+        }
+    }
     let seconds = begun.elapsed().as_secs_f64();
-    let each = card.classes.len() * card.input.pixels();
-    for ((number, ready), scores) in batch.into_iter().zip(scores.chunks_exact(each)) {
+    for ((number, ready), scores) in batch.into_iter().zip(all) {
         // A writer that is gone has told why.
-        let _ = writers[number % writers.len()].send((number, ready, scores.to_vec()));
+        let _ = writers[number % writers.len()].send((number, ready, scores));
     }
     Ok(seconds)
 }
 
 /// Writes the prediction of one picture.
-fn draw(card: &ModelCard, out: &Path, ready: &Ready<'_>, scores: &[f32]) -> Result<[PathBuf; 2]> {
+fn draw(card: &ModelCard, out: &Path, ready: &Ready<'_>, scores: &Scores) -> Result<[PathBuf; 2]> {
     let (width, height) = (ready.width, ready.height);
     let colors = card.classes.colors();
-    let classes = enlarge::classes_at(scores, (card.input.width, card.input.height), (width, height));
+    let classes = enlarge::classes_at(&scores.values, scores.size, (width, height));
     let over = overlay::draw(&ready.rgb, &classes, width, &colors);
     let text = format!(
         "program: furrow {}\nnetwork: {}\nweights: sha256 {}\nclasses: {}",

@@ -9,7 +9,7 @@ use crate::output::place_atomically;
 use crate::train::data::Normalization;
 use crate::train::data::normalise::LEAST;
 use crate::train::run::{TrainedModel, write_json};
-use crate::train::torch::{Model, Precision, Where, failed};
+use crate::train::torch::{Model, Pass, Precision, Where, failed};
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 use tch::{CModule, Device, Kind, Tensor};
@@ -37,7 +37,7 @@ pub fn write(trained: &TrainedModel, (width, height): (u32, u32), path: &Path) -
     model.freeze();
     let example = Tensor::zeros([1, i64::from(height), i64::from(width), bands as i64], (Kind::Uint8, Device::Cpu));
     let taken_out = TakenOut::of(&card.normalization);
-    let mut forward = |x: &[Tensor]| vec![model.walk(&taken_out.from(&x[0]), false)];
+    let mut forward = |x: &[Tensor]| vec![model.walk(&taken_out.from(&x[0]), Pass::Inference)];
     let module = tch::no_grad(|| CModule::create_by_tracing("furrow", "forward", &[example], &mut forward));
     let module = module.map_err(|e| failed(&e))?;
     place_atomically(path, |path| module.save(path).map_err(|e| failed(&e)))?;

@@ -31,6 +31,9 @@ pub struct ValidationPass {
     pub miou: f64,
     /// That of each class; none where neither truth nor prediction has it.
     pub iou: Vec<Option<f64>>,
+    /// Mean loss of the validation images, with the class weights of that step; none without a labelled pixel.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub loss: Option<f64>,
 }
 
 /// Loss curve and validation passes of a training.
@@ -143,7 +146,13 @@ mod tests {
         let array = |name: &str, v: f32| Array { name: name.into(), shape: vec![2], values: vec![v, -v] };
         let passes = [0.3, 0.5, 0.5, 0.4].iter().enumerate();
         let validation = passes
-            .map(|(i, m)| ValidationPass { step: i as u64, ga: 0.9, miou: *m, iou: vec![Some(*m), None] })
+            .map(|(i, m)| ValidationPass {
+                step: i as u64,
+                ga: 0.9,
+                miou: *m,
+                iou: vec![Some(*m), None],
+                loss: Some(1.0 / 7.0),
+            })
             .collect();
         let checkpoint = Checkpoint {
             step: 7,

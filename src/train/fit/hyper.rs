@@ -9,7 +9,8 @@
 use super::class_weights::ClassWeights;
 use super::schedule::Schedule;
 use crate::Error;
-use crate::train::data::{Augment, Shape};
+use crate::train::data::{Augment, Resize, Shape};
+use crate::train::net::Pretrained;
 use serde::{Deserialize, Serialize};
 
 /// The optimiser.
@@ -75,6 +76,14 @@ impl LossFunction {
         match self {
             Self::Entropy => "entropy",
             Self::Dice => "dice",
+        }
+    }
+
+    /// What it is, in words.
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Self::Entropy => "cross-entropy",
+            Self::Dice => "cross-entropy + soft Dice loss",
         }
     }
 }
@@ -144,6 +153,19 @@ pub struct Hyperparameters {
     /// Training images on which class biases are calibrated in the end; 0 for none. See `calibrate`.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub calibrate: u64,
+    /// What the encoder begins with.
+    #[serde(default, skip_serializing_if = "Pretrained::is_none")]
+    pub pretrained: Pretrained,
+    /// Steps in which the encoder stays as it is, its batch norms' statistics too; the decoder alone learns.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub freeze: u64,
+    /// Learning rate of the encoder as a share of [`Self::rate`], 0 to 1: what was learnt from many photographs is changed less than
+    /// what begins at random (Howard & Ruder 2018, "discriminative fine-tuning").
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub encoder_rate: f64,
+    /// The sizes that pictures are brought to once the network is trained; of no effect on training and validation.
+    #[serde(default, skip_serializing_if = "Resize::is_stretch")]
+    pub resize: Resize,
     /// Data augmentation.
     pub augment: Augment,
     /// Input normalization.
@@ -156,9 +178,18 @@ pub struct Hyperparameters {
     pub patience: u64,
 }
 
+fn one() -> f64 {
+    1.0
+}
+
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
-fn is_zero(images: &u64) -> bool {
-    *images == 0
+fn is_one(share: &f64) -> bool {
+    *share == 1.0
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
+fn is_zero(number: &u64) -> bool {
+    *number == 0
 }
 
 impl Default for Hyperparameters {
@@ -176,6 +207,10 @@ impl Default for Hyperparameters {
             loss: LossFunction::Dice,
             class_weights: ClassWeights::None,
             calibrate: 0,
+            pretrained: Pretrained::None,
+            freeze: 0,
+            encoder_rate: 1.0,
+            resize: Resize::Stretch,
             augment: Augment::default(),
             normalization: NormalizationMode::Band,
             validate_every: 100,
@@ -228,6 +263,7 @@ impl Hyperparameters {
         range("rate", self.rate > 0.0 && self.rate < 100.0, &self.rate, "write a number above 0 such as 0.001")?;
         let help = "write a share from 0 to 1";
         range("rare_crops", (0.0..=1.0).contains(&self.rare_crops), &self.rare_crops, help)?;
+        range("encoder_rate", (0.0..=1.0).contains(&self.encoder_rate), &self.encoder_rate, help)?;
         range("decay", (0.0..1.0).contains(&self.decay), &self.decay, "write a share from 0 to below 1")?;
         range("validate_every", self.validate_every > 0, &self.validate_every, whole)?;
         range("patience", self.patience > 0, &self.patience, whole)?;

@@ -9,6 +9,7 @@
 //! | `loss` | the loss that is minimised |
 //! | `schedule` | the learning rate, step by step |
 //! | `optimiser` | from gradients to weights, with a state that can be saved |
+//! | `log` | the log of a training as it grows: CSV, TensorBoard |
 //! | `checkpoint` | a training on disk, between two steps |
 //! | `trainer` | the training loop, with validation passes |
 //! | `calibrate` | class-bias calibration of a trained network |
@@ -21,6 +22,7 @@ pub mod calibrate;
 pub mod checkpoint;
 pub mod class_weights;
 pub mod hyper;
+pub mod log;
 #[cfg(feature = "train")]
 mod loss;
 #[cfg(feature = "train")]

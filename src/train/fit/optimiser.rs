@@ -29,15 +29,17 @@ impl Optimiser {
         Self { kind, decay, steps: steps as i32, memory: all }
     }
 
-    /// One step of this learning rate along the gradients of a loss.
-    pub fn step(&mut self, model: &Model, loss: &Tensor, rate: f64) {
-        let (parameters, mut tensors): (Vec<_>, Vec<_>) =
-            model.trainable().map(|(p, t)| (p, t.shallow_clone())).unzip();
+    /// One step along the gradients of a loss: of the learning rate `rate`, in the encoder of `encoder` times that. At 0 the
+    /// encoder's gradients are not asked for.
+    pub fn step(&mut self, model: &Model, loss: &Tensor, rate: f64, encoder: f64) {
+        let moved = model.trainable().filter(|(p, _)| encoder > 0.0 || !p.is_encoder());
+        let (parameters, mut tensors): (Vec<_>, Vec<_>) = moved.map(|(p, t)| (p, t.shallow_clone())).unzip();
         let gradients = Tensor::run_backward(&[loss], &tensors, false, false);
         self.steps += 1;
         tch::no_grad(|| {
             for ((parameter, tensor), gradient) in parameters.iter().zip(&mut tensors).zip(&gradients) {
                 if gradient.defined() {
+                    let rate = if parameter.is_encoder() { rate * encoder } else { rate };
                     self.update(&parameter.name, tensor, gradient, rate);
                 }
             }

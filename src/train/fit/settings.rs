@@ -8,7 +8,8 @@ use super::hyper::{Invalid, LossFunction, NormalizationMode, OptimiserKind, SIDE
 use super::plan::Plan;
 use super::schedule::Schedule;
 use crate::train::classes::Classes;
-use crate::train::data::{Augment, Band};
+use crate::train::data::{Augment, Band, Resize};
+use crate::train::net::Pretrained;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -86,7 +87,25 @@ pub struct Settings {
     #[arg(long, value_name = "N", default_value = default_of("calibrate"))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibrate: Option<u64>,
-    /// Data augmentation: all, none, or some of flip, rotate, scale, crop, colour, blur, noise with commas between.
+    /// What the encoder begins with: none (random weights), imagenet (EfficientNet-Lite0's, for lite-unet), or a safetensors file with
+    /// the names of torchvision's resnet18 (unet) or vgg16_bn (segnet).
+    #[arg(long, value_name = "NAME", default_value = default_of("pretrained"))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pretrained: Option<String>,
+    /// Steps in which the encoder stays as it is and the decoder alone learns.
+    #[arg(long, value_name = "N", default_value = default_of("freeze"))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub freeze: Option<u64>,
+    /// Learning rate of the encoder as a share of the decoder's, 0 to 1.
+    #[arg(long, value_name = "SHARE", default_value = default_of("encoder_rate"))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub encoder_rate: Option<f64>,
+    /// Sizes that pictures are brought to once the network is trained: stretch (to the size that it was trained at), or lengths of the
+    /// longer side with commas between: the shape is kept, probabilities are averaged over them.
+    #[arg(long, value_name = "SIDES", default_value = default_of("resize"))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub resize: Option<String>,
+    /// Data augmentation: all, none, or some of flip, rotate, scale, crop, colour, blur, noise, erase with commas between.
     #[arg(long, value_name = "NAMES", default_value = default_of("augment"))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub augment: Option<String>,
@@ -104,15 +123,6 @@ pub struct Settings {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub patience: Option<u64>,
 }
-
-/// Fields that had another name, in version 0.1: old, then new. Flags have `-` for `_`.
-pub const RENAMED: [(&str, &str); 5] = [
-    ("window", "crop_size"),
-    ("rare", "rare_crops"),
-    ("balance", "class_weights"),
-    ("normalise", "normalization"),
-    ("watch_every", "validate_every"),
-];
 
 /// The default of a field as a user would write it; empty for what has none.
 pub fn default_of(field: &str) -> &'static str {
@@ -138,6 +148,10 @@ pub fn defaults() -> Vec<(&'static str, String)> {
         ("loss", hyper.loss.name().into()),
         ("class_weights", hyper.class_weights.name().into()),
         ("calibrate", hyper.calibrate.to_string()),
+        ("pretrained", hyper.pretrained.name()),
+        ("freeze", hyper.freeze.to_string()),
+        ("encoder_rate", hyper.encoder_rate.to_string()),
+        ("resize", hyper.resize.name()),
         ("augment", hyper.augment.to_string()),
         ("normalization", hyper.normalization.name().into()),
         ("validate_every", hyper.validate_every.to_string()),
@@ -202,6 +216,10 @@ impl Settings {
         word("class_weights", self.class_weights.as_ref(), &mut hyper.class_weights, ClassWeights::parse)?;
         word("augment", self.augment.as_ref(), &mut hyper.augment, Augment::parse)?;
         word("normalization", self.normalization.as_ref(), &mut hyper.normalization, NormalizationMode::parse)?;
+        word("pretrained", self.pretrained.as_ref(), &mut hyper.pretrained, Pretrained::parse)?;
+        word("resize", self.resize.as_ref(), &mut hyper.resize, Resize::parse)?;
+        number(self.freeze, &mut hyper.freeze);
+        number(self.encoder_rate, &mut hyper.encoder_rate);
         number(self.rare_crops, &mut hyper.rare_crops);
         number(self.steps, &mut hyper.steps);
         number(self.batch, &mut hyper.batch);

@@ -3,13 +3,15 @@
 use super::checkpoint::{Checkpoint, History, LossPoint, ValidationPass};
 use super::class_weights;
 use super::hyper::NormalizationMode;
+use super::log::TrainingLog;
 use super::loss;
 use super::optimiser::Optimiser;
 use super::plan::Plan;
 use crate::dataset::sample::IGNORE;
-use crate::train::data::{Batch, Loader, Normalization, Order, Store, augment};
+use crate::train::data::{Band, Batch, Example, Loader, Normalization, Order, Shape, Store, augment};
+use crate::train::figure::{Sheet, Shot, sheet, spread};
 use crate::train::measure::{Confusion, Scores};
-use crate::train::torch::{Model, Where, failed};
+use crate::train::torch::{Model, Pass, Where, classes, failed};
 use crate::train::weights::Array;
 use crate::{Error, Result};
 use std::path::Path;
@@ -64,6 +66,10 @@ pub struct Outcome {
 
 /// Points of the loss curve.
 const POINTS: u64 = 200;
+/// Validation images in the log, at most.
+const SHOWN: usize = 4;
+/// Pixels across and down that each of them has, at most.
+const LARGEST: u32 = 320;
 
 /// Trains a plan, from its checkpoint in `folder` where there is one. `hash` is the plan's checksum; `begin` the weights to begin with
 /// where they are another run's. Told to stop, it leaves a checkpoint and ends with
@@ -100,6 +106,7 @@ pub fn train(
         augment: hyper.augment,
         normalization: normalization.clone(),
     };
+    let mut log = TrainingLog::begin(folder, &plan.classes.names(), &at.history)?;
     let mut loader = Loader::start(&data.train, &order, at.step, hyper.steps, data.loaders);
     let (begun, before) = (Instant::now(), at.seconds);
     let every = (hyper.steps / POINTS).max(1);
@@ -125,7 +132,8 @@ pub fn train(
         let done = in_time.max(at.step as f64 / hyper.steps as f64);
         let rate = hyper.rate * hyper.schedule.share(done);
         let weights = Tensor::from_slice(&hyper.class_weights.weights(&rarities, done)).to_device(place.device);
-        let loss = step(&model, &mut optimiser, &batch, plan, &weights, rate)?;
+        let encoder = if at.step < hyper.freeze { 0.0 } else { hyper.encoder_rate };
+        let loss = step(&model, &mut optimiser, &batch, plan, &weights, [rate, encoder])?;
         if loss.is_some_and(|loss| !loss.is_finite()) {
             let help = format!("a smaller --rate than {} (this training lies in {})", hyper.rate, folder.display());
             return Err(Error::input(format!("the loss of step {} is no number any more", at.step + 1)).help(help));
@@ -136,12 +144,16 @@ pub fn train(
         }
         if at.step % every == 0 && at.pending.1 > 0 {
             let (sum, n) = std::mem::take(&mut at.pending);
-            at.history.losses.push(LossPoint { step: at.step, loss: sum / n as f64, rate });
+            let point = LossPoint { step: at.step, loss: sum / n as f64, rate };
+            log.loss(&point)?;
+            at.history.losses.push(point);
+            log.csv(&at.history)?;
         }
         (callbacks.step)(at.step, loss);
         if at.step % hyper.validate_every == 0 || at.step == hyper.steps {
             if !data.val.is_empty() {
-                let pass = validate(&model, &data.val, &normalization, at.step)?;
+                let (pass, picture) = validate(&model, &data.val, &normalization, plan, &weights, at.step)?;
+                log.pass(&pass, Some(&picture))?;
                 at.history.validation.push(pass.clone());
                 let best = at.history.since_best() == 0;
                 if best {
@@ -149,6 +161,7 @@ pub fn train(
                 }
                 (callbacks.validation)(&pass, best);
             }
+            log.csv(&at.history)?;
             at.seconds = before + begun.elapsed().as_secs_f64();
             save(&mut at, &model, &optimiser, folder, hash)?;
         }
@@ -163,40 +176,76 @@ fn save(at: &mut Checkpoint, model: &Model, optimiser: &Optimiser, folder: &Path
     at.write(folder, hash)
 }
 
-/// One step; its loss. A batch without a labelled pixel has none and changes nothing.
+/// One step of this learning rate, in the encoder of a share of it; its loss. A batch without a labelled pixel has none and changes nothing.
 fn step(
     model: &Model,
     optimiser: &mut Optimiser,
     batch: &Batch,
     plan: &Plan,
     weights: &Tensor,
-    rate: f64,
+    [rate, encoder]: [f64; 2],
 ) -> Result<Option<f64>> {
     if batch.labels.iter().all(|l| *l == IGNORE) {
         return Ok(None);
     }
     let size = plan.crop_size();
     let x = model.images(&batch.pixels, size);
-    let y = Tensor::from_slice(&batch.labels).to_device(model.place.device).to_kind(Kind::Int64);
-    let y = y.view([batch.images as i64, i64::from(size.1), i64::from(size.0)]);
-    let loss = loss::loss(plan.hyper.loss, &model.forward(&x, true), &y, weights);
-    optimiser.step(model, &loss, rate);
+    let y = labels(model, &batch.labels, batch.images, size);
+    let pass = if encoder > 0.0 { Pass::Training } else { Pass::Decoder };
+    let loss = loss::loss(plan.hyper.loss, &model.forward(&x, pass), &y, weights);
+    optimiser.step(model, &loss, rate, encoder);
     f64::try_from(loss).map(Some).map_err(|e| failed(&e))
 }
 
-/// A validation pass: scores of the network on all validation images together.
-fn validate(model: &Model, val: &Store, normalization: &Normalization, step: u64) -> Result<ValidationPass> {
+/// Labels of images as the loss takes them: images × height × width.
+fn labels(model: &Model, labels: &[u8], images: usize, (width, height): (u32, u32)) -> Tensor {
+    let flat = Tensor::from_slice(labels).to_device(model.place.device).to_kind(Kind::Int64);
+    flat.view([images as i64, i64::from(height), i64::from(width)])
+}
+
+/// A validation pass: scores of the network on all validation images together, and a picture of some of them.
+fn validate(
+    model: &Model,
+    val: &Store,
+    normalization: &Normalization,
+    plan: &Plan,
+    weights: &Tensor,
+    step: u64,
+) -> Result<(ValidationPass, Sheet)> {
     let shape = val.shape();
+    let size = (shape.width, shape.height);
     let mut confusion = Confusion::new(model.classes);
+    let shown = spread(val.len(), SHOWN);
+    let (mut losses, mut shots) = (Vec::new(), Vec::new());
     for place in 0..val.len() {
         let example = val.get(place)?;
         let mut pixels = augment::interleave(&example, 1);
         normalization.apply(&mut pixels, shape.bands.len());
-        confusion.add(&example.labels, &model.predict(&pixels, (shape.width, shape.height))?)?;
+        let scores = tch::no_grad(|| model.forward(&model.images(&pixels, size), Pass::Inference));
+        if example.labels.iter().any(|label| *label != IGNORE) {
+            let truth = labels(model, &example.labels, 1, size);
+            let loss = tch::no_grad(|| loss::loss(plan.hyper.loss, &scores, &truth, weights));
+            losses.push(f64::try_from(loss).map_err(|e| failed(&e))?);
+        }
+        let predicted = classes(&scores)?;
+        confusion.add(&example.labels, &predicted)?;
+        if shown.contains(&place) {
+            shots.push(shot(&example, shape, &predicted));
+        }
     }
     let plants: Vec<bool> = (0..model.classes).map(|c| c > 0).collect();
     let scores = Scores::of(&confusion, &plants);
     let number = |v: Option<f64>| v.unwrap_or(0.0);
     let (ga, miou) = (number(scores.global_accuracy), number(scores.mean_iou));
-    Ok(ValidationPass { step, ga, miou, iou: scores.classes.iter().map(|c| c.iou).collect() })
+    let iou = scores.classes.iter().map(|c| c.iou).collect();
+    let loss = (!losses.is_empty()).then(|| losses.iter().sum::<f64>() / losses.len() as f64);
+    Ok((ValidationPass { step, ga, miou, iou, loss }, sheet(&shots, &plan.classes.colors(), false)))
+}
+
+/// A validation image as it is shown; without red, green and blue its first band as gray.
+fn shot(example: &Example, shape: &Shape, predicted: &[u8]) -> Shot {
+    let place = |band: &Band| shape.bands.iter().position(|b| b == band);
+    let planes = Band::RGB.map(|band| &example.planes[place(&band).unwrap_or(0)]);
+    let rgb: Vec<[u8; 3]> = (0..example.labels.len()).map(|i| planes.map(|plane| plane[i])).collect();
+    Shot::new(&example.name, (shape.width, shape.height), &rgb, &example.labels, &[predicted], LARGEST)
 }

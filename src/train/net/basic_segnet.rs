@@ -9,7 +9,7 @@ const CHANNELS: usize = 64;
 const DEPTH: usize = 4;
 
 pub(super) fn walk<O: Operations>(o: &mut O, x: &O::Value, bands: usize, classes: usize) -> O::Value {
-    let conv = |inputs| Conv { inputs, outputs: CHANNELS, kernel: 7, stride: 1, bias: true };
+    let conv = |inputs| Conv::new(inputs, CHANNELS, 7).bias();
     let mut stack = Vec::new();
     let first = unit(o, x, "enc0_0", conv(bands), true);
     let (mut x, places) = o.pool(&first);
@@ -26,5 +26,5 @@ pub(super) fn walk<O: Operations>(o: &mut O, x: &O::Value, bands: usize, classes
         }
         x = unit(o, &x, &format!("dec{level}_0"), conv(CHANNELS), false);
     }
-    o.conv(&x, "head.conv", Conv { inputs: CHANNELS, outputs: classes, kernel: 1, stride: 1, bias: true })
+    o.conv(&x, "head.conv", Conv::new(CHANNELS, classes, 1).bias())
 }

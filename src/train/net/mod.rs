@@ -6,15 +6,18 @@
 //! A new network is one file and one line in the table below.
 
 mod basic_segnet;
+mod lite_unet;
 mod parameters;
+mod pretrained;
 mod segnet;
 mod unet;
 
-pub use parameters::{Parameter, Role, fitting, parameters};
+pub use parameters::{Parameter, Role, fitting, is_encoder, parameters};
+pub use pretrained::Pretrained;
 
 use serde::{Deserialize, Serialize};
 
-/// A convolution's numbers. Padding keeps the size at stride 1: (kernel − 1) / 2.
+/// A convolution's numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Conv {
     /// Channels in.
@@ -27,6 +30,61 @@ pub struct Conv {
     pub stride: usize,
     /// Whether a number is added to each channel.
     pub bias: bool,
+    /// Groups of channels that do not see each other: 1, or as many as channels, "depthwise".
+    pub groups: usize,
+    /// Whether a stride leaves out what TensorFlow's `SAME` does for even sizes: one pixel fewer is put before the first than behind the
+    /// last.
+    pub same: bool,
+}
+
+impl Conv {
+    /// A convolution of stride 1 without bias.
+    pub const fn new(inputs: usize, outputs: usize, kernel: usize) -> Self {
+        Self { inputs, outputs, kernel, stride: 1, bias: false, groups: 1, same: false }
+    }
+
+    /// The same with this stride.
+    #[must_use]
+    pub const fn stride(self, stride: usize) -> Self {
+        Self { stride, ..self }
+    }
+
+    /// The same with this stride, padded as TensorFlow does.
+    #[must_use]
+    pub const fn same(self, stride: usize) -> Self {
+        Self { stride, same: true, ..self }
+    }
+
+    /// The same with a bias.
+    #[must_use]
+    pub const fn bias(self) -> Self {
+        Self { bias: true, ..self }
+    }
+
+    /// The same, each channel by itself.
+    #[must_use]
+    pub const fn depthwise(self) -> Self {
+        Self { groups: self.inputs, ..self }
+    }
+
+    /// Zeros before the first and behind the last pixel of a row or column: so many that stride 1 keeps the size.
+    pub const fn padding(self) -> (usize, usize) {
+        if self.same {
+            let all = self.kernel - self.stride;
+            (all / 2, all - all / 2)
+        } else {
+            (self.kernel / 2, self.kernel / 2)
+        }
+    }
+}
+
+/// A batch norm's numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Norm {
+    /// Channels.
+    pub channels: usize,
+    /// What is added to variances.
+    pub epsilon: f64,
 }
 
 /// What networks are made of. Values are images × channels × height × width; parameters are found by name, as in
@@ -39,10 +97,12 @@ pub trait Operations {
 
     /// A convolution with the parameters `name.weight` and `name.bias`.
     fn conv(&mut self, x: &Self::Value, name: &str, conv: Conv) -> Self::Value;
-    /// Batch normalisation (Ioffe & Szegedy 2015), ε = 1e-5, with `name.weight`, `.bias`, `.running_mean`, `.running_var`.
-    fn norm(&mut self, x: &Self::Value, name: &str, channels: usize) -> Self::Value;
+    /// Batch normalisation (Ioffe & Szegedy 2015) with `name.weight`, `.bias`, `.running_mean`, `.running_var`.
+    fn norm(&mut self, x: &Self::Value, name: &str, norm: Norm) -> Self::Value;
     /// max(x, 0).
     fn relu(&mut self, x: &Self::Value) -> Self::Value;
+    /// min(max(x, 0), 6).
+    fn relu6(&mut self, x: &Self::Value) -> Self::Value;
     /// a + b.
     fn add(&mut self, a: &Self::Value, b: &Self::Value) -> Self::Value;
     /// The channels of a, then those of b.
@@ -91,15 +151,16 @@ macro_rules! networks {
 networks! {
     BasicSegnet, basic_segnet, "basic-segnet", "Basic SegNet of Kendall et al. 2015: four 7 × 7 convolutions of 64 channels down, four up.";
     Segnet, segnet, "segnet", "SegNet of Badrinarayanan et al. 2017: the 13 convolutions of VGG16 with batch norm, and their mirror.";
+    LiteUnet, lite_unet, "lite-unet", "U-Net with the encoder of EfficientNet-Lite0 (Tan & Le 2019), which may begin with weights learnt from ImageNet.";
     Unet, unet, "unet", "U-Net (Ronneberger et al. 2015) with the residual encoder of ResNet-18 (He et al. 2016).";
 }
 
 impl Network {
-    /// Pixels that an image must have down and across: SegNets halve it once a block and keep nothing of what is odd.
+    /// Pixels that an image must have down and across: SegNets and EfficientNet halve it again and again and keep nothing of what is odd.
     pub fn least_side(self) -> u32 {
         match self {
             Self::BasicSegnet => 16,
-            Self::Segnet => 32,
+            Self::Segnet | Self::LiteUnet => 32,
             Self::Unet => 1,
         }
     }
@@ -115,6 +176,6 @@ impl Network {
 /// Convolution, batch norm and, where asked for, ReLU, with the names `name.conv` and `name.bn`.
 fn unit<O: Operations>(o: &mut O, x: &O::Value, name: &str, conv: Conv, relu: bool) -> O::Value {
     let y = o.conv(x, &format!("{name}.conv"), conv);
-    let y = o.norm(&y, &format!("{name}.bn"), conv.outputs);
+    let y = o.norm(&y, &format!("{name}.bn"), Norm { channels: conv.outputs, epsilon: 1e-5 });
     if relu { o.relu(&y) } else { y }
 }

@@ -1,6 +1,6 @@
 //! What there is to learn in a network: names, shapes and first values.
 
-use super::{Conv, Network, Operations};
+use super::{Conv, Network, Norm, Operations};
 use crate::sampling::{Purpose, Stream};
 use crate::train::weights::Array;
 use crate::{Error, Result};
@@ -34,7 +34,7 @@ impl Role {
 pub struct Parameter {
     /// Its name, such as `enc0_0.conv.weight`.
     pub name: String,
-    /// Its size along each axis: outputs × inputs × kernel × kernel, or channels.
+    /// Its size along each axis: outputs × inputs of a group × kernel × kernel, or channels.
     pub shape: Vec<usize>,
     /// What it does.
     pub role: Role,
@@ -44,6 +44,11 @@ impl Parameter {
     /// How many numbers it holds.
     pub fn len(&self) -> usize {
         self.shape.iter().product()
+    }
+
+    /// Whether it belongs to the encoder, the half of a network that may begin with published weights.
+    pub fn is_encoder(&self) -> bool {
+        is_encoder(&self.name)
     }
 
     /// Whether it holds none.
@@ -65,6 +70,11 @@ impl Parameter {
             Role::Bias | Role::Shift | Role::Mean => vec![0.0; self.len()],
         }
     }
+}
+
+/// Whether what has this name belongs to the encoder.
+pub fn is_encoder(name: &str) -> bool {
+    name.starts_with("stem.") || name.starts_with("enc")
 }
 
 /// The parameters of a network, in the order in which an image meets them.
@@ -94,6 +104,11 @@ pub fn fitting(network: Network, bands: usize, classes: usize, arrays: &[Array])
     parameters(network, bands, classes).iter().map(fit).collect()
 }
 
+/// The unit of a parameter of an encoder and what it is in it: `enc0_1.depthwise` and `bn.bias`.
+pub(super) fn parts(name: &str) -> Option<(&str, &str)> {
+    [".conv.", ".bn."].iter().find_map(|part| name.find(part).map(|at| (&name[..at], &name[at + 1..])))
+}
+
 struct List(Vec<Parameter>);
 
 impl List {
@@ -107,13 +122,17 @@ impl Operations for List {
     type Places = ();
 
     fn conv(&mut self, (): &(), name: &str, conv: Conv) {
-        self.note(format!("{name}.weight"), &[conv.outputs, conv.inputs, conv.kernel, conv.kernel], Role::Weight);
+        self.note(
+            format!("{name}.weight"),
+            &[conv.outputs, conv.inputs / conv.groups, conv.kernel, conv.kernel],
+            Role::Weight,
+        );
         if conv.bias {
             self.note(format!("{name}.bias"), &[conv.outputs], Role::Bias);
         }
     }
 
-    fn norm(&mut self, (): &(), name: &str, channels: usize) {
+    fn norm(&mut self, (): &(), name: &str, norm: Norm) {
         let roles = [
             ("weight", Role::Gain),
             ("bias", Role::Shift),
@@ -121,11 +140,12 @@ impl Operations for List {
             ("running_var", Role::Variance),
         ];
         for (what, role) in roles {
-            self.note(format!("{name}.{what}"), &[channels], role);
+            self.note(format!("{name}.{what}"), &[norm.channels], role);
         }
     }
 
     fn relu(&mut self, (): &()) {}
+    fn relu6(&mut self, (): &()) {}
     fn add(&mut self, (): &(), (): &()) {}
     fn concat(&mut self, (): &(), (): &()) {}
     fn pool(&mut self, (): &()) -> ((), ()) {
@@ -167,6 +187,13 @@ mod tests {
             .map(Parameter::len)
             .sum();
         assert_eq!(resnet, 11_176_512);
+        // EfficientNet-Lite0 has 4 652 008, 1 281 000 of them in its classifier and 412 160 in the convolution before that.
+        let lite: usize = parameters(Network::LiteUnet, 3, 3)
+            .iter()
+            .filter(|p| p.role.is_trainable() && p.is_encoder())
+            .map(Parameter::len)
+            .sum();
+        assert_eq!(lite, 4_652_008 - 1_281_000 - 412_160);
     }
 
     #[test]

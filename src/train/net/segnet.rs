@@ -24,7 +24,7 @@ const DECODER: [&[(usize, usize)]; 5] = [
 ];
 
 pub(super) fn walk<O: Operations>(o: &mut O, x: &O::Value, bands: usize, classes: usize) -> O::Value {
-    let conv = |inputs, outputs| Conv { inputs, outputs, kernel: 3, stride: 1, bias: true };
+    let conv = |inputs, outputs| Conv::new(inputs, outputs, 3).bias();
     let mut stack = Vec::new();
     let mut now = None;
     for (level, block) in ENCODER.iter().enumerate() {
@@ -45,4 +45,15 @@ pub(super) fn walk<O: Operations>(o: &mut O, x: &O::Value, bands: usize, classes
         }
     }
     o.conv(now.as_ref().unwrap_or(x), "head.conv", conv(64, classes))
+}
+
+/// A parameter's name in torchvision's `vgg16_bn`: a list of layers, in which a convolution is followed by its norm and its ReLU, and each
+/// block by a pooling.
+pub(super) fn published(name: &str) -> Option<String> {
+    let (unit, what) = super::parameters::parts(name)?;
+    let (block, i) = unit.strip_prefix("enc")?.split_once('_')?;
+    let (block, i): (usize, usize) = (block.parse().ok()?, i.parse().ok()?);
+    let before: usize = ENCODER[..block].iter().map(|convolutions| 3 * convolutions.len() + 1).sum();
+    let (layer, what) = what.split_once('.')?;
+    Some(format!("features.{}.{what}", before + 3 * i + usize::from(layer == "bn")))
 }

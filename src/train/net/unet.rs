@@ -2,7 +2,7 @@
 //!
 //! Sources: Ronneberger, Fischer & Brox 2015 (skips from encoder to decoder); He, Zhang, Ren & Sun 2016 (ResNet-18: a 7 × 7 stem,
 //! then four stages of two blocks). Decoder of 256, 128, 64, 32 and 16 channels, each two 3 × 3 convolutions behind an
-//! enlargement by the nearest pixel. Weights begin at random: no photographs of everyday things went in.
+//! enlargement by the nearest pixel. Weights begin at random unless a file is given.
 
 use super::{Conv, Operations, unit};
 
@@ -12,7 +12,7 @@ const STAGES: [usize; 4] = [64, 128, 256, 512];
 const DECODER: [usize; 5] = [256, 128, 64, 32, 16];
 
 pub(super) fn walk<O: Operations>(o: &mut O, x: &O::Value, bands: usize, classes: usize) -> O::Value {
-    let stem = unit(o, x, "stem", Conv { inputs: bands, outputs: STAGES[0], kernel: 7, stride: 2, bias: false }, true);
+    let stem = unit(o, x, "stem", Conv::new(bands, STAGES[0], 7).stride(2), true);
     let mut deepest = o.pool3(&stem);
     let mut skips = vec![(stem, STAGES[0])];
     let mut channels = STAGES[0];
@@ -29,7 +29,7 @@ pub(super) fn walk<O: Operations>(o: &mut O, x: &O::Value, bands: usize, classes
     }
     let mut now = deepest;
     for (level, outputs) in DECODER.into_iter().enumerate() {
-        let conv = |inputs| Conv { inputs, outputs, kernel: 3, stride: 1, bias: false };
+        let conv = |inputs| Conv::new(inputs, outputs, 3);
         let (joined, inputs) = match skips.pop() {
             Some((skip, more)) => {
                 let larger = o.enlarge(&now, &skip);
@@ -41,24 +41,37 @@ pub(super) fn walk<O: Operations>(o: &mut O, x: &O::Value, bands: usize, classes
         now = unit(o, &first, &format!("dec{level}_1"), conv(outputs), true);
         channels = outputs;
     }
-    o.conv(&now, "head.conv", Conv { inputs: channels, outputs: classes, kernel: 3, stride: 1, bias: true })
+    o.conv(&now, "head.conv", Conv::new(channels, classes, 3).bias())
 }
 
 /// A residual block: two convolutions and the way past them, which has a convolution of its own where sizes differ.
 fn block<O: Operations>(o: &mut O, x: &O::Value, name: &str, inputs: usize, outputs: usize, stride: usize) -> O::Value {
-    let first = unit(o, x, &format!("{name}.0"), Conv { inputs, outputs, kernel: 3, stride, bias: false }, true);
-    let second = unit(
-        o,
-        &first,
-        &format!("{name}.1"),
-        Conv { inputs: outputs, outputs, kernel: 3, stride: 1, bias: false },
-        false,
-    );
+    let first = unit(o, x, &format!("{name}.0"), Conv::new(inputs, outputs, 3).stride(stride), true);
+    let second = unit(o, &first, &format!("{name}.1"), Conv::new(outputs, outputs, 3), false);
     let sum = if inputs == outputs && stride == 1 {
         o.add(&second, x)
     } else {
-        let past = unit(o, x, &format!("{name}.past"), Conv { inputs, outputs, kernel: 1, stride, bias: false }, false);
+        let past = unit(o, x, &format!("{name}.past"), Conv::new(inputs, outputs, 1).stride(stride), false);
         o.add(&second, &past)
     };
     o.relu(&sum)
+}
+
+/// A parameter's name in torchvision's `resnet18`.
+pub(super) fn published(name: &str) -> Option<String> {
+    let (unit, what) = super::parameters::parts(name)?;
+    if unit == "stem" {
+        return Some(what.replacen("conv", "conv1", 1).replacen("bn", "bn1", 1));
+    }
+    let (place, part) = unit.strip_prefix("enc")?.split_once('.')?;
+    let (stage, k) = place.split_once('_')?;
+    let stage = stage.parse::<usize>().ok()? + 1;
+    let what = match part {
+        "past" => what.replacen("conv", "downsample.0", 1).replacen("bn", "downsample.1", 1),
+        part => {
+            let number = part.parse::<usize>().ok()? + 1;
+            what.replacen("conv", &format!("conv{number}"), 1).replacen("bn", &format!("bn{number}"), 1)
+        }
+    };
+    Some(format!("layer{stage}.{k}.{what}"))
 }

@@ -1,16 +1,27 @@
 //! A walk over a network that computes it.
 
-use super::Precision;
-use crate::train::net::{Conv, Operations};
+use super::device::Precision;
+use crate::train::net::{Conv, Norm, Operations, is_encoder};
 use std::collections::BTreeMap;
 use tch::{Kind, Tensor};
+
+/// Which statistics batch norms take: those of the batch, which also move the running ones, or the running ones.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pass {
+    /// The running ones.
+    Inference,
+    /// The batch's.
+    Training,
+    /// The batch's in the decoder, the running ones in the encoder.
+    Decoder,
+}
 
 /// Computes what it walks over. In bf16 convolutions take rounded copies of their weights, which themselves stay in single
 /// precision, as do the statistics of batch norms: what `torch.autocast` does, which tch has for CUDA alone.
 pub(super) struct Compute<'a> {
     pub(super) tensors: &'a BTreeMap<String, Tensor>,
     pub(super) precision: Precision,
-    pub(super) training: bool,
+    pub(super) pass: Pass,
 }
 
 impl Compute<'_> {
@@ -30,18 +41,31 @@ impl Operations for Compute<'_> {
     fn conv(&mut self, x: &Tensor, name: &str, conv: Conv) -> Tensor {
         let weight = self.rounded(&self.tensors[&format!("{name}.weight")]);
         let bias = conv.bias.then(|| self.rounded(&self.tensors[&format!("{name}.bias")]));
-        let (stride, pad) = (conv.stride as i64, conv.kernel as i64 / 2);
-        self.rounded(x).conv2d(&weight, bias.as_ref(), [stride, stride], [pad, pad], [1, 1], 1)
+        let (stride, groups) = (conv.stride as i64, conv.groups as i64);
+        let (before, after) = (conv.padding().0 as i64, conv.padding().1 as i64);
+        let x = self.rounded(x);
+        let (x, pad) =
+            if before == after { (x, before) } else { (x.constant_pad_nd([before, after, before, after]), 0) };
+        x.conv2d(&weight, bias.as_ref(), [stride, stride], [pad, pad], [1, 1], groups)
     }
 
-    fn norm(&mut self, x: &Tensor, name: &str, _: usize) -> Tensor {
+    fn norm(&mut self, x: &Tensor, name: &str, norm: Norm) -> Tensor {
         let [gain, shift, mean, variance] = ["weight", "bias", "running_mean", "running_var"]
             .map(|what| Some(&self.tensors[&format!("{name}.{what}")]));
-        x.batch_norm(gain, shift, mean, variance, self.training, 0.1, 1e-5, true)
+        let training = match self.pass {
+            Pass::Inference => false,
+            Pass::Training => true,
+            Pass::Decoder => !is_encoder(name),
+        };
+        x.batch_norm(gain, shift, mean, variance, training, 0.1, norm.epsilon, true)
     }
 
     fn relu(&mut self, x: &Tensor) -> Tensor {
         x.relu()
+    }
+
+    fn relu6(&mut self, x: &Tensor) -> Tensor {
+        x.clamp(0.0, 6.0)
     }
 
     fn add(&mut self, a: &Tensor, b: &Tensor) -> Tensor {

@@ -4,6 +4,7 @@
 
 mod compute;
 pub mod device;
+pub mod multiscale;
 
 use super::net::{Network, Parameter, fitting, parameters};
 use super::weights::Array;
@@ -12,6 +13,7 @@ use compute::Compute;
 use std::collections::BTreeMap;
 use tch::{Device, Kind, Tensor};
 
+pub use compute::Pass;
 pub use device::{Precision, Where};
 
 /// A network with its parameters, on a device.
@@ -68,29 +70,37 @@ impl Model {
         self.list.iter().filter(|p| p.role.is_trainable()).map(|p| (p, &self.tensors[&p.name]))
     }
 
-    /// From images × bands × height × width to images × classes × height × width. `training` uses and moves the statistics of
-    /// the batch.
-    pub fn forward(&self, x: &Tensor, training: bool) -> Tensor {
-        self.walk(x, training).to_kind(Kind::Float)
+    /// From images × bands × height × width to images × classes × height × width.
+    pub fn forward(&self, x: &Tensor, pass: Pass) -> Tensor {
+        self.walk(x, pass).to_kind(Kind::Float)
     }
 
     /// The same in the precision of the last convolution.
-    pub(super) fn walk(&self, x: &Tensor, training: bool) -> Tensor {
-        let mut compute = Compute { tensors: &self.tensors, precision: self.place.precision, training };
+    pub(super) fn walk(&self, x: &Tensor, pass: Pass) -> Tensor {
+        let mut compute = Compute { tensors: &self.tensors, precision: self.place.precision, pass };
         self.network.walk(&mut compute, x, self.bands, self.classes)
     }
 
     /// The class of each pixel of images that lie as `height × width × bands`, one after the other.
     pub fn predict(&self, pixels: &[f32], (width, height): (u32, u32)) -> Result<Vec<u8>> {
         let x = self.images(pixels, (width, height));
-        let classes =
-            tch::no_grad(|| self.forward(&x, false).argmax(1, false).to_kind(Kind::Uint8).to_device(Device::Cpu));
-        Vec::<u8>::try_from(classes.contiguous().view(-1)).map_err(|e| failed(&e))
+        classes(&tch::no_grad(|| self.forward(&x, Pass::Inference)))
     }
 
     /// The values of the classes: images × classes × height × width; images lie as in [`Self::predict`].
     pub fn scores(&self, pixels: &[f32], size: (u32, u32)) -> Result<Vec<f32>> {
-        values(&tch::no_grad(|| self.forward(&self.images(pixels, size), false)))
+        values(&tch::no_grad(|| self.forward(&self.images(pixels, size), Pass::Inference)))
+    }
+
+    /// The probabilities of the classes of one image, in straight lines between its pixels' centres brought to another size.
+    pub fn probabilities(&self, pixels: &[f32], size: (u32, u32), to: (u32, u32)) -> Result<Vec<f32>> {
+        values(&tch::no_grad(|| {
+            let found = self.forward(&self.images(pixels, size), Pass::Inference).softmax(1, Kind::Float);
+            if size == to {
+                return found;
+            }
+            found.upsample_bilinear2d([i64::from(to.1), i64::from(to.0)], false, None, None)
+        }))
     }
 
     /// Has gradients change nothing any more: only so can its values become constants of a graph.
@@ -107,6 +117,12 @@ impl Model {
         let lying = Tensor::from_slice(pixels).view([images, i64::from(height), i64::from(width), bands]);
         lying.to_device(self.place.device).permute([0, 3, 1, 2])
     }
+}
+
+/// The class with the highest value at each pixel.
+pub(super) fn classes(scores: &Tensor) -> Result<Vec<u8>> {
+    let classes = scores.argmax(1, false).to_kind(Kind::Uint8).to_device(Device::Cpu);
+    Vec::<u8>::try_from(classes.contiguous().view(-1)).map_err(|e| failed(&e))
 }
 
 /// A tensor's values in single precision, row by row.

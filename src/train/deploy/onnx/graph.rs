@@ -3,7 +3,7 @@
 use super::proto::{Attribute, AttributeKind, DataType, Graph, Node, Tensor};
 use crate::train::data::Normalization;
 use crate::train::data::normalise::LEAST;
-use crate::train::net::{Conv, Operations};
+use crate::train::net::{Conv, Norm, Operations};
 use crate::train::weights::Array;
 
 /// A graph as far as it is written. Values are names; each operation's first result has its name.
@@ -99,21 +99,35 @@ impl Operations for Recorder {
         if conv.bias {
             inputs.push(&bias);
         }
-        let (kernel, stride, pad) = (conv.kernel as i64, conv.stride as i64, (conv.kernel / 2) as i64);
-        let attributes =
-            vec![several("kernel_shape", &[kernel; 2]), several("strides", &[stride; 2]), several("pads", &[pad; 4])];
+        let (kernel, stride) = (conv.kernel as i64, conv.stride as i64);
+        let (before, after) = (conv.padding().0 as i64, conv.padding().1 as i64);
+        let attributes = vec![
+            several("kernel_shape", &[kernel; 2]),
+            several("strides", &[stride; 2]),
+            several("pads", &[before, before, after, after]),
+            whole("group", conv.groups as i64),
+        ];
         self.named(name, "Conv", &inputs, attributes)
     }
 
-    fn norm(&mut self, x: &String, name: &str, _: usize) -> String {
+    fn norm(&mut self, x: &String, name: &str, norm: Norm) -> String {
         let [gain, shift, mean, variance] =
             ["weight", "bias", "running_mean", "running_var"].map(|what| format!("{name}.{what}"));
-        let epsilon = number("epsilon", 1e-5);
+        let epsilon = number("epsilon", norm.epsilon as f32);
         self.named(name, "BatchNormalization", &[x, &gain, &shift, &mean, &variance], vec![epsilon])
     }
 
     fn relu(&mut self, x: &String) -> String {
         self.op("Relu", &[x], vec![])
+    }
+
+    fn relu6(&mut self, x: &String) -> String {
+        for (name, value) in [("zero", 0.0), ("six", 6.0)] {
+            if self.graph.initializer.iter().all(|tensor| tensor.name != name) {
+                self.constant(name, &[], &[value]);
+            }
+        }
+        self.op("Clip", &[x, "zero", "six"], vec![])
     }
 
     fn add(&mut self, a: &String, b: &String) -> String {

@@ -1,0 +1,36 @@
+//! At which sizes a network sees pictures.
+
+use furrow::train::ModelCard;
+use furrow::train::data::Resize;
+use furrow::{Error, Result};
+
+/// Sizes that pictures are brought to.
+#[derive(clap::Args)]
+pub(crate) struct SizeArgs {
+    /// Sizes that pictures are brought to: stretch (to the size that the network was trained at), or lengths of the longer side with
+    /// commas between: the shape is kept, probabilities are averaged over them. As the training said unless given.
+    #[arg(long, value_name = "SIDES", value_parser = Resize::parse, conflicts_with = "pixel_mm")]
+    resize: Option<Resize>,
+    /// Side of the pictures' pixels on the ground, millimetres: they are brought to the pixels that the network was trained on.
+    #[arg(long, value_name = "MM")]
+    pixel_mm: Option<f64>,
+}
+
+impl SizeArgs {
+    /// Puts what is given into a model card.
+    pub(crate) fn apply(&self, card: &mut ModelCard) -> Result<()> {
+        if let Some(resize) = &self.resize {
+            card.resize = resize.clone();
+        }
+        let Some(mm) = self.pixel_mm else { return Ok(()) };
+        let trained = card.pixel_mm.ok_or_else(|| {
+            Error::misuse("--pixel-mm: the network's training images do not tell the size of their pixels")
+                .help("--resize 640 brings the pictures' longer side to 640 pixels")
+        })?;
+        card.resize = Resize::Scale(mm / trained);
+        card.resize.check().map_err(|what| {
+            Error::misuse(format!("--pixel-mm {mm}: {what}"))
+                .help(format!("the network was trained on pixels of {trained:.2} mm"))
+        })
+    }
+}

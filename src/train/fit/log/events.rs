@@ -1,0 +1,78 @@
+//! TensorBoard's event files, as far as a training needs them.
+//!
+//! Source: `event.proto`, `summary.proto` and `lib/io/record_writer.h` of TensorFlow 2: numbers and types of the fields are theirs. A
+//! record is its length, a masked CRC-32C of that, the message, and a masked CRC-32C of the message.
+
+use prost::{Message, Oneof};
+
+/// `Event`.
+#[derive(Clone, PartialEq, Message)]
+pub(super) struct Event {
+    /// Seconds since 1970.
+    #[prost(double, tag = "1")]
+    pub(super) wall_time: f64,
+    #[prost(int64, tag = "2")]
+    pub(super) step: i64,
+    #[prost(oneof = "What", tags = "3, 5")]
+    pub(super) what: Option<What>,
+}
+
+/// What happened.
+#[derive(Clone, PartialEq, Oneof)]
+pub(super) enum What {
+    #[prost(string, tag = "3")]
+    FileVersion(String),
+    #[prost(message, tag = "5")]
+    Summary(Summary),
+}
+
+/// `Summary`.
+#[derive(Clone, PartialEq, Message)]
+pub(super) struct Summary {
+    #[prost(message, repeated, tag = "1")]
+    pub(super) value: Vec<Value>,
+}
+
+/// `Summary.Value`.
+#[derive(Clone, PartialEq, Message)]
+pub(super) struct Value {
+    #[prost(string, tag = "1")]
+    pub(super) tag: String,
+    #[prost(oneof = "Of", tags = "2, 4")]
+    pub(super) of: Option<Of>,
+}
+
+/// A number or a picture.
+#[derive(Clone, PartialEq, Oneof)]
+pub(super) enum Of {
+    #[prost(float, tag = "2")]
+    Number(f32),
+    #[prost(message, tag = "4")]
+    Image(Image),
+}
+
+/// `Summary.Image`.
+#[derive(Clone, PartialEq, Message)]
+pub(super) struct Image {
+    #[prost(int32, tag = "1")]
+    pub(super) height: i32,
+    #[prost(int32, tag = "2")]
+    pub(super) width: i32,
+    /// 3 for RGB.
+    #[prost(int32, tag = "3")]
+    pub(super) colorspace: i32,
+    /// PNG.
+    #[prost(bytes = "vec", tag = "4")]
+    pub(super) encoded: Vec<u8>,
+}
+
+/// A message as a record of the file.
+pub(super) fn record(event: &Event) -> Vec<u8> {
+    let message = event.encode_to_vec();
+    let length = (message.len() as u64).to_le_bytes();
+    [&length[..], &masked(&length), &message, &masked(&message)].concat()
+}
+
+fn masked(bytes: &[u8]) -> [u8; 4] {
+    (crc32c::crc32c(bytes).rotate_right(15).wrapping_add(0xa282_ead8)).to_le_bytes()
+}

@@ -1,0 +1,231 @@
+//! Encoders that begin with published weights: which file holds them, and what its arrays are called there.
+//!
+//! Files are safetensors with the names of the network's public implementation, converted from whatever it ships; nothing here reads a
+//! pickle, which is a program.
+//!
+//! | network | names as in |
+//! |---|---|
+//! | `lite-unet` | `efficientnet_lite_pytorch`, `efficientnet-lite0` |
+//! | `unet` | torchvision's `resnet18` |
+//! | `segnet` | torchvision's `vgg16_bn` |
+
+use super::{Network, Parameter, lite_unet, parameters, segnet, unet};
+use crate::train::weights::{self, Array};
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// What the encoder begins with.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Pretrained {
+    /// Random weights.
+    #[default]
+    None,
+    /// EfficientNet-Lite0's, learnt from ImageNet's photographs; for `lite-unet`.
+    Imagenet,
+    /// Those of a safetensors file.
+    File(PathBuf),
+}
+
+impl Pretrained {
+    /// Reads `none`, `imagenet` or the path of a file.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        match text {
+            "" => Err("an empty name: write none, imagenet or a safetensors file".into()),
+            "none" => Ok(Self::None),
+            "imagenet" => Ok(Self::Imagenet),
+            path => Ok(Self::File(path.into())),
+        }
+    }
+
+    /// Its name: none, imagenet or the file's path.
+    pub fn name(&self) -> String {
+        match self {
+            Self::None => "none".into(),
+            Self::Imagenet => "imagenet".into(),
+            Self::File(path) => path.display().to_string(),
+        }
+    }
+
+    /// Whether weights are random.
+    pub fn is_none(&self) -> bool {
+        *self == Self::None
+    }
+
+    /// All first values of a network, in the order of [`parameters()`]: the encoder's from the file, the others random; empty for
+    /// [`Self::None`]. A band that is not red, green or blue begins with the mean of their kernels, and all are scaled to the number of
+    /// bands: a gray picture gives what it would in colour.
+    ///
+    /// # Errors
+    /// What is missing in the file or has another shape.
+    pub fn begin(&self, network: Network, bands: usize, classes: usize, seed: u64) -> Result<Vec<Array>> {
+        let path = match self {
+            Self::None => return Ok(Vec::new()),
+            Self::Imagenet if network != Network::LiteUnet => {
+                return Err(Error::misuse(format!("there are no ImageNet weights for {} here", network.name()))
+                    .help("--network lite-unet, or a safetensors file with weights of this network's encoder"));
+            }
+            Self::Imagenet => imagenet(),
+            Self::File(path) => path.clone(),
+        };
+        if *self == Self::Imagenet && !path.is_file() {
+            return Err(Error::missing("the ImageNet weights are not here")
+                .help("`sh .libtorch/imagenet.sh` in the repository makes this file; FURROW_IMAGENET names another")
+                .in_file(path));
+        }
+        let found = weights::read_foreign(&path)?;
+        let place = |(i, parameter): (usize, &Parameter)| {
+            let values = if parameter.is_encoder() {
+                values(network, parameter, bands, &found).map_err(|e| e.in_file(&path))?
+            } else {
+                parameter.begin(seed, i)
+            };
+            Ok(Array { name: parameter.name.clone(), shape: parameter.shape.clone(), values })
+        };
+        parameters(network, bands, classes).iter().enumerate().map(place).collect()
+    }
+}
+
+/// Where `sh .libtorch/imagenet.sh` puts its weights.
+fn imagenet() -> PathBuf {
+    const HERE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/.libtorch/efficientnet-lite0.safetensors");
+    std::env::var_os("FURROW_IMAGENET").map_or_else(|| Path::new(HERE).into(), PathBuf::from)
+}
+
+/// A parameter's values among published ones.
+fn values(network: Network, parameter: &Parameter, bands: usize, found: &[Array]) -> Result<Vec<f32>> {
+    let published = match network {
+        Network::LiteUnet => lite_unet::published(&parameter.name),
+        Network::Unet => unet::published(&parameter.name),
+        Network::Segnet => segnet::published(&parameter.name),
+        Network::BasicSegnet => None,
+    };
+    let Some(name) = published else {
+        return Err(Error::misuse(format!("{} has no published weights to begin with", network.name()))
+            .help("--pretrained none, or another --network"));
+    };
+    let wrong = |what: String| {
+        Error::input(format!("these are no weights of the encoder of {}: {what}", network.name()))
+            .help("safetensors with the names of efficientnet_lite_pytorch, or of torchvision's resnet18 or vgg16_bn")
+    };
+    let array = found.iter().find(|a| a.name == name).ok_or_else(|| wrong(format!("`{name}` is missing")))?;
+    if !array.values.iter().all(|v| v.is_finite()) {
+        return Err(wrong(format!("`{name}` holds values that are not finite numbers")));
+    }
+    if array.shape == parameter.shape && (bands == 3 || parameter.shape.len() < 2 || parameter.shape[1] != bands) {
+        return Ok(array.values.clone());
+    }
+    match (array.shape.as_slice(), parameter.shape.as_slice()) {
+        (&[outputs, 3, height, width], &[to, inputs, h, w])
+            if (outputs, height, width, bands) == (to, h, w, inputs) =>
+        {
+            Ok(colours_spread(&array.values, height * width, bands))
+        }
+        (is, must) => Err(wrong(format!("`{name}` is {is:?}, not {must:?}"))),
+    }
+}
+
+/// Kernels of three colours as kernels of so many bands: the colours first, then their mean, all scaled by 3 / bands.
+fn colours_spread(values: &[f32], kernel: usize, bands: usize) -> Vec<f32> {
+    let scale = 3.0 / bands as f32;
+    let mut spread = Vec::with_capacity(values.len() / 3 * bands);
+    for output in values.chunks_exact(3 * kernel) {
+        for band in 0..bands {
+            spread.extend((0..kernel).map(|i| {
+                let colour = |c: usize| output[c * kernel + i];
+                scale * if band < 3 { colour(band) } else { (colour(0) + colour(1) + colour(2)) / 3.0 }
+            }));
+        }
+    }
+    spread
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn published(network: Network) -> Vec<Array> {
+        let name = |parameter: &Parameter| match network {
+            Network::LiteUnet => lite_unet::published(&parameter.name),
+            Network::Unet => unet::published(&parameter.name),
+            _ => segnet::published(&parameter.name),
+        };
+        let array = |(i, p): (usize, &Parameter)| {
+            Some(Array {
+                name: name(p)?,
+                shape: p.shape.clone(),
+                values: (0..p.len()).map(|k| (i + k) as f32).collect(),
+            })
+        };
+        parameters(network, 3, 3).iter().enumerate().filter(|(_, p)| p.is_encoder()).filter_map(array).collect()
+    }
+
+    /// Rationale: one array under another's name, and an encoder begins with nonsense that nobody sees. Expected: the public implementations'
+    /// names, each once. Source: torchvision 0.26 `vgg16_bn` and `resnet18`, efficientnet_lite_pytorch 0.1.0.
+    #[test]
+    fn arrays_have_the_names_of_public_implementations() {
+        let known = [
+            (Network::Segnet, "enc0_0.conv.weight", "features.0.weight"),
+            (Network::Segnet, "enc2_1.bn.running_mean", "features.18.running_mean"),
+            (Network::Segnet, "enc4_2.conv.bias", "features.40.bias"),
+            (Network::Unet, "stem.bn.weight", "bn1.weight"),
+            (Network::Unet, "enc0_1.1.conv.weight", "layer1.1.conv2.weight"),
+            (Network::Unet, "enc3_0.past.bn.bias", "layer4.0.downsample.1.bias"),
+            (Network::LiteUnet, "stem.bn.running_var", "_bn0.running_var"),
+            (Network::LiteUnet, "enc0_0.depthwise.conv.weight", "_blocks.0._depthwise_conv.weight"),
+            (Network::LiteUnet, "enc2_1.project.bn.bias", "_blocks.4._bn2.bias"),
+            (Network::LiteUnet, "enc6_0.expand.conv.weight", "_blocks.15._expand_conv.weight"),
+        ];
+        for (network, ours, theirs) in known {
+            let list = parameters(network, 3, 3);
+            let i = list.iter().filter(|p| p.is_encoder()).position(|p| p.name == ours).unwrap();
+            let all = published(network);
+            assert_eq!(all[i].name, theirs);
+            assert_eq!(all.iter().filter(|a| a.name == theirs).count(), 1, "{theirs}");
+            assert_eq!(all.len(), list.iter().filter(|p| p.is_encoder()).count());
+        }
+    }
+
+    /// Rationale: a file of another network must not be half taken over. Expected: encoders' values from the file, decoders' as without it;
+    /// a fourth band begins with the colours' mean and a gray picture gives the same sums; what is missing, misshapen or no number is told.
+    #[test]
+    fn an_encoder_begins_with_the_file_and_a_wrong_file_is_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("encoder.safetensors");
+        let mut arrays = published(Network::LiteUnet);
+        weights::write(&path, &arrays, "").unwrap();
+        let from = Pretrained::File(path.clone());
+        let begun = from.begin(Network::LiteUnet, 3, 3, 1).unwrap();
+        let list = parameters(Network::LiteUnet, 3, 3);
+        for ((i, parameter), array) in list.iter().enumerate().zip(&begun) {
+            let expected = if parameter.is_encoder() {
+                array.values[0] == i as f32
+            } else {
+                array.values == parameter.begin(1, i)
+            };
+            assert!(expected, "{}", parameter.name);
+        }
+        let four = from.begin(Network::LiteUnet, 4, 3, 1).unwrap();
+        let sums =
+            |values: &[f32], each: usize| values.chunks_exact(each).map(|k| k.iter().sum()).collect::<Vec<f32>>();
+        for (a, b) in sums(&begun[0].values, 27).iter().zip(sums(&four[0].values, 36)) {
+            assert!((a - b).abs() < 1e-3 * a.abs(), "{a} {b}");
+        }
+        let told = |arrays: &[Array], network| {
+            weights::write(&path, arrays, "").unwrap();
+            let error = from.begin(network, 3, 3, 1).unwrap_err();
+            assert_eq!(error.exit_code(), 2);
+            error.to_string()
+        };
+        assert!(told(&arrays, Network::Unet).contains("`conv1.weight` is missing"));
+        assert!(told(&arrays, Network::BasicSegnet).contains("no published weights"));
+        arrays[7].values[0] = f32::NAN;
+        assert!(told(&arrays, Network::LiteUnet).contains("not finite"));
+        arrays[7].shape = vec![1, arrays[7].values.len()];
+        arrays[7].values[0] = 0.0;
+        assert!(told(&arrays, Network::LiteUnet).contains(", not ["));
+        std::fs::write(&path, b"\x80\x02}q\x00.").unwrap();
+        assert!(from.begin(Network::LiteUnet, 3, 3, 1).unwrap_err().to_string().contains("safetensors"));
+    }
+}
