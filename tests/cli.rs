@@ -190,7 +190,7 @@ fn misuse_is_answered_with_a_way_out() {
         (&["--scene", "page.ron", "--out", "page.ron"], "this is a file"),
         (&["--scene", "page.ron", "--out", "page.ron/deep"], "this is a file"),
         (&["--scene", "pages.ron"], "did you mean ./page.ron?"),
-        (&["--scene", "nowhere/field.ron"], "scenes/field.ron"),
+        (&["--scene", "nowhere/field.ron"], "there is none in nowhere; those that ship lie in scenes/"),
         (&["--scene", "."], "folder"),
         (&["texture"], "RECIPES"),
         (&["texture", "page.ron"], "Leaf, Soil"),

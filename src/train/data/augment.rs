@@ -14,7 +14,7 @@ use std::fmt;
 
 /// Data augmentation; each part may be left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(from = "Recorded", deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a switch of its own, none a state")]
 pub struct Augment {
     /// Mirrored left to right, half of the time.
@@ -32,7 +32,7 @@ pub struct Augment {
     pub blur: bool,
     /// Gaussian noise of up to 0.03, in half of the images blurred like the picture, as that of cameras that compress and scale is.
     pub noise: bool,
-    /// Random erasing: patches of one colour, labelled as soil; see [`super::erase`].
+    /// Random erasing: patches of one colour, labelled as soil; see [`super::erase`]. Not part of `all`.
     #[serde(skip_serializing_if = "is_off")]
     pub erase: bool,
 }
@@ -42,36 +42,9 @@ fn is_off(part: &bool) -> bool {
     !part
 }
 
-/// An augmentation as a run recorded it. Runs of version 0.1 knew no erasing, and did none.
-#[derive(Deserialize)]
-#[serde(default, deny_unknown_fields)]
-#[expect(clippy::struct_excessive_bools, reason = "each is a switch of its own, none a state")]
-struct Recorded {
-    flip: bool,
-    rotate: bool,
-    scale: bool,
-    crop: bool,
-    colour: bool,
-    blur: bool,
-    noise: bool,
-    erase: bool,
-}
-
-impl Default for Recorded {
-    fn default() -> Self {
-        Self { flip: true, rotate: true, scale: true, crop: true, colour: true, blur: true, noise: true, erase: false }
-    }
-}
-
-impl From<Recorded> for Augment {
-    fn from(Recorded { flip, rotate, scale, crop, colour, blur, noise, erase }: Recorded) -> Self {
-        Self { flip, rotate, scale, crop, colour, blur, noise, erase }
-    }
-}
-
 impl Default for Augment {
     fn default() -> Self {
-        Self { flip: true, rotate: true, scale: true, crop: true, colour: true, blur: true, noise: true, erase: true }
+        Self { flip: true, rotate: true, scale: true, crop: true, colour: true, blur: true, noise: true, erase: false }
     }
 }
 
@@ -91,7 +64,8 @@ impl fmt::Display for Augment {
         let names: Vec<&str> = parts.iter().filter(|(on, _)| *on).map(|(_, name)| *name).collect();
         match names.len() {
             0 => f.write_str("none"),
-            n if n == parts.len() => f.write_str("all"),
+            n if n + 1 == parts.len() && !erase => f.write_str("all"),
+            n if n == parts.len() => f.write_str("all,erase"),
             _ => f.write_str(&names.join(",")),
         }
     }
@@ -115,12 +89,12 @@ impl Augment {
         Moves { flip: self.flip, rotate: self.rotate, scale: self.scale, shift: self.crop }
     }
 
-    /// Reads `all`, `none` or names with commas between.
+    /// Reads `all` (all but `erase`), `none` or names with commas between.
     pub fn parse(text: &str) -> Result<Self, String> {
         let mut augment = Self::NONE;
         for name in text.split(',').map(str::trim) {
             match name {
-                "all" => augment = Self::default(),
+                "all" => augment = Self { erase: augment.erase, ..Self::default() },
                 "none" => {}
                 "flip" => augment.flip = true,
                 "rotate" => augment.rotate = true,
@@ -324,7 +298,7 @@ mod tests {
     #[test]
     fn labels_move_with_the_picture() {
         let (w, h) = (40, 30);
-        let augment = Augment { colour: false, blur: false, noise: false, erase: false, ..Augment::default() };
+        let augment = Augment { colour: false, blur: false, noise: false, ..Augment::default() };
         for seed in 0..50 {
             let mut stream = Stream::of(seed, 0, Purpose::Test, 0);
             for window in [(w, h), (17, 21)] {

@@ -42,10 +42,8 @@ impl Patch {
     fn draw((w, h): (u32, u32), bands: usize, stream: &mut Stream) -> Self {
         let side = (w.min(h)) as f32;
         let angle = stream.range32(0.0, std::f32::consts::PI);
-        // From lines of a pixel to plates of a third of the crop.
-        let half =
-            [stream.range32(0.02, 0.6).powi(2), stream.range32(0.05, 0.45).powi(2)].map(|share| share * side + 0.5);
-        let long = if stream.chance(0.3) { 8.0 } else { 1.0 };
+        // Plates from a twelfth to two thirds of the crop wide. Thin ones look like leaves of grass, which a network would take for soil.
+        let half = [0, 1].map(|_| stream.range32(0.2, 0.6).powi(2) * side);
         let gray = stream.range32(0.0, 1.0);
         let vivid = if stream.chance(0.5) { 0.0 } else { 0.6 };
         let mut colour: Vec<f32> =
@@ -59,7 +57,7 @@ impl Patch {
         Self {
             centre: [stream.range32(0.0, w as f32), stream.range32(0.0, h as f32)],
             turn: [angle.cos(), angle.sin()],
-            half: [half[0] * long, half[1]],
+            half,
             colour,
             grain: stream.range32(0.0, 0.4),
         }

@@ -105,7 +105,8 @@ pub struct Settings {
     #[arg(long, value_name = "SIDES", default_value = default_of("resize"))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resize: Option<String>,
-    /// Data augmentation: all, none, or some of flip, rotate, scale, crop, colour, blur, noise, erase with commas between.
+    /// Data augmentation: all, none, or some of flip, rotate, scale, crop, colour, blur, noise with commas between, and erase (random
+    /// erasing: patches of one colour labelled as soil), which is not part of all.
     #[arg(long, value_name = "NAMES", default_value = default_of("augment"))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub augment: Option<String>,
