@@ -429,7 +429,7 @@ fn broken_models_get_one_clear_error_at_the_place_that_names_them() {
         (Box::new(far("/bufferViews/0/byteOffset", json!(u64::MAX))), "reaches past its bytes"),
         (Box::new(far("/buffers/0/byteLength", json!(1_u64 << 50))), "has 48 of its"),
         (Box::new(far("/buffers/0/uri", json!("gone.bin"))), "`gone.bin`, which is not there"),
-        (Box::new(far("/buffers/0/uri", json!("https://a.b/c.bin"))), "only files beside it"),
+        (Box::new(far("/buffers/0/uri", json!("https://a.b/c.bin"))), "only files can be read"),
         (Box::new(far("/asset/version", json!("1.0"))), "glTF 2.0 can be read"),
         (Box::new(far("/accessors/0/type", json!("VEC4"))), "VEC3 is needed"),
         (Box::new(far("/accessors/0/componentType", json!(1))), "unknown component type"),
