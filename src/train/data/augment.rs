@@ -32,7 +32,7 @@ pub struct Augment {
     pub blur: bool,
     /// Gaussian noise of up to 0.03, in half of the images blurred like the picture, as that of cameras that compress and scale is.
     pub noise: bool,
-    /// Random erasing: patches of one colour, labelled as soil; see [`super::erase`]. Not part of `all`.
+    /// Random erasing: patches of one colour, labelled as soil; see the module `erase`. Not part of `all`.
     #[serde(skip_serializing_if = "is_off")]
     pub erase: bool,
 }
