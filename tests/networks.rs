@@ -9,6 +9,7 @@ mod common;
 
 use common::python::{ask, python, torch};
 use common::training::{self, learn, normalised, pictures, stirred};
+use furrow::train::data::Band;
 use furrow::train::fit::hyper::NormalizationMode;
 use furrow::train::fit::{Hyperparameters, Plan};
 use furrow::train::net::{Network, Pretrained, is_encoder};
@@ -87,7 +88,7 @@ fn an_encoder_that_begins_with_imagenet_computes_what_its_package_does() {
         Plan { network: Network::LiteUnet, ..Plan::default() },
         Hyperparameters { pretrained: Pretrained::Imagenet, freeze: 6, ..Hyperparameters::default() },
     );
-    let published = Pretrained::Imagenet.begin(Network::LiteUnet, 3, 3, 1).unwrap();
+    let published = Pretrained::Imagenet.begin(Network::LiteUnet, &Band::RGB, 3, 1).unwrap();
     for array in &published {
         let learnt = begun.values.iter().find(|a| a.name == array.name).unwrap();
         assert_eq!(learnt.values == array.values, is_encoder(&array.name), "{}", array.name);

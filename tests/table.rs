@@ -19,7 +19,7 @@ use tempfile::TempDir;
 const PAGE: &str = r#"Experiment(
     networks: ["basic-segnet", "unet"],
     seeds: [1, 2],
-    hyperparameters: (size: (48, 32), steps: 2, batch: 2, validate_every: 1),
+    hyperparameters: (size: (48, 32), steps: 2, batch: 2, validate_every: 1, resize: "64,96"),
     sets: {
         "small": Scene(file: "SMALL", count: 6, size: (48, 36), spp: 2, seed: 5, split: (4, 2, 0)),
         "frames": Real(about: "a few frames"),

@@ -72,7 +72,7 @@ pub fn fit(
                 .help("--init goes on with all weights of a run, --pretrained begins an encoder: give one"));
         }
         Some(run) => TrainedModel::open(run)?.values,
-        None => plan.hyper.pretrained.begin(plan.network, plan.shape.bands.len(), plan.classes.len(), plan.seed)?,
+        None => plan.hyper.pretrained.begin(plan.network, &plan.shape.bands, plan.classes.len(), plan.seed)?,
     };
     let plan = Plan { begin_with: (!begin.is_empty()).then(|| weights::hash(&begin)), ..plan.clone() };
     let identity = Identity::of(&plan, &train, &val)?;
@@ -81,6 +81,7 @@ pub fn fit(
     if !val.is_empty() {
         val.get(0)?;
     }
+    let pixel_mm = train.pixel_mm()?;
     identity.claim(folder)?;
     remove_unfinished(folder)?;
     if let Some(results) = run::results(folder)? {
@@ -101,7 +102,7 @@ pub fn fit(
         input: plan.shape.clone(),
         normalization: outcome.normalization,
         resize: plan.hyper.resize.clone(),
-        pixel_mm: data.train.pixel_mm()?,
+        pixel_mm,
         classes: plan.classes.clone(),
         weights: run::WEIGHTS.into(),
         weights_sha256: weights::hash(&outcome.values),
@@ -180,7 +181,8 @@ pub fn evaluate(
             Resize::Stretch => (trained_at, store.get(place)?),
             _ => store.whole(place).map(|(size, example)| (size, Cow::Owned(example)))?,
         };
-        let inputs = resize::inputs(&example.planes, size, &card.resize.sizes(trained_at, size), &card.normalization);
+        let sizes = card.resize.sizes(trained_at, size)?;
+        let inputs = resize::inputs(&example.planes, size, &sizes, &card.normalization);
         let begun = Instant::now();
         let scores = multiscale::scores(&model, &inputs)?;
         let seconds = Some(begun.elapsed().as_secs_f64());

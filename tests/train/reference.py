@@ -119,6 +119,17 @@ def numpy_basic_segnet(o, x):
     return o.conv(x, "head.conv")
 
 
+def numpy_decoder(o, x, skips, size):
+    for level in range(5):
+        skip = skips.pop() if skips else None
+        x = o.nearest(x, *(size if skip is None else skip.shape[2:]))
+        if skip is not None:
+            x = np.concatenate([x, skip], axis=1)
+        for i in range(2):
+            x = o.unit(x, f"dec{level}_{i}", bias=False)
+    return o.conv(x, "head.conv")
+
+
 def numpy_unet(o, x):
     size = x.shape[2:]
     x = o.unit(x, "stem", stride=2, bias=False)
@@ -133,14 +144,7 @@ def numpy_unet(o, x):
             x = np.maximum(y + past, 0)
         skips.append(x)
     skips.pop()
-    for level in range(5):
-        skip = skips.pop() if skips else None
-        x = o.nearest(x, *(size if skip is None else skip.shape[2:]))
-        if skip is not None:
-            x = np.concatenate([x, skip], axis=1)
-        for i in range(2):
-            x = o.unit(x, f"dec{level}_{i}", bias=False)
-    return o.conv(x, "head.conv")
+    return numpy_decoder(o, x, skips, size)
 
 
 # EfficientNet-B0's table 1, as Lite has it: blocks, kernel, stride, expansion.
@@ -167,14 +171,7 @@ def numpy_lite_unet(o, x):
             y = unit(y, name + ".depthwise", stride=step, kernel=kernel)
             y = unit(y, name + ".project", relu=False)
             x = x + y if block > 0 else y
-    for level in range(5):
-        skip = skips.pop() if skips else None
-        x = o.nearest(x, *(size if skip is None else skip.shape[2:]))
-        if skip is not None:
-            x = np.concatenate([x, skip], axis=1)
-        for i in range(2):
-            x = o.unit(x, f"dec{level}_{i}", bias=False)
-    return o.conv(x, "head.conv")
+    return numpy_decoder(o, x, skips, size)
 
 
 def run_numpy(network, weights, images, classes):

@@ -1,6 +1,6 @@
 //! `train baseline`.
 
-use crate::report::{self, Shots};
+use crate::report;
 use furrow::cli::signal::Signals;
 use furrow::train::baseline::{Kind, files};
 use furrow::train::classes::Classes;
@@ -44,7 +44,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let stop = signals.heed();
     let (_, images) = args.set.open(Pick::All, 0)?;
     let rule = files::fit(args.kind, &args.from, 0, &shape, stop)?;
-    let mut shots = Shots::new(images.len(), &["red", "green", "blue"]);
+    let mut shots = report::shots(images.len(), &Band::RGB);
     let report = files::evaluate(&rule, &args.set, &shape, stop, &mut |example, predicted| {
         shots.see(example, args.size, predicted);
     })?;

@@ -1,10 +1,10 @@
 //! `train eval`.
 
 use crate::machine::MachineArgs;
-use crate::report::{self, Shots};
+use crate::report;
 use crate::sizes::SizeArgs;
 use furrow::cli::signal::Signals;
-use furrow::train::data::{Band, Pick, Resize, Selection};
+use furrow::train::data::{Pick, Resize, Selection};
 use furrow::train::run::TrainedModel;
 use furrow::train::session;
 use furrow::{Result, cli};
@@ -36,9 +36,8 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     cli::check_folder(&out)?;
     let (machine, threads) = (args.machine.machine(), args.machine.threads());
     let card = &trained.card;
-    let bands: Vec<&str> = card.input.bands.iter().map(Band::name).collect();
     let (_, images) = args.set.open(Pick::All, 0)?;
-    let mut shots = Shots::new(images.len(), &bands);
+    let mut shots = report::shots(images.len(), &card.input.bands);
     let mut see = |seen: &session::Predicted<'_>| {
         shots.see(seen.example, seen.size, seen.predicted);
         Ok(())

@@ -28,8 +28,8 @@ pub(crate) struct Args {
     /// Folder of the run; with several seeds, of one run each.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// The network: basic-segnet, segnet or unet.
-    #[arg(long, value_name = "NAME", default_value = Plan::default().network.name(), value_parser = Network::named)]
+    /// The network.
+    #[arg(long, value_name = "NAME", help = network_help(), default_value = Plan::default().network.name(), value_parser = Network::named)]
     network: Network,
     #[command(flatten)]
     settings: Settings,
@@ -47,6 +47,11 @@ pub(crate) struct Args {
     /// Print nothing but errors and the paths of the files.
     #[arg(long)]
     quiet: bool,
+}
+
+fn network_help() -> String {
+    let names: Vec<&str> = Network::ALL.iter().map(|network| network.name()).collect();
+    format!("The network: {}", names.join(", "))
 }
 
 impl Args {

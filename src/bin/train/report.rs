@@ -3,8 +3,8 @@
 use furrow::Result;
 use furrow::output::write_files;
 use furrow::report::chart::{Chart, Curve};
-use furrow::train::data::Example;
-use furrow::train::figure::{Page, Shot, sheet, spread};
+use furrow::train::data::Band;
+use furrow::train::figure::{Page, Shot, Shots, sheet};
 use furrow::train::fit::checkpoint::History;
 use furrow::train::fit::log;
 use furrow::train::measure::Report;
@@ -16,34 +16,9 @@ const SHOWN: usize = 8;
 /// Pixels that they are wide and high at most.
 const LARGEST: u32 = 360;
 
-/// Images to look at, spread over a set.
-pub(crate) struct Shots {
-    places: Vec<usize>,
-    next: usize,
-    colours: Option<[usize; 3]>,
-    pub(crate) kept: Vec<Shot>,
-}
-
-impl Shots {
-    /// Of a set of `images` images, whose bands have these names.
-    pub(crate) fn new(images: usize, bands: &[&str]) -> Self {
-        let band = |name: &str| bands.iter().position(|b| *b == name);
-        let colours = match (band("red"), band("green"), band("blue")) {
-            (Some(r), Some(g), Some(b)) => Some([r, g, b]),
-            _ => None,
-        };
-        Self { places: spread(images, SHOWN), next: 0, colours, kept: Vec::new() }
-    }
-
-    /// Sees an image; keeps it if it is one of the chosen. Without red, green and blue the first band is shown as gray.
-    pub(crate) fn see(&mut self, example: &Example, size: (u32, u32), predicted: &[u8]) {
-        if self.places.contains(&self.next) {
-            let planes = self.colours.unwrap_or_default().map(|band| &example.planes[band]);
-            let rgb: Vec<[u8; 3]> = (0..example.labels.len()).map(|i| planes.map(|plane| plane[i])).collect();
-            self.kept.push(Shot::new(&example.name, size, &rgb, &example.labels, &[predicted], LARGEST));
-        }
-        self.next += 1;
-    }
+/// Images to look at, spread over a set of so many.
+pub(crate) fn shots(images: usize, bands: &[Band]) -> Shots {
+    Shots::new(images, SHOWN, LARGEST, bands)
 }
 
 /// Writes `report.json`, `report.md`, `figure.png` and `report.html`; returns their paths.

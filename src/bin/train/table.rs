@@ -2,7 +2,7 @@
 
 use crate::fit;
 use crate::machine::MachineArgs;
-use crate::report::Shots;
+use crate::report;
 use furrow::cli::signal::Signals;
 use furrow::dataset::generate::Shard;
 use furrow::output::write_atomically;
@@ -156,18 +156,16 @@ fn evaluate(
     let (_, images) = on.open(Pick::All, 0)?;
     let (report, shots, palette) = match predictor {
         Predictor::Network(trained, precision, threads) => {
-            let input = &trained.card.input;
-            let bands: Vec<&str> = input.bands.iter().map(Band::name).collect();
-            let mut shots = Shots::new(images.len(), &bands);
+            let mut shots = report::shots(images.len(), &trained.card.input.bands);
             let mut see = |seen: &session::Predicted<'_>| {
-                shots.see(seen.example, (input.width, input.height), seen.predicted);
+                shots.see(seen.example, seen.size, seen.predicted);
                 Ok(())
             };
             let report = session::evaluate(trained, on, precision, *threads, machine, stop, &mut see)?;
             (report, shots, trained.card.classes.colors())
         }
         Predictor::Baseline(baseline, shape) => {
-            let mut shots = Shots::new(images.len(), &["red", "green", "blue"]);
+            let mut shots = report::shots(images.len(), &Band::RGB);
             let size = (shape.width, shape.height);
             let mut see = |example: &_, predicted: &[u8]| shots.see(example, size, predicted);
             let report = files::evaluate(baseline, on, shape, stop, &mut see)?;

@@ -1,7 +1,7 @@
 //! Random erasing: patches of one colour over a crop, labelled as soil.
 //!
-//! After Zhong et al. 2020, "Random erasing data augmentation", with one difference: what lies over a field (a plate, a hose, a marking
-//! line, a shoe) is no plant, so the label goes with the pixels. Without it a network that has seen nothing but fields takes a white
+//! After Zhong et al. 2020, "Random erasing data augmentation", with one difference: what lies over a field (a plate, a board, a
+//! shoe) is no plant, so the label goes with the pixels. Without it a network that has seen nothing but fields takes a white
 //! plate for a pale leaf.
 
 use crate::sampling::Stream;
@@ -42,8 +42,8 @@ impl Patch {
     fn draw((w, h): (u32, u32), bands: usize, stream: &mut Stream) -> Self {
         let side = (w.min(h)) as f32;
         let angle = stream.range32(0.0, std::f32::consts::PI);
-        // Plates from a twelfth to two thirds of the crop wide. Thin ones look like leaves of grass, which a network would take for soil.
-        let half = [0, 1].map(|_| stream.range32(0.2, 0.6).powi(2) * side);
+        // Plates from a twelfth to two fifths of the crop wide. Thin ones look like leaves of grass, which a network would take for soil.
+        let half = [0, 1].map(|_| stream.range32(0.2, 0.45).powi(2) * side);
         let gray = stream.range32(0.0, 1.0);
         let vivid = if stream.chance(0.5) { 0.0 } else { 0.6 };
         let mut colour: Vec<f32> =

@@ -6,6 +6,7 @@
 
 use super::Normalization;
 use crate::output;
+use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
 /// Sides of inputs are whole multiples of this many pixels: halved five times, nothing of them is left over.
@@ -32,7 +33,7 @@ pub enum Resize {
 
 impl Resize {
     /// Reads `stretch`, or lengths with commas between.
-    pub fn parse(text: &str) -> Result<Self, String> {
+    pub fn parse(text: &str) -> std::result::Result<Self, String> {
         if text == "stretch" {
             return Ok(Self::Stretch);
         }
@@ -44,7 +45,7 @@ impl Resize {
     }
 
     /// Whether lengths are in range.
-    pub fn check(&self) -> Result<(), String> {
+    pub fn check(&self) -> std::result::Result<(), String> {
         match self {
             Self::LongSides(sides)
                 if sides.is_empty() || sides.len() > MOST || !sides.iter().all(|s| LONG.contains(s)) =>
@@ -72,11 +73,11 @@ impl Resize {
         *self == Self::Stretch
     }
 
-    /// The sizes that a picture of this width and height is brought to.
-    pub fn sizes(&self, trained: (u32, u32), (width, height): (u32, u32)) -> Vec<(u32, u32)> {
+    /// The sizes that a picture of this width and height is brought to. An error where one is larger than networks take.
+    pub fn sizes(&self, trained: (u32, u32), (width, height): (u32, u32)) -> Result<Vec<(u32, u32)>> {
         let near = |side: u32, factor: f64| ((f64::from(side) * factor / f64::from(STEP)).round() as u32).max(1) * STEP;
         let scaled = |factor: f64| (near(width, factor), near(height, factor));
-        match self {
+        let sizes = match self {
             Self::Stretch => vec![trained],
             Self::Scale(factor) => vec![scaled(*factor)],
             Self::LongSides(sides) => {
@@ -85,6 +86,14 @@ impl Resize {
                 sizes.dedup();
                 sizes
             }
+        };
+        match sizes.iter().find(|(w, h)| w.max(h) > LONG.end()) {
+            Some((w, h)) if !self.is_stretch() => Err(Error::input(format!(
+                "a picture of {width} × {height} pixels would be brought to {w} × {h}; at most {} are taken",
+                LONG.end()
+            ))
+            .help("cut it into pieces, or check --pixel-mm")),
+            _ => Ok(sizes),
         }
     }
 }
@@ -123,12 +132,15 @@ mod tests {
     fn pictures_keep_their_shape_where_lengths_are_given() {
         let sides = Resize::parse("480, 640").unwrap();
         assert_eq!(sides, Resize::LongSides(vec![480, 640]));
-        assert_eq!(sides.sizes((64, 48), (1296, 966)), [(480, 352), (640, 480)]);
-        assert_eq!(sides.sizes((64, 48), (350, 350)), [(480, 480), (640, 640)]);
-        assert_eq!(sides.sizes((64, 48), (30, 3000)), [(32, 480), (32, 640)]);
-        assert_eq!(Resize::Scale(0.5).sizes((64, 48), (1296, 966)), [(640, 480)]);
+        let sizes = |resize: &Resize, of| resize.sizes((64, 48), of).unwrap();
+        assert_eq!(sizes(&sides, (1296, 966)), [(480, 352), (640, 480)]);
+        assert_eq!(sizes(&sides, (350, 350)), [(480, 480), (640, 640)]);
+        assert_eq!(sizes(&sides, (30, 3000)), [(32, 480), (32, 640)]);
+        assert_eq!(sizes(&Resize::Scale(0.5), (1296, 966)), [(640, 480)]);
         assert!(Resize::Scale(0.5).check().is_ok() && Resize::Scale(f64::NAN).check().is_err());
-        assert_eq!(Resize::parse("stretch").unwrap().sizes((64, 48), (1296, 966)), [(64, 48)]);
+        // What would take all memory is refused.
+        assert_eq!(Resize::Scale(50.0).sizes((64, 48), (1296, 966)).unwrap_err().exit_code(), 2);
+        assert_eq!(sizes(&Resize::parse("stretch").unwrap(), (1296, 966)), [(64, 48)]);
         assert_eq!(Resize::parse(&sides.name()).unwrap(), sides);
         for bad in ["", "0", "480,", "x", "99999", "64,64,64,64,64,64,64,64,64"] {
             assert!(Resize::parse(bad).is_err(), "{bad}");

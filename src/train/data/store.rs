@@ -9,6 +9,9 @@ use std::borrow::Cow;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+/// Images, about, whose records are read for the size of their pixels.
+const ASKED: usize = 256;
+
 /// Images of one or several sets, by place.
 pub struct Store {
     /// With their outlines' margins.
@@ -81,13 +84,10 @@ impl Store {
         Example::read_whole(set, number, map, *margin, &self.shape.bands, self.with_plants)
     }
 
-    /// Side of a pixel on the ground at the network's size, millimetres: the median of the images whose records tell their cameras.
+    /// Side of a pixel on the ground at the network's size, millimetres: the median of some images whose records tell their cameras.
     pub fn pixel_mm(&self) -> Result<Option<f64>> {
         let mut sizes = Vec::new();
-        for (i, (set, number)) in self.images.iter().enumerate() {
-            if self.same[i] != i {
-                continue;
-            }
+        for (set, number) in self.images.iter().step_by(self.images.len().div_ceil(ASKED).max(1)) {
             let record = native::read_record(&self.sets[*set].0.folder, &Set::name(*number))?;
             let across = record.conditions.as_ref().and_then(|conditions| conditions.camera.pixel_m());
             sizes.extend(across.map(|m| 1e3 * m * f64::from(record.width) / f64::from(self.shape.width)));

@@ -8,7 +8,7 @@
 use crate::dataset::{Set, native};
 use crate::output;
 use crate::train::classes::Classes;
-use crate::train::data::{Band, Pick, Selection, Shape};
+use crate::train::data::{Band, Pick, Resize, Selection, Shape};
 use crate::train::run::{self, ModelCard};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -256,10 +256,18 @@ pub struct Prediction {
     pub network: String,
     /// SHA-256 of its weights.
     pub weights_sha256: String,
+    /// The sizes that pictures were brought to, as `--resize` writes them.
+    #[serde(default = "stretch")]
+    pub resize: String,
     /// Classes in the order of their numbers, with their sRGB colours.
     pub classes: Vec<(String, [u8; 3])>,
     /// The photograph of each prediction, by name.
     pub pictures: BTreeMap<String, String>,
+}
+
+/// What version 0.1 did.
+fn stretch() -> String {
+    Resize::Stretch.name()
 }
 
 /// The file that says what the predictions in a folder are.
@@ -274,6 +282,9 @@ impl Prediction {
         let there: Option<Self> = path.exists().then(|| run::read_json(&path)).transpose()?;
         if there.as_ref().is_some_and(|t| t.weights_sha256 != card.weights_sha256) {
             return refuse(&path, "predictions of another network lie in this folder".into());
+        }
+        if there.as_ref().is_some_and(|t| t.resize != card.resize.name()) {
+            return refuse(&path, "predictions at other sizes lie in this folder".into());
         }
         let mut all = there.map(|t| t.pictures).unwrap_or_default();
         for picture in pictures {
@@ -306,6 +317,7 @@ impl Prediction {
             furrow: env!("CARGO_PKG_VERSION").into(),
             network: card.network.name().into(),
             weights_sha256: card.weights_sha256.clone(),
+            resize: card.resize.name(),
             classes,
             pictures: all,
         };

@@ -129,11 +129,11 @@ fn read<'s, 'a: 's>(
     let (sender, receiver) = sync_channel(AHEAD);
     scope.spawn(move || {
         for picture in pictures {
-            let ready = picture.read().map(|found| {
+            let ready = picture.read().and_then(|found| {
                 let (size, trained) = ((found.width, found.height), (card.input.width, card.input.height));
-                let inputs =
-                    resize::inputs(&found.planes, size, &card.resize.sizes(trained, size), &card.normalization);
-                Ready { picture, width: found.width, height: found.height, rgb: found.rgb, inputs }
+                let sizes = card.resize.sizes(trained, size).map_err(|e| e.in_file(picture.photo.clone()))?;
+                let inputs = resize::inputs(&found.planes, size, &sizes, &card.normalization);
+                Ok(Ready { picture, width: found.width, height: found.height, rgb: found.rgb, inputs })
             });
             // Nobody listens any more: it was stopped.
             if sender.send(ready).is_err() {

@@ -8,7 +8,9 @@
 mod page;
 mod sheet;
 mod shot;
+mod shots;
 
 pub use page::Page;
 pub use sheet::{Sheet, sheet};
 pub use shot::{Shot, spread};
+pub use shots::Shots;

@@ -8,8 +8,8 @@ use super::loss;
 use super::optimiser::Optimiser;
 use super::plan::Plan;
 use crate::dataset::sample::IGNORE;
-use crate::train::data::{Band, Batch, Example, Loader, Normalization, Order, Shape, Store, augment};
-use crate::train::figure::{Sheet, Shot, sheet, spread};
+use crate::train::data::{Batch, Loader, Normalization, Order, Store, augment};
+use crate::train::figure::{Sheet, Shots, sheet};
 use crate::train::measure::{Confusion, Scores};
 use crate::train::torch::{Model, Pass, Where, classes, failed};
 use crate::train::weights::Array;
@@ -215,8 +215,8 @@ fn validate(
     let shape = val.shape();
     let size = (shape.width, shape.height);
     let mut confusion = Confusion::new(model.classes);
-    let shown = spread(val.len(), SHOWN);
-    let (mut losses, mut shots) = (Vec::new(), Vec::new());
+    let mut losses = Vec::new();
+    let mut shots = Shots::new(val.len(), SHOWN, LARGEST, &shape.bands);
     for place in 0..val.len() {
         let example = val.get(place)?;
         let mut pixels = augment::interleave(&example, 1);
@@ -229,9 +229,7 @@ fn validate(
         }
         let predicted = classes(&scores)?;
         confusion.add(&example.labels, &predicted)?;
-        if shown.contains(&place) {
-            shots.push(shot(&example, shape, &predicted));
-        }
+        shots.see(&example, size, &predicted);
     }
     let plants: Vec<bool> = (0..model.classes).map(|c| c > 0).collect();
     let scores = Scores::of(&confusion, &plants);
@@ -239,13 +237,5 @@ fn validate(
     let (ga, miou) = (number(scores.global_accuracy), number(scores.mean_iou));
     let iou = scores.classes.iter().map(|c| c.iou).collect();
     let loss = (!losses.is_empty()).then(|| losses.iter().sum::<f64>() / losses.len() as f64);
-    Ok((ValidationPass { step, ga, miou, iou, loss }, sheet(&shots, &plan.classes.colors(), false)))
-}
-
-/// A validation image as it is shown; without red, green and blue its first band as gray.
-fn shot(example: &Example, shape: &Shape, predicted: &[u8]) -> Shot {
-    let place = |band: &Band| shape.bands.iter().position(|b| b == band);
-    let planes = Band::RGB.map(|band| &example.planes[place(&band).unwrap_or(0)]);
-    let rgb: Vec<[u8; 3]> = (0..example.labels.len()).map(|i| planes.map(|plane| plane[i])).collect();
-    Shot::new(&example.name, (shape.width, shape.height), &rgb, &example.labels, &[predicted], LARGEST)
+    Ok((ValidationPass { step, ga, miou, iou, loss }, sheet(&shots.kept, &plan.classes.colors(), false)))
 }

@@ -32,7 +32,7 @@ pub struct Conv {
     pub bias: bool,
     /// Groups of channels that do not see each other: 1, or as many as channels, "depthwise".
     pub groups: usize,
-    /// Whether a stride leaves out what TensorFlow's `SAME` does for even sizes: one pixel fewer is put before the first than behind the
+    /// Whether it is padded as TensorFlow's `SAME` pads even sizes: with stride 2, one zero fewer before the first pixel than behind the
     /// last.
     pub same: bool,
 }

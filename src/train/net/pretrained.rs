@@ -10,6 +10,7 @@
 //! | `segnet` | torchvision's `vgg16_bn` |
 
 use super::{Network, Parameter, lite_unet, parameters, segnet, unet};
+use crate::train::data::Band;
 use crate::train::weights::{self, Array};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -54,12 +55,12 @@ impl Pretrained {
     }
 
     /// All first values of a network, in the order of [`parameters()`]: the encoder's from the file, the others random; empty for
-    /// [`Self::None`]. A band that is not red, green or blue begins with the mean of their kernels, and all are scaled to the number of
-    /// bands: a gray picture gives what it would in colour.
+    /// [`Self::None`]. In the first convolution each band has the kernel of its colour, and one that is no colour the mean of the three;
+    /// all are scaled to the number of bands, so that a gray picture gives what it would in colour.
     ///
     /// # Errors
     /// What is missing in the file or has another shape.
-    pub fn begin(&self, network: Network, bands: usize, classes: usize, seed: u64) -> Result<Vec<Array>> {
+    pub fn begin(&self, network: Network, bands: &[Band], classes: usize, seed: u64) -> Result<Vec<Array>> {
         let path = match self {
             Self::None => return Ok(Vec::new()),
             Self::Imagenet if network != Network::LiteUnet => {
@@ -77,13 +78,13 @@ impl Pretrained {
         let found = weights::read_foreign(&path)?;
         let place = |(i, parameter): (usize, &Parameter)| {
             let values = if parameter.is_encoder() {
-                values(network, parameter, bands, &found).map_err(|e| e.in_file(&path))?
+                values(network, parameter, (i == 0).then_some(bands), &found).map_err(|e| e.in_file(&path))?
             } else {
                 parameter.begin(seed, i)
             };
             Ok(Array { name: parameter.name.clone(), shape: parameter.shape.clone(), values })
         };
-        parameters(network, bands, classes).iter().enumerate().map(place).collect()
+        parameters(network, bands.len(), classes).iter().enumerate().map(place).collect()
     }
 }
 
@@ -93,8 +94,8 @@ fn imagenet() -> PathBuf {
     std::env::var_os("FURROW_IMAGENET").map_or_else(|| Path::new(HERE).into(), PathBuf::from)
 }
 
-/// A parameter's values among published ones.
-fn values(network: Network, parameter: &Parameter, bands: usize, found: &[Array]) -> Result<Vec<f32>> {
+/// A parameter's values among published ones; `bands` are those that the first convolution sees.
+fn values(network: Network, parameter: &Parameter, bands: Option<&[Band]>, found: &[Array]) -> Result<Vec<f32>> {
     let published = match network {
         Network::LiteUnet => lite_unet::published(&parameter.name),
         Network::Unet => unet::published(&parameter.name),
@@ -113,32 +114,30 @@ fn values(network: Network, parameter: &Parameter, bands: usize, found: &[Array]
     if !array.values.iter().all(|v| v.is_finite()) {
         return Err(wrong(format!("`{name}` holds values that are not finite numbers")));
     }
-    if array.shape == parameter.shape && (bands == 3 || parameter.shape.len() < 2 || parameter.shape[1] != bands) {
-        return Ok(array.values.clone());
-    }
-    match (array.shape.as_slice(), parameter.shape.as_slice()) {
-        (&[outputs, 3, height, width], &[to, inputs, h, w])
-            if (outputs, height, width, bands) == (to, h, w, inputs) =>
-        {
-            Ok(colours_spread(&array.values, height * width, bands))
+    match (array.shape.as_slice(), parameter.shape.as_slice(), bands) {
+        (&[outputs, 3, height, width], &[to, _, h, w], Some(bands)) if (outputs, height, width) == (to, h, w) => {
+            Ok(for_bands(&array.values, height * width, bands))
         }
-        (is, must) => Err(wrong(format!("`{name}` is {is:?}, not {must:?}"))),
+        (is, must, _) if is == must => Ok(array.values.clone()),
+        (is, must, _) => Err(wrong(format!("`{name}` is {is:?}, not {must:?}"))),
     }
 }
 
-/// Kernels of three colours as kernels of so many bands: the colours first, then their mean, all scaled by 3 / bands.
-fn colours_spread(values: &[f32], kernel: usize, bands: usize) -> Vec<f32> {
-    let scale = 3.0 / bands as f32;
-    let mut spread = Vec::with_capacity(values.len() / 3 * bands);
+/// Kernels of red, green and blue as kernels of these bands.
+fn for_bands(values: &[f32], kernel: usize, bands: &[Band]) -> Vec<f32> {
+    let scale = 3.0 / bands.len() as f32;
+    let mut kernels = Vec::with_capacity(values.len() / 3 * bands.len());
     for output in values.chunks_exact(3 * kernel) {
-        for band in 0..bands {
-            spread.extend((0..kernel).map(|i| {
-                let colour = |c: usize| output[c * kernel + i];
-                scale * if band < 3 { colour(band) } else { (colour(0) + colour(1) + colour(2)) / 3.0 }
-            }));
+        for band in bands {
+            let colour = Band::RGB.iter().position(|b| b == band);
+            let value = |i: usize| {
+                let of = |c: usize| output[c * kernel + i];
+                scale * colour.map_or_else(|| (of(0) + of(1) + of(2)) / 3.0, of)
+            };
+            kernels.extend((0..kernel).map(value));
         }
     }
-    spread
+    kernels
 }
 
 #[cfg(test)]
@@ -196,7 +195,7 @@ mod tests {
         let mut arrays = published(Network::LiteUnet);
         weights::write(&path, &arrays, "").unwrap();
         let from = Pretrained::File(path.clone());
-        let begun = from.begin(Network::LiteUnet, 3, 3, 1).unwrap();
+        let begun = from.begin(Network::LiteUnet, &Band::RGB, 3, 1).unwrap();
         let list = parameters(Network::LiteUnet, 3, 3);
         for ((i, parameter), array) in list.iter().enumerate().zip(&begun) {
             let expected = if parameter.is_encoder() {
@@ -206,15 +205,20 @@ mod tests {
             };
             assert!(expected, "{}", parameter.name);
         }
-        let four = from.begin(Network::LiteUnet, 4, 3, 1).unwrap();
-        let sums =
-            |values: &[f32], each: usize| values.chunks_exact(each).map(|k| k.iter().sum()).collect::<Vec<f32>>();
-        for (a, b) in sums(&begun[0].values, 27).iter().zip(sums(&four[0].values, 36)) {
-            assert!((a - b).abs() < 1e-3 * a.abs(), "{a} {b}");
-        }
+        // The first kernel counts 0 to 26: 9 numbers a colour.
+        let kernel = |bands: &str| {
+            let bands = Band::list(bands).unwrap();
+            from.begin(Network::LiteUnet, &bands, 3, 1).unwrap()[0].values[..9 * bands.len()].to_vec()
+        };
+        let colour = |first: f32, scale: f32| (0..9).map(|i| scale * (first + i as f32)).collect::<Vec<_>>();
+        assert_eq!(kernel("rgb"), (0..27).map(|i| i as f32).collect::<Vec<_>>());
+        assert_eq!(kernel("nir,blue"), [colour(9.0, 1.5), colour(18.0, 1.5)].concat());
+        assert_eq!(kernel("nir"), colour(9.0, 3.0));
+        let sum = |values: Vec<f32>| values.iter().sum::<f32>();
+        assert!((sum(kernel("rgbn")) - sum(kernel("rgb"))).abs() < 1e-2);
         let told = |arrays: &[Array], network| {
             weights::write(&path, arrays, "").unwrap();
-            let error = from.begin(network, 3, 3, 1).unwrap_err();
+            let error = from.begin(network, &Band::RGB, 3, 1).unwrap_err();
             assert_eq!(error.exit_code(), 2);
             error.to_string()
         };
@@ -226,6 +230,6 @@ mod tests {
         arrays[7].values[0] = 0.0;
         assert!(told(&arrays, Network::LiteUnet).contains(", not ["));
         std::fs::write(&path, b"\x80\x02}q\x00.").unwrap();
-        assert!(from.begin(Network::LiteUnet, 3, 3, 1).unwrap_err().to_string().contains("safetensors"));
+        assert!(from.begin(Network::LiteUnet, &Band::RGB, 3, 1).unwrap_err().to_string().contains("safetensors"));
     }
 }

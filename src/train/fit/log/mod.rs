@@ -1,7 +1,7 @@
 //! The log of a training, which grows while it trains: `log.csv`, and `training.tfevents` for TensorBoard.
 //!
-//! A training that goes on writes both anew from its checkpoint: what came after that is done again. A log that cannot be written does
-//! not end a training, but it is told. Times in the event file are of the clock; nothing else depends on it.
+//! A training that goes on writes both anew from its checkpoint: what came after that is done again. A log that cannot be written
+//! ends it, as a checkpoint does. Times in the event file are of the clock; nothing else depends on it.
 
 mod events;
 
