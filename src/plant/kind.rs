@@ -32,8 +32,8 @@ pub enum Shape {
         /// Width of a segment.
         segment_mm: Vary<Positive>,
     },
-    /// Pairs of leaflets on a rachis, each a sheet within an outline: peanut has two pairs. The blade's width is the span of
-    /// its lowest pair; the rachis is as long as `rib` says.
+    /// Leaflets on a rachis, each a sheet within an outline: peanut has two pairs, soybean one and a leaflet at the tip. The blade's width
+    /// is the span of its lowest pair; the rachis is as long as `rib` says.
     Leaflets {
         /// A leaflet's outline, as in the drawn texture.
         outline: Outline,
@@ -43,6 +43,9 @@ pub enum Shape {
         aspect: Num<Positive>,
         /// Angle between rachis and leaflet, lowest pair and foremost.
         spread_deg: (Num<Positive>, Num<Positive>),
+        /// Length of a leaflet at the rachis' tip over that of those beside it; 0 for none. With one, the pairs stand below the tip.
+        #[serde(default = "num::<NonNegative, 0>", skip_serializing_if = "is_zero")]
+        terminal: Num<NonNegative>,
     },
 }
 
@@ -136,6 +139,11 @@ fn blade() -> OrganKind {
 
 fn stalk() -> String {
     "stalk".into()
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
+fn is_zero(number: &Num<NonNegative>) -> bool {
+    number.get() == 0.0
 }
 
 fn num<B: crate::ron_file::Bound, const N: i32>() -> Num<B> {

@@ -81,19 +81,16 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
     let kind = leaf.kind.organ;
     // The relief leaves the midrib's ends where they are, so they go where their joints go.
     let end = |joint: usize| motions[joint].point(vec3(0.0, skeleton.along()[joint], 0.0));
-    let tip = match leaf.kind.shape {
-        // Between the foremost leaflets nothing is beyond the rachis.
-        Shape::Leaflets { .. } => skin::carried(&skeleton, &motions, leaf.kind.rib.f32() * leaf.blade),
+    let foremost = (0..rest.positions.len()).max_by(|a, b| rest.positions[*a].y.total_cmp(&rest.positions[*b].y));
+    let mesh = skin::skin(rest, &motions);
+    let tip = match (&leaf.kind.shape, foremost) {
+        // Between the foremost leaflets nothing is beyond the rachis; a leaflet at its tip goes its own way.
+        (Shape::Leaflets { terminal, .. }, Some(corner)) if terminal.get() > 0.0 => mesh.positions[corner],
+        (Shape::Leaflets { .. }, _) => skin::carried(&skeleton, &motions, leaf.kind.rib.f32() * leaf.blade),
         _ => end(skeleton.along().len() - 1),
     };
     let midrib = Some([end(skeleton.base()), tip]);
-    organs.push(Organ {
-        kind,
-        leaf: leaf.number,
-        material: material.to_owned(),
-        mesh: skin::skin(rest, &motions),
-        midrib,
-    });
+    organs.push(Organ { kind, leaf: leaf.number, material: material.to_owned(), mesh, midrib });
     let rest = stalk(leaf, &skeleton, &relief, lower, &mut stream);
     if rest.triangles.is_empty() {
         return;

@@ -1,4 +1,4 @@
-//! Compound blades: pairs of leaflets on a rachis. Peanut has two pairs.
+//! Compound blades: leaflets on a rachis. Peanut has two pairs, soybean one pair and a leaflet at the tip.
 //!
 //! A leaflet is a sheet like a whole blade, with relief, fold and bend of its own; its joints bend it once in the flat leaf's
 //! coordinates, then it goes rigidly where the rachis carries its foot. Young leaflets stand up and lie against each other.
@@ -23,45 +23,54 @@ pub(super) fn blade(
     stream: &mut Stream,
 ) -> Rest {
     let mut rest = Rest::default();
-    let Shape::Leaflets { outline, pairs, aspect, spread_deg } = &leaf.kind.shape else { return rest };
+    let Shape::Leaflets { outline, pairs, aspect, spread_deg, terminal } = &leaf.kind.shape else { return rest };
     let pairs = pairs.get() as usize;
     let reach = leaf.kind.rib.f32() * leaf.blade;
     let spread = [spread_deg.0, spread_deg.1].map(|s| s.f32().to_radians());
     let length = 0.5 * leaf.width / spread[0].sin().max(0.2);
-    for pair in 0..pairs {
-        let share = if pairs > 1 { pair as f32 / (pairs - 1) as f32 } else { 1.0 };
-        for side in [-1.0_f32, 1.0] {
-            let size = lerp(0.92, 1.0, share) * (1.0 + 0.04 * stream.normal() as f32);
-            let turn = lerp(spread[0], spread[1], share) + 0.06 * stream.normal() as f32;
-            let rise = (leaf.fold + 0.08 * stream.normal() as f32).min(1.35);
-            let (along, width) = (length * size, length * size * aspect.f32());
-            let mut skeleton = Skeleton::new(&Measures {
-                stalk: 0.0,
-                stalk_joints: 1,
-                length: along,
-                veins: (1..=JOINTS).map(|k| k as f32 / (JOINTS as f32 + 1.0)).collect(),
-                secondaries: None,
-            });
-            for joint in &mut skeleton.joints[1..] {
-                joint.bend = -leaf.bend / (JOINTS as f32 + 1.0) + 0.02 * stream.normal() as f32;
-            }
-            let mut sheet = blade::sheet(*outline, width, rows, columns, &skeleton);
-            let seed = stream.seed32();
-            BladeRelief { fold: 0.5 * leaf.fold, fold_tip: 0.3 * leaf.fold, seed, ..*relief }.apply(&mut sheet, along);
-            let foot = Pose { rotation: stance(side, turn, rise), origin: vec3(0.0, reach * share, 0.0) };
-            let tie = rachis.weights_on_chain(foot.origin.y);
-            let first = rest.positions.len() as u32;
-            for (p, uv) in skin::bend(&sheet.rest, &skeleton.motions(foot)).into_iter().zip(&sheet.rest.uvs) {
-                rest.corner(p, *uv, tie);
-            }
-            rest.triangles.extend(sheet.rest.triangles.iter().map(|t| t.map(|i| i + first)));
+    let terminal = terminal.f32();
+    // The foremost pair is at the rachis' tip, unless a leaflet is there.
+    let steps = if terminal > 0.0 { pairs } else { pairs - 1 };
+    let mut add = |share: f32, side: f32, size: f32, turn: f32, stream: &mut Stream| {
+        let size = size * (1.0 + 0.04 * stream.normal() as f32);
+        let turn = turn + 0.06 * stream.normal() as f32;
+        let rise = (leaf.fold + 0.08 * stream.normal() as f32).min(1.35);
+        let (along, width) = (length * size, length * size * aspect.f32());
+        let mut skeleton = Skeleton::new(&Measures {
+            stalk: 0.0,
+            stalk_joints: 1,
+            length: along,
+            veins: (1..=JOINTS).map(|k| k as f32 / (JOINTS as f32 + 1.0)).collect(),
+            secondaries: None,
+        });
+        for joint in &mut skeleton.joints[1..] {
+            joint.bend = -leaf.bend / (JOINTS as f32 + 1.0) + 0.02 * stream.normal() as f32;
         }
+        let mut sheet = blade::sheet(*outline, width, rows, columns, &skeleton);
+        let seed = stream.seed32();
+        BladeRelief { fold: 0.5 * leaf.fold, fold_tip: 0.3 * leaf.fold, seed, ..*relief }.apply(&mut sheet, along);
+        let foot = Pose { rotation: stance(side, turn, rise), origin: vec3(0.0, reach * share, 0.0) };
+        let tie = rachis.weights_on_chain(foot.origin.y);
+        let first = rest.positions.len() as u32;
+        for (p, uv) in skin::bend(&sheet.rest, &skeleton.motions(foot)).into_iter().zip(&sheet.rest.uvs) {
+            rest.corner(p, *uv, tie);
+        }
+        rest.triangles.extend(sheet.rest.triangles.iter().map(|t| t.map(|i| i + first)));
+    };
+    for pair in 0..pairs {
+        let share = if steps > 0 { pair as f32 / steps as f32 } else { 1.0 };
+        for side in [-1.0_f32, 1.0] {
+            add(share, side, lerp(0.92, 1.0, share), lerp(spread[0], spread[1], share), stream);
+        }
+    }
+    if terminal > 0.0 {
+        add(1.0, 0.0, terminal, 0.0, stream);
     }
     rest
 }
 
 /// The frame of a leaflet's first joint in the flat leaf's coordinates: vein, upper side, hinge. `rise` turns both leaflets of
-/// a pair up about the rachis, until they face each other.
+/// a pair up about the rachis, until they face each other; a leaflet at the tip (`side` 0) goes on in the rachis' direction.
 fn stance(side: f32, turn: f32, rise: f32) -> Mat3 {
     let vein = vec3(side * turn.sin() * rise.cos(), turn.cos(), turn.sin() * rise.sin());
     let up = vec3(-side * rise.sin(), 0.0, rise.cos());
