@@ -119,7 +119,10 @@ const ALLOWED: &[(&str, &str)] = &[
     // How far a misspelt name is from those that are known.
     ("strsim", "ron_file/suggest.rs"),
     // libtorch: networks and how they learn.
-    ("tch", "train/torch/ train/fit/loss.rs train/fit/optimiser.rs train/fit/trainer.rs train/deploy/"),
+    (
+        "tch",
+        "train/torch/ train/fit/gradients.rs train/fit/loss.rs train/fit/optimiser.rs train/fit/trainer.rs train/deploy/",
+    ),
     // Files appear whole or not at all: images of fields, and drawn textures below them. The denoiser's go through a folder,
     // and so does a scene that is taken into a dataset.
     ("tempfile", "cli/mod.rs dataset/plan.rs output/atomic.rs output/denoise.rs texture/draw/write.rs"),

@@ -113,7 +113,8 @@ pub fn fit(
         steps: outcome.steps,
         best_step: outcome.history.best().map(|pass| pass.step),
         ended: outcome.ended.into(),
-        images_per_second: outcome.steps as f64 * plan.hyper.batch as f64 / outcome.seconds.max(1e-9),
+        images_per_second: (outcome.steps * plan.hyper.accumulate) as f64 * plan.hyper.batch as f64
+            / outcome.seconds.max(1e-9),
         history: outcome.history,
         seconds: outcome.seconds,
     };

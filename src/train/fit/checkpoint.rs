@@ -1,4 +1,5 @@
-//! Checkpoints: a training between two steps in one file. Weights, the optimiser's state, the best weights so far, and the history.
+//! Checkpoints: a training between two steps in one file. Weights, their moving average, the optimiser's state, the best weights so far,
+//! and the history.
 
 use crate::error::Kind;
 use crate::train::weights::{self, Array};
@@ -72,6 +73,8 @@ pub struct Checkpoint {
     pub history: History,
     /// The network's weights.
     pub values: Vec<Array>,
+    /// Their exponential moving average; empty where there is none.
+    pub average: Vec<Array>,
     /// The optimiser's state.
     pub memory: Vec<Array>,
     /// The weights at the best validation pass.
@@ -94,7 +97,13 @@ impl Checkpoint {
         let named = |prefix: &str, arrays: &[Array]| -> Vec<Array> {
             arrays.iter().map(|a| Array { name: format!("{prefix}/{}", a.name), ..a.clone() }).collect()
         };
-        let all = [named("values", &self.values), named("memory", &self.memory), named("best", &self.best)].concat();
+        let all = [
+            named("values", &self.values),
+            named("average", &self.average),
+            named("memory", &self.memory),
+            named("best", &self.best),
+        ]
+        .concat();
         let (step, pending, seconds, history) = (self.step, self.pending, self.seconds, self.history.clone());
         let words = Words { step, pending, seconds, history, plan: plan.into() };
         let text = serde_json::to_string(&words).map_err(|e| Error::failed(format!("cannot write JSON: {e}")))?;
@@ -123,7 +132,8 @@ impl Checkpoint {
             arrays.iter().filter_map(strip).collect()
         };
         let Words { step, pending, seconds, history, .. } = words;
-        Ok(Some(Self { step, pending, seconds, history, values: of("values"), memory: of("memory"), best: of("best") }))
+        let (values, average, memory, best) = (of("values"), of("average"), of("memory"), of("best"));
+        Ok(Some(Self { step, pending, seconds, history, values, average, memory, best }))
     }
 
     /// Deletes it.
@@ -160,6 +170,7 @@ mod tests {
             seconds: 12.5,
             history: History { losses: vec![LossPoint { step: 5, loss: 1.0 / 3.0, rate: 0.01 }], validation },
             values: vec![array("a", 1.0), array("b", 2.0)],
+            average: vec![array("a", 1.5), array("b", 2.5)],
             memory: vec![array("a", 3.0)],
             best: vec![array("a", 4.0)],
         };

@@ -127,8 +127,11 @@ impl NormalizationMode {
 pub struct Hyperparameters {
     /// Most steps; ≥ 1.
     pub steps: u64,
-    /// Images of a batch, one batch a step; 1 to 1024.
+    /// Images of a batch; 1 to 1024.
     pub batch: usize,
+    /// Batches of a step, whose gradients are averaged; 1 to 1024. See `gradients`.
+    #[serde(default = "single", skip_serializing_if = "is_single")]
+    pub accumulate: u64,
     /// Width and height, pixels, of the random crop of each image that a step is trained on; whole images with none. Crops make a
     /// step as cheap as small images would, and plants stay as large as they are. Not larger than the images.
     #[serde(rename = "window")]
@@ -163,6 +166,9 @@ pub struct Hyperparameters {
     /// what begins at random (Howard & Ruder 2018, "discriminative fine-tuning").
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub encoder_rate: f64,
+    /// Decay of the exponential moving average of the weights, which then is what is validated and kept; 0 for none. See `ema`.
+    #[serde(default, skip_serializing_if = "is_nothing")]
+    pub ema: f64,
     /// The sizes that pictures are brought to once the network is trained; of no effect on training and validation.
     #[serde(default, skip_serializing_if = "Resize::is_stretch")]
     pub resize: Resize,
@@ -176,6 +182,20 @@ pub struct Hyperparameters {
     pub validate_every: u64,
     /// Validation passes without a better result after which a training ends early; ≥ 1.
     pub patience: u64,
+}
+
+fn single() -> u64 {
+    1
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
+fn is_single(number: &u64) -> bool {
+    *number == 1
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
+fn is_nothing(share: &f64) -> bool {
+    *share == 0.0
 }
 
 fn one() -> f64 {
@@ -198,6 +218,7 @@ impl Default for Hyperparameters {
         Self {
             steps: 2000,
             batch: 4,
+            accumulate: 1,
             crop_size: None,
             rare_crops: 0.0,
             optimiser,
@@ -210,6 +231,7 @@ impl Default for Hyperparameters {
             pretrained: Pretrained::None,
             freeze: 0,
             encoder_rate: 1.0,
+            ema: 0.0,
             resize: Resize::Stretch,
             augment: Augment::default(),
             normalization: NormalizationMode::Band,
@@ -260,6 +282,9 @@ impl Hyperparameters {
         let whole = "write a whole number above 0";
         range("steps", (1..=100_000_000).contains(&self.steps), &self.steps, whole)?;
         range("batch", (1..=1024).contains(&self.batch), &self.batch, "write a number from 1 to 1024")?;
+        let help = "write a number from 1 to 1024";
+        range("accumulate", (1..=1024).contains(&self.accumulate), &self.accumulate, help)?;
+        range("ema", (0.0..1.0).contains(&self.ema), &self.ema, "write a decay such as 0.998, or 0 for none")?;
         range("rate", self.rate > 0.0 && self.rate < 100.0, &self.rate, "write a number above 0 such as 0.001")?;
         let help = "write a share from 0 to 1";
         range("rare_crops", (0.0..=1.0).contains(&self.rare_crops), &self.rare_crops, help)?;

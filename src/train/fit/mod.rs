@@ -8,19 +8,25 @@
 //! | `class_weights` | class weights of the loss |
 //! | `loss` | the loss that is minimised |
 //! | `schedule` | the learning rate, step by step |
+//! | `gradients` | gradients of a step, of several batches where asked for |
 //! | `optimiser` | from gradients to weights, with a state that can be saved |
+//! | `ema` | an exponential moving average of the weights |
 //! | `log` | the log of a training as it grows: CSV, TensorBoard |
 //! | `checkpoint` | a training on disk, between two steps |
 //! | `trainer` | the training loop, with validation passes |
 //! | `calibrate` | class-bias calibration of a trained network |
 //!
-//! Only `loss`, `optimiser`, `trainer` and `calibrate` need libtorch. On a CPU the same plan on the same number of threads gives
+//! Only `loss`, `gradients`, `optimiser`, `ema`, `trainer` and `calibrate` need libtorch. On a CPU the same plan on the same number of threads gives
 //! the same bits, stopped and gone on with or not.
 
 #[cfg(feature = "train")]
 pub mod calibrate;
 pub mod checkpoint;
 pub mod class_weights;
+#[cfg(feature = "train")]
+pub mod ema;
+#[cfg(feature = "train")]
+pub mod gradients;
 pub mod hyper;
 pub mod log;
 #[cfg(feature = "train")]

@@ -1,5 +1,6 @@
 //! Optimisers. libtorch's own cannot be saved, and a training that goes on must have their state.
 
+use super::gradients::Gradients;
 use super::hyper::OptimiserKind;
 use crate::Result;
 use crate::train::torch::{Model, laid, values};
@@ -29,18 +30,14 @@ impl Optimiser {
         Self { kind, decay, steps: steps as i32, memory: all }
     }
 
-    /// One step along the gradients of a loss: of the learning rate `rate`, in the encoder of `encoder` times that. At 0 the
-    /// encoder's gradients are not asked for.
-    pub fn step(&mut self, model: &Model, loss: &Tensor, rate: f64, encoder: f64) {
-        let moved = model.trainable().filter(|(p, _)| encoder > 0.0 || !p.is_encoder());
-        let (parameters, mut tensors): (Vec<_>, Vec<_>) = moved.map(|(p, t)| (p, t.shallow_clone())).unzip();
-        let gradients = Tensor::run_backward(&[loss], &tensors, false, false);
+    /// One step along gradients: of the learning rate `rate`, in the encoder of `encoder` times that.
+    pub fn step(&mut self, mut gradients: Gradients, rate: f64, encoder: f64) {
         self.steps += 1;
         tch::no_grad(|| {
-            for ((parameter, tensor), gradient) in parameters.iter().zip(&mut tensors).zip(&gradients) {
+            for ((name, in_encoder, tensor), gradient) in gradients.parameters.iter_mut().zip(&gradients.sums) {
                 if gradient.defined() {
-                    let rate = if parameter.is_encoder() { rate * encoder } else { rate };
-                    self.update(&parameter.name, tensor, gradient, rate);
+                    let rate = if *in_encoder { rate * encoder } else { rate };
+                    self.update(name, tensor, gradient, rate);
                 }
             }
         });

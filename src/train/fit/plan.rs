@@ -40,13 +40,14 @@ impl Plan {
         self.hyper.crop_size.unwrap_or((self.shape.width, self.shape.height))
     }
 
-    /// What a batch is, in words.
+    /// What a step is trained on, in words.
     pub fn batch_in_words(&self) -> String {
         let (width, height) = self.crop_size();
+        let batches = if self.hyper.accumulate > 1 { format!("{} × ", self.hyper.accumulate) } else { String::new() };
         if (width, height) == (self.shape.width, self.shape.height) {
-            return format!("{} images", self.hyper.batch);
+            return format!("{batches}{} images", self.hyper.batch);
         }
-        format!("{} crops of {width} × {height}", self.hyper.batch)
+        format!("{batches}{} crops of {width} × {height}", self.hyper.batch)
     }
 }
 

@@ -53,10 +53,15 @@ pub struct Settings {
     #[arg(long, value_name = "N", default_value = default_of("steps"))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub steps: Option<u64>,
-    /// Batch size: images a step, 1 to 1024.
+    /// Batch size: images that a network sees at once, 1 to 1024.
     #[arg(long, value_name = "N", default_value = default_of("batch"))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub batch: Option<usize>,
+    /// Gradient accumulation: batches a step, 1 to 1024. A step goes along their mean gradient, as that of a batch so many times as
+    /// large but for batch norms and soft Dice loss, which see one at a time.
+    #[arg(long, value_name = "N", default_value = default_of("accumulate"))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accumulate: Option<u64>,
     /// Optimiser: sgd or adam.
     #[arg(long, alias = "optimizer", value_name = "NAME", default_value = default_of("optimiser"))]
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -100,6 +105,10 @@ pub struct Settings {
     #[arg(long, value_name = "SHARE", default_value = default_of("encoder_rate"))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub encoder_rate: Option<f64>,
+    /// Decay of an exponential moving average (EMA) of the weights, such as 0.998: it is validated and kept in their place. 0 for none.
+    #[arg(long, value_name = "DECAY", default_value = default_of("ema"))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ema: Option<f64>,
     /// Sizes that pictures are brought to once the network is trained: stretch (to the size that it was trained at), or lengths of the
     /// longer side with commas between: the shape is kept, probabilities are averaged over them.
     #[arg(long, value_name = "SIDES", default_value = default_of("resize"))]
@@ -143,6 +152,7 @@ pub fn defaults() -> Vec<(&'static str, String)> {
         ("rare_crops", hyper.rare_crops.to_string()),
         ("steps", hyper.steps.to_string()),
         ("batch", hyper.batch.to_string()),
+        ("accumulate", hyper.accumulate.to_string()),
         ("optimiser", hyper.optimiser.name().into()),
         ("decay", hyper.decay.to_string()),
         ("schedule", hyper.schedule.name().into()),
@@ -152,6 +162,7 @@ pub fn defaults() -> Vec<(&'static str, String)> {
         ("pretrained", hyper.pretrained.name()),
         ("freeze", hyper.freeze.to_string()),
         ("encoder_rate", hyper.encoder_rate.to_string()),
+        ("ema", hyper.ema.to_string()),
         ("resize", hyper.resize.name()),
         ("augment", hyper.augment.to_string()),
         ("normalization", hyper.normalization.name().into()),
@@ -221,6 +232,8 @@ impl Settings {
         word("resize", self.resize.as_ref(), &mut hyper.resize, Resize::parse)?;
         number(self.freeze, &mut hyper.freeze);
         number(self.encoder_rate, &mut hyper.encoder_rate);
+        number(self.ema, &mut hyper.ema);
+        number(self.accumulate, &mut hyper.accumulate);
         number(self.rare_crops, &mut hyper.rare_crops);
         number(self.steps, &mut hyper.steps);
         number(self.batch, &mut hyper.batch);

@@ -2,6 +2,8 @@
 
 use super::checkpoint::{Checkpoint, History, LossPoint, ValidationPass};
 use super::class_weights;
+use super::ema::Ema;
+use super::gradients::Gradients;
 use super::hyper::NormalizationMode;
 use super::log::TrainingLog;
 use super::loss;
@@ -97,6 +99,7 @@ pub fn train(
         model.load(begin)?;
     }
     let mut optimiser = Optimiser::new(hyper.optimiser, hyper.decay, at.step, &at.memory, &model);
+    let mut ema = if hyper.ema > 0.0 { Some(Ema::new(hyper.ema, &at.average, &model)?) } else { None };
     let rarities = class_weights::rarities(&data.train, classes)?;
     let order = Order {
         seed: plan.seed,
@@ -107,7 +110,8 @@ pub fn train(
         normalization: normalization.clone(),
     };
     let mut log = TrainingLog::begin(folder, &plan.classes.names(), &at.history)?;
-    let mut loader = Loader::start(&data.train, &order, at.step, hyper.steps, data.loaders);
+    let (first, last) = (at.step * hyper.accumulate, hyper.steps * hyper.accumulate);
+    let mut loader = Loader::start(&data.train, &order, first, last, data.loaders);
     let (begun, before) = (Instant::now(), at.seconds);
     let every = (hyper.steps / POINTS).max(1);
     let out_of_patience = |at: &Checkpoint| at.history.since_best() >= hyper.patience && !data.val.is_empty();
@@ -123,22 +127,26 @@ pub fn train(
             break "time";
         }
         if callbacks.stop.load(Ordering::Relaxed) {
-            save(&mut at, &model, &optimiser, folder, hash)?;
+            save(&mut at, &model, ema.as_ref(), &optimiser, folder, hash)?;
             let words = format!("stopped after step {} of {}, where it goes on", at.step, hyper.steps);
             return Err(Error::stopped(words).help("the same command goes on with it").in_file(folder));
         }
-        let batch = loader.next().unwrap_or_else(|| Err(Error::failed("the loading threads have ended")))?;
+        let mut next = || loader.next().unwrap_or_else(|| Err(Error::failed("the loading threads have ended")));
+        let batches: Vec<Batch> = (0..hyper.accumulate).map(|_| next()).collect::<Result<_>>()?;
         let in_time = plan.seconds.map_or(0.0, |most| at.seconds / most as f64);
         let done = in_time.max(at.step as f64 / hyper.steps as f64);
         let rate = hyper.rate * hyper.schedule.share(done);
         let weights = Tensor::from_slice(&hyper.class_weights.weights(&rarities, done)).to_device(place.device);
         let encoder = if at.step < hyper.freeze { 0.0 } else { hyper.encoder_rate };
-        let loss = step(&model, &mut optimiser, &batch, plan, &weights, [rate, encoder])?;
+        let loss = step(&model, &mut optimiser, &batches, plan, &weights, [rate, encoder])?;
         if loss.is_some_and(|loss| !loss.is_finite()) {
             let help = format!("a smaller --rate than {} (this training lies in {})", hyper.rate, folder.display());
             return Err(Error::input(format!("the loss of step {} is no number any more", at.step + 1)).help(help));
         }
         at.step += 1;
+        if let Some(ema) = &mut ema {
+            ema.update(&model, at.step);
+        }
         if let Some(loss) = loss {
             at.pending = (at.pending.0 + loss, at.pending.1 + 1);
         }
@@ -151,50 +159,67 @@ pub fn train(
         }
         (callbacks.step)(at.step, loss);
         if at.step % hyper.validate_every == 0 || at.step == hyper.steps {
+            let kept = ema.as_ref().map_or(&model, Ema::model);
             if !data.val.is_empty() {
-                let (pass, picture) = validate(&model, &data.val, &normalization, plan, &weights, at.step)?;
+                let (pass, picture) = validate(kept, &data.val, &normalization, plan, &weights, at.step)?;
                 log.pass(&pass, Some(&picture))?;
                 at.history.validation.push(pass.clone());
                 let best = at.history.since_best() == 0;
                 if best {
-                    at.best = model.arrays()?;
+                    at.best = kept.arrays()?;
                 }
                 (callbacks.validation)(&pass, best);
             }
             log.csv(&at.history)?;
             at.seconds = before + begun.elapsed().as_secs_f64();
-            save(&mut at, &model, &optimiser, folder, hash)?;
+            save(&mut at, &model, ema.as_ref(), &optimiser, folder, hash)?;
         }
     };
-    let values = if at.best.is_empty() { model.arrays()? } else { at.best };
+    let kept = ema.as_ref().map_or(&model, Ema::model);
+    let values = if at.best.is_empty() { kept.arrays()? } else { at.best };
     Ok(Outcome { values, normalization, history: at.history, steps: at.step, ended, seconds: at.seconds })
 }
 
-fn save(at: &mut Checkpoint, model: &Model, optimiser: &Optimiser, folder: &Path, hash: &str) -> Result<()> {
+fn save(
+    at: &mut Checkpoint,
+    model: &Model,
+    ema: Option<&Ema>,
+    optimiser: &Optimiser,
+    folder: &Path,
+    hash: &str,
+) -> Result<()> {
     at.values = model.arrays()?;
+    at.average = ema.map_or_else(|| Ok(Vec::new()), |ema| ema.model().arrays())?;
     at.memory = optimiser.arrays()?;
     at.write(folder, hash)
 }
 
-/// One step of this learning rate, in the encoder of a share of it; its loss. A batch without a labelled pixel has none and changes nothing.
+/// One step of this learning rate, in the encoder of a share of it; the mean loss of its batches. A batch without a labelled pixel has
+/// none; where no batch has one, nothing changes.
 fn step(
     model: &Model,
     optimiser: &mut Optimiser,
-    batch: &Batch,
+    batches: &[Batch],
     plan: &Plan,
     weights: &Tensor,
     [rate, encoder]: [f64; 2],
 ) -> Result<Option<f64>> {
-    if batch.labels.iter().all(|l| *l == IGNORE) {
+    let size = plan.crop_size();
+    let pass = if encoder > 0.0 { Pass::Training } else { Pass::Decoder };
+    let mut gradients = Gradients::new(model, encoder > 0.0);
+    let mut losses: Vec<f64> = Vec::with_capacity(batches.len());
+    for batch in batches.iter().filter(|batch| batch.labels.iter().any(|l| *l != IGNORE)) {
+        let x = model.images(&batch.pixels, size);
+        let y = labels(model, &batch.labels, batch.images, size);
+        let loss = loss::loss(plan.hyper.loss, &model.forward(&x, pass), &y, weights);
+        gradients.add(&loss);
+        losses.push(f64::try_from(loss).map_err(|e| failed(&e))?);
+    }
+    if losses.is_empty() {
         return Ok(None);
     }
-    let size = plan.crop_size();
-    let x = model.images(&batch.pixels, size);
-    let y = labels(model, &batch.labels, batch.images, size);
-    let pass = if encoder > 0.0 { Pass::Training } else { Pass::Decoder };
-    let loss = loss::loss(plan.hyper.loss, &model.forward(&x, pass), &y, weights);
-    optimiser.step(model, &loss, rate, encoder);
-    f64::try_from(loss).map(Some).map_err(|e| failed(&e))
+    optimiser.step(gradients.mean(), rate, encoder);
+    Ok(Some(losses.iter().sum::<f64>() / losses.len() as f64))
 }
 
 /// Labels of images as the loss takes them: images × height × width.

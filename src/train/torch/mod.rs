@@ -65,6 +65,15 @@ impl Model {
             .collect()
     }
 
+    /// Moves all values, running means and variances among them, by this share of the way to another model's of the same network.
+    pub fn approach(&mut self, other: &Self, share: f64) {
+        tch::no_grad(|| {
+            for (name, tensor) in &mut self.tensors {
+                let _ = tensor.lerp_(&other.tensors[name], share);
+            }
+        });
+    }
+
     /// The trainable parameters, by name.
     pub fn trainable(&self) -> impl Iterator<Item = (&Parameter, &Tensor)> {
         self.list.iter().filter(|p| p.role.is_trainable()).map(|p| (p, &self.tensors[&p.name]))
