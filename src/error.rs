@@ -69,6 +69,8 @@ struct Inner {
     kind: Kind,
     message: String,
     help: Option<String>,
+    /// The command that tells more.
+    see: Option<String>,
     place: Option<Place>,
     source: Option<std::io::Error>,
     /// Whether the cause stays whatever field is made.
@@ -77,7 +79,15 @@ struct Inner {
 
 impl Error {
     fn new(kind: Kind, message: impl Into<String>) -> Self {
-        Self(Box::new(Inner { kind, message: message.into(), help: None, place: None, source: None, lasting: false }))
+        Self(Box::new(Inner {
+            kind,
+            message: message.into(),
+            help: None,
+            see: None,
+            place: None,
+            source: None,
+            lasting: false,
+        }))
     }
 
     /// Arguments that cannot be: [`Kind::Misuse`].
@@ -167,6 +177,13 @@ impl Error {
         self
     }
 
+    /// Names a command that tells more about what stands at the place.
+    #[must_use]
+    pub(crate) fn see(mut self, command: Option<String>) -> Self {
+        self.0.see = command;
+        self
+    }
+
     /// What kind of failure it is.
     pub fn kind(&self) -> Kind {
         self.0.kind
@@ -239,13 +256,14 @@ impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.words())?;
         match self.advice() {
-            None => Ok(()),
+            None => {}
             // A scene file's own text may stand in it.
             Some(help) if self.place().is_some_and(|place| place.span.is_some()) => {
-                write!(f, "\n help: {}", harmless(help))
+                write!(f, "\n help: {}", harmless(help))?;
             }
-            Some(help) => write!(f, "\n help: {help}"),
+            Some(help) => write!(f, "\n help: {help}")?,
         }
+        self.0.see.as_ref().map_or(Ok(()), |command| write!(f, "\n see:  {command}"))
     }
 }
 

@@ -47,11 +47,11 @@
 //! The modules that documentation does not list are public for the programs and tests of this repository alone; they may change with any
 //! version. Modules import only modules of lower layers; `tests/architecture.rs` reads this table and holds them to it.
 //!
-//! `scatter` says where plants stand, `accel` holds the BVH, `cli` is what the two programs share.
+//! `scatter` says where plants stand, `accel` holds the BVH, `cli` is what the two programs share, `reference` is what they say about the files that people write.
 //!
 //! | layer | modules |
 //! |---|---|
-//! | 15 | [`prelude`], [`scene_format`] |
+//! | 15 | [`prelude`], [`scene_format`], `reference` |
 //! | 14 | [`train`] |
 //! | 13 | [`dataset`], `compare` |
 //! | 12 | [`job`] |
@@ -107,6 +107,8 @@ pub mod prelude;
 #[cfg(feature = "raster")]
 #[doc(hidden)]
 pub mod raster;
+#[doc(hidden)]
+pub mod reference;
 #[doc(hidden)]
 pub mod render;
 #[doc(hidden)]

@@ -60,7 +60,7 @@ const ALLOWED: &[(&str, &str)] = &[
     // Numbers as bytes for the card, and waiting for it.
     ("bytemuck", "raster/"),
     // Command lines; hyper-parameters are read from flags and from files alike.
-    ("clap", "bin/ train/fit/settings.rs"),
+    ("clap", "bin/ train/fit/settings.rs reference/manual.rs"),
     // Checksums of TensorBoard's records.
     ("crc32c", "train/fit/log/events.rs"),
     // Tables: measured spectra in; boxes of plants and numbers of reports out.
@@ -80,6 +80,8 @@ const ALLOWED: &[(&str, &str)] = &[
     // Pages that people read: what writes them, and the parts that they share.
     ("maud", "report/ compare/page.rs compare/gap/ dataset/report/ train/figure/page.rs bin/trace/catalogue/page.rs"),
     ("noise", "texture/noise.rs"),
+    // Files that are saved while they are watched.
+    ("notify", "bin/trace/watch/files.rs"),
     // Measures of difference that others have written and checked.
     ("nv_flip", "compare/flip.rs"),
     ("palette", "compare/color.rs"),
@@ -102,11 +104,13 @@ const ALLOWED: &[(&str, &str)] = &[
     ("ron", "ron_file/"),
     // Spectra of pictures.
     ("rustfft", "compare/gap/frequency.rs"),
+    // Types of files say what may stand in them.
+    ("schemars", "*"),
     ("serde", "*"),
-    // glTF documents, read and written; records and formats of datasets.
+    // glTF documents, read and written; records and formats of datasets; what a page asks and is told.
     (
         "serde_json",
-        "model/document.rs model/gltf.rs output/gltf/ dataset/ compare/table.rs compare/gap/table.rs train/ report/table.rs",
+        "model/document.rs model/gltf.rs output/gltf/ dataset/ compare/table.rs compare/gap/table.rs train/ report/table.rs reference/ ron_file/schema.rs bin/trace/watch/",
     ),
     // Weights, as every trainer reads them.
     ("safetensors", "train/weights.rs"),
@@ -126,6 +130,10 @@ const ALLOWED: &[(&str, &str)] = &[
     // Files appear whole or not at all: images of fields, and drawn textures below them. The denoiser's go through a folder,
     // and so does a scene that is taken into a dataset.
     ("tempfile", "cli/mod.rs dataset/plan.rs output/atomic.rs output/denoise.rs texture/draw/write.rs"),
+    // Another program that shows pictures.
+    ("tev_client", "bin/trace/watch/tev.rs"),
+    // A page on this machine.
+    ("tiny_http", "bin/trace/watch/answer.rs bin/trace/watch/server.rs"),
     ("tobj", "model/obj.rs"),
     // Graphics cards.
     ("wgpu", "raster/"),

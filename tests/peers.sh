@@ -6,7 +6,7 @@
 # What is there already is left alone.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-packages="libembree-dev build-essential mesa-vulkan-drivers libvulkan1 python3-venv libllvm19 chromium slurm-wlm munge iproute2 procps parallel python3-torch"
+packages="libembree-dev build-essential mesa-vulkan-drivers libvulkan1 python3-venv libllvm19 chromium slurm-wlm munge iproute2 procps parallel python3-torch python3-pil"
 # shellcheck disable=SC2086 # a list of packages
 if ! dpkg -s $packages >/dev/null 2>&1; then
   sudo=$([ "$(id -u)" = 0 ] || echo sudo)

@@ -257,7 +257,7 @@ fn tidy<T>(read: Result<T>) -> Result<(), TestCaseError> {
     let Err(error) = read else { return Ok(()) };
     prop_assert!(error.place().is_some_and(|place| place.span.is_some()), "{error}");
     let words = error.to_string();
-    prop_assert!(words.lines().count() <= 4 && words.lines().all(|l| l.chars().count() < 2000), "{words}");
+    prop_assert!(words.lines().count() <= 5 && words.lines().all(|l| l.chars().count() < 2000), "{words}");
     prop_assert!(words.chars().all(|c| c == '\n' || !c.is_control()), "{words:?}");
     prop_assert!(words.contains('^'), "{words}");
     Ok(())

@@ -4,6 +4,7 @@ pub mod signal;
 
 use crate::error::Kind;
 use crate::geometry::Window;
+use crate::input::shipped;
 use crate::ron_file::nearest;
 use crate::{Error, Result};
 use std::fmt;
@@ -87,13 +88,42 @@ pub fn check_folder(folder: &Path) -> Result<()> {
     tempfile::tempfile_in(there).map_err(Error::io(there)).map(drop)
 }
 
-/// Checks that a scene file is there, and says which scene files are where it is not.
-pub fn check_scene(file: &Path) -> Result<()> {
-    check_ron(file, "scene file")
+/// Checks that a PNG can be written at `out` from what `source` holds, before there is work to lose: not over the source itself, nor in the place of
+/// a folder or a device.
+pub fn check_png(out: &Path, source: &Path) -> Result<()> {
+    let help = "give --out a file that ends in .png";
+    if !out.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
+        return Err(Error::misuse("the picture must be a PNG").in_file(out).help(help));
+    }
+    if out.exists() && !out.is_file() {
+        return Err(Error::misuse("this is no file, so no picture can be written there").in_file(out).help(help));
+    }
+    if let (Ok(a), Ok(b)) = (out.canonicalize(), source.canonicalize())
+        && a == b
+    {
+        return Err(Error::misuse("the picture would be written over what it is made from").in_file(out).help(help));
+    }
+    check_folder(out.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new(".")))
 }
 
-/// The same of any RON file; `what` it is, such as `species file`.
-pub fn check_ron(file: &Path, what: &str) -> Result<()> {
+/// Checks that a scene file is there, and says which scene files are where it is not.
+pub fn check_scene(file: &Path) -> Result<()> {
+    match shipped::scene_names() {
+        Ok(names) => check_ron(file, "scene file", &names),
+        // A name that would be found where the program is whole.
+        Err(lack) if file.to_str().is_some_and(shipped::is_bare) => check_ron(file, "scene file", &[])
+            .map_err(|error| error.help(format!("{}: {}", lack.message(), lack.advice().unwrap_or_default()))),
+        Err(_) => check_ron(file, "scene file", &[]),
+    }
+}
+
+/// The same of a species file.
+pub fn check_species(file: &Path) -> Result<()> {
+    check_ron(file, "species file", &[])
+}
+
+/// The same of any RON file: `what` it is, and by which bare names those are asked for that ship.
+fn check_ron(file: &Path, what: &str, shipped: &[String]) -> Result<()> {
     if file.exists() {
         return Ok(());
     }
@@ -104,10 +134,12 @@ pub fn check_ron(file: &Path, what: &str) -> Result<()> {
     files.retain(|name| Path::new(name).extension().is_some_and(|e| e == "ron"));
     files.sort();
     let name = file.file_name().unwrap_or_default().to_string_lossy();
-    let help = match (nearest(&files, &name), files.is_empty()) {
-        (Some(near), _) => format!("did you mean {}?", folder.join(near).display()),
-        (None, false) => format!("{what}s in {} are {}", folder.display(), files.join(", ")),
-        (None, true) => format!("there is none in {}; those that ship lie in scenes/", folder.display()),
+    let near_shipped = nearest(shipped, &name).filter(|_| file.to_str().is_some_and(shipped::is_bare));
+    let help = match (nearest(&files, &name), near_shipped, files.is_empty()) {
+        (Some(near), ..) => format!("did you mean {}?", folder.join(near).display()),
+        (None, Some(near), _) => format!("did you mean {near}, which ships with the program?"),
+        (None, None, false) => format!("{what}s in {} are {}", folder.display(), files.join(", ")),
+        (None, None, true) => format!("there is none in {}; those that ship lie in scenes/", folder.display()),
     };
     Err(Error::input(format!("there is no such {what}")).in_file(file).help(help))
 }

@@ -1,11 +1,13 @@
 //! Takes everything that a scene reads into the dataset's folder, so that the dataset can be continued and checked on any machine.
 //!
 //! Files that the scene reaches by relative paths keep their places to each other below `scene/`. A file that only an absolute path
-//! leads to goes to `scene/external/`, and where a path no longer leads to its file, the copied RON file gets a relative one.
+//! leads to goes to `scene/external/`, and where a path no longer leads to its file, the copied RON file gets a relative one. So do names
+//! that stand for files that ship with the program.
 
 use super::File;
 use crate::input::tidy;
 use crate::ron_file::RonFile;
+use crate::soil::LAYERS;
 use crate::{Error, Result};
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -20,24 +22,34 @@ pub(super) struct Gathered {
     pub(super) rewritten: bool,
 }
 
-/// Gathers the files that a scene reads, `scene` itself among them; paths as they were opened.
-pub(super) fn gather(paths: &[PathBuf], scene: &Path) -> Result<Gathered> {
+/// Gathers the files that a scene reads, `scene` itself among them; paths as they were opened. `shipped` has the files for which names
+/// stand in the scene file.
+pub(super) fn gather(paths: &[PathBuf], shipped: &BTreeMap<String, PathBuf>, scene: &Path) -> Result<Gathered> {
     let places = places(paths, scene)?;
+    let scene = absolute(scene)?;
+    let none = BTreeMap::new();
     let mut rewritten = false;
     let mut files = Vec::new();
     for (from, to) in &places {
         let mut bytes = std::fs::read(from).map_err(Error::reading(from))?;
         if from.extension().is_some_and(|e| e == "ron")
             && let Ok(text) = std::str::from_utf8(&bytes)
-            && let Some(text) = renamed(text, from, to, &places)
         {
-            bytes = text.into_bytes();
-            rewritten = true;
+            let page = RonFile { path: from.clone(), text: text.to_owned() };
+            let is_scene = *from == scene;
+            // Layers that are not named are files that ship, which the copy must name.
+            let whole = is_scene.then(|| page.written_out("soil", "layers", LAYERS)).flatten();
+            let text = whole.as_ref().unwrap_or(&page.text);
+            if let Some(text) =
+                renamed(text, from, to, &places, if is_scene { shipped } else { &none }).or(whole.clone())
+            {
+                bytes = text.into_bytes();
+                rewritten = true;
+            }
         }
         files.push(File { path: slashed(to), bytes });
     }
-    let scene = &places[&absolute(scene)?];
-    Ok(Gathered { files, scene: slashed(scene), rewritten })
+    Ok(Gathered { files, scene: slashed(&places[&scene]), rewritten })
 }
 
 /// Where each file goes, by its absolute path; places are relative to the dataset's folder.
@@ -73,10 +85,18 @@ fn places(paths: &[PathBuf], scene: &Path) -> Result<BTreeMap<PathBuf, PathBuf>>
 }
 
 /// The text of a RON file that moves from `from` to `to` with the others; `None` where each of its paths leads to its file as before.
-fn renamed(text: &str, from: &Path, to: &Path, places: &BTreeMap<PathBuf, PathBuf>) -> Option<String> {
+fn renamed(
+    text: &str,
+    from: &Path,
+    to: &Path,
+    places: &BTreeMap<PathBuf, PathBuf>,
+    shipped: &BTreeMap<String, PathBuf>,
+) -> Option<String> {
     let (old, new) = (from.parent()?, to.parent()?);
     RonFile { path: from.into(), text: text.to_owned() }.replace_quoted(|written| {
-        let place = places.get(&tidy(&old.join(written)))?;
+        let full =
+            shipped.get(written).and_then(|file| absolute(file).ok()).unwrap_or_else(|| tidy(&old.join(written)));
+        let place = places.get(&full)?;
         (tidy(&new.join(written)) != *place).then(|| slashed(&relative(new, place)))
     })
 }
@@ -136,7 +156,10 @@ mod tests {
         .into_iter()
         .map(|(from, to)| (from.into(), to.into()))
         .collect();
-        let new = |text| renamed(text, Path::new("/p/scenes/a.ron"), Path::new("scene/scenes/a.ron"), &places);
+        let shipped = BTreeMap::from([("bee".to_owned(), PathBuf::from("/q/b.ron"))]);
+        let new =
+            |text| renamed(text, Path::new("/p/scenes/a.ron"), Path::new("scene/scenes/a.ron"), &places, &shipped);
+        assert_eq!(new(r#"(a: "bee", b: "bees")"#).unwrap(), r#"(a: "../external/b.ron", b: "bees")"#);
         assert_eq!(new(r#"(a: "../textures/x.png", b: "b.ron")"#), None);
         assert_eq!(
             new(r#"(a: "/p/textures/x.png", /* "/q/b.ron" */ b: "/p/../q/b.ron")"#).unwrap(),

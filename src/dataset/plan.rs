@@ -83,7 +83,7 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
         .in_file(&order.scene)
         .help("make two scene files of it"));
     }
-    let Gathered { files, scene, rewritten } = gather(&field.files, &order.scene)?;
+    let Gathered { files, scene, rewritten } = gather(&field.files, &field.shipped, &order.scene)?;
     let elsewhere = rewritten || source.allows_outside();
     let scene_sha256 = if elsewhere { hash_of_copies(order, &files, &scene)? } else { field.hash.clone() };
     let camera = &field.scene.camera;

@@ -3,7 +3,7 @@
 use crate::math::{Vec2, vec2};
 
 /// A pixel's footprint. Samples are drawn from its shape, so pixels stay independent.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 pub enum Filter {
     /// The pixel's own square, as a sensor with full fill factor and a perfect lens.
     Box,

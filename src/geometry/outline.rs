@@ -18,7 +18,7 @@ pub fn uv(x: f32, t: f32) -> Vec2 {
 }
 
 /// A blade's outline.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum Outline {
     /// `t^a (1 − t)^b`.

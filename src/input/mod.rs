@@ -4,6 +4,7 @@
 //! a device may never end.
 
 mod scope;
+pub mod shipped;
 
 pub use scope::{Outside, Scope, tidy};
 

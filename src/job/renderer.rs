@@ -89,6 +89,35 @@ impl Renderer {
         })
     }
 
+    /// Renders a field in passes: `show` is given the film whenever every pixel has one of these numbers of samples, which rise, and the
+    /// labels with it. The first surface is labelled once. Stopped by the request's watch, an interruption is returned.
+    #[doc(hidden)]
+    pub fn refine(
+        &self,
+        field: &Field,
+        request: &Request<'_>,
+        passes: &[u32],
+        show: &mut (dyn FnMut(&Film, &LabelMap) -> Result<()> + Send),
+    ) -> Result<()> {
+        if matches!(self.engine, Opened::Rasterizer(_)) {
+            return Err(Error::misuse("--engine raster draws no passes").help("use --engine trace, or leave it out"));
+        }
+        request.view.check(&self.options)?;
+        let world = field.world()?;
+        let camera = &world.scene.camera;
+        let window = request.window.unwrap_or(Window::full(camera.width(), camera.height()));
+        let settings = self.settings(field, window);
+        let integrator = request.view.integrator(path(&self.options.techniques));
+        field.threads().install(|| {
+            let labels = render::label(world.geometry, &world.scene.parts, camera, window);
+            let mut image = render::Progressive::new(&world, integrator.as_ref(), &settings);
+            passes.iter().try_for_each(|spp| {
+                image.advance(*spp, &request.watch)?;
+                show(&image.film(), &labels)
+            })
+        })
+    }
+
     /// What pixel (x, y) shows, in words: label, surface, light.
     pub fn explain(&self, field: &Field, view: View, (x, y): (u32, u32)) -> Result<String> {
         let world = field.world()?;

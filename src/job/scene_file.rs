@@ -37,6 +37,13 @@ impl SceneFile {
         Ok(Self { source, edit, options: Options::default(), threads: Threads::all()? })
     }
 
+    /// The scene file as it is now on the disk, or with this text in its place. Species, textures and models that did not change since are
+    /// not decoded again.
+    #[doc(hidden)]
+    pub fn reread(&self, text: Option<&str>) -> Result<Self> {
+        Ok(Self { source: Arc::new(self.source.reread(text)?), ..self.clone() })
+    }
+
     /// Whether a model of it may name files outside its own folder.
     pub(crate) fn allows_outside(&self) -> bool {
         self.source.allows_outside()

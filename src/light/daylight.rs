@@ -62,20 +62,23 @@ impl Bound for Longitude {
     const WORDS: &'static str = "between -180 and 180 degrees";
 }
 
-/// Where the sun stands, as it is written.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Where the sun stands.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum SunDesc {
     /// Where it stood at a place and time.
     At {
         /// Degrees north.
+        #[schemars(extend("x-example" = "50.6"))]
         latitude_deg: Vary<Latitude>,
         /// Degrees east.
+        #[schemars(extend("x-example" = "7.0"))]
         longitude_deg: Vary<Longitude>,
         /// Universal time; `Choice(["…", "…"])` for one of several.
+        #[schemars(extend("x-example" = "\"2016-05-02T10:00:00Z\""))]
         utc: Pick<Utc>,
         /// Hours added to it: `Uniform(0, 6)` for any time of an afternoon.
-        #[serde(default = "zero")]
+        #[serde(default = "zero::<Finite>")]
         later_h: Vary<Finite>,
     },
     /// In this direction.
@@ -83,6 +86,7 @@ pub enum SunDesc {
         /// Degrees above the horizon.
         elevation_deg: Vary<AboveHorizon>,
         /// Degrees clockwise from north.
+        #[schemars(extend("x-example" = "140"))]
         azimuth_deg: Vary<Finite>,
     },
 }

@@ -25,8 +25,8 @@ const WAVELENGTHS: [f32; 3] = [470.0, 615.0, 824.0];
 /// Ends of its exponent: haze and clean air.
 const EXPONENT: (f32, f32) = (0.3, 4.1);
 
-/// Near infrared of a picture of colours, as it is written.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Near infrared of a picture of colours.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub enum InfraredDesc {
     /// The file's channel NIR.
     Channel,

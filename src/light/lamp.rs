@@ -200,26 +200,29 @@ impl Emitter for Lamp {
     }
 }
 
-/// The outline of a lamp, as it is written.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// The outline of a lamp.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum ShapeDesc {
     /// A rectangle; its width is horizontal.
     Rectangle {
         /// Horizontal side, metres.
+        #[schemars(extend("x-example" = "0.3"))]
         width_m: Vary<Positive>,
         /// Other side, metres.
+        #[schemars(extend("x-example" = "0.12"))]
         height_m: Vary<Positive>,
     },
     /// A disc.
     Disc {
         /// Radius, metres.
+        #[schemars(extend("x-example" = "0.05"))]
         radius_m: Vary<Positive>,
     },
 }
 
-/// How bright a lamp is and of what colour, as it is written.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// How bright a lamp is and of what colour.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum GlowDesc {
     /// Radiance in R, G, B, NIR, W·m⁻²·sr⁻¹·nm⁻¹.
@@ -227,27 +230,33 @@ pub enum GlowDesc {
     /// Halogen, 3000 K: G irradiance of a plane facing the lamp at a distance on its axis.
     Halogen {
         /// Irradiance in G, W·m⁻²·nm⁻¹; the noon sun gives 1.4.
+        #[schemars(extend("x-example" = "Uniform(0.2, 0.7)"))]
         irradiance: Vary<NonNegative>,
         /// Distance at which it is given, metres.
+        #[schemars(extend("x-example" = "0.8"))]
         at_m: Vary<Positive>,
     },
     /// White diode: G irradiance of a plane facing the lamp at a distance on its axis.
     WhiteLed {
         /// Irradiance in G, W·m⁻²·nm⁻¹.
+        #[schemars(extend("x-example" = "Uniform(0.2, 0.7)"))]
         irradiance: Vary<NonNegative>,
         /// Distance at which it is given, metres.
+        #[schemars(extend("x-example" = "0.8"))]
         at_m: Vary<Positive>,
     },
     /// Infrared diode, 810 to 850 nm: NIR irradiance of a plane facing the lamp at a distance on its axis.
     NirLed {
         /// Irradiance in NIR, W·m⁻²·nm⁻¹.
+        #[schemars(extend("x-example" = "Uniform(0.2, 0.7)"))]
         irradiance: Vary<NonNegative>,
         /// Distance at which it is given, metres.
+        #[schemars(extend("x-example" = "0.8"))]
         at_m: Vary<Positive>,
     },
 }
 
-/// A point, as it is written, metres.
+/// A point, metres.
 pub type PointDesc = (Vary<Finite>, Vary<Finite>, Vary<Finite>);
 
 pub(super) fn origin() -> PointDesc {

@@ -143,7 +143,7 @@ impl Light {
     }
 }
 
-/// A light, as it is written.
+/// A light.
 ///
 /// ```
 /// use furrow::light::LightDesc;
@@ -180,7 +180,7 @@ impl Light {
 /// assert_eq!((lists[0].len(), lists[1].len()), (1, 2));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[expect(clippy::large_enum_variant, reason = "a page has a handful of lights")]
 pub enum LightDesc {
@@ -192,7 +192,7 @@ pub enum LightDesc {
         #[serde(default = "daylight::clear_air")]
         turbidity: Vary<Turbidity>,
         /// Cloud cover, 0 clear to 1 overcast; default 0.
-        #[serde(default = "daylight::zero")]
+        #[serde(default = "daylight::zero::<Fraction>")]
         cloud: Vary<Fraction>,
     },
     /// A sky of even cloud.
@@ -204,12 +204,14 @@ pub enum LightDesc {
     /// The same radiance from everywhere.
     Constant {
         /// Radiance in R, G, B, NIR, W·m⁻²·sr⁻¹·nm⁻¹.
+        #[schemars(extend("x-example" = "(0.3, 0.3, 0.3, 0.2)"))]
         radiance: (Vary<NonNegative>, Vary<NonNegative>, Vary<NonNegative>, Vary<NonNegative>),
     },
     /// An environment map: light of all directions as it was photographed.
     #[serde(alias = "Environment")]
     EnvironmentMap {
         /// A .exr or .hdr file, equirectangular, linear, the zenith in its first row; its path counts from the scene file's folder.
+        #[schemars(extend("x-example" = "\"sky.exr\""))]
         file: String,
         /// By what its values become radiance, W·m⁻²·sr⁻¹·nm⁻¹; default 1.
         #[serde(default = "environment_map::as_it_is")]
@@ -226,6 +228,7 @@ pub enum LightDesc {
         /// The area.
         shape: ShapeDesc,
         /// Its centre, metres.
+        #[schemars(extend("x-example" = "(-0.35, 0.2, 1)"))]
         position_m: PointDesc,
         /// The point it shines at, metres; default the origin.
         #[serde(default = "lamp::origin")]

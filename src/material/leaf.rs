@@ -32,13 +32,14 @@ impl Bound for Index {
 /// let leaf: LeafDesc = file.parse().unwrap();
 /// assert!(RonFile::of("Leaf(roughnes: 0.3)").parse::<LeafDesc>().is_err());
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default, rename = "Leaf")]
 pub struct LeafDesc {
     /// RGBA picture, sRGB; its alpha cuts the blade's shape. Without one the pigments alone give the colour.
     ///
     /// A photograph's exposure and white balance are not known: unless `calibrated` is set, each of its bands is scaled by one factor until
     /// the mean over the blade is the reflectance that the pigments have.
+    #[schemars(extend("x-example" = "\"../../textures/leaf/cirsium.png\""))]
     pub texture: Option<Pick<String>>,
     /// Whether the picture's linear values are reflectances, as those that `trace texture` draws, and are taken as they are.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
@@ -54,9 +55,11 @@ pub struct LeafDesc {
     pub ior: Num<Index>,
     /// Share of the light from straight above that meets a hair: 0.05 downy, 0.3 felted; default none.
     #[serde(skip_serializing_if = "Num::is_zero")]
+    #[schemars(extend("x-example" = "0.05"))]
     pub hairs: Num<Fraction>,
     /// Share that meets a crystal of wax or a bladder of meal: 0.03 bluish, 0.1 mealy; default none. They scatter blue the most.
     #[serde(skip_serializing_if = "Num::is_zero")]
+    #[schemars(extend("x-example" = "0.03"))]
     pub bloom: Num<Fraction>,
     /// How much more visible light the lower side reflects: 1.3–1.8 on most dicots.
     pub back_paleness: Num<NonNegative>,

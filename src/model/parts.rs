@@ -11,7 +11,7 @@ use std::sync::Arc;
 pub(super) const MOST_TRIANGLES: usize = 1 << 25;
 
 /// Which of a file's axes points up.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub enum Up {
     /// y up, z towards the viewer: glTF, and most OBJ files. The model's front (+z) then looks south.
     #[default]

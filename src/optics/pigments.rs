@@ -24,7 +24,7 @@ impl Bound for Structure {
 /// assert!(p.bands().reflectance.to_array()[3] > 0.4);
 /// assert!(ron::from_str::<Pigments>("(n: 0.5)").is_err());
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Pigments {
     /// Structure N: 1 is one compact layer, 1.2–1.7 a young leaf, 2.2 dry or thick tissue.

@@ -32,13 +32,13 @@ pub(super) use forms;
 macro_rules! declare {
     ($($(#[$doc:meta])* $name:ident => $file:ident,)*) => {
         /// How a plant stands.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
         pub enum Form { $($(#[$doc])* $name,)* }
     };
 }
 forms!(declare);
 
-/// A species' plant, as it is written.
+/// A species' plant.
 ///
 /// ```
 /// let plant: furrow::plant::PlantDesc = ron::from_str(r#"(
@@ -60,7 +60,7 @@ forms!(declare);
 /// )"#).unwrap();
 /// assert!(ron::from_str::<furrow::plant::PlantDesc>("(form: Rosette, kinds: {}, stages: [])").is_err());
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct PlantDesc {
     /// How it stands.
     pub form: Form,
@@ -72,18 +72,28 @@ pub struct PlantDesc {
     /// for 10 %, 33 for 30 %, 39 for 90 %. Such a code then stands for this age, and leaves are counted by the stages as before: the two
     /// run side by side. Source of the codes: Meier 2001. Empty: all codes are those of the stages.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    #[schemars(default)]
+    #[schemars(extend("x-example" = "{31: 32, 33: 44, 39: 60}"))]
     pub cover_days: BTreeMap<u32, Num<NonNegative>>,
     /// Factor on all sizes of one plant.
+    #[schemars(default = "vigour")]
     pub vigour: Vary<Positive>,
-    /// Factor on the sizes of one leaf, the paper's r.
+    /// Factor on the sizes of one leaf, drawn for each (the random factor r of Di Cicco et al. 2017).
+    #[schemars(default = "size")]
     pub size: Vary<Positive>,
     /// How far a leaf strays from its place in the layer.
+    #[schemars(default = "azimuth")]
     pub azimuth_deg: Vary<Finite>,
     /// How far the axis leans.
+    #[schemars(default = "lean")]
     pub lean_deg: Vary<Finite>,
     /// Material of the hypocotyl; empty: `"stalk"`.
+    #[schemars(default)]
+    #[schemars(extend("x-example" = "\"leaf\""))]
     pub hypocotyl_material: String,
     /// Material of the stem; empty: `"stalk"`.
+    #[schemars(default)]
+    #[schemars(extend("x-example" = "\"leaf\""))]
     pub stem_material: String,
 }
 

@@ -6,7 +6,7 @@ use crate::ron_file::{Finite, Fraction, NonNegative, Num, Positive, PositiveCoun
 use serde::{Deserialize, Serialize};
 
 /// How a blade is made.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum Shape {
     /// One sheet within an outline; the texture's opacity cuts its margin.
@@ -56,7 +56,7 @@ pub enum Shape {
 ///     "(shape: Sheet(outline: Power(a: 0.55, b: 1.0)), wave: Uniform(0.01, 0.02), stalk_width: 0.05, channel: 0.6)",
 /// ).unwrap();
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LeafKind {
     /// How the blade is made.

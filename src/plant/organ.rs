@@ -4,7 +4,7 @@ use crate::geometry::Mesh;
 use crate::math::Vec3;
 
 /// What an organ is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 pub enum OrganKind {
     /// The flat part of a true leaf.
     Blade,
@@ -18,6 +18,20 @@ pub enum OrganKind {
     Stem,
     /// The lower part of a grass leaf, rolled round the stem.
     Sheath,
+}
+
+impl OrganKind {
+    /// Lower-case name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Blade => "blade",
+            Self::Petiole => "petiole",
+            Self::Cotyledon => "cotyledon",
+            Self::Hypocotyl => "hypocotyl",
+            Self::Stem => "stem",
+            Self::Sheath => "sheath",
+        }
+    }
 }
 
 /// Where a leaf's blade begins and ends: the keypoints of a leaf.

@@ -13,10 +13,11 @@ use serde::{Deserialize, Serialize};
 pub const BUD: f32 = 0.002;
 
 /// One layer of leaves at one stage.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LayerDesc {
     /// Which kind of leaf, a key of the plant's `kinds`.
+    #[schemars(extend("x-example" = "\"leaf\""))]
     pub kind: String,
     /// N_l: leaves in the layer.
     #[serde(default = "one")]
@@ -25,13 +26,16 @@ pub struct LayerDesc {
     #[serde(default = "vary::<Finite>")]
     pub alpha: Vary<Finite>,
     /// Length of the blade; 0 once the leaf is gone.
+    #[schemars(extend("x-example" = "Uniform(50, 60)"))]
     pub blade_mm: Vary<NonNegative>,
     /// Width of the blade.
+    #[schemars(extend("x-example" = "Uniform(30, 36)"))]
     pub width_mm: Vary<NonNegative>,
     /// Length of the stalk; of a grass: of the sheath.
     #[serde(default = "vary::<NonNegative>")]
     pub stalk_mm: Vary<NonNegative>,
     /// Angle between growth axis and stalk at its base.
+    #[schemars(extend("x-example" = "Uniform(40, 55)"))]
     pub angle_deg: Vary<NonNegative>,
     /// Angle between stalk and blade, positive outward and down.
     #[serde(default = "vary::<Finite>")]
@@ -48,16 +52,20 @@ pub struct LayerDesc {
 }
 
 /// One stage.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StageDesc {
     /// BBCH code.
+    #[schemars(extend("x-example" = "14"))]
     pub bbch: u32,
     /// Days after emergence, the middle of the stage.
+    #[schemars(extend("x-example" = "18"))]
     pub days: Num<NonNegative>,
     /// Height of the first layer above the soil.
+    #[schemars(extend("x-example" = "8"))]
     pub hypocotyl_mm: Vary<NonNegative>,
     /// Width of the stem at the soil.
+    #[schemars(extend("x-example" = "2"))]
     pub stem_mm: Vary<NonNegative>,
     /// Side shoots, each a smaller copy of the main one.
     #[serde(default = "vary::<NonNegative>")]

@@ -23,6 +23,8 @@ struct Material {
 #[allow(dead_code)]
 struct Page {
     name: String,
+    #[serde(default)]
+    scientific: String,
     eppo: String,
     role: IgnoredAny,
     materials: BTreeMap<String, Material>,

@@ -141,11 +141,24 @@ fn current<'a>(keyword: Keyword, expected: &[&'a str]) -> Vec<&'a str> {
     expected.iter().copied().filter(|name| !is_old(keyword, name)).collect()
 }
 
+/// What readers call a type: `NoiseDesc` is the noise. Names that files write, such as `Field`, stay.
+pub(super) fn plain(name: &str) -> String {
+    let Some(stem) = name.strip_suffix("Desc") else { return name.to_owned() };
+    let mut words = String::new();
+    for c in stem.chars() {
+        if c.is_uppercase() && !words.is_empty() {
+            words.push(' ');
+        }
+        words.extend(c.to_lowercase());
+    }
+    words
+}
+
 /// A parser's error in our words: what is wrong, and what to do.
 fn explain(code: &Ron) -> (String, String) {
     let (message, help) = match code {
         Ron::NoSuchStructField { expected, found, outer } => {
-            let of = outer.as_ref().map(|o| format!(" in {o}")).unwrap_or_default();
+            let of = outer.as_ref().map(|o| format!(" in {}", plain(o))).unwrap_or_default();
             let fields = current(Keyword::Field, expected);
             return (format!("unknown field `{found}`{of}"), choose("fields", &fields, found));
         }
@@ -154,7 +167,7 @@ fn explain(code: &Ron) -> (String, String) {
             return (format!("unknown name `{found}`"), choose("names that can stand here", &names, found));
         }
         Ron::MissingStructField { field, outer } => {
-            let of = outer.as_ref().map(|o| format!(" of {o}")).unwrap_or_default();
+            let of = outer.as_ref().map(|o| format!(" of {}", plain(o))).unwrap_or_default();
             return (format!("field `{field}`{of} is missing"), format!("add `{field}: …` before this bracket closes"));
         }
         Ron::DuplicateStructField { field, .. } => {
@@ -171,7 +184,8 @@ fn explain(code: &Ron) -> (String, String) {
             let wanted = expected.split(|c: char| !c.is_ascii_digit()).find(|n| !n.is_empty()).unwrap_or("others");
             let name = expected.split("::").nth(1).and_then(|rest| rest.split(' ').next()).unwrap_or_default();
             let verb = if *found == 1 { "value stands" } else { "values stand" };
-            let help = format!("write all {wanted}, separated by commas: {name}(…, …)");
+            let all = vec!["…"; wanted.parse().unwrap_or(2)].join(", ");
+            let help = format!("write all {wanted}, separated by commas: {name}({all})");
             return (format!("{found} {verb} here, where {wanted} belong"), help);
         }
         Ron::Message(text) if text.ends_with(TWICE) => return (text.clone(), "keep one of them".to_owned()),

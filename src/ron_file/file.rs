@@ -1,12 +1,15 @@
 //! A RON file: its text, and the way from it to a value or to an error that shows its place.
 
-use super::fault::{Fault, locate};
-use super::place::{Step, offset_of, place, quoted};
+use super::fault::{Fault, locate, plain};
+use super::place::{Step, fields_around, lacks, offset_of, path_at, place, quoted};
 use super::renamed::{self, Renamed};
+use super::schema;
 use super::suggest::nearest;
 use crate::error::{Kind, Place, Span};
 use crate::input::{self, Refusal};
 use crate::{Error, Result};
+use ron::error::SpannedError;
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
@@ -74,11 +77,35 @@ impl RonFile {
                 .fault(&Fault { raw_len: 0, start: 0, end: 0, message: "this file is empty".to_owned(), help })
                 .lasting());
         }
-        options().from_str(&self.text).map_err(|e| {
-            let fault = locate(&self.text, &e);
-            let help = decimal_comma(&self.text, &fault).unwrap_or(fault.help.clone());
-            self.fault(&Fault { help, ..fault }).lasting()
-        })
+        options().from_str(&self.text).map_err(|e| self.refused(&e, |_, _| Vec::new()))
+    }
+
+    /// The same of a type that knows its fields: all that are missing in one place are told at once.
+    pub fn parse_all<T: DeserializeOwned + JsonSchema>(&self) -> Result<T> {
+        if self.text.trim().is_empty() {
+            return self.parse();
+        }
+        options().from_str(&self.text).map_err(|e| self.refused(&e, schema::required::<T>))
+    }
+
+    /// What the parser refused; `required` tells which fields a struct of a name must have beside one that is missing.
+    fn refused(&self, error: &SpannedError, required: impl Fn(&str, &str) -> Vec<String>) -> Error {
+        let fault = locate(&self.text, error);
+        let help = decimal_comma(&self.text, &fault).unwrap_or(fault.help.clone());
+        let fault = Fault { help, ..fault };
+        let ron::Error::MissingStructField { field, outer: Some(outer) } = &error.code else {
+            return self.fault(&fault).lasting();
+        };
+        let there = fields_around(&self.text, fault.start);
+        let mut missing = required(outer, field);
+        missing.retain(|name| !there.contains(&name.as_str()));
+        if missing.len() < 2 {
+            return self.fault(&fault).lasting();
+        }
+        let list = |each: fn(&String) -> String| missing.iter().map(each).collect::<Vec<_>>().join(", ");
+        let message = format!("fields {} of {} are missing", list(|name| format!("`{name}`")), plain(outer));
+        let help = format!("add `{}` before this bracket closes", list(|name| format!("{name}: …")));
+        self.fault(&Fault { message, help, ..fault }).lasting()
     }
 
     /// The text of a file that reads as `value`.
@@ -121,6 +148,14 @@ impl RonFile {
             }
         }
         (text != self.text).then_some(text)
+    }
+
+    /// The text with a default written out: `field` with a value, RON, inside the value of the file's field `parent`. `None` where that is not there,
+    /// or has such a field.
+    pub fn written_out(&self, parent: &str, field: &str, value: &str) -> Option<String> {
+        let at = lacks(&self.text, parent, field)?;
+        let (before, after) = self.text.split_at(at);
+        Some(format!("{before}{field}: {value}, {after}"))
     }
 
     /// An error about the value that `path` leads to. A wrong value that was found while building gets its place in the file; errors
@@ -178,8 +213,24 @@ impl RonFile {
         let end = fault.end.clamp(start, line_start + line_text.len()).max(start);
         let width = text.get(start..end).map_or(1, |t| t.trim_end().chars().count()).max(1);
         let span = Some(Span { line, column, width, text: line_text.to_owned() });
-        Error::input(fault.message.as_str()).help(fault.help.as_str()).at(Place { file: self.path.clone(), span })
+        let place = Place { file: self.path.clone(), span };
+        Error::input(fault.message.as_str()).help(fault.help.as_str()).at(place).see(more(text, fault.start))
     }
+}
+
+/// The command that tells what may stand at a byte of a file; `None` for files that have no such pages.
+fn more(text: &str, offset: usize) -> Option<String> {
+    let path = path_at(text, offset);
+    let (root, rest) = path.split_first()?;
+    let (program, mut steps) = match *root {
+        "Field" => ("trace", Vec::new()),
+        "Species" => ("trace", vec!["species"]),
+        "Leaf" | "Soil" => ("trace", vec!["texture", root]),
+        "Experiment" => ("train", vec!["experiment"]),
+        _ => return None,
+    };
+    steps.extend(rest);
+    Some(format!("{program} explain {}", steps.join(".")).trim_end().to_owned())
 }
 
 /// What stands in a quoted text.
@@ -240,6 +291,8 @@ mod tests {
             m,
             "page.ron:2:22: unknown field `azimut_deg` in Sun\n   2 |   elevation_deg: 45, azimut_deg: 10,\n     |                      ^^^^^^^^^^\n help: did you mean `azimuth_deg`? fields are elevation_deg, azimuth_deg"
         );
+        let m = RonFile::of("Field(soil: (clods: (max_mm: -1)))").parse::<Sun>().unwrap_err().to_string();
+        assert!(!m.contains("see:") || m.contains("trace explain"), "{m}");
     }
 
     #[test]

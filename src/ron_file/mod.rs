@@ -4,6 +4,8 @@
 //! value, `blame` puts an error at the place that a path of fields and items ([`Step`]) leads to. [`Num`] and [`Vary`] are
 //! the numbers of such files: fixed, or drawn for every field from a distribution, within the [`Bound`] that their type says.
 //!
+//! [`quantities`] lists the numbers and distributions of a text with their places, for programs that show or replace one.
+//!
 //! Types that read themselves from raw text use [`from_raw`]; what they refuse is a [`Fault`], which keeps its place.
 
 mod bound;
@@ -12,7 +14,9 @@ mod fault;
 mod file;
 mod num;
 mod place;
+mod quantities;
 mod renamed;
+mod schema;
 mod suggest;
 mod vary;
 
@@ -22,6 +26,8 @@ pub use fault::{Fault, from_raw, inside, parse_in, whole};
 pub use file::RonFile;
 pub use num::Num;
 pub use place::{Step, place};
+pub use quantities::{Quantity, Value, quantities};
 pub use renamed::{Keyword, RENAMED, Renamed};
+pub use schema::{DRAWN, FIXED, KIND, PICKED, RANGE};
 pub use suggest::{choose, nearest};
 pub use vary::{Distribution, Pick, Vary};

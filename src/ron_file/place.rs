@@ -35,11 +35,89 @@ pub fn place(text: &str, path: &[Step<'_>]) -> Range<usize> {
     at
 }
 
+/// Names of the fields and variants that lead to what stands at a byte of the text, the name that the text begins with first. Keys of tables
+/// and numbers of items are left out; so is the name of a field that stands there itself, for it may be wrong.
+pub(super) fn path_at(text: &str, offset: usize) -> Vec<&str> {
+    let start = skip(text, 0);
+    let mut at = start..value_end(text, start);
+    let mut path = Vec::new();
+    while let Some(open) = text[at.clone()].find(['(', '[', '{']).map(|i| at.start + i).filter(|open| *open < offset) {
+        let name = text[at.start..open].trim_end();
+        if !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || c == '_') {
+            path.push(name);
+        }
+        let inside =
+            entries(text, &at).into_iter().find(|entry| entry.value.start <= offset && offset < entry.value.end);
+        let Some(entry) = inside else { break };
+        path.extend(entry.field);
+        at = entry.value;
+    }
+    path
+}
+
+/// Behind which byte a field could be added to the value of a file's field `parent`, which has none of that name; `None` where it has, or where there is
+/// no such value.
+pub(super) fn lacks(text: &str, parent: &str, field: &str) -> Option<usize> {
+    let start = skip(text, 0);
+    let whole = entries(text, &(start..value_end(text, start)));
+    let value = whole.into_iter().find(|entry| entry.field == Some(parent))?.value;
+    let open = text[value.clone()].find('(')? + value.start;
+    (!entries(text, &value).iter().any(|entry| entry.field == Some(field))).then_some(open + 1)
+}
+
+/// Names of the fields that stand beside a byte of the text, in the innermost brackets about it.
+pub(super) fn fields_around(text: &str, offset: usize) -> Vec<&str> {
+    let start = skip(text, 0);
+    let mut at = start..value_end(text, start);
+    loop {
+        let all = entries(text, &at);
+        match all.iter().find(|entry| entry.value.start <= offset && offset < entry.value.end) {
+            Some(entry) => at = entry.value.clone(),
+            None => return all.into_iter().filter_map(|entry| entry.field).collect(),
+        }
+    }
+}
+
+/// A field, or an item, of a bracketed value.
+struct Inside<'a> {
+    /// The field's name; `None` for items and for keys in quotes.
+    field: Option<&'a str>,
+    value: Range<usize>,
+}
+
+fn entries<'a>(text: &'a str, whole: &Range<usize>) -> Vec<Inside<'a>> {
+    let mut all = Vec::new();
+    let Some(open) = text[whole.clone()].find(['(', '[', '{']).map(|i| whole.start + i) else { return all };
+    let mut at = skip(text, open + 1);
+    while at < whole.end && !text[at..].starts_with([')', ']', '}']) {
+        let end = value_end(text, at);
+        let key = key_end(text, at).filter(|k| text[skip(text, *k)..].starts_with(':'));
+        let value = key.map_or(at, |k| skip(text, skip(text, k) + 1).min(end));
+        let field = key.map(|k| &text[at..k]).filter(|name| !name.starts_with('"'));
+        all.push(Inside { field, value: value..end });
+        at = skip(text, end);
+        if !text[at..].starts_with(',') {
+            break;
+        }
+        at = skip(text, at + 1);
+    }
+    all
+}
+
 /// The value one step into the bracketed value at `whole`.
 fn find(text: &str, whole: &Range<usize>, step: Step<'_>) -> Option<Range<usize>> {
-    let open = whole.start + text[whole.clone()].find(['(', '[', '{'])?;
-    let mut at = skip(text, open + 1);
-    let mut number = 0;
+    let wanted = |(number, (key, _)): &(usize, (Option<&str>, Range<usize>))| match step {
+        Step::Field(name) => *key == Some(name),
+        Step::Item(n) => n == *number,
+    };
+    members(text, whole).into_iter().enumerate().find(wanted).map(|(_, (_, value))| value)
+}
+
+/// The values one step into the bracketed value at `whole`, each with its field's name or its key where it has one.
+pub(super) fn members<'t>(text: &'t str, whole: &Range<usize>) -> Vec<(Option<&'t str>, Range<usize>)> {
+    let mut all = Vec::new();
+    let Some(open) = text[whole.clone()].find(['(', '[', '{']) else { return all };
+    let mut at = skip(text, whole.start + open + 1);
     while at < whole.end && !text[at..].starts_with([')', ']', '}']) {
         let end = value_end(text, at);
         let (key, value) = match key_end(text, at).map(|k| (k, skip(text, k))) {
@@ -48,21 +126,14 @@ fn find(text: &str, whole: &Range<usize>, step: Step<'_>) -> Option<Range<usize>
             }
             _ => (None, at),
         };
-        let wanted = match step {
-            Step::Field(name) => key == Some(name),
-            Step::Item(n) => n == number,
-        };
-        if wanted {
-            return Some(value.min(end)..end);
-        }
-        number += 1;
+        all.push((key, value.min(end)..end));
         at = skip(text, end);
         if !text[at..].starts_with(',') {
-            return None;
+            break;
         }
         at = skip(text, at + 1);
     }
-    None
+    all
 }
 
 /// A bracket that does not fit: where it stands or the text ends, and the one that is still open there, if any.
@@ -300,5 +371,26 @@ Field(
             prop_assert!(words(&text).into_iter().all(|word| text.get(word.at).is_some()));
             prop_assert!(quoted(&text).into_iter().all(|at| text.get(at).is_some()));
         }
+    }
+
+    #[test]
+    fn a_field_that_is_missing_has_its_place() {
+        assert_eq!(lacks("Field(soil: (a: 1))", "soil", "layers"), Some(13));
+        assert_eq!(lacks("Field(soil: Soil())", "soil", "layers"), Some(17));
+        assert_eq!(lacks("Field(soil: (layers: []))", "soil", "layers"), None);
+        assert_eq!(lacks("Field(seed: 1) // soil: ()", "soil", "layers"), None);
+    }
+
+    #[test]
+    fn the_path_to_a_byte_names_fields_and_variants() {
+        let text = r#"Field(soil: (clods: (max_mm: 40)), lights: [Daylight(sun: Angles(elevation_deg: 9))], m: {"leaf": Leaf(ior: 2)}, seeds: 3)"#;
+        let at = |of: &str| path_at(text, text.find(of).unwrap()).join(".");
+        assert_eq!(at("40"), "Field.soil.clods.max_mm");
+        assert_eq!(at("max_mm"), "Field.soil.clods");
+        assert_eq!(at("9)"), "Field.lights.Daylight.sun.Angles.elevation_deg");
+        assert_eq!(at("2)"), "Field.m.Leaf.ior");
+        assert_eq!(at("seeds"), "Field");
+        assert_eq!(at("3)"), "Field.seeds");
+        assert_eq!(path_at("", 0), Vec::<&str>::new());
     }
 }

@@ -15,8 +15,10 @@ pub fn choose(what: &str, expected: &[&str], found: &str) -> String {
 
 /// The name that was probably meant; `None` where none is like it.
 pub fn nearest<'a, S: AsRef<str>>(known: &'a [S], found: &str) -> Option<&'a str> {
-    let near = known.iter().map(|k| (strsim::levenshtein(k.as_ref(), found), k.as_ref())).min();
-    near.filter(|(d, k)| *d <= 1 + k.len() / 4).map(|(_, k)| k)
+    // Of names that are equally near, one that begins alike: `weeds`, not `seed`, for `weed`.
+    let unlike = |known: &str| known.chars().next() != found.chars().next();
+    let near = known.iter().map(AsRef::as_ref).map(|k| (strsim::levenshtein(k, found), unlike(k), k)).min();
+    near.filter(|(d, _, k)| *d <= 1 + k.len() / 4).map(|(_, _, k)| k)
 }
 
 #[cfg(test)]
@@ -27,6 +29,7 @@ mod tests {
     fn a_name_that_is_nearly_right_is_found_and_no_other() {
         assert_eq!(nearest(&["elevation_deg", "azimuth_deg"], "azimut_deg"), Some("azimuth_deg"));
         assert_eq!(nearest(&["kitten"], "sitting"), None);
+        assert_eq!(nearest(&["seed", "weeds"], "weed"), Some("weeds"));
         assert_eq!(choose("sizes", &["small", "large"], "smal"), "did you mean `small`? sizes are small, large");
         assert_eq!(choose("sizes", &[], "smal"), "there are no sizes");
     }

@@ -20,7 +20,7 @@ const DRAWN: &str =
     "write one number, or draw it for every field: Uniform(a, b), Normal(mean: a, sd: b), Choice([a, b])";
 
 /// The distributions, as they are written.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum Distribution {
     /// Uniform between the two; where only whole numbers make sense, each of them as likely as the others, both ends included.
@@ -116,6 +116,23 @@ impl<B: Bound> Vary<B> {
     /// One value, single precision.
     pub fn draw32(&self, stream: &mut Stream) -> f32 {
         self.draw(stream) as f32
+    }
+
+    /// About the range of what is drawn: all of it, or two standard deviations about the centre where there is no end.
+    pub fn usual(&self) -> (f64, f64) {
+        let (lo, hi) = match self {
+            Self::Fixed(x) => (x.get(), x.get()),
+            Self::Drawn(Distribution::Uniform(lo, hi)) => (*lo, *hi),
+            Self::Drawn(Distribution::Normal { mean, sd, min, max }) => {
+                ((mean - 2.0 * sd).max(*min), (mean + 2.0 * sd).min(*max))
+            }
+            Self::Drawn(Distribution::LogNormal { median, sigma, min, max }) => {
+                ((median * (-2.0 * sigma).exp()).max(*min), (median * (2.0 * sigma).exp()).min(*max))
+            }
+            Self::Drawn(Distribution::Choice(of)) => ends(of.iter().copied()),
+            Self::Drawn(Distribution::Weighted(of)) => ends(of.iter().filter(|(_, w)| *w > 0.0).map(|(x, _)| *x)),
+        };
+        (lo.max(B::MIN), hi.min(B::MAX))
     }
 
     /// What is wrong with a distribution: where in it, what, and what to do.
@@ -244,8 +261,14 @@ impl<'de, B: Bound> Deserialize<'de> for Vary<B> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         from_raw(deserializer, |raw| {
             let Some(name) = name_of(raw) else {
-                return number::<B>(raw, DRAWN).map(Self::fixed);
+                return match listed(raw) {
+                    Some(fault) => Err(fault),
+                    None => number::<B>(raw, DRAWN).map(Self::fixed),
+                };
             };
+            if let Some(fault) = unnamed(raw, name) {
+                return Err(fault);
+            }
             if !DISTRIBUTIONS.contains(&name) {
                 let start = raw.len() - raw.trim_start().len();
                 let help =
@@ -258,6 +281,40 @@ impl<'de, B: Bound> Deserialize<'de> for Vary<B> {
             Ok(Self::Drawn(distribution))
         })
     }
+}
+
+/// The least and the largest of some numbers.
+fn ends(of: impl Iterator<Item = f64>) -> (f64, f64) {
+    of.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), x| (lo.min(x), hi.max(x)))
+}
+
+/// Numbers that stand in a value, where it holds nothing else.
+fn numbers(inside: &str) -> Option<Vec<&str>> {
+    inside.split(',').map(str::trim).filter(|n| !n.is_empty()).map(|n| n.parse::<f64>().ok().map(|_| n)).collect()
+}
+
+/// What to write instead of a list such as `[100, 150]`.
+fn listed(raw: &str) -> Option<Fault> {
+    let inside = raw.trim().strip_prefix('[')?.strip_suffix(']')?;
+    let help = match numbers(inside)?.as_slice() {
+        [a, b] => format!("write Uniform({a}, {b}) for anything between, or Choice([{a}, {b}]) for one of the two"),
+        _ => format!("write Choice([{}]) for one of them", inside.trim()),
+    };
+    Some(whole(raw, "a list stands where a number or a distribution belongs", help))
+}
+
+/// What to write instead of `Normal(150, 20)`, whose numbers need names.
+fn unnamed(raw: &str, name: &str) -> Option<Fault> {
+    let names = match name {
+        "Normal" => ["mean", "sd", "min", "max"],
+        "LogNormal" => ["median", "sigma", "min", "max"],
+        _ => return None,
+    };
+    let inside = raw.trim().strip_prefix(name)?.trim().strip_prefix('(')?.strip_suffix(')')?;
+    let given = numbers(inside).filter(|of| (1..=names.len()).contains(&of.len()))?;
+    let fields = names.iter().zip(given.iter().copied().chain(["…"])).take(given.len().max(2));
+    let fields: Vec<String> = fields.map(|(name, value)| format!("{name}: {value}")).collect();
+    Some(whole(raw, format!("the numbers of {name} need names"), format!("write {name}({})", fields.join(", "))))
 }
 
 impl<B: Bound> Serialize for Vary<B> {
@@ -393,6 +450,25 @@ mod tests {
         ] {
             assert!(ron::from_str::<Vary<NonNegative>>(text).is_err(), "{text}");
         }
+    }
+
+    /// Method: what people write who know other formats. Expected: the help is the very text to write, and it is read.
+    #[test]
+    fn the_right_form_is_told() {
+        for (wrong, right) in [
+            ("Normal(150, 20)", "Normal(mean: 150, sd: 20)"),
+            ("LogNormal(3, 0.5, 1)", "LogNormal(median: 3, sigma: 0.5, min: 1)"),
+            ("[100, 150]", "Uniform(100, 150)"),
+            ("[1, 2, 3]", "Choice([1, 2, 3])"),
+        ] {
+            let told = ron::from_str::<Vary<NonNegative>>(wrong).unwrap_err().to_string();
+            assert!(told.contains(&format!("write {right}")), "{told}");
+            ron::from_str::<Vary<NonNegative>>(right).unwrap();
+        }
+        let usual = |text: &str| ron::from_str::<Vary<NonNegative>>(text).unwrap().usual();
+        assert_eq!(usual("Normal(mean: 3, sd: 2)"), (0.0, 7.0));
+        assert_eq!(usual("Choice([2, 1, 5])"), (1.0, 5.0));
+        assert_eq!(usual("4"), (4.0, 4.0));
     }
 
     #[test]

@@ -15,12 +15,12 @@ use serde::{Deserialize, Serialize};
 /// ).unwrap();
 /// assert!(ron::from_str::<RowsDesc>("(spacing: 0.5)").is_err());
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RowsDesc {
-    /// From row to row.
+    /// Distance from row to row: sugar beet 0.45 to 0.5, maize 0.75, cereals 0.12, carrot 0.25 to 0.45.
     pub spacing_m: Vary<Positive>,
-    /// From seed to seed.
+    /// Distance from seed to seed in the row: sugar beet 0.18 to 0.22, maize 0.13 to 0.17, cereals 0.02, carrot 0.02 to 0.04.
     pub in_row_m: Vary<Positive>,
     /// Standard deviation of a seed's place along the row.
     pub jitter_along_m: Vary<NonNegative>,

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 /// ).unwrap();
 /// assert!(ron::from_str::<WeedsDesc>("(per_m2: -3)").is_err());
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct WeedsDesc {
     /// Mean number, m⁻².
@@ -49,7 +49,7 @@ impl Default for WeedsDesc {
 }
 
 /// Thomas clusters: Poisson numbers of plants, normally scattered around a centre.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ClustersDesc {
     /// Share of the plants that stand in clusters.

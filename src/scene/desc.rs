@@ -26,11 +26,12 @@ use std::collections::BTreeMap;
 /// let field: furrow::scene::desc::FieldDesc = ron::from_str(text).unwrap();
 /// assert_eq!(field.plants.len(), 1);
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, rename = "Field")]
 pub struct FieldDesc {
     /// Seed of everything that is drawn; `--seed` overrides it.
     #[serde(default)]
+    #[schemars(extend("x-example" = "7"))]
     pub seed: u64,
     /// Who looks.
     pub camera: CameraDesc,
@@ -43,8 +44,9 @@ pub struct FieldDesc {
     /// What shines.
     #[serde(default)]
     pub lights: Vec<LightDesc>,
-    /// What the plants stand in; nothing unless given.
+    /// The ground; none unless given, and then plants stand in a black void. `soil: ()` is a natural seedbed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "(colors: [Loess], moisture: (mean: 0.4))"))]
     pub soil: Option<SoilDesc>,
     /// Sown in rows.
     #[serde(default)]
@@ -74,7 +76,7 @@ pub struct FieldDesc {
 /// let field: FieldDesc = ron::from_str(text).unwrap();
 /// assert_eq!(field.sown, Sown::One);
 /// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub enum Sown {
     /// All of them, each in its rows.
     #[default]
@@ -115,11 +117,13 @@ fn point_spread() -> Filter {
 /// // A field that was photographed in its first weeks or a month later: this crop and its weeds are all young or all old.
 /// let g: Growth = ron::from_str("Either([AgeDays(Uniform(8, 14)), AgeDays(Uniform(30, 40))])").unwrap();
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub enum Growth {
     /// Days after emergence.
+    #[schemars(extend("x-example" = "(Uniform(18, 28))"))]
     AgeDays(Vary<NonNegative>),
     /// Growth stage, BBCH scale (Meier 2001).
+    #[schemars(extend("x-example" = "(Choice([12, 14]))"))]
     Bbch(Vary<PositiveCount>),
     /// One of these, drawn once a field: the same place in every such list of the scene file, so all of them have the same length.
     Either(Vec<Growth>),
@@ -140,15 +144,17 @@ impl Growth {
 }
 
 /// A crop in rows.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, rename = "Crop")]
 pub struct CropDesc {
-    /// Species file.
+    /// A species that ships, by its name (`trace species` lists them), or the path of a species file.
+    #[schemars(extend("x-example" = "\"sugar beet\""))]
     pub species: String,
     /// How far each plant has grown.
     pub growth: Growth,
     /// Factor on its sizes, beyond that of the species file: below 1 where cold or drought kept plants small for their leaves.
     #[serde(default = "as_it_is", skip_serializing_if = "is_as_it_is")]
+    #[schemars(extend("x-example" = "Uniform(0.9, 1.1)"))]
     pub vigour: Vary<Positive>,
     /// Where they stand.
     pub rows: RowsDesc,
@@ -158,15 +164,17 @@ pub struct CropDesc {
 }
 
 /// A weed.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, rename = "Weed")]
 pub struct WeedDesc {
-    /// Species file.
+    /// A species that ships, by its name (`trace species` lists them), or the path of a species file.
+    #[schemars(extend("x-example" = "\"galium\""))]
     pub species: String,
     /// How far each plant has grown.
     pub growth: Growth,
     /// Factor on its sizes, beyond that of the species file: below 1 where cold or drought kept plants small for their leaves.
     #[serde(default = "as_it_is", skip_serializing_if = "is_as_it_is")]
+    #[schemars(extend("x-example" = "Uniform(0.9, 1.1)"))]
     pub vigour: Vary<Positive>,
     /// How many and how they gather.
     #[serde(default)]
@@ -177,24 +185,28 @@ pub struct WeedDesc {
 }
 
 /// One plant in its place.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, rename = "Plant")]
 pub struct PlacedDesc {
-    /// Species file.
+    /// A species that ships, by its name (`trace species` lists them), or the path of a species file.
+    #[schemars(extend("x-example" = "\"maize\""))]
     pub species: String,
     /// How far it has grown.
     pub growth: Growth,
     /// Factor on its sizes, beyond that of the species file: below 1 where cold or drought kept plants small for their leaves.
     #[serde(default = "as_it_is", skip_serializing_if = "is_as_it_is")]
+    #[schemars(extend("x-example" = "Uniform(0.9, 1.1)"))]
     pub vigour: Vary<Positive>,
     /// Where its stem meets the ground, metres east and north.
     #[serde(default = "origin")]
+    #[schemars(extend("x-example" = "(0.1, Uniform(-0.1, 0.1))"))]
     pub position_m: (Vary<Finite>, Vary<Finite>),
     /// Turns it about its axis, degrees clockwise from above.
     #[serde(default = "no_turn")]
     pub turn_deg: Vary<Finite>,
     /// Only this leaf of it, counted from 1 with the seed leaves; the whole plant unless given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "3"))]
     pub only_leaf: Option<Num<PositiveCount>>,
     /// Age, health and damage of it; as the species file has it unless given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -209,10 +221,11 @@ pub struct PlacedDesc {
 /// let model: ModelDesc = file.parse().unwrap();
 /// assert!(RonFile::of(r#"Model(file: "thistle.glb", clas: Weed)"#).parse::<ModelDesc>().is_err());
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, rename = "Model")]
 pub struct ModelDesc {
     /// glTF (`.glb`, `.gltf`) or Wavefront OBJ with its materials; lengths in metres.
+    #[schemars(extend("x-example" = "\"thistle.glb\""))]
     pub file: String,
     /// Whether the file may name pictures and other parts outside its own folder, by absolute paths or by `..`: for a model of your own.
     /// In a dataset they stay within the dataset's folder in any case.
@@ -223,6 +236,7 @@ pub struct ModelDesc {
     pub class: Option<Class>,
     /// Where its origin stands, metres east and north.
     #[serde(default = "origin")]
+    #[schemars(extend("x-example" = "(0.1, Uniform(-0.1, 0.1))"))]
     pub position_m: (Vary<Finite>, Vary<Finite>),
     /// Height of its origin over the ground there, metres; below 0 sinks it in.
     #[serde(default = "no_turn")]
@@ -241,6 +255,7 @@ pub struct ModelDesc {
     pub roughness: Option<Num<Fraction>>,
     /// Share of light that passes in R, G, B, NIR, instead of the file's: (0.05, 0.12, 0.03, 0.45) for a green leaf.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "(0.05, 0.12, 0.03, 0.45)"))]
     pub transmission: Option<Shares>,
     /// Reflectance in near infrared. Unless given: 0.45 for what lets light through, as much as in red for what does not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -267,17 +282,24 @@ fn no_turn() -> Vary<Finite> {
 }
 
 /// A species, as its file writes it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, rename = "Species")]
 pub struct SpeciesDesc {
-    /// Scientific name.
+    /// English name.
+    #[schemars(extend("x-example" = "\"creeping thistle\""))]
     pub name: String,
+    /// Scientific name; empty where the file does not say it.
+    #[schemars(extend("x-example" = "\"Cirsium arvense\""))]
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub scientific: String,
     /// EPPO code.
+    #[schemars(extend("x-example" = "\"CIRAR\""))]
     pub eppo: String,
     /// Crop or weed.
     pub role: Role,
     /// What its organs look like, by the names that the plant uses.
     #[serde(alias = "skins", deserialize_with = "ron_file::entries")]
+    #[schemars(extend("x-example" = "{\"leaf\": Leaf(texture: \"../../textures/leaf/cirsium.png\", calibrated: true)}"))]
     pub materials: BTreeMap<String, LeafDesc>,
     /// How it grows.
     pub plant: PlantDesc,
@@ -298,7 +320,7 @@ const fn spread() -> Num<Fraction> {
 }
 
 /// What a plant is to the farmer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub enum Role {
     /// Sown.
     Crop,

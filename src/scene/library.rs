@@ -2,15 +2,16 @@
 
 use super::desc::{ModelDesc, SpeciesDesc};
 use super::growing::Growing;
+use super::shipped::species as shipped_species;
 use crate::error::{Kind, Place};
 use crate::geometry::{AlphaMask, Margin};
-use crate::input::{self, Outside, Scope};
+use crate::input::{self, Outside, Scope, shipped};
 use crate::light::{Infrared, Table};
 use crate::material::{LeafMaterial, Picture, Tones};
 use crate::math::{Spectrum, Vec2};
 use crate::model::{Model, Up};
 use crate::optics::{Pigments, soil};
-use crate::ron_file::{RENAMED, RonFile, Step, choose};
+use crate::ron_file::{Pick, RENAMED, RonFile, Step, choose};
 use crate::soil::{LayerDesc, LayerMaps};
 use crate::texture::{ColorSpace, Height, HeightFromBrightness, Maps, Texture, Wrap};
 use crate::{Error, Result};
@@ -66,16 +67,34 @@ pub(super) struct Library {
     models: BTreeMap<(PathBuf, bool, bool), Arc<Model>>,
     layers: BTreeMap<(PathBuf, PathBuf), Arc<Layer>>,
     environment_maps: BTreeMap<(PathBuf, Infrared), Arc<Table>>,
-    /// Keywords of species files that were renamed, by file.
-    renamed: BTreeMap<PathBuf, Vec<String>>,
+    /// What to tell of species files, by file: keywords that were renamed, pictures that look wrong.
+    told: BTreeMap<PathBuf, Vec<String>>,
+    /// What ships, by the names that stand for it in the scene file.
+    shipped: BTreeMap<String, PathBuf>,
     /// How species grow otherwise than their files say.
     pub(super) growing: Growing,
+    /// What was read before: used again where the contents of its files are what they were.
+    before: Option<Arc<Library>>,
 }
 
 impl Library {
     /// One that reads nothing outside a scope, whatever its files name.
     pub(super) fn within(scope: Scope) -> Self {
         Self { scope, ..Self::default() }
+    }
+
+    /// One that has read nothing yet, and decodes nothing again whose files hold what they held.
+    pub(super) fn renewed(self) -> Self {
+        let (scope, growing) = (self.scope.clone(), self.growing);
+        let before = Some(Arc::new(Self { before: None, ..self }));
+        Self { scope, growing, before, ..Self::default() }
+    }
+
+    /// What was made of these files before, if they hold what they held; all that are there have been noted.
+    fn kept<T>(&self, files: &[&Path], known: impl FnOnce(&Self) -> Option<T>) -> Option<T> {
+        let before = self.before.as_deref()?;
+        let same = files.iter().all(|file| before.files.get(*file) == self.files.get(*file));
+        if same { known(before) } else { None }
     }
 
     /// Where a file lies that `page` names; an error about the page where it is not there or may not be read.
@@ -85,11 +104,37 @@ impl Library {
         page.need_file(path)
     }
 
+    /// The same where `path` may also be the name of something that ships, which `find` looks up: where no such file lies beside the
+    /// page, and the page may name files anywhere.
+    fn need_or_shipped(
+        &mut self,
+        page: &RonFile,
+        path: &str,
+        find: impl FnOnce(&str) -> Result<Option<PathBuf>>,
+    ) -> Result<PathBuf> {
+        if let Some(known) = self.shipped.get(path) {
+            return Ok(known.clone());
+        }
+        if self.scope == Scope::Anywhere && shipped::is_bare(path) && !page.resolve(path).exists() {
+            let found = find(path).map_err(|e| page.about(path, e.message(), e.advice().unwrap_or_default()))?;
+            if let Some(full) = found {
+                self.shipped.insert(path.to_owned(), full.clone());
+                return Ok(full);
+            }
+        }
+        self.need(page, path)
+    }
+
     /// The scene file itself.
     pub(super) fn page(&mut self, path: &Path) -> Result<RonFile> {
         let page = RonFile::read(path)?;
-        self.files.insert(path.into(), Sha256::digest(page.text.as_bytes()).into());
-        Ok(page)
+        Ok(self.page_of(path, &page.text))
+    }
+
+    /// The scene file with this text.
+    pub(super) fn page_of(&mut self, path: &Path, text: &str) -> RonFile {
+        self.files.insert(path.into(), Sha256::digest(text.as_bytes()).into());
+        RonFile { path: path.into(), text: text.to_owned() }
     }
 
     /// Everything that was read, in order.
@@ -97,9 +142,14 @@ impl Library {
         self.files.keys().cloned().collect()
     }
 
+    /// Names of the scene file that stand for files that ship, and those files.
+    pub(super) fn shipped(&self) -> BTreeMap<String, PathBuf> {
+        self.shipped.clone()
+    }
+
     /// What to tell of the species files that were read, in the order of their paths.
     pub(super) fn warnings(&self) -> Vec<String> {
-        self.renamed.values().flatten().cloned().collect()
+        self.told.values().flatten().cloned().collect()
     }
 
     /// SHA-256 over the contents of everything that was read, in hex: contents, not names, so a moved project keeps it.
@@ -113,13 +163,13 @@ impl Library {
 
     /// The species file that `page` names.
     pub(super) fn species(&mut self, page: &RonFile, path: &str) -> Result<Arc<Species>> {
-        let full = self.need(page, path)?;
+        let full = self.need_or_shipped(page, path, shipped_species)?;
         if let Some(known) = self.species.get(&full) {
             return Ok(known.clone());
         }
         let own = self.page(&full)?;
-        let mut desc: SpeciesDesc = own.parse()?;
-        self.renamed.insert(full.clone(), own.renamed(RENAMED));
+        let mut desc: SpeciesDesc = own.parse_all()?;
+        self.told.insert(full.clone(), own.renamed(RENAMED));
         for key in desc.plant.materials() {
             if !desc.materials.contains_key(&key) {
                 let known: Vec<&str> = desc.materials.keys().map(String::as_str).collect();
@@ -136,23 +186,40 @@ impl Library {
                 });
             }
         }
+        let mut cuts: Vec<Vec<Cut>> = Vec::new();
+        for leaf in desc.materials.values() {
+            let paths = leaf.texture.as_ref().map_or(&[][..], Pick::all);
+            let range = leaf.relief_range.f32();
+            let mut all = Vec::new();
+            for path in paths {
+                let cut = self.picture(&own, path, range)?;
+                // Pictures that the program drew are sound.
+                if !leaf.calibrated {
+                    self.told.entry(full.clone()).or_default().extend(doubt(path, cut.mask.as_deref()));
+                }
+                all.push(cut);
+            }
+            cuts.push(all);
+        }
+        let known = |before: &Self| {
+            let held = |cut: &Cut| before.pictures.values().any(|c| Arc::ptr_eq(&c.picture, &cut.picture));
+            cuts.iter().flatten().all(held).then(|| before.species.get(&full).cloned())?
+        };
+        if let Some(known) = self.kept(&[&full], known) {
+            self.species.insert(full, known.clone());
+            return Ok(known);
+        }
         let mut materials = BTreeMap::new();
-        for (name, leaf) in &desc.materials {
-            let choices = match &leaf.texture {
-                None => {
-                    let material = LeafMaterial::new(leaf, None);
-                    vec![Choice { material, mask: None, margin: None, pictured: false, tones: OnceLock::new() }]
-                }
-                Some(of) => {
-                    let mut choices = Vec::new();
-                    for path in of.all() {
-                        let Cut { picture, mask, margin } = self.picture(&own, path, leaf.relief_range.f32())?;
-                        let material = LeafMaterial::new(leaf, Some(picture));
-                        choices.push(Choice { material, mask, margin, pictured: true, tones: OnceLock::new() });
-                    }
-                    choices
-                }
-            };
+        for ((name, leaf), cuts) in desc.materials.iter().zip(cuts) {
+            let mut choices = Vec::new();
+            for Cut { picture, mask, margin } in cuts {
+                let material = LeafMaterial::new(leaf, Some(picture));
+                choices.push(Choice { material, mask, margin, pictured: true, tones: OnceLock::new() });
+            }
+            if choices.is_empty() {
+                let material = LeafMaterial::new(leaf, None);
+                choices.push(Choice { material, mask: None, margin: None, pictured: false, tones: OnceLock::new() });
+            }
             materials.insert(name.clone(), choices);
         }
         if let Some(change) = self.growing.species {
@@ -170,11 +237,18 @@ impl Library {
             return Ok(known.clone());
         }
         self.note(&full)?;
-        let color = Texture::load(&full, ColorSpace::Srgb).map_err(|e| at_its_place(page, path, IMAGE_HELP, e))?;
         // A height map drawn or measured for the picture lies beside it; without one the relief is read off the colours.
         let beside = self.scope.check(full.with_extension("height.png")).map_err(outside(page, path))?;
-        let maps = if beside.is_file() {
+        let relief = beside.is_file();
+        if relief {
             self.note(&beside)?;
+        }
+        if let Some(known) = self.kept(&[&full, &beside], |before| before.pictures.get(&key).cloned()) {
+            self.pictures.insert(key, known.clone());
+            return Ok(known);
+        }
+        let color = Texture::load(&full, ColorSpace::Srgb).map_err(|e| at_its_place(page, path, IMAGE_HELP, e))?;
+        let maps = if relief {
             Maps::from_height(Height::load(&beside, relief_range).map_err(|e| at_its_place(page, path, IMAGE_HELP, e))?)
         } else {
             Maps::derive(&color, &HeightFromBrightness::LEAF)
@@ -195,13 +269,25 @@ impl Library {
             return Ok(known.clone());
         }
         let lifted = desc.allow_outside.then_some(&self.scope);
-        let model = Model::load_within(&full, desc.up, lifted).map_err(|e| at_its_place(page, path, MODEL_HELP, e))?;
-        let model = Arc::new(model);
+        let model = if let Some(known) = self.model_before(&key) {
+            known
+        } else {
+            let model = Model::load_within(&full, desc.up, lifted);
+            Arc::new(model.map_err(|e| at_its_place(page, path, MODEL_HELP, e))?)
+        };
         for file in &model.files {
             self.note(file)?;
         }
         self.models.insert(key, model.clone());
         Ok(model)
+    }
+
+    /// A model that was read before and whose files hold what they held.
+    fn model_before(&self, key: &(PathBuf, bool, bool)) -> Option<Arc<Model>> {
+        let before = self.before.as_deref()?;
+        let known = before.models.get(key)?;
+        let same = |file: &PathBuf| digest(file).is_ok_and(|digest| before.files.get(file) == Some(&digest));
+        known.files.iter().all(same).then(|| known.clone())
     }
 
     /// The file of an environment map that `page` names, whether or not a field draws it.
@@ -218,6 +304,10 @@ impl Library {
             return Ok(known.clone());
         }
         self.environment_map_file(page, path)?;
+        if let Some(known) = self.kept(&[&full], |before| before.environment_maps.get(&key).cloned()) {
+            self.environment_maps.insert(key, known.clone());
+            return Ok(known);
+        }
         let table = Arc::new(Table::load(&full, infrared).map_err(|error| {
             let help = "name an equirectangular .exr or .hdr; `nir` says where near infrared comes from: Channel, Sky or OfRed(0.8)";
             at_its_place(page, path, help, error)
@@ -234,19 +324,24 @@ impl Library {
         }
         let mut need = |path: &Path| -> Result<(PathBuf, String)> {
             let text = path.to_string_lossy().into_owned();
-            let full = self.need(page, &text)?;
+            let full = self.need_or_shipped(page, &text, shipped::soil_texture)?;
             self.note(&full)?;
             Ok((full, text))
         };
         let (albedo, albedo_text) = need(&desc.albedo)?;
+        let height = if desc.height.as_os_str().is_empty() { None } else { Some(need(&desc.height)?) };
+        let files = [Some(albedo.as_path()), height.as_ref().map(|(height, _)| height.as_path())];
+        let files: Vec<&Path> = files.into_iter().flatten().collect();
+        if let Some(known) = self.kept(&files, |before| before.layers.get(&key).cloned()) {
+            self.layers.insert(key, known.clone());
+            return Ok(known);
+        }
         let albedo =
             Texture::load(&albedo, ColorSpace::Srgb).map_err(|e| at_its_place(page, &albedo_text, IMAGE_HELP, e))?;
         let albedo = albedo.wrapped(Wrap::Repeat);
-        let height = if desc.height.as_os_str().is_empty() {
-            read_off(&albedo)
-        } else {
-            let (height, text) = need(&desc.height)?;
-            Height::load(&height, 1.0).map_err(|e| at_its_place(page, &text, IMAGE_HELP, e))?
+        let height = match height {
+            None => read_off(&albedo),
+            Some((height, text)) => Height::load(&height, 1.0).map_err(|e| at_its_place(page, &text, IMAGE_HELP, e))?,
         };
         let layer = Arc::new(Layer { albedo, height: height.wrapped(Wrap::Repeat) });
         self.layers.insert(key, layer.clone());
@@ -254,10 +349,15 @@ impl Library {
     }
 
     fn note(&mut self, path: &Path) -> Result<()> {
-        let bytes = input::read(path, input::LARGEST).map_err(|refusal| refusal.into_error(path))?;
-        self.files.insert(path.into(), Sha256::digest(&bytes).into());
+        self.files.insert(path.into(), digest(path)?);
         Ok(())
     }
+}
+
+/// SHA-256 of a file's contents.
+fn digest(path: &Path) -> Result<[u8; 32]> {
+    let bytes = input::read(path, input::LARGEST).map_err(|refusal| refusal.into_error(path))?;
+    Ok(Sha256::digest(&bytes).into())
 }
 
 /// A file that `page` names where none may lie.
@@ -271,6 +371,26 @@ fn read_off(albedo: &Texture) -> Height {
     let (columns, rows) = height.size();
     let unit = |h: &f32| (0.5 + 0.5 * h / HeightFromBrightness::SOIL.amplitude).clamp(0.0, 1.0);
     Height::from_values(columns, rows, height.values().iter().map(unit).collect())
+}
+
+/// Share of a blade's picture that must hang together with its foot, the rest being holes and specks.
+const WHOLE: f64 = 0.95;
+
+/// What looks wrong with a photograph of a leaf.
+fn doubt(path: &str, mask: Option<&AlphaMask>) -> Option<String> {
+    let Some(mask) = mask else {
+        return Some(format!(
+            "{path} has no transparent pixels, so its whole rectangle is the blade; cut the leaf out"
+        ));
+    };
+    let share = mask.hanging().count() as f64 / mask.count().max(1) as f64;
+    (share < WHOLE).then(|| {
+        format!(
+            "{path}: {:.0} % of its opaque pixels do not hang together with the foot in the middle of its lower edge; \
+             one leaf a picture, its base at the bottom",
+            100.0 * (1.0 - share)
+        )
+    })
 }
 
 /// What helps where an image cannot be used.
@@ -334,6 +454,30 @@ mod tests {
         let (low, high, again) = (highest(0.01), highest(0.04), highest(0.01));
         assert!(low > 0.0 && (high / low - 4.0).abs() < 0.1, "{low} {high}");
         assert_eq!(low, again);
+    }
+
+    /// Rationale: a scene file that is saved again and again must not decode its textures each time, and must never show an old one.
+    /// Expected: the very same picture where the file's contents are what they were, another one where they are not; the same hash
+    /// as a library that has read nothing before.
+    #[test]
+    fn what_did_not_change_is_not_decoded_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("leaf.png");
+        let copy = |name: &str| std::fs::copy(format!("textures/leaf/{name}.png"), &path).unwrap();
+        copy("sugar_beet");
+        let page = RonFile { path: folder.path().join("page.ron"), text: "Species()".to_owned() };
+        let read = |library: &mut Library| library.picture(&page, "leaf.png", 0.02).unwrap().picture;
+        let mut first = Library::default();
+        let picture = read(&mut first);
+        let mut second = first.clone().renewed();
+        assert!(Arc::ptr_eq(&picture, &read(&mut second)));
+        assert_eq!(first.hash(), second.hash());
+        copy("galium");
+        let mut third = second.renewed();
+        assert!(!Arc::ptr_eq(&picture, &read(&mut third)));
+        let mut fresh = Library::default();
+        read(&mut fresh);
+        assert_eq!(third.hash(), fresh.hash());
     }
 
     #[test]

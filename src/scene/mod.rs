@@ -5,6 +5,7 @@ pub mod desc;
 mod growing;
 mod library;
 pub mod record;
+pub mod shipped;
 pub mod tag;
 
 use crate::accel::Surface;

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// One of the species that a scene file can draw, or a model from disk.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SpeciesRecord {
-    /// Scientific name; of a model its file's name.
+    /// English name; of a model its file's name.
     pub name: String,
     /// EPPO code; empty for a model.
     pub eppo: String,

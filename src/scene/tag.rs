@@ -1,7 +1,20 @@
 //! Who a part is: the table that turns a hit into a label.
 
 /// The classes of the label image, by their index in it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    serde::Serialize,
+    serde::Deserialize,
+    schemars::JsonSchema,
+)]
 #[repr(u8)]
 pub enum Class {
     /// Ground, clods, stones, litter, and everything that is not a plant.

@@ -31,8 +31,9 @@ pub use develop::{
     Jpeg, JpegDesc, MatrixDesc, MatrixRow, Quality, Sharpen, SharpenDesc, Tone, WhiteBalance, WhiteBalanceDesc,
 };
 pub use lens::{
-    Aperture, ApertureDesc, ApertureRecord, Camera, CameraDesc, CameraRecord, Distortion, DistortionDesc,
+    Aperture, ApertureDesc, ApertureRecord, Camera, CameraDesc, CameraModel, CameraRecord, Distortion, DistortionDesc,
     IntrinsicsDesc, Motion, MotionDesc, MotionRecord, PixelBox, Pose, PoseDesc, Psf, PsfDesc,
 };
+pub use preset::PRESETS;
 pub use record::SensorRecord;
 pub use settings::SensorDesc;

@@ -8,7 +8,8 @@ use crate::ron_file::{self, Num, Vary};
 use serde::{Deserialize, Deserializer};
 
 /// What [`sensor`] knows.
-const NAMES: [&str; 3] = ["JaiAd130", "Phone", "MachineVision"];
+/// Names of sensors, each that of a camera too.
+pub const PRESETS: [&str; 3] = ["JaiAd130", "Phone", "MachineVision"];
 
 /// A sensor by its name.
 fn sensor(name: &str) -> Option<SensorDesc> {
@@ -31,7 +32,7 @@ impl<'de> Deserialize<'de> for SensorDesc {
                 return ron_file::parse_in(raw).map(|written: SensorWritten| written.over(Self::default()));
             }
             let Some(preset) = sensor(name) else {
-                let help = ron_file::choose("sensors", &NAMES, name);
+                let help = ron_file::choose("sensors", &PRESETS, name);
                 return Err(ron_file::Fault {
                     end: start + len,
                     ..ron_file::whole(raw, format!("unknown sensor `{name}`"), help)
@@ -146,7 +147,7 @@ mod tests {
     /// within a step; what is printed reads as the same.
     #[test]
     fn a_sensor_has_a_name_and_what_differs_from_it() {
-        for name in NAMES {
+        for name in PRESETS {
             let plain = read(name).unwrap();
             assert_eq!(read(&format!("{name}()")).unwrap(), plain);
             assert_eq!(

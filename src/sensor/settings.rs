@@ -10,7 +10,7 @@ use crate::sampling::rng::{Purpose, Stream};
 use serde::Serialize;
 
 layered! {
-    /// A sensor, as it is written: `(…)` with every field as its default says, or a camera's name, whose values any field replaces.
+    /// A sensor: `(…)` with every field as its default says, or a camera's name, whose values any field replaces.
     /// The steps behind the noise are off unless a scene file or a preset asks for them.
     ///
     /// ```
@@ -47,7 +47,8 @@ layered! {
     /// assert_eq!(ron::from_str::<SensorDesc>("()")?, SensorDesc::default());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    #[derive(Clone, Debug, PartialEq, Serialize)]
+    #[derive(Clone, Debug, PartialEq, Serialize, schemars::JsonSchema)]
+    #[schemars(default)]
     pub struct SensorDesc, SensorWritten = "SensorDesc" {
         /// Exposure of the colour image; default `Auto(level: 0.18)`.
         pub exposure: ExposureDesc = Given<ExposureDesc>,

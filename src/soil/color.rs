@@ -3,11 +3,12 @@
 use super::LayerMaps;
 use crate::math::{Spectrum, vec2};
 use crate::optics::soil;
+use crate::ron_file::{Fraction, Num};
 use crate::sampling::Stream;
 use serde::{Deserialize, Serialize};
 
-/// A dry soil whose reflectance is known; see [`crate::optics::soil`] for their sources.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// A dry soil whose reflectance is known; the book's page on soil has their sources.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub enum SoilColor {
     /// Common loam.
     Loam,
@@ -21,9 +22,15 @@ pub enum SoilColor {
     Reddish,
     /// Pale, chalky soil.
     Chalky,
+    /// A soil of your own: reflectance of the dry soil in R, G, B and NIR, as a spectrometer or a photograph with a grey card gives it.
+    #[schemars(extend("x-example" = "(0.2, 0.15, 0.11, 0.28)"))]
+    Rgbn(Num<Fraction>, Num<Fraction>, Num<Fraction>, Num<Fraction>),
 }
 
 impl SoilColor {
+    /// All of them.
+    pub const ALL: [Self; 6] = [Self::Loam, Self::Loess, Self::Sandy, Self::Humic, Self::Reddish, Self::Chalky];
+
     /// Reflectance of the dry soil: R, G, B, NIR.
     pub fn reflectance(self) -> Spectrum {
         match self {
@@ -33,6 +40,7 @@ impl SoilColor {
             Self::Humic => soil::HUMIC,
             Self::Reddish => soil::REDDISH,
             Self::Chalky => soil::CHALKY,
+            Self::Rgbn(r, g, b, nir) => Spectrum::new(r.f32(), g.f32(), b.f32(), nir.f32()),
         }
     }
 }
@@ -104,5 +112,8 @@ mod tests {
         assert!(least > soil::HUMIC.0.x && most < soil::SANDY.0.x, "{least} {most}");
         assert!(most - least > 0.9 * (soil::SANDY.0.x - soil::HUMIC.0.x), "{least} {most}");
         assert_eq!(draw(&[], 0), Shift::NONE);
+        let own: SoilColor = ron::from_str("Rgbn(0.3, 0.2, 0.1, 0.4)").unwrap();
+        assert_eq!(own.reflectance(), Spectrum::new(0.3, 0.2, 0.1, 0.4));
+        assert!(ron::from_str::<SoilColor>("Rgbn(0.3, 0.2, 0.1, 1.4)").is_err());
     }
 }

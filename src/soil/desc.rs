@@ -2,11 +2,18 @@
 
 use super::{SoilColor, WheelDesc};
 use crate::math::Spectrum;
-use crate::ron_file::{Count, Finite, Fraction, NonNegative, Num, Positive, PositiveCount, Vary};
+use crate::ron_file::{Count, Finite, Fraction, NonNegative, Num, Positive, PositiveCount, RonFile, Vary};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// The ground of a field. Only the layers must be given; the rest defaults to a dry sugar-beet seedbed.
+/// The layers of a scene file that names none, as it would write them: a picture that ships with the program.
+pub const LAYERS: &str = r#"[(albedo: "dirt.png", height: "dirt.height.png", size_m: 0.5, height_mm: (-4, 8))]"#;
+
+fn shipped() -> Vec<LayerDesc> {
+    RonFile::of(LAYERS).parse().unwrap_or_default()
+}
+
+/// The ground of a field; by default a dry sugar-beet seedbed.
 ///
 /// ```
 /// use furrow::soil::SoilDesc;
@@ -26,11 +33,13 @@ use std::path::PathBuf;
 /// )"#).unwrap();
 /// assert_eq!(soil.layers.len(), 2);
 /// assert!(ron::from_str::<SoilDesc>("(layers: [], clouds: ())").is_err());
+/// assert_eq!(ron::from_str::<SoilDesc>("()").unwrap().layers.len(), 1);
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SoilDesc {
-    /// One to [`super::MAX_LAYERS`] layers.
+    /// One to eight layers; one of crumbled soil that ships unless given.
+    #[serde(default = "shipped")]
     pub layers: Vec<LayerDesc>,
     /// The dry soil's colour: each field has a random mix of these measured soils, and the layers' pictures vary around it. Empty:
     /// the colours of the pictures.
@@ -64,17 +73,21 @@ pub struct SoilDesc {
 }
 
 /// One layer of soil.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LayerDesc {
     /// Colour of the dry soil, a tile.
+    #[schemars(extend("x-example" = "\"../textures/soil/dirt.png\""))]
     pub albedo: PathBuf,
     /// Height, a linear tile; 16 bit is best. Left out, it is read off the albedo: what is bright stands up.
     #[serde(default, skip_serializing_if = "unnamed")]
+    #[schemars(extend("x-example" = "\"../textures/soil/dirt.height.png\""))]
     pub height: PathBuf,
     /// Side of one tile, metres.
+    #[schemars(extend("x-example" = "0.5"))]
     pub size_m: Num<Positive>,
     /// Height of the map's black and of its white.
+    #[schemars(extend("x-example" = "(-4, 8)"))]
     pub height_mm: (Num<Finite>, Num<Finite>),
     /// How much of the ground it takes beside the others.
     #[serde(default = "one")]
@@ -96,8 +109,8 @@ fn whole() -> Num<Fraction> {
     Num::new(1.0)
 }
 
-/// How layers share the ground; see [`super::blend`] for the formula.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// How layers share the ground; the book's page on soil has the formula.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct BlendDesc {
     /// Size of the largest patches, metres.
@@ -117,7 +130,7 @@ impl Default for BlendDesc {
 }
 
 /// The shape of the ground.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ReliefDesc {
     /// Root mean square height of the noise alone: 2–5 rolled, 5–10 a sugar-beet seedbed, 8–15 harrowed, 20–40 ploughed.
@@ -148,7 +161,7 @@ impl Default for ReliefDesc {
 }
 
 /// The profile across a seed row.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RowReliefDesc {
     /// Depth of the furrow that the press wheel leaves, 5–15.
@@ -166,10 +179,10 @@ impl Default for RowReliefDesc {
 }
 
 /// How wet the ground is: 0 air-dry, 1 saturated.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MoistureDesc {
-    /// Mean.
+    /// Mean of the field: 0.1 dry, 0.5 moist, 0.9 after rain.
     pub mean: Vary<Fraction>,
     /// Standard deviation of the patches.
     pub spread: Vary<Fraction>,
@@ -191,7 +204,7 @@ impl Default for MoistureDesc {
 }
 
 /// Aggregates that are drawn into the surface, because they are too many and too small to be bodies.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct CrumbsDesc {
     /// Smallest length. The largest is the clods' smallest, the law is theirs.
@@ -211,16 +224,16 @@ impl Default for CrumbsDesc {
 /// Source: Aubertot et al. 1999, Soil Sci. Soc. Am. J. 63:1377 (sugar-beet seedbeds): D 3.8–4.0, axes 1 : 0.77 : 0.55
 /// whatever the size; 9400 m⁻² above 5 mm then cover 30 % of the ground. That is the whole tilled layer: tines bring
 /// coarse aggregates to the surface, so the default is smaller.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ClodsDesc {
     /// How many are longer than 5 mm, m⁻²; 0 for none, not even crumbs.
     pub over_5mm_per_m2: Vary<NonNegative>,
-    /// Shortest body.
+    /// Length of the shortest body; smaller ones are crumbs, part of the surface.
     pub min_mm: Num<Positive>,
-    /// Longest.
+    /// Length of the longest body.
     pub max_mm: Num<Positive>,
-    /// D.
+    /// D: the larger, the fewer large aggregates for each small one.
     pub exponent: Vary<Positive>,
     /// Standard deviation of the logarithm of their local number.
     pub clustering: Vary<NonNegative>,
@@ -264,7 +277,7 @@ impl Default for ClodsDesc {
 }
 
 /// One population of stones, with lengths that are lognormal and cut at both ends.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct StonesDesc {
     /// Share of the ground they cover: loess 0–0.01, loam 0.01–0.05, moraine and chalk 0.05–0.2.
@@ -273,9 +286,9 @@ pub struct StonesDesc {
     pub median_mm: Num<Positive>,
     /// Standard deviation of the length's logarithm.
     pub sigma: Num<NonNegative>,
-    /// Shortest.
+    /// Length of the shortest stone.
     pub min_mm: Num<Positive>,
-    /// Longest.
+    /// Length of the longest stone.
     pub max_mm: Num<Positive>,
     /// Mean reflectance: R, G, B, NIR.
     pub albedo: Spectrum,
@@ -304,7 +317,7 @@ impl Default for StonesDesc {
 }
 
 /// What plants of former years left. Straw Ø 2–5 mm × 20–150 mm, sticks Ø 3–10 × 50–250 mm.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct LitterDesc {
     /// Share of the ground under straw: conventional tillage below 0.15, reduced 0.15–0.3, conservation above.

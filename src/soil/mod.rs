@@ -37,7 +37,7 @@ pub use clod::{Clods, clods};
 pub use color::SoilColor;
 pub use debris::{Debris, DebrisKind};
 pub use desc::{
-    BlendDesc, ClodsDesc, CrumbsDesc, LayerDesc, LitterDesc, MoistureDesc, ReliefDesc, RowReliefDesc, SoilDesc,
+    BlendDesc, ClodsDesc, CrumbsDesc, LAYERS, LayerDesc, LitterDesc, MoistureDesc, ReliefDesc, RowReliefDesc, SoilDesc,
     StonesDesc,
 };
 pub use ground::Ground;

@@ -7,7 +7,7 @@ use crate::sampling::Stream;
 use serde::{Deserialize, Serialize};
 
 /// One wheel's track. A tractor's are 20–50 mm deep and 300–500 mm wide; a light robot's or a seeder's press less.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct WheelDesc {
     /// From the first row's line to the middle of the track, towards the row's right-hand side; from the world's origin where nothing is

@@ -5,6 +5,7 @@
 //!
 //! This file is the only door to the `image` crate for reading.
 
+mod cutout;
 pub mod draw;
 mod height;
 pub mod maps;
@@ -15,6 +16,7 @@ mod rgbe;
 mod srgb;
 mod texels;
 
+pub use cutout::{Cutting, cut_out};
 pub use height::Height;
 pub use maps::{AmbientOcclusion, HeightFromBrightness, Maps, NormalMap};
 pub use pyramid::Wrap;
@@ -30,6 +32,9 @@ use std::path::Path;
 
 /// The largest width and height of an image.
 pub const MAX_SIZE: u32 = 16384;
+
+/// The most that the pixels of an image may take, decoded, bytes: 8192 × 8192 of 16 bits with opacity. A small file may hold many.
+const MAX_BYTES: u64 = 1 << 29;
 
 /// A colour image with opacity and its mip pyramid.
 #[derive(Clone, Debug)]
@@ -227,11 +232,14 @@ fn read(source: impl BufRead + Seek) -> Result<image::DynamicImage, Fault> {
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(MAX_SIZE);
     limits.max_image_height = Some(MAX_SIZE);
-    limits.max_alloc = Some(3 << 30);
+    limits.max_alloc = Some(MAX_BYTES);
     reader.limits(limits);
     reader.decode().map_err(|e| match e {
         image::ImageError::Limits(_) => {
-            Fault::Image(format!("the image is larger than {MAX_SIZE} × {MAX_SIZE}; scale it down"))
+            let mib = MAX_BYTES >> 20;
+            Fault::Image(format!(
+                "the image has sides of more than {MAX_SIZE} pixels or takes more than {mib} MiB; scale it down"
+            ))
         }
         image::ImageError::IoError(e) if e.kind() != ErrorKind::UnexpectedEof => Fault::Io(e),
         image::ImageError::IoError(_) => wrong("the image ends too early; the file is damaged"),

@@ -1,9 +1,11 @@
 //! What several tests share.
 #![allow(dead_code, unreachable_pub, reason = "each test uses its part")]
 
+pub mod book;
 pub mod browser;
 pub mod chi2;
 pub mod dataset;
+pub mod devtools;
 pub mod layers;
 pub mod pictures;
 pub mod program;

@@ -36,9 +36,14 @@ fn first(before: impl Iterator<Item = PathBuf>, probe: &str) -> Option<PathBuf> 
 /// A Python with PyTorch: `$FURROW_TORCH_PYTHON`, then `target/venv-torch/bin/python`, which `tests/peers.sh` makes, then those of
 /// [`python`], to which it is equal otherwise.
 pub fn torch() -> Option<PathBuf> {
+    torch_with("safetensors, efficientnet_lite_pytorch")
+}
+
+/// The same with other modules beside PyTorch and numpy.
+pub fn torch_with(modules: &str) -> Option<PathBuf> {
     let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/venv-torch/bin/python");
     let named = std::env::var_os("FURROW_TORCH_PYTHON").map(PathBuf::from);
-    first(named.into_iter().chain([own]), "import torch, numpy, safetensors, efficientnet_lite_pytorch")
+    first(named.into_iter().chain([own]), &format!("import torch, numpy, {modules}"))
 }
 
 /// Runs a script of `tests/` and expects it to be content; shows what it says.

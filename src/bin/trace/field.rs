@@ -1,6 +1,8 @@
 //! Which field: the flags that every verb with a scene file shares.
 
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use furrow::ablation::Edit;
+use furrow::input::shipped;
 use furrow::job::{Field, SceneFile, Threads};
 use furrow::{Result, cli};
 use std::path::{Path, PathBuf};
@@ -8,8 +10,8 @@ use std::path::{Path, PathBuf};
 /// A scene's distribution over fields, at one size.
 #[derive(clap::Args)]
 pub(crate) struct SceneArgs {
-    /// Scene file (RON): what grows, what shines, who looks.
-    #[arg(long, value_name = "FILE", required = true)]
+    /// Scene file (RON): what grows, what shines, who looks. A bare name such as `field` also finds those that ship.
+    #[arg(long, value_name = "FILE", required = true, value_parser = scene_file())]
     scene: Option<PathBuf>,
     /// Seed, instead of the scene file's.
     #[arg(long, allow_negative_numbers = true)]
@@ -20,6 +22,11 @@ pub(crate) struct SceneArgs {
     /// Image height in pixels.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=16384))]
     pub(crate) height: Option<u32>,
+}
+
+/// A scene file of the user's, or one that ships.
+pub(crate) fn scene_file() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().map(shipped::scene_file)
 }
 
 impl SceneArgs {

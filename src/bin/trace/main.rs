@@ -6,11 +6,19 @@ mod ablate;
 mod catalogue;
 mod compare;
 mod dataset;
+mod explain;
 mod export;
 mod field;
+mod init;
+mod leaf;
+mod letters;
+mod list;
+mod pages;
+mod preview;
 mod quality;
 mod render;
 mod texture;
+mod watch;
 
 use clap::{Parser, Subcommand};
 use furrow::cli::{self, signal};
@@ -39,6 +47,8 @@ Examples:
   trace --scene scenes/field.ron --engine raster        the same field as a game engine draws it (feature `raster`)
   trace --scene scenes/field.ron --integrator ids       which part each pixel belongs to, in false colours
   trace --scene scenes/field.ron --pixel 648,483        what that pixel shows, in words
+  trace watch scenes/field.ron                          a page that shows the field whenever the file is saved
+  trace preview scenes/field.ron --indices 0..12 --out sheet.png   twelve fields of the same kind on one sheet
   trace dataset --scene scenes/field.ron --count 100 --out data   a hundred of them, labelled, resumable
   trace ablate --scene scenes/field.ron --count 100 --out ab      the same hundred with one thing changed at a time
   trace export --scene scenes/field.ron --format gltf   the same field for another program
@@ -46,6 +56,10 @@ Examples:
   trace compare --real photos --synthetic data          how far a dataset is from photographs: colour, spectra, noise, plants
   trace texture textures/leaf/sugar_beet.ron            draw a texture from its recipe
   trace catalogue --species sugar_beet,galium           plants at every stage, with a scale, to look at
+  trace leaf photo.jpg --out leaf.png                   a leaf cut out of a photograph, for a species file
+  trace explain soil.clods                              what may stand there in a scene file; `trace explain` alone: all
+  trace init my-field                                   a scene file of your own to begin with, and all that it names
+  trace species                                         what ships; so do trace cameras and trace soils
 
 Files of an image:
   rgb.png, nir.png   photographs in colour and near infrared, 8 bit
@@ -57,7 +71,7 @@ Files of an image:
   *_denoised.png, denoised.exr   with --denoise
 
 More samples make less noise: twice the --spp takes twice the time and leaves 0.7 of it.
-The scene files scenes/01-one-leaf.ron to 08 teach how a scene is written.
+The scene files scenes/01-one-leaf.ron to 08 teach how a scene is written. From any folder, --scene field finds what ships.
 Paths go to stdout, everything else to stderr.
 Exit codes: 0 done, 1 failed, 2 wrong input, 75 stopped cleanly (Ctrl-C, TERM, HUP, USR1).";
 
@@ -73,8 +87,27 @@ enum Verb {
     Ablate(Box<ablate::Args>),
     /// Write a field as a scene of another program.
     Export(export::Args),
+    /// Draw several fields of a scene file on one sheet, each with its index.
+    Preview(Box<preview::Args>),
+    /// Show a scene file's field on a page of this machine, again whenever the file is saved.
+    Watch(Box<watch::Args>),
     /// Draw textures from their recipes; images are written beside them.
     Texture(texture::Args),
+    /// Cut a leaf out of a photograph, as a texture for a species file.
+    Leaf(leaf::Args),
+    /// Explain what may stand in a scene file, a species file or a texture recipe: every field with its unit, range, default and an example.
+    Explain(explain::Args),
+    /// Write the generated pages of the documentation.
+    #[command(hide = true)]
+    Reference(pages::Args),
+    /// Begin a folder of your own: a scene file with comments, its species and textures.
+    Init(init::Args),
+    /// List the species that ship.
+    Species,
+    /// List the cameras that a scene file may name.
+    Cameras,
+    /// List the soils that ship: colours and pictures.
+    Soils,
 }
 
 fn main() -> ExitCode {
@@ -87,6 +120,15 @@ fn main() -> ExitCode {
         Some(Verb::Ablate(args)) => ablate::run(&args, &signals),
         Some(Verb::Export(args)) => export::run(&args),
         Some(Verb::Texture(args)) => texture::run(&args),
+        Some(Verb::Leaf(args)) => leaf::run(&args),
+        Some(Verb::Explain(args)) => explain::run(&args),
+        Some(Verb::Reference(args)) => pages::run::<Cli>(&args),
+        Some(Verb::Init(args)) => init::run(&args),
+        Some(Verb::Species) => list::species(),
+        Some(Verb::Cameras) => list::cameras(),
+        Some(Verb::Soils) => list::soils(),
+        Some(Verb::Preview(args)) => preview::run(&args, &signals),
+        Some(Verb::Watch(args)) => watch::run(&args, &signals),
         None => render::run(&cli.render, &signals),
     };
     cli::end(done)

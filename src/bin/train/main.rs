@@ -5,9 +5,11 @@
 mod baseline;
 mod calibrate;
 mod eval;
+mod explain;
 mod export;
 mod fit;
 mod machine;
+mod pages;
 mod predict;
 mod renamed;
 mod report;
@@ -41,6 +43,7 @@ Examples:
   train export runs/d --format onnx                       the network for a robot
   train baseline exg-size --from data/real@0..10 --set data/real@12..20
   train table scenes/experiments/paper.ron --real jai=DIR the paper's tables, from scenes and real folders
+  train explain hyperparameters.rate                      what may stand in an experiment file
 
 A run that was stopped or killed goes on with the same command, and ends the same.
 Paths go to stdout, everything else to stderr.
@@ -62,6 +65,11 @@ enum Verb {
     Baseline(baseline::Args),
     /// Run an experiment file: datasets, trainings, evaluations, tables.
     Table(Box<table::Args>),
+    /// Explain what may stand in an experiment file: every field with its range, default and an example.
+    Explain(explain::Args),
+    /// Write the generated pages of the documentation.
+    #[command(hide = true)]
+    Reference(pages::Args),
 }
 
 fn main() -> ExitCode {
@@ -78,6 +86,8 @@ fn main() -> ExitCode {
         Verb::Export(args) => export::run(&args),
         Verb::Baseline(args) => baseline::run(&args, &signals),
         Verb::Table(args) => table::run(&args, &signals),
+        Verb::Explain(args) => explain::run(&args),
+        Verb::Reference(args) => pages::run::<Cli>(&args),
     };
     cli::end(done)
 }

@@ -27,6 +27,9 @@ use maud::{Markup, html};
 use photographs::Photographs;
 use statistics::{PLANTS, Pair, Statistics};
 
+const STYLE: &str = include_str!("sheet.css");
+const SCRIPT: &str = include_str!("sheet.js");
+
 /// The report's file, below the dataset's folder.
 pub const FILE: &str = "report.html";
 
@@ -52,7 +55,7 @@ fn html(set: &Set, found: &Statistics, photographs: &Photographs, names: &[Vec<S
             input type="checkbox" id="labels";
             label for="labels" class="switch" { "Show labels on all" }
             span.hint { "or point at one image, or tap it" }
-            div.sheet { (sheet) }
+            (sheet)
         }))
         (section("Labels", grid(labels(found))))
         (section("Plants", html! { (card::species(recipe, found)) (grid(plants(found))) }))
@@ -70,7 +73,8 @@ fn html(set: &Set, found: &Statistics, photographs: &Photographs, names: &[Vec<S
         (section("Sources", card::sources(recipe)))
     };
     let (title, lead) = (card::title(recipe), card::lead(recipe, found));
-    Page { kind: "Dataset", title: &title, lead: html! { (lead) }, style: "", body, script: "" }.html(&recipe.furrow)
+    Page { kind: "Dataset", title: &title, lead: html! { (lead) }, style: STYLE, body, script: SCRIPT }
+        .html(&recipe.furrow)
 }
 
 /// The numbers at the top.

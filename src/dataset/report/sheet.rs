@@ -1,4 +1,4 @@
-//! The contact sheet: some images of each split, their labels over them.
+//! The contact sheet: some images of each split, their labels over them, to be filtered, sorted, searched and enlarged.
 
 use crate::Result;
 use crate::dataset::record::Record;
@@ -7,6 +7,7 @@ use crate::dataset::split::Split;
 use crate::dataset::{Set, native};
 use crate::output::{self, Picture};
 use crate::report::{count, data_url, percent};
+use crate::scene::record::SpeciesRecord;
 use crate::scene::tag::Class;
 use maud::{Markup, html};
 use rayon::prelude::*;
@@ -25,9 +26,99 @@ pub(super) fn sheet(set: &Set, names: &[Vec<String>; 3]) -> Result<Markup> {
         .zip(names)
         .flat_map(|(places, names)| places.into_iter().map(move |k| &names[k]))
         .collect();
-    let cards: Vec<Markup> =
-        all.par_iter().map(|name| card(&native::read(&set.folder, name)?)).collect::<Result<_>>()?;
-    Ok(html! { @for card in &cards { (card) } })
+    let samples: Vec<Sample> = all.par_iter().map(|name| native::read(&set.folder, name)).collect::<Result<_>>()?;
+    let facts: Vec<Facts> = samples.iter().map(|sample| Facts::of(&sample.record, &set.recipe.species)).collect();
+    let unusual = unusual(&facts);
+    let cards: Vec<Markup> = samples
+        .par_iter()
+        .zip(&facts)
+        .zip(&unusual)
+        .map(|((sample, facts), unusual)| card(sample, facts, *unusual))
+        .collect::<Result<_>>()?;
+    Ok(html! {
+        (tools(&facts))
+        div.sheet { @for card in &cards { (card) } }
+        dialog #large {
+            form method="dialog" { button { "Close" } }
+            div {}
+            p {}
+        }
+    })
+}
+
+/// What images are filtered and sorted by.
+struct Facts {
+    /// Shares of the image under crop and weed, percent.
+    cover: [f64; 2],
+    /// Growth stage of the oldest crop plant.
+    stage: Option<u32>,
+    /// Species in view, in order, each once.
+    species: Vec<String>,
+}
+
+impl Facts {
+    fn of(record: &Record, table: &[SpeciesRecord]) -> Self {
+        let pixels = f64::from(record.width) * f64::from(record.height);
+        let share = |class: Class| {
+            100.0 * record.classes.iter().find(|c| c.class == class).map_or(0, |c| c.pixels) as f64 / pixels
+        };
+        let crops = record.seen().filter(|p| p.class == Class::Crop);
+        let stage = crops.filter_map(|p| Some(p.grown.as_ref()?.bbch)).max();
+        let named = |kind: u16| Some(table.get(usize::from(kind).checked_sub(1)?)?.name.clone());
+        let mut species: Vec<String> = record.seen().filter_map(|p| named(p.kind)).collect();
+        species.sort();
+        species.dedup();
+        Self { cover: [share(Class::Crop), share(Class::Weed)], stage, species }
+    }
+
+    fn values(&self) -> [f64; 3] {
+        [self.cover[0], self.cover[1], self.stage.map_or(f64::NAN, f64::from)]
+    }
+}
+
+/// How far each image is from the others: the largest distance of one of its values from their mean, in standard deviations.
+fn unusual(facts: &[Facts]) -> Vec<f64> {
+    let mut far = vec![0.0_f64; facts.len()];
+    for k in 0..3 {
+        let known = || facts.iter().map(|f| f.values()[k]).filter(|v| v.is_finite());
+        let n = known().count().max(1) as f64;
+        let mean = known().sum::<f64>() / n;
+        let sd = (known().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt();
+        for (far, facts) in far.iter_mut().zip(facts) {
+            let distance = (facts.values()[k] - mean).abs() / sd.max(1e-9);
+            if distance.is_finite() && sd > 0.0 {
+                *far = far.max(distance);
+            }
+        }
+    }
+    far
+}
+
+/// What filters and sorts the images; without scripts it is not shown.
+fn tools(facts: &[Facts]) -> Markup {
+    let mut species: Vec<&String> = facts.iter().flat_map(|f| &f.species).collect();
+    species.sort();
+    species.dedup();
+    html! {
+        p.tools hidden {
+            label { "Show " select #show {
+                option value="all" { "all" }
+                option value="crop" { "with crop" }
+                option value="weed" { "with weeds" }
+                option value="bare" { "without plants" }
+                @for name in species { option value={ "species:" (name) } { "with " (name) } }
+            } }
+            label { "Sort by " select #sort {
+                option value="place" { "set" }
+                option value="unusual" { "most unusual first" }
+                option value="cover" { "most cover first" }
+                option value="bare" { "least cover first" }
+                option value="stage" { "oldest crop first" }
+            } }
+            label { "Find " input #find type="search" placeholder="number" size="8"; }
+            span #shown {}
+        }
+    }
 }
 
 /// Which images of splits of these sizes are shown: of each the same number as far as they go, spread over it.
@@ -44,13 +135,14 @@ fn chosen(sizes: [usize; Split::ALL.len()]) -> [Vec<usize>; Split::ALL.len()] {
 }
 
 /// One image: photograph, labels, words.
-fn card(sample: &Sample) -> Result<Markup> {
+fn card(sample: &Sample, facts: &Facts, unusual: f64) -> Result<Markup> {
     let Record { name, source, split, width, height, .. } = &sample.record;
     let (w, h, rgb) = output::shrink(*width, *height, &sample.rgb, SIDE);
     let photograph = data_url("jpeg", &output::encode_jpeg(w, h, &rgb, QUALITY)?);
     let labels = data_url("png", &output::encode_png(w, h, &Picture::Rgba(&overlay(sample, w, h)), "")?);
     Ok(html! {
-        figure.shot {
+        figure.shot data-name=(name) data-crop=(rounded(facts.cover[0])) data-weed=(rounded(facts.cover[1]))
+            data-stage=[facts.stage] data-unusual=(rounded(unusual)) data-species=(facts.species.join("|")) {
             label title=[source.as_ref()] {
                 input type="checkbox";
                 span.frame {
@@ -58,9 +150,18 @@ fn card(sample: &Sample) -> Result<Markup> {
                     img.labels src=(labels) width=(w) height=(h) alt={ "labels of image " (name) };
                 }
             }
-            figcaption { b { (name) } " " (split.name()) " · " (words(&sample.record)) }
+            figcaption {
+                b { (name) } " " (split.name()) " · " (words(&sample.record)) " "
+                a.enlarge href={ (native::folder(name)) "/rgb.png" } { "full size" } " "
+                a href={ (native::folder(name)) "/record.json" } { "record" }
+            }
         }
     })
+}
+
+/// Two decimals, so that equal datasets have equal pages.
+fn rounded(value: f64) -> String {
+    format!("{value:.2}")
 }
 
 /// What an image shows: plants, or shares of classes where nobody has told plants apart.
@@ -127,6 +228,15 @@ fn tint((class, plant): (u8, u16), edge: bool) -> [u8; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_image_that_is_unlike_the_others_is_the_most_unusual() {
+        let facts = |crop: f64, stage| Facts { cover: [crop, 1.0], stage, species: Vec::new() };
+        let all = [facts(10.0, Some(14)), facts(11.0, Some(14)), facts(12.0, None), facts(60.0, Some(14))];
+        let far = unusual(&all);
+        assert!(far[3] > 1.5 && far[..3].iter().all(|f| *f < far[3]), "{far:?}");
+        assert_eq!(unusual(&[facts(1.0, None)]), [0.0]);
+    }
 
     #[test]
     fn every_split_is_shown_as_far_as_it_goes() {

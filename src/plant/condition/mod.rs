@@ -38,7 +38,7 @@ impl Bound for MarkCount {
 /// let tired: ConditionDesc = file.parse().unwrap();
 /// assert!(RonFile::of("Condition(hole: 3)").parse::<ConditionDesc>().is_err());
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default, rename = "Condition")]
 pub struct ConditionDesc {
     /// Holes that slugs and caterpillars eat into a leaf of 8 cm² or more, mean number; smaller ones have fewer in proportion.

@@ -5,6 +5,7 @@ use super::season::Season;
 use crate::geometry::Mesh;
 use crate::light::LightRecord;
 use crate::material::LeafMaterial;
+use crate::plant::OrganKind;
 use crate::ron_file::RonFile;
 use crate::scene::desc::FieldDesc;
 use crate::scene::library::Library;
@@ -30,6 +31,8 @@ pub(super) struct Builder<'a> {
     pub(super) lights: Vec<LightRecord>,
     pub(super) lighting: Vec<Lighting>,
     pub(super) scene: Scene,
+    /// What the plants' parts are, in the order of the parts; those of models and of the ground have none.
+    pub(super) organs: Vec<OrganKind>,
     pub(super) warnings: Vec<String>,
 }
 
@@ -51,6 +54,7 @@ impl Floor<'_> {
 /// An organ that stands in the field.
 pub(super) struct Grown {
     pub(super) part: Part,
+    pub(super) kind: OrganKind,
     /// Its key among the species' materials.
     pub(super) key: String,
     pub(super) choice: usize,

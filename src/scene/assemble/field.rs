@@ -2,17 +2,21 @@
 
 use crate::film::Film;
 use crate::math::Spectrum;
+use crate::plant::OrganKind;
 use crate::sampling::rng::mix;
 use crate::sampling::{Purpose, Stream};
 use crate::scene::record::{Conditions, SpeciesRecord};
 use crate::scene::{PlantRecord, Scene};
 use crate::sensor::{Linear, Photograph, SensorDesc};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// One field, ready to be rendered, and what is known of it.
 pub struct Field {
     /// What is out there.
     pub scene: Scene,
+    /// What the scene's parts are, in their order; none for what is not grown here.
+    pub organs: Vec<Option<OrganKind>>,
     /// Its plants, in the order of their numbers.
     pub plants: Vec<PlantRecord>,
     /// How its film becomes a picture.
@@ -29,6 +33,8 @@ pub struct Field {
     pub conditions: Conditions,
     /// Every file that was read for it, in order.
     pub files: Vec<PathBuf>,
+    /// Names in its scene file that stand for files that ship with the program, and those files.
+    pub shipped: BTreeMap<String, PathBuf>,
     /// Its scene file.
     pub text: String,
     /// What the user should know.

@@ -3,6 +3,7 @@
 mod builder;
 mod census;
 mod condition;
+mod doubts;
 mod field;
 mod ground;
 mod identity;
@@ -109,8 +110,19 @@ impl Source {
         self.desc.models.iter().any(|model| model.allow_outside)
     }
 
+    /// The same scene file as it is now, or with another text; what this one has read and what did not change since is kept.
+    pub fn reread(&self, text: Option<&str>) -> Result<Self> {
+        let mut library = self.library.lock().unwrap_or_else(PoisonError::into_inner).clone().renewed();
+        let page = match text {
+            None => library.page(&self.page.path)?,
+            Some(text) => library.page_of(&self.page.path, text),
+        };
+        let growing = library.growing;
+        Ok(Self::of(page, library)?.growing(growing))
+    }
+
     fn of(page: RonFile, library: Library) -> Result<Self> {
-        let desc: FieldDesc = page.parse()?;
+        let desc: FieldDesc = page.parse_all()?;
         Ok(Self { page, desc, library: Mutex::new(library) })
     }
 
@@ -204,7 +216,20 @@ impl<'a> Builder<'a> {
         let scene = Scene { parts: Vec::new(), materials: Vec::new(), lights, camera, filter: desc.filter.footprint() };
         let season = Season::draw(page, desc, &mut Stream::of(seed, index, Purpose::Page, SEASON))?;
         let sown = desc.sown.draw(desc.crops.len(), &mut Stream::of(seed, index, Purpose::Page, SOWN));
-        Ok(Self { page, desc, library, seed, index, season, sown, lights: light_records, lighting, scene, warnings })
+        Ok(Self {
+            page,
+            desc,
+            library,
+            seed,
+            index,
+            season,
+            sown,
+            lights: light_records,
+            lighting,
+            scene,
+            organs: Vec::new(),
+            warnings,
+        })
     }
 
     fn stream(&self, purpose: Purpose, index: u64) -> Stream {
@@ -232,11 +257,16 @@ impl<'a> Builder<'a> {
         let wanted = self.desc.soil.is_some() || !self.desc.crops.is_empty() || !self.desc.weeds.is_empty();
         let View { area: view, open } = if wanted { self.view()? } else { View::NONE };
         let (sown, shown) = (view.grown(PLANT_MARGIN), wanted.then_some(view));
+        self.doubt_camera();
+        self.doubt_plants()?;
         let mut known = None;
+        let planted;
         let mut plants = match &self.desc.soil {
             None => {
                 let seedlings = self.seedlings(sown, &[])?;
-                self.populate(&seedlings, None, shown)?
+                let plants = self.populate(&seedlings, None, shown)?;
+                planted = self.scene.parts.len();
+                plants
             }
             Some(soil) => {
                 let Earth { ground, maps, mut pile, mut stones } = self.break_ground(soil, view, open)?;
@@ -260,12 +290,14 @@ impl<'a> Builder<'a> {
                     },
                 );
                 let (clods, plants) = rest?;
+                planted = self.scene.parts.len();
                 self.lay(floor, clods, stones, &baked);
                 plants
             }
         };
         let species = self.species()?;
         known::number_kinds(&mut plants, &species);
+        self.doubt_view(&plants, shown);
         let conditions = Conditions {
             camera: self.scene.camera.record(),
             sensor: self.desc.sensor.build(&mut self.stream(Purpose::Sensor, 0)).record(),
@@ -276,13 +308,19 @@ impl<'a> Builder<'a> {
             weeds: self.weed_records()?,
             season: self.season,
         };
+        // Plants come behind the ground, and models behind them.
+        let mut organs = vec![None; self.scene.parts.len() - planted];
+        organs.extend(self.organs.into_iter().map(Some));
+        organs.resize(self.scene.parts.len(), None);
         self.warnings.extend(self.library.warnings());
         let field = Field {
             scene: self.scene,
+            organs,
             plants,
             species,
             conditions,
             files: self.library.files(),
+            shipped: self.library.shipped(),
             text: self.page.text.clone(),
             sensor: self.desc.sensor.clone(),
             hash: self.library.hash(),
@@ -418,6 +456,7 @@ impl<'a> Builder<'a> {
                     }
                     material
                 });
+                self.organs.push(organ.kind);
                 self.scene.parts.push(Part { material, ..organ.part });
             }
             records.push(record);
@@ -472,6 +511,7 @@ fn grow(s: &Seedling, number: u16, floor: Option<Floor<'_>>, dust: Spectrum) -> 
                 material: 0,
                 tag: Tag { class, plant: number, leaf: organ.leaf },
             },
+            kind: organ.kind,
             key: organ.material,
             choice,
             material: chosen.material.with_chlorophyll(pigments.chlorophyll.f32(), green),

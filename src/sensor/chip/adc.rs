@@ -27,8 +27,8 @@ impl Bound for Black {
     const WORDS: &'static str = "a share of the range, between 0 and 0.5";
 }
 
-/// A converter, as it is written.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// A converter.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum AdcDesc {
     /// None: every electron is told from the next.
@@ -37,6 +37,7 @@ pub enum AdcDesc {
     /// Whole numbers.
     Bits {
         /// 8 to 16.
+        #[schemars(extend("x-example" = "12"))]
         bits: Num<Depth>,
         /// What a pixel without light reads, as a share of the range; default 0.032.
         #[serde(default = "black")]

@@ -14,21 +14,24 @@ impl Bound for Percent {
     const WORDS: &'static str = "between 0 and 100";
 }
 
-/// An exposure, as it is written. Levels are linear: 1 is white, 0.18 middle grey.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// An exposure. Levels are linear: 1 is white, 0.18 middle grey.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum ExposureDesc {
     /// The picture's mean comes to this level, the brightest hundredth counting as no brighter than its darkest: what an
     /// automatic shutter does.
     Auto {
         /// Where the mean comes to lie.
+        #[schemars(extend("x-example" = "Uniform(0.15, 0.21)"))]
         level: Vary<Positive>,
     },
     /// The value that so many percent of the pixels do not exceed comes to this level.
     Percentile {
         /// 50 is the median, 99 the highlights.
+        #[schemars(extend("x-example" = "50"))]
         percent: Vary<Percent>,
         /// Where that value comes to lie.
+        #[schemars(extend("x-example" = "0.18"))]
         level: Vary<Positive>,
     },
     /// A white card lying flat under the open light comes to this level, whatever is in the picture: a handheld light meter.

@@ -13,9 +13,10 @@ use serde::Serialize;
 use std::f32::consts::TAU;
 
 layered! {
-    /// Noise, as it is written. The defaults are those of the JAI AD-130: 52 dB in colour, 54 dB in NIR; neither dark current nor a fixed
+    /// Noise. The defaults are those of the JAI AD-130: 52 dB in colour, 54 dB in NIR; neither dark current nor a fixed
     /// pattern.
-    #[derive(Clone, Debug, PartialEq, Serialize)]
+    #[derive(Clone, Debug, PartialEq, Serialize, schemars::JsonSchema)]
+    #[schemars(default)]
     pub struct NoiseDesc, NoiseWritten = "NoiseDesc" {
         /// Whether there is any; default true.
         pub on: bool = Given<bool>,

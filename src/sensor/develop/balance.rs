@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 /// ASTM G173 global irradiance: what "daylight" balances for.
 const DAYLIGHT: Spectrum = Spectrum::new(1.437, 1.511, 1.464, 0.943);
 
-/// The white balance, as it is written.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// The white balance.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum WhiteBalanceDesc {
     /// A white card lying flat under the scene's light comes out neutral.
@@ -27,10 +27,13 @@ pub enum WhiteBalanceDesc {
     /// These gains on the channels.
     Fixed {
         /// Gain of R.
+        #[schemars(extend("x-example" = "1.1"))]
         red: Vary<Positive>,
         /// Gain of G.
+        #[schemars(extend("x-example" = "1"))]
         green: Vary<Positive>,
         /// Gain of B.
+        #[schemars(extend("x-example" = "1.4"))]
         blue: Vary<Positive>,
     },
     /// None: the channels as the sensor gives them, greenish.

@@ -23,8 +23,8 @@ impl Bound for Quality {
     const WORDS: &'static str = "a whole number from 1 to 100";
 }
 
-/// Compression of the colour image, as it is written.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// Compression of the colour image.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum JpegDesc {
     /// None.
@@ -33,6 +33,7 @@ pub enum JpegDesc {
     /// As a JPEG of this quality.
     On {
         /// 1 to 100: 95 hardly shows, 50 does.
+        #[schemars(extend("x-example" = "Uniform(70, 95)"))]
         quality: Vary<Quality>,
         /// Whether colour has the full resolution (4:4:4) and not half of it (4:2:0); default false.
         #[serde(default)]

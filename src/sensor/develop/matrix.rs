@@ -6,8 +6,8 @@ use crate::ron_file::{Finite, NonNegative, Vary};
 use crate::sampling::rng::Stream;
 use serde::{Deserialize, Serialize};
 
-/// A colour matrix, as it is written.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// A colour matrix.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[expect(clippy::large_enum_variant, reason = "a page has one")]
 pub enum MatrixDesc {

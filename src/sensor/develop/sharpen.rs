@@ -9,8 +9,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 layered! {
-    /// Sharpening of the colour image, as it is written; none by default.
-    #[derive(Clone, Debug, PartialEq, Serialize)]
+    /// Sharpening of the colour image; none by default.
+    #[derive(Clone, Debug, PartialEq, Serialize, schemars::JsonSchema)]
+    #[schemars(default)]
     pub struct SharpenDesc, SharpenWritten = "SharpenDesc" {
         /// How much of the difference is added; default 0.
         pub amount: Vary<NonNegative> = Given<Vary<NonNegative>>,

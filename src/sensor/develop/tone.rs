@@ -5,7 +5,7 @@ use crate::sensor::chip::CLIP;
 use serde::{Deserialize, Serialize};
 
 /// The curve from linear sensor values (1 is white) to what is stored.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub enum Tone {
     /// A shoulder that rolls the highlights off, then sRGB: looks like a photograph.
     #[default]

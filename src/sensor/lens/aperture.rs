@@ -5,13 +5,15 @@ use crate::sampling::rng::Stream;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
-/// A thin lens, as it is written.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// A thin lens.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ApertureDesc {
     /// Focal length over the pupil's diameter.
+    #[schemars(extend("x-example" = "4"))]
     pub f_number: Vary<Positive>,
     /// Distance of the plane in focus.
+    #[schemars(extend("x-example" = "0.85"))]
     pub focus_m: Vary<Positive>,
 }
 

@@ -59,6 +59,7 @@ macro_rules! cameras {
                     distortion: DistortionDesc,
                     /// Aperture, focused on the ground; default a pinhole, sharp everywhere.
                     #[serde(default, with = "bare", skip_serializing_if = "Option::is_none")]
+                    #[schemars(with = "Option<Vary<Positive>>", extend("x-example" = "4"))]
                     f_number: Option<Vary<Positive>>,
                     $(#[$motion])*
                     #[serde(default, skip_serializing_if = "MotionDesc::is_default")]
@@ -69,6 +70,9 @@ macro_rules! cameras {
         }
 
         impl CameraDesc {
+            /// The cameras with a name, and what they are made of.
+            pub const NAMED: &[(&str, CameraModel)] = &[$((stringify!($name), $model)),*];
+
             /// Draws the camera. A [`Kind::Input`](crate::error::Kind::Input) where no image could be taken: a folded lens, an aperture without a focal length in
             /// millimetres, a target at the camera's own place.
             pub fn build(&self, stream: &mut Stream) -> Result<Camera> {
@@ -99,7 +103,7 @@ macro_rules! cameras {
 }
 
 cameras! {
-    /// A camera, as it is written.
+    /// A camera.
     ///
     /// ```
     /// use furrow::sampling::{Purpose, Stream};
@@ -129,11 +133,11 @@ cameras! {
     /// }
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
     #[serde(deny_unknown_fields)]
     pub enum CameraDesc {
         /// The JAI AD-130GE of the Bonirob robot, 1296 × 966 pixels of 3.75 µm, looking down. Everything has a default.
-        JaiAd130(Model { size: (1296, 966), pixel_um: 3.75, readout_ms: 0.0 }) {
+        JaiAd130(CameraModel { size: (1296, 966), pixel_um: 3.75, readout_ms: 0.0 }) {
             /// Focal length, millimetres; default 15, which sees 275 × 205 mm from 0.85 m.
             #[serde(default = "jai_focal")]
             focal_mm,
@@ -144,7 +148,7 @@ cameras! {
             motion,
         },
         /// A phone's main camera, 4032 × 3024 pixels of 1.4 µm, looking down. Everything has a default.
-        Phone(Model { size: (4032, 3024), pixel_um: 1.4, readout_ms: 20.0 }) {
+        Phone(CameraModel { size: (4032, 3024), pixel_um: 1.4, readout_ms: 20.0 }) {
             /// Focal length, millimetres; default 4.25, as 26 mm are on 35 mm film.
             #[serde(default = "phone_focal")]
             focal_mm,
@@ -155,7 +159,7 @@ cameras! {
             motion,
         },
         /// A camera of machine vision with Sony's IMX250, 2448 × 2048 pixels of 3.45 µm, looking down. Everything has a default.
-        MachineVision(Model { size: (2448, 2048), pixel_um: 3.45, readout_ms: 0.0 }) {
+        MachineVision(CameraModel { size: (2448, 2048), pixel_um: 3.45, readout_ms: 0.0 }) {
             /// Focal length, millimetres; default 12, which sees 598 × 500 mm from 0.85 m.
             #[serde(default = "vision_focal")]
             focal_mm,
@@ -169,6 +173,7 @@ cameras! {
         /// Any camera.
         Pinhole {
             /// Pixels across and down.
+            #[schemars(extend("x-example" = "(640, 480)"))]
             size: (Num<PositiveCount>, Num<PositiveCount>),
             /// Focal length and centre.
             intrinsics: IntrinsicsDesc,
@@ -179,6 +184,7 @@ cameras! {
             distortion: DistortionDesc,
             /// A thin lens; default a pinhole. Needs a focal length in millimetres.
             #[serde(default, with = "bare", skip_serializing_if = "Option::is_none")]
+            #[schemars(with = "Option<ApertureDesc>")]
             aperture: Option<ApertureDesc>,
             /// How it drives; default at rest.
             #[serde(default, skip_serializing_if = "MotionDesc::is_default")]
@@ -208,13 +214,14 @@ fn phone_height() -> Vary<Positive> {
 }
 
 /// What a camera with a name is made of.
-struct Model {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraModel {
     /// Pixels across and down.
-    size: (u32, u32),
+    pub size: (u32, u32),
     /// Side of a pixel.
-    pixel_um: f64,
-    /// From the first row's exposure to the last one's.
-    readout_ms: f64,
+    pub pixel_um: f64,
+    /// From the first row's exposure to the last one's; 0 for a global shutter.
+    pub readout_ms: f64,
 }
 
 /// How a camera with a name is written.
@@ -230,7 +237,7 @@ struct Named<'a> {
 }
 
 impl Named<'_> {
-    fn build(&self, &Model { size, pixel_um, readout_ms }: &Model, stream: &mut Stream) -> Result<Camera> {
+    fn build(&self, &CameraModel { size, pixel_um, readout_ms }: &CameraModel, stream: &mut Stream) -> Result<Camera> {
         let focal = self.focal_mm.draw(stream);
         let pose = nadir(self.height_m, self.at_m, self.turns_deg, stream);
         let distortion = self.distortion.draw(stream);

@@ -100,8 +100,8 @@ impl Distortion {
     }
 }
 
-/// Lens distortion, as it is written: OpenCV's coefficients, each 0 by default.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Lens distortion: OpenCV's coefficients, each 0 by default.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct DistortionDesc {
     /// Radial, r².

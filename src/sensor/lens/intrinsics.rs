@@ -6,31 +6,38 @@ use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
 /// Intrinsics, as they are written.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum IntrinsicsDesc {
     /// OpenCV's matrix, pixels; with pixel centres at +0.5. A calibration that puts the first pixel's centre at 0 needs 0.5 added
     /// to cx and cy.
     Pixels {
         /// Focal length along x.
+        #[schemars(extend("x-example" = "500"))]
         fx: Vary<Positive>,
         /// Focal length along y.
+        #[schemars(extend("x-example" = "500"))]
         fy: Vary<Positive>,
         /// Optical axis, from the left edge.
+        #[schemars(extend("x-example" = "320"))]
         cx: Vary<Finite>,
         /// Optical axis, from the top edge.
+        #[schemars(extend("x-example" = "240"))]
         cy: Vary<Finite>,
     },
     /// From the lens and the sensor; the axis in the image's middle.
     Millimetres {
         /// Focal length.
+        #[schemars(extend("x-example" = "8"))]
         focal_mm: Vary<Positive>,
         /// Side of a square pixel, micrometres.
+        #[schemars(extend("x-example" = "3.75"))]
         pixel_um: Vary<Positive>,
     },
     /// From the angle of view between the left and right edges; square pixels, the axis in the image's middle.
     FieldOfView {
         /// Degrees, below 180.
+        #[schemars(extend("x-example" = "60"))]
         horizontal_deg: Vary<Positive>,
     },
 }

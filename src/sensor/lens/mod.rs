@@ -27,7 +27,7 @@ mod tests;
 pub use aperture::{Aperture, ApertureDesc};
 pub use bounds::PixelBox;
 pub use camera::Camera;
-pub use desc::CameraDesc;
+pub use desc::{CameraDesc, CameraModel};
 pub use distortion::{Distortion, DistortionDesc};
 pub use intrinsics::IntrinsicsDesc;
 pub use motion::{Motion, MotionDesc};

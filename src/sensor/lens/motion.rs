@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// let motion: MotionDesc = ron::from_str("(speed_m_s: Uniform(0.1, 0.5), heading_deg: 0, exposure_ms: 2)").unwrap();
 /// ron::from_str::<CameraDesc>("Phone(height_m: 0.5, motion: (speed_m_s: 0.4, readout_ms: 15))").unwrap();
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MotionDesc {
     /// Speed over the ground, m/s; default 0.
@@ -21,9 +21,11 @@ pub struct MotionDesc {
     pub heading_deg: Vary<Finite>,
     /// How long a row gathers light; default that of the camera, 1 ms.
     #[serde(with = "super::bare", skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Vary<NonNegative>>")]
     pub exposure_ms: Option<Vary<NonNegative>>,
     /// From the first row's exposure to the last one's; default that of the camera, 0 unless it rolls.
     #[serde(with = "super::bare", skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Vary<NonNegative>>")]
     pub readout_ms: Option<Vary<NonNegative>>,
 }
 

@@ -66,13 +66,14 @@ impl Default for Pose {
     }
 }
 
-/// A pose, as it is written.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// A pose.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum PoseDesc {
     /// Looking down: at yaw 0 the image's top is north, its right east.
     Nadir {
         /// Height above the ground's mean level.
+        #[schemars(extend("x-example" = "Normal(mean: 0.85, sd: 0.03)"))]
         height_m: Vary<Positive>,
         /// Position on the ground, metres east and north; default the origin.
         #[serde(default = "origin")]
@@ -90,8 +91,10 @@ pub enum PoseDesc {
     /// From a point to a point, upright.
     LookAt {
         /// The lens, metres.
+        #[schemars(extend("x-example" = "(0, -1.5, 1)"))]
         position_m: (Vary<Finite>, Vary<Finite>, Vary<Finite>),
         /// What is in the image's middle, metres.
+        #[schemars(extend("x-example" = "(0, 0, 0)"))]
         target_m: (Vary<Finite>, Vary<Finite>, Vary<Finite>),
     },
 }

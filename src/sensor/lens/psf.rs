@@ -11,8 +11,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 layered! {
-    /// A point spread, as it is written; nothing by default.
-    #[derive(Clone, Debug, PartialEq, Serialize)]
+    /// A point spread; nothing by default.
+    #[derive(Clone, Debug, PartialEq, Serialize, schemars::JsonSchema)]
+    #[schemars(default)]
     pub struct PsfDesc, PsfWritten = "PsfDesc" {
         /// Standard deviation of the blur of the colour image, pixels of the camera's own: an image in another size has the blur of the same
         /// lens; default 0.

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 ///     pigments: (chlorophyll: 45),
 /// )").unwrap();
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LeafRecipe {
     /// What all randomness flows from.
@@ -53,7 +53,7 @@ pub struct LeafRecipe {
 }
 
 /// What varies over a blade. Shares are of the blade's chlorophyll unless stated.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Look {
     /// Chlorophyll left in the midrib, in secondaries and in finer veins.
@@ -100,7 +100,7 @@ impl Default for Look {
 }
 
 /// Relief of the upper side, mm.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, rename = "Relief")]
 pub struct LeafRelief {
     /// Height that white stands for; all the rest must fit in.

@@ -30,7 +30,7 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// What a recipe describes.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub enum Recipe {
     /// A leaf's upper side, cut out by its opacity.
     Leaf(Box<LeafRecipe>),
@@ -40,7 +40,7 @@ pub enum Recipe {
 
 /// Reads a recipe.
 pub fn read(path: &Path) -> Result<Recipe> {
-    RonFile::read(path)?.parse()
+    RonFile::read(path)?.parse_all()
 }
 
 /// Draws a recipe.

@@ -10,7 +10,7 @@ use crate::sampling::rng::mix;
 use serde::{Deserialize, Serialize};
 
 /// How the margin departs from the outline; always inward, so that the mesh's outline bounds the leaf.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum Margin {
     /// The outline itself.
@@ -48,7 +48,7 @@ pub enum Margin {
 
 /// A sinus in the base, between two lobes that reach behind the stalk's end: heart- and arrow-shaped leaves. The picture's
 /// lower edge is then that of the lobes, and the stalk runs through the sinus.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Sinus {
     /// How far it reaches in, of the leaf's length.

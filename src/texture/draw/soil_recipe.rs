@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// use furrow::texture::draw::SoilRecipe;
 /// let recipe: SoilRecipe = ron::from_str("(seed: 1, size: 256, period_mm: 120, ground: Dirt)").unwrap();
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SoilRecipe {
     /// What all randomness flows from.
@@ -51,7 +51,7 @@ fn loam() -> [Num<Fraction>; 3] {
 }
 
 /// Aggregates, by the law N(>L) ∝ L^−power.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Crumbs {
     /// Sum of their areas over the ground's; above 1 they cover each other.
@@ -72,7 +72,7 @@ impl Default for Crumbs {
 }
 
 /// Bits on the surface, each per square metre.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Litter {
     /// Pale mineral grains.
@@ -90,7 +90,7 @@ impl Default for Litter {
 }
 
 /// Kinds of ground.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum Ground {
     /// Crumbs all over: a fresh seedbed.

@@ -11,7 +11,7 @@ use crate::sampling::rng::{Purpose, Stream};
 use serde::{Deserialize, Serialize};
 
 /// The plan of a leaf's veins.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum Veins {
     /// A midrib with secondaries on both sides.

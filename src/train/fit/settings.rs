@@ -24,7 +24,7 @@ use std::sync::LazyLock;
 /// settings.apply(&mut plan).unwrap();
 /// assert_eq!((plan.hyper.rate, plan.hyper.steps), (0.05, 2000));
 /// ```
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, clap::Args)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, clap::Args, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default, rename = "Hyperparameters")]
 pub struct Settings {
     /// Classes to tell apart, with a semicolon between, each with its labels: "soil; beet=crop; other=weed".

@@ -29,7 +29,7 @@ use std::marker::PhantomData;
 /// let experiment: ExperimentDesc = file.parse().unwrap();
 /// assert_eq!(experiment.train.len(), 3);
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, rename = "Experiment")]
 pub struct ExperimentDesc {
     /// Networks by name, as `train fit --network` takes them; at least one.
@@ -62,7 +62,7 @@ fn one_seed() -> Vec<u64> {
 }
 
 /// A set of images.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum SetDesc {
     /// Rendered from a scene by `trace dataset`, into `sets/NAME` of the experiment's folder.
@@ -108,7 +108,7 @@ fn usual_split() -> (u32, u32, u32) {
 }
 
 /// A training set, with its validation set.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, rename = "Train")]
 pub struct TrainDesc {
     /// Its name in the tables.
@@ -122,7 +122,7 @@ pub struct TrainDesc {
 }
 
 /// Images of a set.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, rename = "Part")]
 pub struct PartDesc {
     /// The set.
@@ -145,7 +145,7 @@ fn once() -> u32 {
 }
 
 /// A test set.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, rename = "Test")]
 pub struct TestDesc {
     /// Its name in the tables.
@@ -158,7 +158,7 @@ pub struct TestDesc {
 }
 
 /// What is otherwise at another scale.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default, rename = "Scale")]
 pub struct ScaleDesc {
     /// Images of each scene.
@@ -211,6 +211,21 @@ impl<T> Named<T> {
 impl<T: Serialize> Serialize for Named<T> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_map(self.0.iter().map(|(name, value)| (name, value)))
+    }
+}
+
+impl<T: schemars::JsonSchema> schemars::JsonSchema for Named<T> {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Named".into()
+    }
+
+    fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        let value = generator.subschema_for::<T>();
+        schemars::json_schema!({ "type": "object", "additionalProperties": value })
     }
 }
 

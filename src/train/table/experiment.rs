@@ -116,7 +116,7 @@ impl Experiment {
 
     /// The same of an experiment file that was read before.
     pub fn of(page: &RonFile, scale: Option<&str>) -> Result<Self> {
-        let desc: ExperimentDesc = page.parse()?;
+        let desc: ExperimentDesc = page.parse_all()?;
         Checker { page, desc: &desc }.experiment(scale)
     }
 

@@ -4,7 +4,6 @@
 //! the same plant in all of them. A sheet says inside what it was made of; asked again, one that would come out the same is
 //! kept.
 
-mod letters;
 mod page;
 mod sheet;
 
@@ -12,6 +11,7 @@ use crate::quality::threads;
 use furrow::accel::EmbreeAccel;
 use furrow::cli::{self, signal::Signals};
 use furrow::geometry::Window;
+use furrow::input::shipped;
 use furrow::integrator::{PathTracer, World};
 use furrow::math::vec3;
 use furrow::output::{self, Picture};
@@ -36,6 +36,9 @@ const ROOM: f32 = 1.15;
 /// The smallest half-width of a view, metres.
 const LEAST: f32 = 0.004;
 
+/// Where species files lie in a working directory that has some.
+const SPECIES: &str = "scenes/species";
+
 /// What to show.
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -45,9 +48,9 @@ pub(crate) struct Args {
     /// Only these, by the names of their species files: sugar_beet,galium.
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     species: Vec<String>,
-    /// Folder of the species files.
-    #[arg(long, alias = "pages", value_name = "DIR", default_value = "scenes/species")]
-    species_dir: PathBuf,
+    /// Folder of the species files; scenes/species unless given, or those that ship where there is no such folder.
+    #[arg(long, alias = "pages", value_name = "DIR")]
+    species_dir: Option<PathBuf>,
     /// Samples a pixel.
     #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..=4096))]
     spp: u32,
@@ -85,22 +88,31 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
 impl Args {
     /// The species files that are asked for, in order of their names.
     fn pages(&self) -> Result<Vec<PathBuf>> {
+        let folder = self.folder()?;
         if !self.species.is_empty() {
-            let pages: Vec<PathBuf> =
-                self.species.iter().map(|s| self.species_dir.join(s).with_extension("ron")).collect();
-            pages.iter().try_for_each(|page| cli::check_ron(page, "species file"))?;
+            let pages: Vec<PathBuf> = self.species.iter().map(|s| folder.join(s).with_extension("ron")).collect();
+            pages.iter().try_for_each(|page| cli::check_species(page))?;
             return Ok(pages);
         }
-        let entries = std::fs::read_dir(&self.species_dir).map_err(Error::reading(&self.species_dir))?;
+        let entries = std::fs::read_dir(&folder).map_err(Error::reading(&folder))?;
         let mut pages: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
         pages.retain(|p| p.extension().is_some_and(|e| e == "ron"));
         pages.sort();
         if pages.is_empty() {
             let error =
                 Error::input("there is no species file in this folder").help("those that ship lie in scenes/species");
-            return Err(error.in_file(&self.species_dir));
+            return Err(error.in_file(&folder));
         }
         Ok(pages)
+    }
+
+    /// Where they lie.
+    fn folder(&self) -> Result<PathBuf> {
+        match &self.species_dir {
+            Some(given) => Ok(given.clone()),
+            None if Path::new(SPECIES).is_dir() => Ok(SPECIES.into()),
+            None => Ok(shipped::folder()?.join(SPECIES)),
+        }
     }
 
     /// One species: its sheet's path, and its entry on the page.
@@ -146,10 +158,9 @@ impl Args {
     /// The field with one plant, on bare ground where somebody looks, else on none.
     fn field(&self, page: &Path, bbch: u32, view: Option<&View>) -> Result<Field> {
         let text = |path: &Path| format!("{:?}", path.to_string_lossy());
-        let soil = page.parent().unwrap_or(Path::new("")).join("../../textures/soil");
         let (angle, pose, soil) = view.map_or((VIEW_DEG, "Nadir(height_m: 1)".to_owned(), String::new()), |view| {
-            let (albedo, height) = (text(&soil.join("dirt.png")), text(&soil.join("dirt.height.png")));
-            let layer = format!("(albedo: {albedo}, height: {height}, size_m: 0.5, height_mm: (-0.6, 0.6))");
+            // One that ships: a species file may lie anywhere.
+            let layer = r#"(albedo: "dirt.png", height: "dirt.height.png", size_m: 0.5, height_mm: (-0.6, 0.6))"#;
             let bare = "relief: (rms_mm: 0.4, tilt_deg: 0), moisture: (mean: 0.25), clods: (over_5mm_per_m2: 0), \
                         litter: (straw_cover: 0, sticks_per_m2: 0, bits_per_m2: 0)";
             (view.angle_deg, view.pose(), format!("soil: (layers: [{layer}], {bare}),"))

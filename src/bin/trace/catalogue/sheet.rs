@@ -1,6 +1,6 @@
 //! One sheet: a species' pictures side by side, with words and scales drawn into them.
 
-use super::letters;
+use crate::letters;
 
 const PAPER: [u8; 3] = [251, 250, 247];
 const INK: [u8; 3] = [34, 38, 31];

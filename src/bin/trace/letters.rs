@@ -1,14 +1,14 @@
 //! Letters of 5 × 7 dots, for words in pictures. Small letters look like capitals.
 
 /// Dots of a letter across.
-pub(super) const WIDTH: usize = 5;
+pub(crate) const WIDTH: usize = 5;
 /// Dots of a letter down.
-pub(super) const HEIGHT: usize = 7;
+pub(crate) const HEIGHT: usize = 7;
 /// From one letter to the next.
-pub(super) const PITCH: usize = 6;
+pub(crate) const PITCH: usize = 6;
 
 /// The rows of a letter from the top, the leftmost dot in bit 4; empty for what is not here.
-pub(super) fn glyph(letter: char) -> [u8; HEIGHT] {
+pub(crate) fn glyph(letter: char) -> [u8; HEIGHT] {
     match letter.to_ascii_uppercase() {
         'A' => [0x0e, 0x11, 0x11, 0x1f, 0x11, 0x11, 0x11],
         'B' => [0x1e, 0x11, 0x11, 0x1e, 0x11, 0x11, 0x1e],

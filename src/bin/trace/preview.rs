@@ -1,0 +1,192 @@
+//! `trace preview`: several fields of a scene file on one sheet, each with its index.
+
+use crate::field::scene_file;
+use crate::letters;
+use crate::quality::{samples, threads};
+use furrow::cli::{self, signal::Signals};
+use furrow::job::{Renderer, Request, SceneFile, Threads};
+use furrow::output::{self, Picture};
+use furrow::render::Watch;
+use furrow::settings::{Quality, RenderOptions};
+use furrow::{Error, Result};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+const PAPER: [u8; 3] = [251, 250, 247];
+const INK: [u8; 3] = [34, 38, 31];
+/// Between pictures, pixels.
+const GAP: usize = 8;
+/// Pixels of a letter's dot.
+const DOT: usize = 2;
+/// Height of the line of words above a picture.
+const LINE: usize = DOT * letters::HEIGHT + GAP;
+/// Most fields on a sheet.
+const MOST: u64 = 400;
+/// Most pixels of a sheet.
+const MOST_PIXELS: usize = 1 << 28;
+
+/// Which fields, and how they are drawn.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Scene file (RON).
+    #[arg(value_name = "FILE", value_parser = scene_file())]
+    scene: PathBuf,
+    /// Indices of the fields: from the first up to, and without, the last.
+    #[arg(long, value_name = "FROM..TO", value_parser = indices, default_value = "0..12")]
+    indices: Range<u64>,
+    /// The sheet, a PNG file; `out/` and the scene file's name with `-sheet.png` unless given.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Seed, instead of the scene file's.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Width of each picture in pixels; the field of view stays.
+    #[arg(long, default_value_t = 320, value_parser = clap::value_parser!(u32).range(16..=4096))]
+    width: u32,
+    /// Pictures side by side.
+    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=64))]
+    columns: u32,
+    /// Samples a pixel.
+    #[arg(long, default_value_t = 8, value_parser = samples())]
+    spp: u32,
+    /// Threads; 0 for one on each core. The file does not depend on it.
+    #[arg(long, default_value_t = 0, value_parser = threads)]
+    threads: usize,
+    /// Print nothing but errors and the path of the sheet.
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// `0..12`.
+fn indices(text: &str) -> std::result::Result<Range<u64>, String> {
+    let range = text.split_once("..").and_then(|(from, to)| Some(from.trim().parse().ok()?..to.trim().parse().ok()?));
+    match range {
+        Some(range) if !range.is_empty() && range.end - range.start <= MOST => Ok(range),
+        Some(range) if !range.is_empty() => Err(format!("at most {MOST} fields stand on a sheet")),
+        _ => Err("write the first index and that behind the last, such as 0..12".into()),
+    }
+}
+
+/// One field's picture.
+struct Shot {
+    words: String,
+    width: usize,
+    pixels: Vec<[u8; 3]>,
+}
+
+/// Renders the fields and writes the sheet; returns its path.
+pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
+    cli::check_scene(&args.scene)?;
+    let out = args.out.clone().unwrap_or_else(|| {
+        let name = args.scene.file_stem().unwrap_or_default().to_string_lossy();
+        Path::new("out").join(format!("{name}-sheet.png"))
+    });
+    cli::check_png(&out, &args.scene)?;
+    let renderer = Renderer::open(&RenderOptions::path_traced(Quality::spp(args.spp)))?;
+    let scene = SceneFile::open(&args.scene)?.seed(args.seed).width(args.width).threads(&Threads::new(args.threads)?);
+    let stop = signals.heed();
+    let (mut shots, mut seed) = (Vec::new(), 0);
+    for index in args.indices.clone() {
+        let field = scene.field(index)?;
+        let request = Request { watch: Watch { done: &|_| (), stop }, ..Request::default() };
+        let photograph = renderer.render(&field, &request)?.photograph();
+        let grown = field.grown();
+        seed = grown.seed;
+        if !args.quiet {
+            furrow::tell!("index {index}: {} plants", grown.plants.len());
+            grown.warnings.iter().for_each(|warning| furrow::tell!("warning: {warning}"));
+        }
+        shots.push(Shot {
+            words: format!("index {index}"),
+            width: photograph.width as usize,
+            pixels: photograph.rgb.as_chunks::<3>().0.to_vec(),
+        });
+    }
+    let sheet = compose(&shots, args.columns as usize)?;
+    let Range { start, end } = args.indices;
+    let text = format!(
+        "program: furrow {}\nseed: {seed}\nindices: {start}..{end}\nspp: {}",
+        env!("CARGO_PKG_VERSION"),
+        args.spp
+    );
+    output::write_png(
+        &out,
+        sheet.width as u32,
+        (sheet.pixels.len() / sheet.width) as u32,
+        &Picture::Rgb(&sheet.pixels),
+        &text,
+    )?;
+    Ok(vec![out])
+}
+
+/// A picture that is drawn into.
+struct Sheet {
+    width: usize,
+    pixels: Vec<[u8; 3]>,
+}
+
+/// Puts pictures side by side, each below its words.
+fn compose(shots: &[Shot], columns: usize) -> Result<Sheet> {
+    let columns = columns.min(shots.len()).max(1);
+    let wide = shots.iter().map(|shot| shot.width.max(shot.words.len() * letters::PITCH * DOT)).max().unwrap_or(0);
+    let tall = shots.iter().map(|shot| shot.pixels.len() / shot.width.max(1)).max().unwrap_or(0);
+    let width = GAP + columns * (wide + GAP);
+    let height = GAP + shots.len().div_ceil(columns) * (LINE + tall + GAP);
+    if width * height > MOST_PIXELS {
+        let help = "a smaller --width or fewer --indices";
+        return Err(Error::misuse(format!("a sheet of {width} × {height} pixels is too large")).help(help));
+    }
+    let mut sheet = Sheet { width, pixels: vec![PAPER; width * height] };
+    for (i, shot) in shots.iter().enumerate() {
+        let (x, y) = (GAP + i % columns * (wide + GAP), GAP + i / columns * (LINE + tall + GAP));
+        write(&mut sheet, &shot.words, (x, y));
+        for (row, pixels) in shot.pixels.chunks_exact(shot.width).enumerate() {
+            let start = (y + LINE + row) * width + x;
+            sheet.pixels[start..start + shot.width].copy_from_slice(pixels);
+        }
+    }
+    Ok(sheet)
+}
+
+/// Writes words.
+fn write(sheet: &mut Sheet, words: &str, (x, y): (usize, usize)) {
+    for (i, letter) in words.chars().enumerate() {
+        for (row, bits) in letters::glyph(letter).into_iter().enumerate() {
+            for dot in (0..letters::WIDTH).filter(|dot| bits >> (letters::WIDTH - 1 - dot) & 1 == 1) {
+                let left = x + (i * letters::PITCH + dot) * DOT;
+                for down in 0..DOT {
+                    let start = (y + row * DOT + down) * sheet.width + left;
+                    sheet.pixels[start..start + DOT].fill(INK);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn indices_are_checked() {
+        assert_eq!(indices("0..12"), Ok(0..12));
+        for bad in ["", "12", "3..3", "4..2", "a..b", "0..100000", "-1..3"] {
+            assert!(indices(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn every_picture_stands_below_its_words() {
+        let shot = |n: u8| Shot { words: format!("index {n}"), width: 100, pixels: vec![[n, 0, 0]; 100 * 40] };
+        let sheet = compose(&[shot(1), shot(2), shot(3)], 2).unwrap();
+        assert_eq!(
+            (sheet.width, sheet.pixels.len() / sheet.width),
+            (GAP + 2 * (100 + GAP), GAP + 2 * (LINE + 40 + GAP))
+        );
+        let at = |x: usize, y: usize| sheet.pixels[y * sheet.width + x];
+        assert_eq!(at(GAP, GAP + LINE), [1, 0, 0]);
+        assert_eq!(at(2 * GAP + 100, GAP + LINE), [2, 0, 0]);
+        assert_eq!(at(GAP, 2 * GAP + 2 * LINE + 40), [3, 0, 0]);
+        assert!(sheet.pixels.iter().filter(|p| **p == INK).count() > 100);
+    }
+}

@@ -1,0 +1,102 @@
+//! Who may ask. The page's address holds a random token, so that no other user of the machine can guess it; `Host` and `Origin` must be
+//! those of the page itself, so that no other page in the user's browser can ask in its place (DNS rebinding, cross-site requests).
+
+use furrow::{Error, Result};
+use std::fmt::Write;
+use std::io::Read;
+use std::net::IpAddr;
+
+/// Random bytes of a token.
+const BYTES: usize = 16;
+
+/// What a request must show.
+pub(super) struct Guard {
+    token: String,
+    host: IpAddr,
+}
+
+impl Guard {
+    /// One with a new token, for a page at this address.
+    pub(super) fn new(host: IpAddr) -> Result<Self> {
+        let mut bytes = [0_u8; BYTES];
+        std::fs::File::open("/dev/urandom")
+            .and_then(|mut file| file.read_exact(&mut bytes))
+            .map_err(|e| Error::failed(format!("the system gives no random numbers: {e}")))?;
+        let token = bytes.iter().fold(String::new(), |mut text, byte| {
+            let _ = write!(text, "{byte:02x}");
+            text
+        });
+        Ok(Self { token, host })
+    }
+
+    /// The token.
+    pub(super) fn token(&self) -> &str {
+        &self.token
+    }
+
+    /// What of a request's path follows the token; `None` where the token is wrong.
+    pub(super) fn within<'p>(&self, path: &'p str) -> Option<&'p str> {
+        let (token, rest) = path.strip_prefix('/')?.split_once('/')?;
+        // All bytes are looked at, so that the time tells nothing about where they differ.
+        let differs = token.bytes().zip(self.token.bytes()).fold(0, |sum, (a, b)| sum | (a ^ b));
+        (token.len() == self.token.len() && differs == 0).then_some(rest)
+    }
+
+    /// Whether a request with this `Host` and, if it has one, this `Origin` comes from the page.
+    pub(super) fn admits(&self, host: Option<&str>, origin: Option<&str>) -> bool {
+        let Some(host) = host else { return false };
+        // Any port: `ssh -L` may have forwarded another one.
+        let own = match name(host) {
+            "localhost" => true,
+            name => name.parse::<IpAddr>().is_ok_and(|ip| {
+                // Whoever listens on every address may be asked by any of them; a name could be anybody's.
+                ip.is_loopback() || ip == self.host || self.host.is_unspecified()
+            }),
+        };
+        own && origin.is_none_or(|origin| origin.strip_prefix("http://") == Some(host))
+    }
+}
+
+/// A `Host` header without its port and without the brackets of an IPv6 address.
+fn name(host: &str) -> &str {
+    match host.strip_prefix('[') {
+        Some(rest) => rest.split(']').next().unwrap_or_default(),
+        None => host.split(':').next().unwrap_or_default(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn guard(host: &str) -> Guard {
+        Guard { token: "a1b2".into(), host: host.parse().unwrap() }
+    }
+
+    #[test]
+    fn only_the_token_opens_a_path() {
+        let guard = guard("127.0.0.1");
+        assert_eq!(guard.within("/a1b2/"), Some(""));
+        assert_eq!(guard.within("/a1b2/events"), Some("events"));
+        for path in ["", "/", "/a1b2", "/a1b3/", "/a1b/", "/a1b2c/", "a1b2/", "//a1b2/", "/A1B2/"] {
+            assert_eq!(guard.within(path), None, "{path}");
+        }
+    }
+
+    #[test]
+    fn foreign_hosts_and_origins_are_refused() {
+        let local = guard("127.0.0.1");
+        assert!(local.admits(Some("127.0.0.1:8000"), None));
+        assert!(local.admits(Some("localhost:9"), Some("http://localhost:9")));
+        assert!(local.admits(Some("[::1]:8000"), None));
+        assert!(!local.admits(None, None));
+        assert!(!local.admits(Some("evil.example:8000"), None));
+        assert!(!local.admits(Some("192.168.1.5:8000"), None));
+        for origin in ["http://evil.example", "null", "http://127.0.0.1:9", "https://127.0.0.1:8000"] {
+            assert!(!local.admits(Some("127.0.0.1:8000"), Some(origin)), "{origin}");
+        }
+        assert!(guard("192.168.1.5").admits(Some("192.168.1.5:8000"), None));
+        assert!(guard("0.0.0.0").admits(Some("192.168.1.5:8000"), None));
+        assert!(!guard("0.0.0.0").admits(Some("evil.example"), None));
+    }
+}

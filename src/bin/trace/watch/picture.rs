@@ -1,0 +1,134 @@
+//! A picture that is shown: pixels of the four views, and what one pixel shows.
+
+use furrow::film::Film;
+use furrow::job::{Field, Renderer, View};
+use furrow::output::{self, Picture as Png};
+use furrow::plant::OrganKind;
+use furrow::render::LabelMap;
+use furrow::render::label::NONE;
+use furrow::scene::tag::Class;
+use furrow::sensor::Photograph;
+use furrow::{Error, Result};
+use serde_json::{Value, json};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// How a picture came about.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Made {
+    /// Number of what was asked for that it answers.
+    pub(super) asked: u64,
+    /// From the beginning of the work, the reading of the file, until the first picture of this field was there.
+    pub(super) first: Duration,
+    /// Samples a pixel.
+    pub(super) spp: u32,
+}
+
+/// A field and what was rendered of it so far.
+pub(super) struct Picture {
+    field: Arc<Field>,
+    labels: Arc<LabelMap>,
+    photograph: Photograph,
+    made: Made,
+}
+
+impl Picture {
+    /// Takes the photograph of a film.
+    pub(super) fn new(field: &Arc<Field>, film: &Film, labels: &Arc<LabelMap>, made: Made) -> Self {
+        let photograph = field.edit().photograph(field.grown(), film);
+        Self { field: field.clone(), labels: labels.clone(), photograph, made }
+    }
+
+    /// What the page says of it.
+    pub(super) fn about(&self) -> Value {
+        let grown = self.field.grown();
+        let (grow, build) = self.field.times();
+        let camera = &grown.scene.camera;
+        let (near, far) = self.reach();
+        json!({
+            "asked": self.made.asked,
+            "spp": self.made.spp,
+            "width": self.photograph.width,
+            "height": self.photograph.height,
+            "scale": camera.scale(),
+            "seed": grown.seed,
+            "index": grown.index,
+            "hash": grown.hash,
+            "plants": grown.plants.len(),
+            "triangles": grown.scene.triangles(),
+            "warnings": grown.warnings,
+            "near_m": near,
+            "far_m": far,
+            "grow_s": grow.as_secs_f64(),
+            "build_s": build.as_secs_f64(),
+            "first_s": self.made.first.as_secs_f64(),
+        })
+    }
+
+    /// Depth of the nearest and the farthest surface, metres.
+    fn reach(&self) -> (f32, f32) {
+        let depths = self.labels.depth.iter().copied().filter(|depth| depth.is_finite());
+        let (near, far) = depths.fold((f32::INFINITY, 0.0_f32), |(near, far), d| (near.min(d), far.max(d)));
+        if near <= far { (near, far) } else { (0.0, 0.0) }
+    }
+
+    /// One of its views as PNG; `None` for a name that is none.
+    pub(super) fn png(&self, view: &str) -> Option<Result<Vec<u8>>> {
+        let Photograph { width, height, rgb, nir, .. } = &self.photograph;
+        let encode = |pixels: &Png<'_>| output::encode_png(*width, *height, pixels, "");
+        Some(match view {
+            "rgb" => encode(&Png::Rgb(rgb.as_chunks::<3>().0)),
+            "nir" => encode(&Png::Gray(nir)),
+            "labels" => {
+                let classes: Vec<u8> = self.labels.tags.iter().map(|tag| tag.class as u8).collect();
+                encode(&Png::Indexed(&classes, &Class::ALL.map(Class::color)))
+            }
+            "depth" => {
+                let (near, far) = self.reach();
+                // What is near is bright; what is nowhere is black.
+                let gray = |d: &f32| {
+                    let share = if d.is_finite() { (far - d) / (far - near).max(1e-9) } else { 0.0 };
+                    (share * 255.0 + 0.5) as u8
+                };
+                let depths: Vec<u8> = self.labels.depth.iter().map(gray).collect();
+                encode(&Png::Gray(&depths))
+            }
+            _ => return None,
+        })
+    }
+
+    /// What a pixel's centre shows: class, plant and leaf, species, organ and depth.
+    pub(super) fn at(&self, (x, y): (u32, u32)) -> Result<Value> {
+        self.check((x, y))?;
+        let i = (y * self.photograph.width + x) as usize;
+        let grown = self.field.grown();
+        let (tag, part, depth) = (self.labels.tags[i], self.labels.parts[i], self.labels.depth[i]);
+        let organ = grown.organs.get(part as usize).copied().flatten();
+        let plant = grown.plants.iter().find(|plant| plant.number == tag.plant);
+        Ok(json!({
+            "x": x,
+            "y": y,
+            "class": tag.class.name(),
+            "plant": tag.plant,
+            "leaf": tag.leaf,
+            "organ": organ.map(OrganKind::name),
+            "species": plant.map(|plant| plant.species.as_str()),
+            // A model from disk has neither code nor age.
+            "bbch": plant.filter(|plant| !plant.eppo.is_empty()).map(|plant| plant.bbch),
+            "age_days": plant.filter(|plant| !plant.eppo.is_empty()).map(|plant| plant.age_days),
+            "depth_m": (part != NONE).then_some(depth),
+        }))
+    }
+
+    /// The words of `--pixel`.
+    pub(super) fn explain(&self, renderer: &Renderer, at: (u32, u32)) -> Result<String> {
+        self.check(at)?;
+        renderer.explain(&self.field, View::Path, at)
+    }
+
+    fn check(&self, (x, y): (u32, u32)) -> Result<()> {
+        let Photograph { width, height, .. } = self.photograph;
+        let inside = x < width && y < height;
+        if inside { Ok(()) } else { Err(Error::misuse(format!("pixel {x},{y} lies outside {width} × {height}"))) }
+    }
+}

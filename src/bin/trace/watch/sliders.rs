@@ -1,0 +1,164 @@
+//! The numbers of a scene file as sliders: how the field looks where a number is this one, and that number written into the file.
+
+use furrow::output;
+use furrow::ron_file::{Distribution, Quantity, Value, quantities};
+use furrow::{Error, Result};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+/// Steps of a slider over a range that is not one of whole numbers.
+const STEPS: f64 = 200.0;
+/// Standard deviations about the middle of a bell that a slider reaches.
+const BELL: f64 = 3.0;
+
+/// One number of the file.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct Slider {
+    /// The fields and items that lead to it.
+    path: String,
+    /// What the file says.
+    says: String,
+    /// Its line, from 1.
+    line: usize,
+    /// Whether it is drawn for every field.
+    drawn: bool,
+    /// The slider's ends.
+    low: f64,
+    high: f64,
+    step: f64,
+    /// Where it stands unless moved.
+    at: f64,
+    /// The only values that it may have; any between its ends where empty.
+    values: Vec<f64>,
+}
+
+/// The sliders of a text: those of distributions first.
+pub(super) fn sliders(text: &str) -> Vec<Slider> {
+    let mut all: Vec<Slider> = quantities(text).into_iter().filter_map(|q| slider(text, &q)).collect();
+    all.sort_by_key(|slider| !slider.drawn);
+    all
+}
+
+fn slider(text: &str, quantity: &Quantity) -> Option<Slider> {
+    let says = text[quantity.at.clone()].to_owned();
+    let line = text[..quantity.at.start].matches('\n').count() + 1;
+    // Written without a point, these are whole numbers, or may be.
+    let whole = !says.contains('.');
+    let mut values = Vec::new();
+    let (drawn, low, high, at) = match &quantity.value {
+        // Seed and size have their own places in the page.
+        Value::Fixed { .. } if quantity.path == "seed" => return None,
+        Value::Fixed { number, whole } => {
+            let far = if *number == 0.0 { 1.0 } else { 2.0 * number.abs() };
+            let far = if *whole { far.max(10.0) } else { far };
+            (false, if *number < 0.0 { -far } else { 0.0 }, far, *number)
+        }
+        Value::Drawn(Distribution::Uniform(low, high)) => (true, *low, *high, f64::midpoint(*low, *high)),
+        Value::Drawn(Distribution::Normal { mean, sd, min, max }) => {
+            (true, (mean - BELL * sd).max(*min), (mean + BELL * sd).min(*max), mean.clamp(*min, *max))
+        }
+        Value::Drawn(Distribution::LogNormal { median, sigma, min, max }) => {
+            let reach = (BELL * sigma).exp();
+            (true, (median / reach).max(*min), (median * reach).min(*max), median.clamp(*min, *max))
+        }
+        Value::Drawn(Distribution::Choice(of)) => {
+            values.clone_from(of);
+            (true, 0.0, 0.0, *of.first()?)
+        }
+        Value::Drawn(Distribution::Weighted(of)) => {
+            values = of.iter().map(|(value, _)| *value).collect();
+            (true, 0.0, 0.0, *values.first()?)
+        }
+    };
+    if !(low.is_finite() && high.is_finite() && low <= high) {
+        return None;
+    }
+    let step = if whole && high - low >= 2.0 { 1.0 } else { ((high - low) / STEPS).max(1e-9) };
+    let at = if step == 1.0 { at.round() } else { at };
+    Some(Slider { path: quantity.path.clone(), says, line, drawn, low, high, step, at, values })
+}
+
+/// The text with these values in the place of its own; paths that lead nowhere are left out.
+pub(super) fn with(text: &str, values: &BTreeMap<String, f64>) -> String {
+    let mut new = text.to_owned();
+    // From the end, so that places before stay where they are.
+    for Quantity { path, at, .. } in quantities(text).into_iter().rev() {
+        if let Some(value) = values.get(&path) {
+            new.replace_range(at, &value.to_string());
+        }
+    }
+    new
+}
+
+/// Writes a value into the scene file in the place of the one that is there, and changes no other byte. `seen` is the text that the user
+/// saw: a file that says something else by now is left alone.
+pub(super) fn write(file: &Path, path: &str, value: f64, seen: &str) -> Result<String> {
+    // Where a link leads, so that the link stays.
+    let file = &file.canonicalize().map_err(Error::reading(file))?;
+    let mark = unchanged(file, seen)?;
+    let new = with(seen, &BTreeMap::from([(path.to_owned(), value)]));
+    if !quantities(seen).iter().any(|q| q.path == path) {
+        return Err(Error::input(format!("the file has no number `{path}`; nothing was written")).in_file(file));
+    }
+    let permissions = fs::metadata(file).map_err(Error::reading(file))?.permissions();
+    let mut whole = output::Together::default();
+    whole.add(file, &[mark.as_slice(), new.as_bytes()].concat())?;
+    // Once more, as late as can be: writing takes time, in which an editor may have saved.
+    unchanged(file, seen)?;
+    if whole.finish()?.is_none() {
+        return Err(Error::failed("somebody has removed the temporary file; nothing was written").in_file(file));
+    }
+    fs::set_permissions(file, permissions).map_err(Error::io(file))?;
+    Ok(new)
+}
+
+/// The byte order mark of a file that still holds what was seen; an error where it holds something else.
+fn unchanged(file: &Path, seen: &str) -> Result<Vec<u8>> {
+    let bytes = fs::read(file).map_err(Error::reading(file))?;
+    let mark: &[u8] = b"\xef\xbb\xbf";
+    let (mark, text) = bytes.strip_prefix(mark).map_or((&mark[..0], &bytes[..]), |rest| (mark, rest));
+    if text == seen.as_bytes() {
+        return Ok(mark.to_vec());
+    }
+    Err(Error::input("the file has changed since; nothing was written").in_file(file))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "Field( // a field\r\n  seed: 7,\r\n  camera: JaiAd130(height_m: Normal(mean: 0.9, sd: 0.1, min: 0.7), yaw_deg: -4),\r\n  crops: [(growth: Bbch(Choice([12, 14])), n: Uniform(1, 9))], // end\r\n)";
+
+    #[test]
+    fn sliders_reach_what_may_be_drawn() {
+        let all = sliders(TEXT);
+        let paths: Vec<&str> = all.iter().map(|s| s.path.as_str()).collect();
+        assert_eq!(paths, ["camera.height_m", "crops[0].growth.Bbch", "crops[0].n", "camera.yaw_deg"]);
+        let [height, stage, n, yaw] = all.as_slice() else { panic!("{all:?}") };
+        assert_eq!((height.low, height.line), (0.7, 3));
+        assert!((height.high - 1.2).abs() < 1e-9 && height.step < 0.01);
+        assert_eq!(stage.values, [12.0, 14.0]);
+        assert_eq!((n.low, n.high, n.step, n.at), (1.0, 9.0, 1.0, 5.0));
+        assert_eq!((yaw.drawn, yaw.low, yaw.high), (false, -10.0, 10.0));
+    }
+
+    /// Expected: of all bytes, those of one value are other ones; comments, line ends, a byte order mark and permissions stay.
+    #[test]
+    fn a_value_is_written_and_nothing_else() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("field.ron");
+        fs::write(&file, format!("\u{feff}{TEXT}")).unwrap();
+        fs::set_permissions(&file, fs::Permissions::from_mode(0o640)).unwrap();
+        write(&file, "crops[0].n", 3.5, TEXT).unwrap();
+        let expected = format!("\u{feff}{}", TEXT.replace("Uniform(1, 9)", "3.5"));
+        assert_eq!(fs::read_to_string(&file).unwrap(), expected);
+        assert_eq!(fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o640);
+        // By now the file says something else.
+        assert!(write(&file, "crops[0].n", 4.0, TEXT).is_err());
+        assert!(write(&file, "nothing", 4.0, &expected[3..]).is_err());
+        assert_eq!(fs::read_to_string(&file).unwrap(), expected);
+    }
+}

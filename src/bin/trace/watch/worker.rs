@@ -1,0 +1,153 @@
+//! The thread that grows and renders what is asked for. Whatever is asked for later stops it; a scene file that cannot be rendered leaves the
+//! last picture and says why.
+
+use super::files::Files;
+use super::picture::{Made, Picture};
+use super::session::{Session, Wish};
+use super::sheet;
+use super::sliders::{sliders, with};
+use super::tev::Tev;
+use furrow::error::Kind;
+use furrow::job::{Field, Renderer, Request, SceneFile, Threads};
+use furrow::render::Watch;
+use furrow::ron_file::RonFile;
+use furrow::settings::{Quality, RenderOptions};
+use furrow::{Error, Result};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+/// What renders, and what it has read.
+pub(super) struct Worker {
+    session: Arc<Session>,
+    files: Files,
+    threads: Threads,
+    renderer: Renderer,
+    tev: Option<Tev>,
+    /// The last scene file that could be read, with its textures and species.
+    known: Option<SceneFile>,
+    /// Pixels across of the scene's own camera, once one was seen.
+    own_width: Option<u32>,
+}
+
+impl Worker {
+    /// One that has done nothing yet.
+    pub(super) fn new(session: Arc<Session>, files: Files, threads: &Threads, tev: Option<Tev>) -> Result<Self> {
+        let renderer = Renderer::open(&RenderOptions::path_traced(Quality::spp(session.spp())))?;
+        let threads = threads.clone();
+        Ok(Self { session, files, threads, renderer, tev, known: None, own_width: None })
+    }
+
+    /// Works until the session ends.
+    pub(super) fn run(mut self) {
+        let mut done = 0;
+        let session = self.session.clone();
+        while let Some((asked, wish)) = session.next(done) {
+            done = asked;
+            match self.answer(asked, &wish) {
+                Err(error) if error.kind() == Kind::Interrupted => {}
+                Err(error) => {
+                    self.files.follow(session.path(), &[]);
+                    session.show(|shown| {
+                        (shown.doing, shown.error) = ("", Some(format!("error: {error}")));
+                    });
+                }
+                Ok(()) => session.show(|shown| shown.doing = ""),
+            }
+        }
+    }
+
+    /// Reads, grows and renders.
+    fn answer(&mut self, asked: u64, wish: &Wish) -> Result<()> {
+        let begin = Instant::now();
+        let session = self.session.clone();
+        // Before it is read: a change from now on is seen.
+        if self.known.is_none() {
+            self.files.follow(session.path(), &[]);
+        }
+        let text = RonFile::read(session.path())?.text;
+        session.show(|shown| {
+            if shown.text != text || shown.sliders.is_empty() {
+                shown.sliders = sliders(&text);
+                shown.text.clone_from(&text);
+            }
+            shown.doing = "growing";
+        });
+        let text = with(&text, &wish.values);
+        let scene = match &self.known {
+            Some(known) => known.reread(Some(&text))?,
+            None => SceneFile::open(session.path())?.threads(&self.threads).reread(Some(&text))?,
+        };
+        let scene = scene.seed(wish.seed);
+        let field = Arc::new(self.grow(&scene, wish)?);
+        self.files.follow(session.path(), &field.grown().files);
+        self.known = Some(scene.clone());
+        let grown = begin.elapsed();
+        if wish.sheet {
+            // Of a species or texture that has changed, the text is the same and the hash of what was read is not.
+            let of = [text.as_str(), &field.grown().hash].concat();
+            self.sheet(&scene, of, wish, asked)?;
+        }
+        // The sheet's time is not the picture's.
+        self.refine(&field, asked, Instant::now().checked_sub(grown).unwrap_or(begin))
+    }
+
+    /// Grows the field at the width that is asked for, or at the camera's own where that is less.
+    fn grow(&mut self, scene: &SceneFile, wish: &Wish) -> Result<Field> {
+        let guess = self.own_width.map_or(wish.width, |own| own.min(wish.width));
+        let field = scene.clone().width(guess).field(wish.index)?;
+        let camera = &field.grown().scene.camera;
+        let own = (f64::from(camera.width()) / f64::from(camera.scale())).round() as u32;
+        self.own_width = Some(own);
+        let wanted = own.min(wish.width);
+        if wanted == guess { Ok(field) } else { scene.clone().width(wanted).field(wish.index) }
+    }
+
+    /// Shows the field with more and more samples.
+    fn refine(&mut self, field: &Arc<Field>, asked: u64, begin: Instant) -> Result<()> {
+        let Self { session, renderer, tev, .. } = self;
+        let watch = Watch { done: &|_| (), stop: session.outdated() };
+        if watch.stop.load(Ordering::Relaxed) {
+            return Err(Error::interrupted());
+        }
+        session.show(|shown| shown.doing = "rendering");
+        let passes: Vec<u32> =
+            (0..u32::BITS).map(|k| 1 << k).take_while(|spp| *spp < session.spp()).chain([session.spp()]).collect();
+        let (mut spp, mut first, mut kept) = (passes.iter(), None, None);
+        renderer.refine(field, &Request { watch, ..Request::default() }, &passes, &mut |film, labels| {
+            let labels = kept.get_or_insert_with(|| Arc::new(labels.clone()));
+            let made = Made {
+                asked,
+                first: *first.get_or_insert_with(|| begin.elapsed()),
+                spp: spp.next().copied().unwrap_or_default(),
+            };
+            let picture = Arc::new(Picture::new(field, film, labels, made));
+            session.show(|shown| (shown.picture, shown.error) = (Some(picture), None));
+            if let Some(tev) = tev {
+                tev.send(film);
+            }
+            Ok(())
+        })
+    }
+
+    /// Renders what is missing of the sheet of indices.
+    fn sheet(&mut self, scene: &SceneFile, text: String, wish: &Wish, asked: u64) -> Result<()> {
+        let session = &self.session;
+        let same = |of: &(String, Option<u64>, u64)| of.0 == text && of.1 == wish.seed;
+        if !session.shown(|shown| shown.sheet.of.as_ref().is_some_and(same)) {
+            session.show(|shown| {
+                shown.sheet = sheet::Sheet { of: Some((text, wish.seed, asked)), pictures: Vec::new() };
+            });
+        }
+        let width = self.own_width.unwrap_or(sheet::WIDTH).min(sheet::WIDTH);
+        let scene = scene.clone().width(width);
+        for index in session.shown(|shown| shown.sheet.pictures.len() as u64)..sheet::COUNT {
+            if session.outdated().load(Ordering::Relaxed) {
+                return Err(Error::interrupted());
+            }
+            let picture = Arc::new(sheet::picture(&scene, index, session.outdated())?);
+            session.show(|shown| shown.sheet.pictures.push(picture));
+        }
+        Ok(())
+    }
+}

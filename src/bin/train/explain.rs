@@ -1,0 +1,22 @@
+//! `train explain`: what may stand in experiment files.
+
+use furrow::Result;
+use furrow::reference::{answer, experiment};
+use std::io::Write;
+use std::path::PathBuf;
+
+/// What to explain.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// A path such as sets.Scene.spp or hyperparameters.rate; the tree of all paths unless given.
+    #[arg(value_name = "PATH")]
+    path: Option<String>,
+}
+
+/// Prints the explanation.
+pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
+    let words = answer(args.path.as_deref().unwrap_or_default(), &[experiment()], "train")?;
+    // The words are the result; a closed pipe is no failure.
+    let _ = std::io::stdout().write_all(words.as_bytes());
+    Ok(Vec::new())
+}

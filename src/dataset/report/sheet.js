@@ -1,0 +1,59 @@
+"use strict";
+// Filters, sorts and enlarges the images of the sheet. Without this script all of them are shown, and their links lead to the files.
+(() => {
+  const byId = (id) => document.getElementById(id);
+  const sheet = document.querySelector(".sheet");
+  const tools = document.querySelector(".tools");
+  const large = byId("large");
+  if (!sheet || !tools || !large) return;
+  const shots = [...sheet.querySelectorAll(".shot")];
+  const number = (shot, key) => Number(shot.dataset[key] ?? NaN);
+  const cover = (shot) => number(shot, "crop") + number(shot, "weed");
+  const wanted = {
+    all: () => true,
+    crop: (shot) => number(shot, "crop") > 0,
+    weed: (shot) => number(shot, "weed") > 0,
+    bare: (shot) => cover(shot) === 0,
+  };
+  const order = {
+    place: () => 0,
+    unusual: (shot) => -number(shot, "unusual"),
+    cover: (shot) => -cover(shot),
+    bare: cover,
+    stage: (shot) => -(shot.dataset.stage === undefined ? -1 : number(shot, "stage")),
+  };
+  const update = () => {
+    const show = byId("show").value;
+    const name = show.startsWith("species:") ? show.slice(8) : null;
+    const keep = name === null ? wanted[show] : (shot) => shot.dataset.species.split("|").includes(name);
+    const text = byId("find").value.trim();
+    let count = 0;
+    for (const shot of shots) {
+      shot.hidden = !keep(shot) || !shot.dataset.name.includes(text);
+      count += shot.hidden ? 0 : 1;
+    }
+    const rank = order[byId("sort").value];
+    sheet.append(...shots.map((shot, i) => [rank(shot), i, shot]).sort((a, b) => a[0] - b[0] || a[1] - b[1]).map((all) => all[2]));
+    byId("shown").textContent = `${count} of ${shots.length}`;
+  };
+  for (const id of ["show", "sort", "find"]) byId(id).addEventListener("input", update);
+  sheet.addEventListener("click", (event) => {
+    const link = event.target.closest("a.enlarge");
+    if (!link) return;
+    event.preventDefault();
+    const folder = link.getAttribute("href").replace(/[^/]*$/, "");
+    const name = link.closest(".shot").dataset.name;
+    const pictures = [["rgb.png", "image "], ["semantics.png", "labels of image "]].map(([file, words]) => {
+      const picture = new Image();
+      picture.alt = words + name;
+      picture.onerror = () => { picture.hidden = true; };
+      picture.src = folder + file;
+      return picture;
+    });
+    large.querySelector("div").replaceChildren(...pictures);
+    large.querySelector("p").textContent = link.closest("figcaption").textContent;
+    large.showModal();
+  });
+  tools.hidden = false;
+  update();
+})();

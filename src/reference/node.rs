@@ -1,0 +1,115 @@
+//! What a JSON schema says of one value: its type behind references, and its fields or variants.
+
+use serde_json::{Map, Value};
+
+/// Key of a schema that holds an example, RON: for fields whose type alone suggests none that reads well.
+pub(super) const EXAMPLE: &str = "x-example";
+
+/// A schema.
+pub(super) type Object = Map<String, Value>;
+
+/// A root schema with the types that it refers to.
+#[derive(Clone, Debug)]
+pub(super) struct Types(pub(super) Value);
+
+/// What a value is: its schema without references and options, and the name of its type.
+pub(super) struct Node<'a> {
+    pub(super) schema: &'a Object,
+    pub(super) name: Option<&'a str>,
+}
+
+impl Types {
+    /// The type that a schema refers to, behind references and options.
+    pub(super) fn resolve<'a>(&'a self, schema: &'a Value) -> Option<Node<'a>> {
+        let mut node = Node { schema: schema.as_object()?, name: None };
+        loop {
+            if let Some(name) = node.schema.get("$ref").and_then(Value::as_str).and_then(|r| r.strip_prefix("#/$defs/"))
+            {
+                node = Node { schema: self.0.get("$defs")?.get(name)?.as_object()?, name: Some(name) };
+                continue;
+            }
+            let options = node.schema.get("anyOf").and_then(Value::as_array);
+            let some = options.and_then(|of| of.iter().find(|s| s.get("type") != Some(&"null".into())));
+            match some.and_then(Value::as_object) {
+                Some(inner) => node = Node { schema: inner, name: None },
+                None => return Some(node),
+            }
+        }
+    }
+
+    /// The value inside lists and tables, with what they are called.
+    pub(super) fn inner<'a>(&'a self, schema: &'a Value) -> Option<(Node<'a>, &'static str)> {
+        let node = self.resolve(schema)?;
+        if let Some(items) = node.schema.get("items").filter(|_| tuple(node.schema).is_none()) {
+            return self.inner(items).map(|(inner, _)| (inner, "list of "));
+        }
+        if let Some(values) = node.schema.get("additionalProperties").filter(|v| v.is_object()) {
+            return self.inner(values).map(|(inner, _)| (inner, "table by name of "));
+        }
+        Some((node, ""))
+    }
+}
+
+/// Schemas of a tuple's items; `None` for a list.
+pub(super) fn tuple(schema: &Object) -> Option<Vec<&Value>> {
+    if let Some(items) = schema.get("prefixItems").and_then(Value::as_array) {
+        return Some(items.iter().collect());
+    }
+    let count = schema.get("minItems").filter(|n| schema.get("maxItems") == Some(n))?.as_u64()?;
+    let item = schema.get("items")?;
+    Some(vec![item; count as usize])
+}
+
+/// A field of a struct, or a variant.
+pub(super) struct Part<'a> {
+    pub(super) name: &'a str,
+    /// What stands behind the field's colon, or in the variant's brackets; null for a variant that is its name alone.
+    pub(super) schema: &'a Value,
+    /// Whether a field must be given; `None` for a variant.
+    pub(super) required: Option<bool>,
+    /// What its doc comment says.
+    pub(super) words: Option<&'a str>,
+    /// What stands behind the name of a variant in an example, where its types alone suggest none that reads well.
+    pub(super) example: Option<&'a str>,
+}
+
+/// Fields of a struct, those that must be given first; or variants.
+pub(super) fn parts(schema: &Object) -> Vec<Part<'_>> {
+    fn words(of: &Value) -> Option<&str> {
+        of.get("description").and_then(Value::as_str)
+    }
+    if let Some(fields) = schema.get("properties").and_then(Value::as_object) {
+        let required: Vec<&str> =
+            schema.get("required").and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str).collect();
+        let field = |name: &str| fields.get_key_value(name);
+        let first = required.iter().filter_map(|name| field(name));
+        let rest = fields.iter().filter(|(name, _)| !required.contains(&name.as_str()));
+        return first
+            .chain(rest)
+            .map(|(name, schema)| Part {
+                name,
+                schema,
+                required: Some(required.contains(&name.as_str())),
+                words: words(schema),
+                example: None,
+            })
+            .collect();
+    }
+    let bare = |name| Part { name, schema: &Value::Null, required: None, words: None, example: None };
+    if let Some(names) = schema.get("enum").and_then(Value::as_array) {
+        return names.iter().filter_map(Value::as_str).map(bare).collect();
+    }
+    let mut all = Vec::new();
+    for variant in schema.get("oneOf").and_then(Value::as_array).into_iter().flatten() {
+        let words = words(variant);
+        if let Some(name) = variant.get("const").and_then(Value::as_str) {
+            all.push(Part { words, ..bare(name) });
+        } else if let Some(names) = variant.get("enum").and_then(Value::as_array) {
+            all.extend(names.iter().filter_map(Value::as_str).map(|name| Part { words, ..bare(name) }));
+        } else if let Some(inside) = variant.get("properties").and_then(Value::as_object) {
+            let example = variant.get(EXAMPLE).and_then(Value::as_str);
+            all.extend(inside.iter().map(|(name, schema)| Part { name, schema, required: None, words, example }));
+        }
+    }
+    all
+}

@@ -1,0 +1,234 @@
+//! From a JSON schema to sections, and from a path to one of them.
+
+use super::node::{Node, Object, Part, Types, parts, tuple};
+use super::ron;
+use super::sample;
+use super::section::{Entry, Section, prose, unit};
+use crate::ron_file::{self, KIND, RANGE};
+use schemars::JsonSchema;
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+/// All that may stand in one kind of file.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    /// What paths begin with where several kinds of file are meant: `scene`, `species`.
+    pub root: &'static str,
+    /// Name that the file begins with, before its bracket; empty where it is one of several.
+    pub opening: &'static str,
+    /// Title of its page.
+    pub title: &'static str,
+    /// Its sections, the whole file first, others in the order in which they are met.
+    pub sections: Vec<Section>,
+    types: Types,
+}
+
+impl Reference {
+    /// Reads a type's schema.
+    pub(super) fn of<T: JsonSchema>(root: &'static str, opening: &'static str, title: &'static str) -> Self {
+        let schema = schemars::SchemaGenerator::default().into_root_schema_for::<T>().to_value();
+        let mut reference = Self { root, opening, title, sections: Vec::new(), types: Types(schema) };
+        let mut met = BTreeMap::new();
+        let mut sections = Vec::new();
+        if let Some(whole) = reference.types.0.as_object() {
+            reference.collect(&Node { schema: whole, name: None }, None, "", &mut met, &mut sections);
+        }
+        reference.sections = sections;
+        reference
+    }
+
+    /// The section of a path and, where the path ends in a field or variant, that entry of it. Numbers of items are skipped; so are names of
+    /// structs. Where variants differ, a field that only one of them has may be named without it.
+    pub fn find(&self, path: &str) -> Option<(&Section, Option<&Entry>)> {
+        let mut at = self.sections.first()?;
+        let mut entry = None;
+        let steps: Vec<&str> =
+            path.split(['.', '[', ']']).filter(|step| !step.is_empty() && step.parse::<usize>().is_err()).collect();
+        for step in &steps {
+            let found = at.entry(step).map(|e| (at, e)).or_else(|| self.within_variants(at, step));
+            match found {
+                Some((section, e)) => {
+                    at = e.section.as_deref().and_then(|path| self.section(path)).unwrap_or(section);
+                    entry = Some((section, e));
+                    // What follows is inside a number: a distribution and its ends.
+                    if e.section.is_none() {
+                        break;
+                    }
+                }
+                // The name of a struct, as in `materials.Leaf`.
+                None if step.starts_with(char::is_uppercase) && steps.len() > 1 => {}
+                None => return None,
+            }
+        }
+        match entry {
+            // A number, a text or a bare variant is a line of the section that it stands in; a struct is its own section.
+            Some((section, e)) if e.section.is_none() => Some((section, Some(e))),
+            _ => Some((at, None)),
+        }
+    }
+
+    /// Paths of all sections and entries whose last name is this one.
+    pub fn named(&self, name: &str) -> Vec<String> {
+        let mut all = Vec::new();
+        for section in &self.sections {
+            for entry in section.entries.iter().filter(|entry| entry.name == name) {
+                all.push(entry.section.clone().unwrap_or_else(|| joined(&section.path, &entry.name)));
+            }
+        }
+        all.dedup();
+        all
+    }
+
+    /// A whole file as short as it can be, with the example of a path in its place: names of fields and variants with dots between.
+    pub fn file_with(&self, path: &str) -> String {
+        let steps: Vec<&str> = path.split('.').filter(|step| !step.is_empty()).collect();
+        format!("{}{}", self.opening, sample::value(&self.types, &self.types.0, &steps))
+    }
+
+    /// All paths.
+    pub fn paths(&self) -> Vec<String> {
+        let each = |section: &Section| -> Vec<String> {
+            section.entries.iter().map(|entry| joined(&section.path, &entry.name)).collect()
+        };
+        self.sections.iter().flat_map(each).collect()
+    }
+
+    /// A section by its path.
+    pub fn section(&self, path: &str) -> Option<&Section> {
+        self.sections.iter().find(|section| section.path == path)
+    }
+
+    fn within_variants(&self, section: &Section, step: &str) -> Option<(&Section, &Entry)> {
+        let mut inside =
+            section.entries.iter().filter(|e| e.variant).filter_map(|e| self.section(e.section.as_deref()?));
+        inside.find_map(|s| s.entry(step).map(|e| (s, e)))
+    }
+
+    /// Adds the section of a value at `path`, and those of what is in it.
+    fn collect<'a>(
+        &'a self,
+        node: &Node<'a>,
+        words: Option<&str>,
+        path: &str,
+        met: &mut BTreeMap<&'a str, usize>,
+        sections: &mut Vec<Section>,
+    ) {
+        let words = words.or_else(|| description(node.schema)).map(prose).unwrap_or_default();
+        let at = sections.len();
+        if let Some(name) = node.name {
+            met.insert(name, at);
+        }
+        sections.push(Section { path: path.into(), also: Vec::new(), words, entries: Vec::new() });
+        let mut entries = Vec::new();
+        for part in parts(node.schema) {
+            let section = self.enter(&joined(path, part.name), &part, met, sections);
+            entries.push(self.entry(&part, section));
+        }
+        sections[at].entries = entries;
+    }
+
+    /// The path of the section of a value with fields or variants; `None` for what has none.
+    fn enter<'a>(
+        &'a self,
+        path: &str,
+        part: &Part<'a>,
+        met: &mut BTreeMap<&'a str, usize>,
+        sections: &mut Vec<Section>,
+    ) -> Option<String> {
+        let (node, _) = self.types.inner(part.schema)?;
+        if parts(node.schema).is_empty() {
+            return None;
+        }
+        if let Some(at) = node.name.and_then(|name| met.get(name)) {
+            let section = &mut sections[*at];
+            section.also.push(path.to_owned());
+            return Some(section.path.clone());
+        }
+        // Only a variant's own words say what its fields are together.
+        let words = part.words.filter(|_| part.required.is_none());
+        self.collect(&node, words, path, met, sections);
+        Some(path.to_owned())
+    }
+
+    fn entry(&self, part: &Part<'_>, section: Option<String>) -> Entry {
+        let inner = self.types.inner(part.schema).map(|(node, _)| node.schema);
+        let words = part.words.or_else(|| inner.and_then(description)).map(prose).unwrap_or_default();
+        let given = self.default(part.schema, section.is_some());
+        let default = match part.required {
+            Some(true) => None,
+            None => Some(String::new()),
+            Some(false) => Some(given.unwrap_or_else(|| "none".into())),
+        };
+        let range = inner.and_then(|schema| schema.get(RANGE)).and_then(Value::as_str);
+        Entry {
+            name: part.name.into(),
+            kind: self.kind(part.schema),
+            unit: unit(part.name),
+            range: range.unwrap_or_default().into(),
+            default,
+            words,
+            example: sample::entry(&self.types, part),
+            section,
+            variant: part.required.is_none(),
+        }
+    }
+
+    /// A default as it is written; a struct's defaults are those of its fields.
+    fn default(&self, schema: &Value, deep: bool) -> Option<String> {
+        let given = schema.get("default").filter(|value| !value.is_null() && **value != "")?;
+        let node = self.types.resolve(schema)?;
+        if deep && given.is_object() && node.schema.contains_key("properties") {
+            return Some("those of its fields".into());
+        }
+        Some(ron::ron(&self.types, schema, given))
+    }
+
+    /// What may stand there, in words.
+    fn kind(&self, schema: &Value) -> String {
+        let Some((node, outer)) = self.types.inner(schema) else { return String::new() };
+        let own = node.schema.get(KIND).and_then(Value::as_str);
+        let kind = match own {
+            Some(ron_file::PICKED) => "text, or Choice of texts".into(),
+            Some(kind) => kind.to_owned(),
+            None if node.schema.contains_key("oneOf") || node.schema.contains_key("enum") => "one of".into(),
+            None if node.schema.contains_key("properties") => "fields".into(),
+            None => match tuple(node.schema) {
+                Some(items) => {
+                    let kinds: Vec<String> = items.iter().map(|item| self.kind(item)).collect();
+                    if kinds.windows(2).all(|pair| pair[0] == pair[1]) {
+                        format!("{} × ({})", kinds.len(), kinds.first().map_or("", String::as_str))
+                    } else {
+                        format!("({})", kinds.join(", "))
+                    }
+                }
+                None => basic(node.schema).into(),
+            },
+        };
+        format!("{outer}{kind}")
+    }
+}
+
+fn description(schema: &Object) -> Option<&str> {
+    schema.get("description").and_then(Value::as_str)
+}
+
+/// Words for a plain JSON type.
+fn basic(schema: &Object) -> &'static str {
+    let named = |name: &str| match schema.get("type") {
+        Some(Value::String(one)) => one == name,
+        Some(Value::Array(all)) => all.iter().any(|t| t == name),
+        _ => false,
+    };
+    match () {
+        () if named("boolean") => "true or false",
+        () if named("integer") => "whole number",
+        () if named("number") => "number",
+        () if named("string") => "text",
+        () => "",
+    }
+}
+
+/// A path one step on.
+pub(super) fn joined(path: &str, name: &str) -> String {
+    if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") }
+}

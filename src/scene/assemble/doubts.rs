@@ -1,0 +1,103 @@
+//! What a scene file says that is allowed and was probably not meant: the field is built, and its warnings tell.
+
+use super::builder::Builder;
+use crate::Result;
+use crate::ron_file::{Step, place};
+use crate::sampling::Purpose;
+use crate::scatter::Rows;
+use crate::scene::PlantRecord;
+use crate::scene::desc::{Growth, SpeciesDesc};
+use crate::scene::tag::Class;
+use crate::soil::Rect;
+
+/// Widest rows that no one asks about, metres: maize and sunflower stand at 0.75, vines at 2.
+const WIDE_ROWS_M: f32 = 2.0;
+/// Height of a camera that no one asks about, metres; robots hold theirs at half a metre to two, masts at three.
+const HIGH_M: f32 = 5.0;
+
+impl Builder<'_> {
+    /// Doubts about the camera and the sensor.
+    pub(super) fn doubt_camera(&mut self) {
+        let height = self.scene.camera.pose().height();
+        if height > HIGH_M {
+            self.warnings.push(format!(
+                "the camera hangs {height:.1} m above the ground; heights are in metres, 0.85 for 85 cm"
+            ));
+        }
+        let first = |field| {
+            let at = place(&self.page.text, &[Step::Field(field)]);
+            let value = &self.page.text[at];
+            value[..value.find(|c: char| !c.is_alphanumeric()).unwrap_or(value.len())].to_owned()
+        };
+        let (camera, sensor) = (first("camera"), first("sensor"));
+        let known = |name: &str| crate::sensor::PRESETS.contains(&name);
+        if known(&camera) && known(&sensor) && camera != sensor {
+            self.warnings.push(format!(
+                "the camera is {camera} and its sensor that of {sensor}; `sensor: {camera}` has its own"
+            ));
+        }
+    }
+
+    /// Doubts about rows and growth stages of the crops that this field has, and about growth stages of its weeds and plants.
+    pub(super) fn doubt_plants(&mut self) -> Result<()> {
+        let (page, desc) = (self.page, self.desc);
+        for k in self.sown.clone() {
+            let crop = &desc.crops[k];
+            let rows = Rows::draw(&crop.rows, &self.stream(Purpose::Scatter, k as u64));
+            if rows.spacing_m > WIDE_ROWS_M {
+                let spacing = rows.spacing_m;
+                self.warnings.push(format!(
+                    "rows of {} stand {spacing} m apart; spacing_m is in metres, 0.75 for 75 cm",
+                    crop.species
+                ));
+            }
+        }
+        let crops = self.sown.clone().map(|k| (&desc.crops[k].species, &desc.crops[k].growth));
+        let weeds = desc.weeds.iter().map(|weed| (&weed.species, &weed.growth));
+        let plants = desc.plants.iter().map(|plant| (&plant.species, &plant.growth));
+        for (path, growth) in crops.chain(weeds).chain(plants) {
+            let species = self.library.species(page, path)?;
+            if let Some(words) = beyond(&species.desc, growth, self.season.place()) {
+                self.warnings.push(format!("{path}: {words}"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Doubts about what stands in view.
+    pub(super) fn doubt_view(&mut self, plants: &[PlantRecord], shown: Option<Rect>) {
+        let (Some(view), false) = (shown, self.sown.is_empty()) else { return };
+        let near = |plant: &&PlantRecord| view.grown(plant.radius).contains(plant.position.truncate());
+        if plants.iter().filter(near).any(|plant| plant.class == Class::Crop) {
+            return;
+        }
+        self.warnings.push(
+            "no crop stands in the camera's view; rows.offset_m moves the rows, spacing_m and in_row_m bring plants closer".into(),
+        );
+    }
+}
+
+/// What a species file cannot show of a growth stage: its plants stay at its first or last stage.
+fn beyond(species: &SpeciesDesc, growth: &Growth, season: usize) -> Option<String> {
+    let stages = &species.plant.stages;
+    let (first, last) = (stages.first()?, stages.last()?);
+    match growth {
+        Growth::Either(of) => beyond(species, of.get(season)?, season),
+        Growth::Bbch(code) => {
+            let (lo, hi) = code.usual();
+            let top = species.plant.cover_days.keys().max().map_or(0, |code| *code).max(last.bbch);
+            (hi > f64::from(top))
+                .then(|| format!("its plants end at BBCH {top}, so BBCH {hi} looks like that"))
+                .or_else(|| {
+                    (lo < f64::from(first.bbch))
+                        .then(|| format!("its plants begin at BBCH {}, so BBCH {lo} looks like that", first.bbch))
+                })
+        }
+        // All of them beyond the last stage: that some are is what a wide distribution does.
+        Growth::AgeDays(days) => {
+            let (lo, end) = (days.usual().0, last.days.get());
+            (lo > end)
+                .then(|| format!("its plants end {end} days after emergence, so {lo} days and more look like that"))
+        }
+    }
+}

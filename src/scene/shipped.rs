@@ -1,0 +1,102 @@
+//! The species that ship with the program, and the names by which a scene file may ask for them.
+
+use super::desc::SpeciesDesc;
+use crate::input::shipped;
+use crate::ron_file::{RonFile, nearest};
+use crate::{Error, Result};
+use std::path::{Path, PathBuf};
+
+/// A species that ships.
+pub struct Shipped {
+    /// Its file.
+    pub file: PathBuf,
+    /// What stands in it.
+    pub desc: SpeciesDesc,
+}
+
+impl Shipped {
+    /// The name of its file, without `.ron`.
+    pub fn stem(&self) -> String {
+        self.file.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
+    /// Every name that means it alone: of its file, its EPPO code, in English, scientific.
+    fn names(&self) -> [String; 4] {
+        let SpeciesDesc { name, scientific, eppo, .. } = &self.desc;
+        [self.stem(), eppo.clone(), name.clone(), scientific.clone()]
+    }
+
+    /// Whether a word is one of its English name: `thistle` of creeping thistle.
+    fn has_word(&self, word: &str) -> bool {
+        self.desc.name.split(|c: char| !c.is_alphanumeric() && c != '\'').any(|own| own.eq_ignore_ascii_case(word))
+    }
+}
+
+/// All species that ship, in order of their files' names.
+pub fn all_species() -> Result<Vec<Shipped>> {
+    let read = |file: PathBuf| Ok(Shipped { desc: RonFile::read(&file)?.parse()?, file });
+    shipped::species_files()?.into_iter().map(read).collect()
+}
+
+/// The file of the species that a name means: `cirsium`, `cirsium.ron`, `CIRAR`, `creeping thistle`, `Cirsium arvense`, or a word of the
+/// English name that no other species has, `thistle`. `None` where it is the name of another file; an error where it is no file's name
+/// and no species is called that.
+pub fn species(name: &str) -> Result<Option<PathBuf>> {
+    let all = all_species()?;
+    let (wanted, is_file) = name.strip_suffix(".ron").map_or((name, false), |stem| (stem, true));
+    if is_file {
+        return Ok(all.into_iter().find(|species| species.stem() == wanted).map(|species| species.file));
+    }
+    let called = |species: &&Shipped| species.names().iter().any(|own| own.eq_ignore_ascii_case(wanted));
+    if let Some(species) = all.iter().find(called) {
+        return Ok(Some(species.file.clone()));
+    }
+    if Path::new(wanted).extension().is_some() {
+        return Ok(None);
+    }
+    let with_word: Vec<&Shipped> = all.iter().filter(|species| species.has_word(wanted)).collect();
+    match with_word.as_slice() {
+        [one] => Ok(Some(one.file.clone())),
+        [] => {
+            let words = |species: &Shipped| species.desc.name.split(' ').map(str::to_owned).collect::<Vec<_>>();
+            let mut names: Vec<String> =
+                all.iter().flat_map(|species| [&species.names()[..], &words(species)].concat()).collect();
+            names.retain(|name| !name.is_empty());
+            let near = nearest(&names, wanted).map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
+            Err(Error::input(format!("no species that ships is called `{wanted}`"))
+                .help(format!("{near}`trace species` lists them; a species file of your own ends in .ron")))
+        }
+        several => {
+            let names: Vec<&str> = several.iter().map(|species| species.desc.name.as_str()).collect();
+            Err(Error::input(format!("several species are called `{wanted}`"))
+                .help(format!("write {}", names.join(" or "))))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_of_a_species_leads_to_its_file() {
+        for species in all_species().unwrap() {
+            for name in species.names() {
+                assert!(!name.is_empty(), "{}", species.file.display());
+                assert_eq!(super::species(&name).unwrap().as_ref(), Some(&species.file), "{name}");
+            }
+        }
+        let stem = |name| species(name).unwrap().map(|file| file.file_stem().unwrap().to_str().unwrap().to_owned());
+        for name in ["cirsium", "cirsium.ron", "CIRAR", "cirar", "Cirsium arvense", "creeping thistle", "thistle"] {
+            assert_eq!(stem(name).as_deref(), Some("cirsium"), "{name}");
+        }
+        assert_eq!((stem("thistle.ron"), stem("a.glb")), (None, None));
+    }
+
+    #[test]
+    fn names_of_none_and_of_several_are_told() {
+        let told = |name| species(name).unwrap_err().to_string();
+        assert!(told("thistel").contains("did you mean"), "{}", told("thistel"));
+        assert!(told("grass").contains("barnyard grass or annual meadow-grass"), "{}", told("grass"));
+    }
+}

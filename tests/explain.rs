@@ -1,0 +1,134 @@
+//! Method: `trace explain` and the generated pages are run as a user runs them. Expected: the pages under `docs/reference` are those that the
+//! programs write now, and every command that an error names answers.
+//!
+//! `cargo run -- reference` (and `cargo run --features train --bin train -- reference`) writes the pages anew.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn trace(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_trace")).args(arguments).output().unwrap()
+}
+
+fn said(output: &Output) -> String {
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+fn pages_are_fresh(program: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    let output = Command::new(program).args(["reference", "--out"]).arg(folder.path()).output().unwrap();
+    let written = said(&output);
+    assert!(written.lines().count() >= 2, "{written}");
+    for path in written.lines().map(Path::new) {
+        let name = path.file_name().unwrap();
+        let there = fs::read_to_string(Path::new("docs/reference").join(name)).unwrap_or_default();
+        assert!(there == fs::read_to_string(path).unwrap(), "docs/reference/{} is not fresh", name.display());
+    }
+}
+
+#[test]
+fn the_generated_pages_are_fresh() {
+    pages_are_fresh(env!("CARGO_BIN_EXE_trace"));
+    #[cfg(feature = "train")]
+    pages_are_fresh(env!("CARGO_BIN_EXE_train"));
+}
+
+#[test]
+fn a_field_is_explained_with_unit_range_default_and_example() {
+    let words = said(&trace(&["explain", "soil.clods.over_5mm_per_m2"]));
+    for part in ["longer than 5 mm", "0 or above", "m⁻²", "Uniform(8000, 14000)", "number or distribution"] {
+        assert!(words.contains(part), "{part}: {words}");
+    }
+    let words = said(&trace(&["explain", "camera.JaiAd130"]));
+    assert!(words.contains("height_m") && words.contains("default 0.85"), "{words}");
+    // A name alone, and a name that stands in several places.
+    assert_eq!(said(&trace(&["explain", "moisture"])), said(&trace(&["explain", "soil.moisture"])));
+    let words = said(&trace(&["explain", "azimuth_deg"]));
+    assert!(words.contains("crops.rows.azimuth_deg") && words.contains("species.plant.azimuth_deg"), "{words}");
+    assert!(said(&trace(&["explain", "species.plant.stages.layers.blade_mm"])).contains("mm"));
+}
+
+#[test]
+fn the_tree_names_everything_once() {
+    let words = said(&trace(&["explain"]));
+    for name in ["camera", "clods", "over_5mm_per_m2", "Daylight", "spacing_m"] {
+        assert!(words.lines().any(|line| line.trim_start().starts_with(name)), "{name}: {words}");
+    }
+    assert!(words.contains("trace explain species"), "{words}");
+}
+
+#[test]
+fn what_is_not_there_is_refused_with_the_nearest() {
+    let output = trace(&["explain", "soil.clouds"]);
+    let words = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(words.contains("there is no `soil.clouds`") && words.contains("did you mean `soil.clods`"), "{words}");
+}
+
+#[test]
+fn every_command_that_an_error_names_answers() {
+    let references = [furrow::reference::scene(), furrow::reference::species(), furrow::reference::texture()];
+    let mut asked = 0;
+    for entry in fs::read_dir("tests/bad").unwrap() {
+        let path = entry.unwrap().path();
+        let Some(text) = path.extension().filter(|e| *e == "txt").map(|_| fs::read_to_string(&path).unwrap()) else {
+            continue;
+        };
+        for command in text.lines().filter_map(|line| line.strip_prefix(" see:  trace explain")) {
+            let answer = furrow::reference::answer(command.trim(), &references, "trace");
+            assert!(answer.is_ok(), "{}: {command}: {}", path.display(), answer.unwrap_err());
+            asked += 1;
+        }
+    }
+    assert!(asked > 30, "{asked} errors name a command");
+}
+
+/// Method: what people write who have not read anything. Expected: all that is missing is told at once, with the right form of what is wrong.
+#[test]
+fn messages_tell_what_to_write() {
+    let folder = tempfile::tempdir().unwrap();
+    let told = |text: &str| {
+        let file = folder.path().join("field.ron");
+        fs::write(&file, text).unwrap();
+        let output = trace(&["--scene", file.to_str().unwrap()]);
+        assert_eq!(output.status.code(), Some(2));
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let words = told("Field(camera: JaiAd130(), soil: (layers: [(share: 1)]))");
+    assert!(words.contains("fields `albedo`, `size_m`, `height_mm` of layer are missing"), "{words}");
+    assert!(words.contains("see:  trace explain soil.layers"), "{words}");
+    let words = told("Field(camera: JaiAd130(height_m: Normal(0.8, 0.02)))");
+    assert!(words.contains("write Normal(mean: 0.8, sd: 0.02)"), "{words}");
+    let words = told("Field(camera: JaiAd130(height_m: [0.8, 0.9]))");
+    assert!(words.contains("write Uniform(0.8, 0.9)"), "{words}");
+}
+
+/// Method: scene files with what is allowed and hardly meant. Expected: a warning for each, and none for the scenes that teach.
+#[test]
+fn what_was_hardly_meant_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let species = fs::canonicalize("scenes/species/maize.ron").unwrap();
+    let warnings = |camera: &str, crop: &str| {
+        let file = folder.path().join("field.ron");
+        let text = format!("Field(camera: {camera}, lights: [Overcast()], crops: [(species: {species:?}, {crop})])");
+        fs::write(&file, text).unwrap();
+        let field = furrow::scene::assemble::field(
+            &file,
+            &furrow::scene::assemble::Options { width: Some(32), ..Default::default() },
+        );
+        field.unwrap().warnings.join("\n")
+    };
+    let rows = "rows: (spacing_m: 0.75, in_row_m: 0.05)";
+    let low = "JaiAd130(height_m: 3)";
+    assert_eq!(warnings(low, &format!("growth: Bbch(14), {rows}")), "");
+    let words = warnings(low, &format!("growth: Bbch(45), {rows}"));
+    assert!(words.contains("its plants end at BBCH 18, so BBCH 45 looks like that"), "{words}");
+    let words = warnings(low, "growth: Bbch(14), rows: (spacing_m: 75)");
+    assert!(words.contains("rows of") && words.contains("stand 75 m apart"), "{words}");
+    let words = warnings(low, "growth: Bbch(11), rows: (spacing_m: 75, offset_m: 30)");
+    assert!(words.contains("no crop stands in the camera's view"), "{words}");
+    let words = warnings("JaiAd130(height_m: 8), sensor: Phone", &format!("growth: Bbch(14), {rows}"));
+    assert!(words.contains("hangs 8.0 m above the ground") && words.contains("sensor: JaiAd130"), "{words}");
+}

@@ -1,0 +1,168 @@
+//! What ships with the program, found from any folder by its name: scene files, species, soils; and the folder that `trace init` makes.
+//!
+//! Rationale: who has installed the program has no clone of the repository to name paths in. Expected: names lead to the files that ship,
+//! files of one's own come first, and a dataset made from names holds all that it needs. Source: the names in the species files.
+
+mod common;
+
+use common::program::{names, scratch};
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// Runs `trace` in a folder; `data` is what FURROW_DATA names.
+fn run(folder: &Path, data: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_trace"));
+    command.current_dir(folder).env("FURROW_DATA", data).args(arguments).output().expect("the program")
+}
+
+fn repository() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Expects success; returns stdout.
+fn done(output: &Output) -> String {
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout.clone()).expect("text")
+}
+
+/// Expects exit code 2; returns stderr.
+fn refused(output: &Output) -> String {
+    assert_eq!(output.status.code(), Some(2), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stderr.clone()).expect("text")
+}
+
+/// A scene file that names a species and a soil by their names alone.
+const BY_NAME: &str = r#"Field(
+    camera: Pinhole(size: (48, 36), intrinsics: FieldOfView(horizontal_deg: 30), pose: Nadir(height_m: 0.5)),
+    lights: [Constant(radiance: (1, 1, 1, 1))],
+    soil: (layers: [(albedo: "dirt.png", height: "dirt.height.png", size_m: 0.5, height_mm: (-4, 8))]),
+    plants: [(species: "thistle", growth: Bbch(14))],
+)"#;
+
+#[test]
+fn scene_files_are_found_by_name_from_an_empty_folder() {
+    let (_keep, folder) = scratch();
+    std::fs::create_dir(&folder).unwrap();
+    let arguments = ["--scene", "02-one-plant", "--width", "32", "--spp", "1", "--quiet"];
+    let paths = done(&run(&folder, repository(), &arguments));
+    assert!(paths.lines().count() == 7 && paths.lines().all(|path| path.starts_with("out/02-one-plant/")), "{paths}");
+    // A file of that name in the folder comes first.
+    std::fs::write(folder.join("02-one-plant.ron"), "Field(").unwrap();
+    assert!(refused(&run(&folder, repository(), &arguments)).contains("02-one-plant.ron:1:"));
+    let near = refused(&run(&folder, repository(), &["--scene", "fild"]));
+    assert!(near.contains("did you mean field, which ships"), "{near}");
+    let lacking = refused(&run(&folder, &folder, &["--scene", "field"]));
+    assert!(lacking.contains("FURROW_DATA names a folder without"), "{lacking}");
+    let nowhere = refused(&run(&folder, &folder, &["species"]));
+    assert!(nowhere.contains("FURROW_DATA"), "{nowhere}");
+}
+
+/// Expected: a species and a soil by name grow as by path; the dataset holds copies and names them by path, so that a machine on which
+/// nothing is installed but the program renders the same bytes.
+#[test]
+fn a_dataset_holds_what_its_scene_file_names() {
+    holds(BY_NAME);
+}
+
+/// The same of layers that the scene file leaves out.
+#[test]
+fn a_dataset_holds_the_soil_that_its_scene_file_leaves_out() {
+    let start = BY_NAME.find("layers:").unwrap();
+    let end = start + BY_NAME[start..].find(']').unwrap() + 1;
+    holds(&[&BY_NAME[..start], BY_NAME[end..].trim_start_matches(',')].concat());
+}
+
+fn holds(text: &str) {
+    let (_keep, folder) = scratch();
+    std::fs::create_dir(&folder).unwrap();
+    std::fs::write(folder.join("mine.ron"), text).unwrap();
+    let scene = ["--scene", "mine.ron", "--spp", "1", "--quiet"];
+    let labels = |out: &str| std::fs::read(folder.join(out).join("semantics.png")).unwrap();
+    done(&run(&folder, repository(), &[&scene[..], &["--out", "by-name"]].concat()));
+    let plan = [&["dataset"], &scene[..], &["--count", "2", "--out", "data"]].concat();
+    done(&run(&folder, repository(), &plan));
+    let text = std::fs::read_to_string(folder.join("data/scene/mine.ron")).unwrap();
+    assert!(text.contains(r#"species: "external/scenes/species/cirsium.ron""#), "{text}");
+    assert!(text.contains(r#"albedo: "external/textures/soil/dirt.png""#), "{text}");
+    let verified = run(&folder, Path::new("/nowhere"), &["dataset", "verify", "data", "--rerender", "2"]);
+    done(&verified);
+    // The copy is a scene file like any other.
+    let copy = ["--scene", "data/scene/mine.ron", "--spp", "1", "--quiet", "--out", "by-path"];
+    done(&run(&folder, Path::new("/nowhere"), &copy));
+    let pixels = |out: &str| furrow::output::read_indexed(&folder.join(out).join("semantics.png")).unwrap();
+    assert_eq!(pixels("by-name"), pixels("by-path"));
+    assert!(!labels("by-name").is_empty());
+    // Again, by the same command: the dataset goes on.
+    done(&run(&folder, repository(), &plan));
+}
+
+#[test]
+fn a_name_that_no_species_has_is_shown_where_it_stands() {
+    let (_keep, folder) = scratch();
+    std::fs::create_dir(&folder).unwrap();
+    for (name, words) in [
+        ("thistel", "did you mean `thistle`?"),
+        ("grass", "barnyard grass or annual meadow-grass"),
+        ("thistle.ron", "there is no file `thistle.ron`"),
+    ] {
+        std::fs::write(folder.join("mine.ron"), BY_NAME.replace("thistle", name)).unwrap();
+        let said = refused(&run(&folder, repository(), &["--scene", "mine.ron"]));
+        assert!(said.contains("mine.ron:5:") && said.contains(words), "{said}");
+    }
+    // A file of one's own comes first.
+    std::fs::write(folder.join("cirsium"), "Species(").unwrap();
+    std::fs::write(folder.join("mine.ron"), BY_NAME.replace("thistle", "cirsium")).unwrap();
+    let said = refused(&run(&folder, repository(), &["--scene", "mine.ron"]));
+    assert!(said.contains("cirsium:1:"), "{said}");
+}
+
+#[test]
+fn a_folder_of_ones_own_renders_at_once() {
+    let (_keep, folder) = scratch();
+    std::fs::create_dir(&folder).unwrap();
+    let paths = done(&run(&folder, repository(), &["init", "my-field"]));
+    assert!(paths.lines().all(|path| folder.join(path).is_file()) && paths.contains("my-field/field.ron"), "{paths}");
+    // Nothing else is needed.
+    let own = folder.join("my-field");
+    let render = ["--scene", "field.ron", "--width", "32", "--spp", "1", "--quiet"];
+    done(&run(&own, Path::new("/nowhere"), &render));
+    assert_eq!(names(&own.join("out/field")).len(), 7);
+    let readme = std::fs::read_to_string(own.join("README.md")).unwrap();
+    assert!(readme.lines().count() <= 25, "{}", readme.lines().count());
+    let again = refused(&run(&folder, repository(), &["init", "my-field"]));
+    assert!(again.contains("not empty"), "{again}");
+    std::fs::create_dir(folder.join("empty")).unwrap();
+    done(&run(&folder, repository(), &["init", "empty"]));
+}
+
+#[test]
+fn lists_have_a_line_for_everything_that_ships() {
+    let (_keep, folder) = scratch();
+    std::fs::create_dir(&folder).unwrap();
+    let list = |what: &str| done(&run(&folder, repository(), &[what]));
+    let species = list("species");
+    assert_eq!(species.lines().count(), names(&repository().join("scenes/species")).len());
+    let thistle = species.lines().find(|line| line.starts_with("cirsium ")).expect("the thistle");
+    let words: Vec<&str> = thistle.split("  ").map(str::trim).filter(|word| !word.is_empty()).collect();
+    assert_eq!(words, ["cirsium", "Cirsium arvense", "creeping thistle", "CIRAR", "weed", "BBCH 10 to 19"]);
+    assert!(
+        species.lines().any(|line| line.starts_with("sugar_beet ") && line.ends_with("BBCH 10 to 39")),
+        "{species}"
+    );
+    let cameras = list("cameras");
+    for words in [
+        "JaiAd130",
+        "1296 × 966 pixels",
+        "18.4° × 13.8°",
+        "4.86 × 3.62 mm",
+        "Phone",
+        "rolling shutter of 20 ms",
+        "Pinhole",
+    ] {
+        assert!(cameras.contains(words), "no {words} in\n{cameras}");
+    }
+    let soils = list("soils");
+    for words in ["Loess", "R 0.220, G 0.144, B 0.088, NIR 0.273", "albedo: \"dirt.png\"", "cracked", "stony"] {
+        assert!(soils.contains(words), "no {words} in\n{soils}");
+    }
+}

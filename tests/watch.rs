@@ -1,0 +1,409 @@
+//! `trace watch`: a scene file that is written while its field is shown, through HTTP and in a browser.
+//!
+//! Rationale: who writes a scene file must see each change, and each mistake in the program's own words, without asking for it; and nobody
+//! else may look or write. Expected: load → edit → change → break → error → mend, with the last good picture kept; wrong tokens, hosts and
+//! origins refused; values written into the file change no other byte; exit code 75 on a signal.
+#![cfg(unix)]
+
+mod common;
+
+use common::browser::browser;
+use common::devtools::Page;
+use serde_json::{Value, json};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// A scene that renders in a blink.
+const SCENE: &str = r"// One beet.
+Field(
+    seed: 3, // of the file
+    camera: Pinhole(size: (96, 72), intrinsics: FieldOfView(horizontal_deg: 30), pose: Nadir(height_m: 0.5)),
+    lights: [Constant(radiance: (1, 1, 1, 1))],
+    plants: [(species: SPECIES, growth: Bbch(Choice([14, 16])) /* leaves */, turn_deg: Uniform(0, 360))],
+)
+";
+
+/// How long anything may take on a busy machine.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// A running program and the folder of its scene file.
+struct Watched {
+    program: Child,
+    folder: tempfile::TempDir,
+    /// `127.0.0.1:port`, and the path that begins with the token.
+    host: String,
+    base: String,
+    said: BufReader<std::process::ChildStderr>,
+}
+
+impl Watched {
+    fn start(more: &[&str]) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let species = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/species/sugar_beet.ron");
+        std::fs::write(folder.path().join("a.ron"), SCENE.replace("SPECIES", &format!("\"{}\"", species.display())))
+            .unwrap();
+        let mut program = Command::new(env!("CARGO_BIN_EXE_trace"))
+            .current_dir(folder.path())
+            .args(["watch", "a.ron", "--spp", "2", "--threads", "2"])
+            .args(more)
+            .stderr(Stdio::piped())
+            .stdout(Stdio::null())
+            .spawn()
+            .unwrap();
+        let mut said = BufReader::new(program.stderr.take().unwrap());
+        let mut line = String::new();
+        said.read_line(&mut line).unwrap();
+        let address = line.split("http://").nth(1).unwrap_or_else(|| panic!("{line}")).trim();
+        let (host, base) = address.split_once('/').unwrap();
+        let (host, base) = (host.to_owned(), format!("/{base}"));
+        Self { program, folder, host, base, said }
+    }
+
+    fn file(&self) -> PathBuf {
+        self.folder.path().join("a.ron")
+    }
+
+    fn text(&self) -> String {
+        std::fs::read_to_string(self.file()).unwrap()
+    }
+
+    /// Saves as many editors do: a new file is renamed over the old one.
+    fn save(&self, text: &str) {
+        let beside = self.folder.path().join("a.ron~");
+        std::fs::write(&beside, text).unwrap();
+        std::fs::rename(beside, self.file()).unwrap();
+    }
+
+    /// Status and body of a request with these headers.
+    fn ask(&self, method: &str, path: &str, headers: &str, body: &str) -> (u16, Vec<u8>) {
+        let mut stream = TcpStream::connect(&self.host).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        let length = body.len();
+        write!(
+            stream,
+            "{method} {path} HTTP/1.1\r\n{headers}Content-Length: {length}\r\nConnection: close\r\n\r\n{body}"
+        )
+        .unwrap();
+        let mut answer = Vec::new();
+        stream.read_to_end(&mut answer).unwrap();
+        let head = answer.windows(4).position(|w| w == b"\r\n\r\n").unwrap();
+        let status = String::from_utf8_lossy(&answer[9..12]).parse().unwrap();
+        (status, answer[head + 4..].to_vec())
+    }
+
+    fn get(&self, name: &str) -> (u16, Vec<u8>) {
+        self.ask("GET", &format!("{}{name}", self.base), &format!("Host: {}\r\n", self.host), "")
+    }
+
+    fn post(&self, name: &str, body: &Value) -> (u16, String) {
+        let headers = format!("Host: {0}\r\nOrigin: http://{0}\r\n", self.host);
+        let (status, body) = self.ask("POST", &format!("{}{name}", self.base), &headers, &body.to_string());
+        (status, String::from_utf8(body).unwrap())
+    }
+
+    /// The stream of states, each as it comes.
+    fn events(&self) -> Events {
+        let mut stream = TcpStream::connect(&self.host).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        write!(stream, "GET {}events HTTP/1.1\r\nHost: {}\r\n\r\n", self.base, self.host).unwrap();
+        Events(BufReader::new(stream))
+    }
+
+    /// Ends it with a signal; its exit code and the rest of what it said.
+    fn end(mut self, signal: &str) -> (Option<i32>, String) {
+        let kill = format!("kill -{signal} {}", self.program.id());
+        assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
+        let begin = Instant::now();
+        let code = loop {
+            if let Some(status) = self.program.try_wait().unwrap() {
+                break status.code();
+            }
+            assert!(begin.elapsed() < PATIENCE, "it did not stop");
+            std::thread::sleep(Duration::from_millis(10));
+        };
+        let mut rest = String::new();
+        self.said.read_to_string(&mut rest).unwrap();
+        (code, rest)
+    }
+}
+
+impl Drop for Watched {
+    fn drop(&mut self) {
+        let _ = self.program.kill();
+        let _ = self.program.wait();
+    }
+}
+
+/// Server-sent events.
+struct Events(BufReader<TcpStream>);
+
+impl Events {
+    /// The first state from now on of which this holds.
+    fn until(&mut self, holds: impl Fn(&Value) -> bool) -> Value {
+        let begin = Instant::now();
+        loop {
+            assert!(begin.elapsed() < PATIENCE, "no such state came");
+            let mut line = String::new();
+            assert!(self.0.read_line(&mut line).unwrap() > 0, "the stream ended");
+            if let Some(data) = line.strip_prefix("data: ") {
+                let state = serde_json::from_str(data).unwrap();
+                if holds(&state) {
+                    return state;
+                }
+            }
+        }
+    }
+
+    /// The state when the newest picture is finished.
+    fn done(&mut self) -> Value {
+        self.until(|s| s["error"].is_null() && s["picture"]["asked"] == s["asked"] && s["picture"]["spp"] == 2)
+    }
+}
+
+#[test]
+fn a_file_that_is_saved_is_shown_and_a_mistake_in_it_is_told_in_the_programs_words() {
+    let watched = Watched::start(&[]);
+    let mut events = watched.events();
+    let first = events.done();
+    assert_eq!(
+        (first["picture"]["width"].as_u64(), first["picture"]["scale"].as_f64()),
+        (Some(96), Some(1.0)),
+        "not larger than its camera"
+    );
+    let view = |name: &str| {
+        let (status, png) = watched.get(&format!("view/{name}"));
+        assert_eq!((status, &png[1..4]), (200, &b"PNG"[..]), "{name}");
+        png
+    };
+    let before: Vec<Vec<u8>> = ["rgb", "nir", "labels", "depth"].map(view).to_vec();
+
+    let good = watched.text();
+    watched.save(&good.replace("Choice([14, 16])", "11"));
+    let second = events.until(|s| s["picture"]["hash"] != first["picture"]["hash"]);
+    assert!(second["error"].is_null());
+    events.done();
+    assert_ne!(before, ["rgb", "nir", "labels", "depth"].map(view).to_vec());
+
+    let last = view("rgb");
+    watched.save(&good.replace("turn_deg", "turn_dge"));
+    let broken = events.until(|s| !s["error"].is_null());
+    let said = Command::new(env!("CARGO_BIN_EXE_trace"))
+        .current_dir(watched.folder.path())
+        .args(["--scene", "a.ron"])
+        .output()
+        .unwrap();
+    assert_eq!(format!("{}\n", broken["error"].as_str().unwrap()), String::from_utf8(said.stderr).unwrap());
+    assert!(
+        broken["error"].as_str().unwrap().contains("a.ron:6:")
+            && broken["error"].as_str().unwrap().contains("^^^^^^^^")
+    );
+    assert_eq!(view("rgb"), last, "the last good picture stays");
+
+    watched.save(&good);
+    let mended = events.done();
+    assert_eq!(mended["picture"]["hash"], first["picture"]["hash"]);
+    assert_eq!(view("rgb"), before[0], "the same file, the same picture");
+
+    // A file that it names.
+    let species = std::fs::read_to_string("scenes/species/sugar_beet.ron").unwrap();
+    let own = species.replace("\"../../", &format!("\"{}/", env!("CARGO_MANIFEST_DIR")));
+    std::fs::write(watched.folder.path().join("beet.ron"), &own).unwrap();
+    let start = good.find('"').unwrap();
+    let end = start + 1 + good[start + 1..].find('"').unwrap();
+    watched.save(&format!("{}\"beet.ron\"{}", &good[..start], &good[end + 1..]));
+    let named = events.until(|s| {
+        s["error"].is_null() && s["picture"]["asked"] == s["asked"] && s["picture"]["hash"] != mended["picture"]["hash"]
+    });
+    std::fs::write(watched.folder.path().join("beet.ron"), own + "// saved\n").unwrap();
+    events.until(|s| s["picture"]["hash"] != named["picture"]["hash"]);
+    let (code, said) = watched.end("INT");
+    assert_eq!(code, Some(75), "{said}");
+    assert!(said.contains("ssh -L") && said.contains("stopped watching"), "{said}");
+}
+
+#[test]
+fn a_pixel_tells_what_it_shows() {
+    let watched = Watched::start(&[]);
+    watched.events().done();
+    let at = |x: u32, y: u32| -> Value { serde_json::from_slice(&watched.get(&format!("at?x={x}&y={y}")).1).unwrap() };
+    let leaf =
+        (0..72 * 96).map(|i| at(i * 7 % 96, i * 7 / 96 % 72)).find(|at| at["organ"] == "blade").expect("no blade");
+    assert_eq!(
+        (leaf["class"].as_str(), leaf["plant"].as_u64(), leaf["species"].as_str()),
+        (Some("crop"), Some(1), Some("sugar beet"))
+    );
+    assert!(leaf["leaf"].as_u64() > Some(0) && leaf["depth_m"].as_f64() > Some(0.3), "{leaf}");
+    let (x, y) = (&leaf["x"], &leaf["y"]);
+    let words = String::from_utf8(watched.get(&format!("explain?x={x}&y={y}")).1).unwrap();
+    let expected = format!("label: crop plant 1 leaf {}", leaf["leaf"]);
+    assert!(words.contains(&expected) && words.contains("reflectance:"), "{words}");
+    for odd in ["at", "at?x=1", "at?x=-1&y=2", "at?x=96&y=0", "at?x=1e9&y=0", "explain?x=0&y=99999999999", "at?%ff&&=="]
+    {
+        assert_eq!(watched.get(odd).0, 400, "{odd}");
+    }
+    for unknown in ["nothing", "view/none", "sheet/x", "sheet/99", "photo", "../a.ron", "view/../../a.ron"] {
+        assert_eq!(watched.get(unknown).0, 404, "{unknown}");
+    }
+}
+
+#[test]
+fn whoever_does_not_know_the_address_is_refused() {
+    let watched = Watched::start(&[]);
+    watched.events().done();
+    let own = format!("Host: {}\r\n", watched.host);
+    let status = |path: &str, headers: &str| watched.ask("GET", path, headers, "").0;
+    assert_eq!(status(&watched.base, &own), 200);
+    // A length for which there is no memory, from somebody who knows no address: the program lives on.
+    for length in ["1000000000000000", "9223372036854775807"] {
+        let mut stream = TcpStream::connect(&watched.host).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        write!(stream, "POST /x/ HTTP/1.1\r\n{own}Content-Length: {length}\r\n\r\nabc").unwrap();
+        let mut answer = [0; 12];
+        stream.read_exact(&mut answer).unwrap();
+        assert_eq!(&answer, b"HTTP/1.1 413");
+    }
+    for path in ["/", "/state", "/00000000000000000000000000000000/", "/00000000000000000000000000000000/state"] {
+        assert_eq!(status(path, &own), 403, "{path}");
+    }
+    for headers in ["", "Host: evil.example\r\n", "Host: 192.0.2.1\r\n"] {
+        assert_eq!(status(&watched.base, headers), 403, "{headers}");
+    }
+    for origin in ["http://evil.example", "null"] {
+        assert_eq!(status(&format!("{}events", watched.base), &format!("{own}Origin: {origin}\r\n")), 403, "{origin}");
+    }
+    let before = watched.text();
+    let wish = format!("{}wish", watched.base);
+    assert_eq!(watched.ask("POST", &wish, &own, &"x".repeat(100_000)).0, 413);
+    for odd in [
+        "",
+        "{",
+        "[]",
+        "{\"index\": -1}",
+        "{\"seed\": \"other\"}",
+        "{\"other\": 1}",
+        "{\"values\": {\"a\": \"b\"}}",
+        "\u{0}",
+    ] {
+        assert_eq!(watched.ask("POST", &wish, &own, odd).0, 400, "{odd}");
+    }
+    assert_eq!(watched.ask("DELETE", &watched.base, &own, "").0, 405);
+    assert_eq!((watched.text(), watched.end("TERM").0), (before, Some(75)));
+}
+
+#[test]
+fn a_slider_is_a_look_until_it_is_written() {
+    let watched = Watched::start(&[]);
+    let mut events = watched.events();
+    let first = events.done();
+    let paths: Vec<&str> = first["sliders"].as_array().unwrap().iter().map(|s| s["path"].as_str().unwrap()).collect();
+    assert_eq!(paths[..2], ["plants[0].growth.Bbch", "plants[0].turn_deg"], "{paths:?}");
+    let before = watched.text();
+    let values = json!({ "plants[0].growth.Bbch": 12, "plants[0].turn_deg": 90.5 });
+    assert_eq!(watched.post("wish", &json!({ "values": values, "index": 2 })).0, 200);
+    let moved = events.until(|s| s["picture"]["asked"] == s["asked"] && s["picture"]["index"] == 2);
+    assert_ne!(moved["picture"]["hash"], first["picture"]["hash"]);
+    assert_eq!(watched.text(), before, "a look writes nothing");
+    let (status, said) = watched.post("write", &json!({ "path": "plants[0].growth.Bbch", "value": 12 }));
+    assert_eq!(status, 200, "{said}");
+    assert_eq!(watched.text(), before.replace("Choice([14, 16])", "12"), "comments and all else stay");
+    let written =
+        events.until(|s| s["values"].as_object().is_some_and(|v| v.len() == 1) && s["picture"]["asked"] == s["asked"]);
+    assert_eq!(written["picture"]["hash"], moved["picture"]["hash"], "it looks as the slider had shown it");
+    assert_eq!(watched.post("write", &json!({ "path": "nothing", "value": 1 })).0, 400);
+    assert_eq!(watched.post("wish", &json!({ "values": {}, "index": 0, "seed": 9, "sheet": true })).0, 200);
+    let sheet = events.until(|s| s["sheet"]["done"] == 12);
+    assert_eq!(sheet["seed"], 9);
+    assert_eq!(watched.post("wish", &json!({ "seed": "file", "sheet": false })).0, 200);
+    assert_eq!(events.until(|s| s["seed"].is_null() && s["picture"]["asked"] == s["asked"])["picture"]["seed"], 3);
+    assert_ne!(watched.get("sheet/0").1, watched.get("sheet/1").1);
+}
+
+#[test]
+fn a_browser_shows_changes_and_mistakes() {
+    let Some(browser) = browser() else { return };
+    let photo = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/gallery/field.jpg");
+    let watched = Watched::start(&["--photo", photo.to_str().unwrap()]);
+    let folder = tempfile::tempdir().unwrap();
+    let mut page = Page::open(&browser, folder.path(), &format!("http://{}{}", watched.host, watched.base));
+    page.wait("document.getElementById('picture')?.naturalWidth === 96 && state.picture.spp === 2");
+    page.wait("document.getElementById('photo').naturalWidth > 0");
+    let scales = page.ask(
+        "['photo', 'picture'].map((id) => document.getElementById(id)).map((i) => i.clientWidth / i.naturalWidth)",
+    );
+    let scale = |i: usize| scales[i].as_f64().unwrap();
+    assert!((scale(0) / scale(1) - 1.0).abs() < 0.02, "the same pixel scale: {scales}");
+
+    let good = watched.text();
+    let before = page.ask("document.body.dataset.shown");
+    watched.save(&good.replace("Choice([14, 16])", "11"));
+    page.wait(&format!("document.body.dataset.shown !== {before} && !document.body.classList.contains('failed')"));
+    watched.save(&good.replace("turn_deg", "turn_dge"));
+    page.wait("document.body.classList.contains('failed')");
+    let shown = page.ask("document.getElementById('error-text').textContent");
+    assert!(
+        shown.as_str().unwrap().contains("unknown field `turn_dge`") && shown.as_str().unwrap().contains("^^^^^^^^"),
+        "{shown}"
+    );
+    assert_eq!(page.ask("document.getElementById('error').hidden || !document.getElementById('picture').src"), false);
+    page.wait("Number(getComputedStyle(document.getElementById('picture')).opacity) < 0.5");
+    watched.save(&good);
+    page.wait("!document.body.classList.contains('failed') && document.getElementById('error').hidden");
+
+    // Keys, a pixel and a slider.
+    let press = |key: &str| format!("dispatchEvent(new KeyboardEvent('keydown', {{ key: {key:?}, bubbles: true }}))");
+    let press = |key: &str| format!("document.body.{}", press(key));
+    page.ask(&press("3"));
+    page.wait("document.body.dataset.shown.startsWith('view/labels')");
+    page.ask(&press("ArrowRight"));
+    page.wait("state.picture.index === 1 && state.picture.asked === state.asked");
+    page.ask("inspect({ x: 48, y: 36 })");
+    page.wait("document.getElementById('pixel').textContent.includes('class')");
+    page.ask(&press("Enter"));
+    page.wait("document.getElementById('explained').textContent.includes('reflectance')");
+    page.ask("(() => { const i = document.querySelector('.slider input'); i.value = 1; i.dispatchEvent(new Event('input')); })()");
+    page.wait("state.values['plants[0].growth.Bbch'] === 16 && state.picture.asked === state.asked");
+    page.ask("document.querySelector('.slider .acts button:last-child').click()");
+    page.wait("state.sliders[0].path === 'plants[0].turn_deg'");
+    assert_eq!(watched.text(), good.replace("Choice([14, 16])", "16"));
+
+    for width in [1280, 400] {
+        page.resize(width, 800);
+        let over = "document.documentElement.scrollWidth - innerWidth";
+        for state in ["", "s", "s", "?"] {
+            if !state.is_empty() {
+                page.ask(&press(state));
+            }
+            std::thread::sleep(Duration::from_millis(300));
+            assert!(page.ask(over).as_i64() <= Some(0), "{width} {state}");
+        }
+        page.ask(&press("?"));
+    }
+    let foreign = "performance.getEntriesByType('resource').map((e) => e.name).filter((n) => !n.startsWith(location.href) && !n.startsWith('blob:') && !n.startsWith('data:'))";
+    assert_eq!(page.ask(foreign), json!([]));
+    assert!(page.complaints.is_empty(), "{:?}", page.complaints);
+}
+
+#[test]
+fn a_sheet_shows_several_indices() {
+    let watched = Watched::start(&[]);
+    let out = watched.folder.path().join("sheet.png");
+    let run = |indices: &str, out: &Path| {
+        let arguments = ["preview", "a.ron", "--width", "48", "--spp", "1", "--indices", indices, "--out"];
+        Command::new(env!("CARGO_BIN_EXE_trace"))
+            .current_dir(watched.folder.path())
+            .args(arguments)
+            .arg(out)
+            .output()
+            .unwrap()
+    };
+    let done = run("3..9", &out);
+    assert_eq!(String::from_utf8(done.stdout).unwrap().trim(), out.to_str().unwrap());
+    let (width, height, _) = furrow::output::read_photo(&out).unwrap();
+    // Four wide, two high; the words are wider than such small pictures.
+    assert!(width > 4 * 48 && height > 2 * 36, "{width} × {height}");
+    assert_eq!(run("9..3", &out).status.code(), Some(2));
+    assert_eq!(run("0..2", watched.folder.path()).status.code(), Some(2));
+}
