@@ -1,0 +1,168 @@
+"""Crop fields, rendered and labelled exactly: datasets from disk, and images from scene files.
+
+    import furrow
+
+    image = furrow.render("field", index=7, spp=16, width=648)    # runs the program `trace`
+    crop = image["semantics"] == 1                                # 0 soil, 1 crop, 2 weed
+
+    data = furrow.Dataset("data/d", split="train")                # a folder that `trace dataset` has made
+    print(len(data), data[0]["plants"].max(), data[0]["record"]["conditions"]["camera"])
+
+Needs numpy and Pillow. A `Dataset` goes into PyTorch's `DataLoader` as it is; `transform` chooses what a batch holds.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import operator
+import os
+import shutil
+import subprocess
+import sysconfig
+import tempfile
+from pathlib import Path
+from typing import Any, Callable, Dict, Iterator, Optional, Sequence, SupportsIndex, Union
+
+import numpy as np
+from PIL import Image
+
+__all__ = ["Dataset", "Error", "Sample", "program", "render"]
+
+SPLITS = ("train", "val", "test")
+
+
+class Error(Exception):
+    """What the program said when it failed, or what a dataset lacks."""
+
+
+class Sample(Dict[str, Any]):
+    """One image with its labels, by name; a notebook shows its picture.
+
+    ========== ======================= ==========================================================
+    image      uint8, (H, W, 3)        the photograph in colour
+    nir        uint8, (H, W)           the one in near infrared, where there is one
+    semantics  uint8, (H, W)           0 soil, 1 crop, 2 weed, 255 no label
+    plants     int32, (H, W)           number of the plant, 0 for none
+    leaves     int32, (H, W)           number of the leaf on its plant, 0 for none
+    record     dict                    a dataset's `record.json`; of `render`, where the image came from
+    ========== ======================= ==========================================================
+    """
+
+    def _repr_png_(self) -> bytes:
+        """The photograph, as notebooks show it."""
+        out = io.BytesIO()
+        Image.fromarray(self["image"]).save(out, "PNG")
+        return out.getvalue()
+
+
+def _read(path: Path, kind: type[np.generic]) -> np.ndarray[Any, Any]:
+    """A picture's values, in memory that may be written."""
+    try:
+        with Image.open(path) as picture:
+            return np.array(picture).astype(kind)
+    except OSError as error:
+        raise Error(f"{path}: {error}") from error
+
+
+def _sample(folder: Path, photographs: str = "") -> Sample:
+    """The pictures and labels of an image's folder; `photographs` ends the names of other photographs."""
+    sample = Sample(image=_read(folder / f"rgb{photographs}.png", np.uint8))
+    nir = folder / f"nir{photographs}.png"
+    if nir.is_file():
+        sample["nir"] = _read(nir, np.uint8)
+    sample["semantics"] = _read(folder / "semantics.png", np.uint8)
+    # Not the 16 bits of the files: PyTorch before 2.3 takes none without a sign.
+    for name in ("plants", "leaves"):
+        sample[name] = _read(folder / f"{name}.png", np.int32)
+    return sample
+
+
+class Dataset:
+    """The images of a dataset, each read when it is asked for.
+
+    `split` keeps those of "train", "val" or "test"; `transform` gets each `Sample` and its result is the item. PyTorch's own way to
+    make batches takes numbers and arrays of one shape, so for it leave the record out:
+    `transform=lambda sample: (sample["image"], sample["semantics"])`.
+    """
+
+    def __init__(
+        self,
+        path: Union[str, "os.PathLike[str]"],
+        split: Optional[str] = None,
+        transform: Optional[Callable[[Sample], Any]] = None,
+    ) -> None:
+        self.path = Path(path)
+        self.transform = transform
+        try:
+            self.recipe: Dict[str, Any] = json.loads((self.path / "dataset.json").read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise Error(f"{self.path} is no dataset: {error}") from error
+        if split is not None and split not in SPLITS:
+            raise ValueError(f"split is one of {', '.join(SPLITS)}, not {split!r}")
+        # Of any so many images in a row, the first are for training, then validation, then test.
+        pattern = [name for name, share in zip(SPLITS, self.recipe["split"]) for _ in range(share)]
+        every = range(self.recipe["count"])
+        self.indices = [k for k in every if split is None or pattern[k % len(pattern)] == split]
+
+    def __len__(self) -> int:
+        return len(self.indices)
+
+    def __getitem__(self, item: SupportsIndex) -> Any:
+        folder = self.path / "images" / f"{self.indices[operator.index(item)]:06d}"
+        sample = _sample(folder)
+        sample["record"] = json.loads((folder / "record.json").read_text(encoding="utf-8"))
+        return sample if self.transform is None else self.transform(sample)
+
+    def __iter__(self) -> Iterator[Any]:
+        return (self[k] for k in range(len(self)))
+
+    def __repr__(self) -> str:
+        return f"furrow.Dataset({str(self.path)!r}: {len(self)} images)"
+
+
+def program() -> str:
+    """The program `trace`: `$FURROW_TRACE`, then the one that came with this package, then the first on `$PATH`."""
+    named = os.environ.get("FURROW_TRACE")
+    own = (Path(__file__).parent.parent / "furrow.scripts/trace", Path(sysconfig.get_path("scripts")) / "trace")
+    found = named or next((str(path) for path in own if path.is_file()), None) or shutil.which("trace")
+    if not found:
+        raise Error("there is no program `trace`: install Furrow, or name the program in FURROW_TRACE")
+    return found
+
+
+def _flags(flags: Dict[str, Any]) -> Sequence[str]:
+    """`target_error=0.02, without=["mis"], denoise=True` as the program's command line writes it."""
+    words = []
+    for name, value in flags.items():
+        if value is None or value is False:
+            continue
+        words.append("--" + name.replace("_", "-"))
+        if isinstance(value, (list, tuple)):
+            words.append(",".join(map(str, value)))
+        elif value is not True:
+            words.append(str(value))
+    return words
+
+
+def render(scene: Union[str, "os.PathLike[str]"], index: int = 0, spp: Optional[int] = 16, **flags: Any) -> Sample:
+    """Field `index` of a scene file, rendered with `spp` samples a pixel.
+
+    `scene` is a file, or the name of one that ships, such as "field". Further keywords are the program's flags with `_` for `-`:
+    `width=648`, `seed=3`, `crop=(0, 0, 200, 100)`, `denoise=True`; `target_error=0.05` or `time="30s"` want `spp=None`. With
+    `denoise=True` the photographs are those without noise. Raises `Error` with the program's own words.
+    """
+    with tempfile.TemporaryDirectory(prefix="furrow-") as folder:
+        command = [program(), "--scene", os.fspath(scene), "--out", folder, "--quiet"]
+        command += _flags({"index": index, "spp": spp, **flags})
+        try:
+            done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+        except OSError as error:
+            raise Error(f"{command[0]}: {error}") from error
+        if done.returncode != 0:
+            raise Error(done.stderr.strip() or f"{command[0]} ended with {done.returncode}")
+        sample = _sample(Path(folder), "_denoised" if flags.get("denoise") else "")
+        with Image.open(Path(folder) / "rgb.png") as picture:
+            comment = str(picture.info.get("Comment", ""))
+        sample["record"] = dict(line.split(": ", 1) for line in comment.splitlines() if ": " in line)
+        return sample

@@ -1,0 +1,119 @@
+//! The Python package: built as a wheel, installed into an environment of its own, used from an empty folder.
+//!
+//! Rationale: most people who train networks meet the program through pip. Expected: the wheel brings the program, Embree, and all
+//! that ships; the module's arrays are what the files hold; PyTorch takes them. Source: Pillow, numpy and torch themselves. The wheel is built
+//! around the program that the tests built, so nothing is compiled for it. Without maturin the tests say so and pass, with
+//! `FURROW_REQUIRE_PEERS=1` they fail.
+
+mod common;
+
+use common::program::{SMALL, names, scratch, trace};
+use common::python::{python, torch_with};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::LazyLock;
+
+/// What the wheel needs, to be built and to run.
+const PROBE: &str = "import maturin, numpy, PIL";
+
+/// A dataset of two images, one to train on and one to validate.
+static DATASET: LazyLock<PathBuf> = LazyLock::new(|| {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("python-dataset");
+    let _ = std::fs::remove_dir_all(&folder);
+    let rest = ["--count", "2", "--spp", "1", "--split", "1,1,0", "--quiet", "--out"];
+    let output = trace(&[&["dataset", "--scene", SMALL], &rest[..]].concat()).arg(&folder).output().expect("trace");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    folder
+});
+
+/// The source of the module, for environments in which no wheel is installed.
+fn source() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("python")
+}
+
+/// Runs a command and expects success; returns what it wrote to stdout.
+fn done(command: &mut Command) -> String {
+    let Output { status, stdout, stderr } = command.output().unwrap_or_else(|e| panic!("{command:?}: {e}"));
+    assert!(status.success(), "{command:?}: {}{}", String::from_utf8_lossy(&stdout), String::from_utf8_lossy(&stderr));
+    String::from_utf8(stdout).expect("text")
+}
+
+/// Builds the wheel in `folder`, around the program that the tests built: `tests/python/stand-in` has a cargo that compiles nothing.
+fn wheel(python: &Path, folder: &Path) -> PathBuf {
+    let cargo = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/stand-in/cargo");
+    let tools = python.parent().expect("a folder").display().to_string();
+    let path = std::env::var("PATH").unwrap_or_default();
+    let mut build = Command::new(source().join("build_wheel.sh"));
+    build.args(["--profile", "dev"]).env("WHEELS", folder).env("PATH", format!("{tools}:{path}"));
+    build.env("CARGO", cargo).env("REAL_CARGO", env!("CARGO")).env("BUILT_TRACE", env!("CARGO_BIN_EXE_trace"));
+    done(&mut build);
+    let built = names(folder);
+    assert!(built.len() == 1 && built[0].contains("-py3-none-manylinux_2_"), "{built:?}");
+    folder.join(&built[0])
+}
+
+/// A fresh environment with the wheel; numpy and Pillow are seen where `python` has them, as nothing is to be fetched.
+fn environment(python: &Path, wheel: &Path, folder: &Path) -> PathBuf {
+    done(Command::new(python).args(["-m", "venv"]).arg(folder));
+    let own = folder.join("bin/python");
+    done(Command::new(&own).args(["-m", "pip", "install", "-q", "--no-index", "--no-deps"]).arg(wheel));
+    let place = "import sysconfig; print(sysconfig.get_path('platlib'))";
+    let place_of = |python: &Path| PathBuf::from(done(Command::new(python).args(["-c", place])).trim());
+    std::fs::write(place_of(&own).join("peers.pth"), place_of(python).display().to_string()).expect("a file");
+    folder.to_path_buf()
+}
+
+#[test]
+fn an_installed_wheel_needs_nothing_else() {
+    let Some(python) = python(PROBE) else { return };
+    let (_keep, folder) = scratch();
+    let wheel = wheel(&python, &folder.join("wheels"));
+    let venv = environment(&python, &wheel, &folder.join("venv"));
+    let empty = folder.join("empty");
+    std::fs::create_dir(&empty).expect("a folder");
+    let run = |arguments: &[&str]| {
+        let mut command = Command::new(venv.join("bin/trace"));
+        for variable in ["FURROW_DATA", "FURROW_TRACE", "LD_LIBRARY_PATH", "PYTHONPATH"] {
+            command.env_remove(variable);
+        }
+        command.current_dir(&empty).args(arguments);
+        command
+    };
+    // Data and libraries are the wheel's, not the repository's and the system's.
+    let soils = done(&mut run(&["soils"]));
+    let albedo = soils.lines().find(|line| line.contains("dirt.png")).expect("a soil");
+    assert!(albedo.contains(venv.to_str().expect("a path")), "{soils}");
+    let site = done(Command::new(venv.join("bin/python")).args(["-c", "import furrow; print(furrow.__path__[0])"]));
+    let site = Path::new(site.trim()).parent().expect("a folder");
+    let libraries = done(Command::new("ldd").arg(site.join("furrow.scripts/trace")));
+    for library in ["libembree3", "libtbb"] {
+        assert!(libraries.lines().any(|l| l.contains(library) && l.contains("furrow.libs")), "{libraries}");
+    }
+
+    let paths = done(&mut run(&["--scene", "field", "--width", "64", "--spp", "1", "--quiet"]));
+    assert!(paths.lines().all(|path| path.starts_with("out/field/") && empty.join(path).is_file()), "{paths}");
+    done(&mut run(&["init", "my-field"]));
+    done(&mut run(&["--scene", "my-field/field.ron", "--width", "64", "--spp", "1", "--quiet"]));
+    std::fs::remove_dir_all(empty.join("out")).expect("a folder");
+
+    let mut check = Command::new(venv.join("bin/python"));
+    check.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/check_module.py"));
+    check.arg(&*DATASET).arg(&empty).env_remove("FURROW_TRACE").env("PATH", "/usr/bin:/bin");
+    done(&mut check);
+}
+
+#[test]
+fn pytorch_loads_batches_of_a_dataset() {
+    let Some(python) = torch_with("PIL") else { return };
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/check_loader.py");
+    let quiet = [("PYTHONDONTWRITEBYTECODE", "1"), ("OMP_NUM_THREADS", "1")];
+    done(Command::new(python).arg(script).arg(&*DATASET).env("PYTHONPATH", source()).envs(quiet));
+}
+
+#[test]
+fn the_types_of_the_module_are_right() {
+    let Some(python) = python("import mypy, numpy, PIL") else { return };
+    let mut check = Command::new(python);
+    check.args(["-m", "mypy", "--strict", "--cache-dir", env!("CARGO_TARGET_TMPDIR")]).arg(source().join("furrow"));
+    done(&mut check);
+}
