@@ -1,19 +1,35 @@
-//! What the README promises: its page parses, its commands are those that are run, its files are there.
+//! What README, CONTRIBUTING and the book in `docs/` promise: pages parse, links lead somewhere, commands and files are there.
 //!
-//! Rationale: a README is the first program that a newcomer runs. Expected: nothing in it is stale. Source: the README.
+//! Rationale: a README is the first program that a newcomer runs, and a page that names a flag or a test that is gone misleads. Expected:
+//! nothing in them is stale. Source: the pages; the rules stand in CONTRIBUTING.md. `tests/guide.rs` runs the guide.
 
+mod common;
+
+use common::book::{self, anchors, blocks, commands, links, pages, program, prose, quoted, read, root, shell};
+use common::program::SMALL;
+use furrow::light::LightDesc;
+use furrow::material::LeafDesc;
 use furrow::ron_file::RonFile;
-use furrow::scene::desc::FieldDesc;
-use std::path::Path;
+use furrow::scene::desc::{FieldDesc, ModelDesc};
+use furrow::sensor::{CameraDesc, SensorDesc};
+use furrow::soil::SoilDesc;
 
-fn read(path: &str) -> String {
-    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
+/// Pages that the program writes from its own types and command line: they may be linked to before they are there.
+const GENERATED: [&str; 6] = ["scene", "species", "texture", "experiment", "trace", "train"];
+
+/// Whether a path is that of a page which the program writes.
+fn generated(path: &str) -> bool {
+    GENERATED.iter().any(|name| path == format!("docs/reference/{name}.md"))
 }
 
-/// The text of the code blocks of one language.
-fn blocks(text: &str, language: &str) -> Vec<String> {
-    let open = format!("```{language}\n");
-    text.split(&open).skip(1).map(|b| b.split("```").next().unwrap_or_default().to_owned()).collect()
+/// Whether the program has written a page, so that rules for people's prose do not hold for it.
+fn written_by_people(path: &str) -> bool {
+    !generated(path)
+}
+
+/// README, CONTRIBUTING and all pages of the book.
+fn documents() -> Vec<String> {
+    ["README.md", "CONTRIBUTING.md"].map(String::from).into_iter().chain(pages()).collect()
 }
 
 /// Most words of a paragraph, or of an item of a list, that people read with ease.
@@ -21,11 +37,12 @@ const MOST_WORDS: usize = 80;
 
 /// Paragraphs and items of lists, without code blocks, tables, headings and pictures.
 fn paragraphs(text: &str) -> Vec<String> {
-    let prose: String = text.split("```").step_by(2).collect::<Vec<_>>().join("\n\n");
     let mut all = vec![String::new()];
-    for line in prose.lines() {
+    for line in prose(text).lines() {
         let skip = line.is_empty() || line == ">" || ["|", "#", "!"].iter().any(|start| line.starts_with(start));
-        if skip || line.starts_with("- ") {
+        let number = line.trim_start_matches(|c: char| c.is_ascii_digit());
+        let item = line.starts_with("- ") || (number.len() < line.len() && number.starts_with(". "));
+        if skip || item {
             all.push(String::new());
         }
         if let (false, Some(last)) = (skip, all.last_mut()) {
@@ -39,24 +56,38 @@ fn paragraphs(text: &str) -> Vec<String> {
 
 #[test]
 fn paragraphs_are_short() {
-    for file in ["README.md", "docs/results.md", "docs/glossary.md"] {
-        let all = paragraphs(&read(file));
-        assert!(!all.is_empty());
+    for file in documents().into_iter().filter(|file| written_by_people(file)) {
+        let all = paragraphs(&read(&file));
+        assert!(!all.is_empty(), "{file}: no words");
         for paragraph in all {
             let words = paragraph.split_whitespace().count();
             assert!(words <= MOST_WORDS, "{file}: a paragraph of {words} words:{paragraph}");
         }
     }
     // The test must be able to fail.
-    let long = format!("one\n\n{}\n- an item\n", "word ".repeat(90));
+    let long = format!("one\n\n{}\n- an item\n1. another\n", "word ".repeat(90));
     let words: Vec<usize> = paragraphs(&long).iter().map(|p| p.split_whitespace().count()).collect();
-    assert_eq!(words, [1, 90, 3]);
+    assert_eq!(words, [1, 90, 3, 2]);
+}
+
+/// Expected: the README is one screen or two, and its pictures and those of the guide are small.
+#[test]
+fn the_readme_is_short_and_pictures_are_small() {
+    assert!(read("README.md").lines().count() <= 80);
+    let mut pictures = 0;
+    for entry in std::fs::read_dir(root().join("docs/guide/pictures")).unwrap() {
+        let entry = entry.unwrap();
+        let bytes = entry.metadata().unwrap().len();
+        assert!(bytes <= 80 * 1024, "{}: {bytes} bytes", entry.path().display());
+        pictures += 1;
+    }
+    assert!(pictures >= 8, "{pictures}");
 }
 
 /// Expected: who searches README or docs for a standard term of rendering or training finds it.
 #[test]
 fn standard_terms_are_found() {
-    let text = ["README.md", "docs/glossary.md", "docs/results.md"].map(read).join("\n").to_lowercase();
+    let text = documents().iter().map(|file| read(file)).collect::<String>().to_lowercase();
     for term in [
         "russian roulette",
         "loss",
@@ -71,46 +102,218 @@ fn standard_terms_are_found() {
         "checksum",
         "prediction",
         "trainer",
+        "linear blend skinning",
+        "phyllotaxis",
+        "bootstrap",
     ] {
         assert!(text.contains(term), "nobody finds `{term}`");
     }
 }
 
+/// Expected: every page of the book stands in its list, once, and everything in the list is a page.
 #[test]
-fn the_page_in_the_readme_is_a_page() {
-    let pages = blocks(&read("README.md"), "ron");
-    assert!(!pages.is_empty());
-    for page in pages {
-        let page = RonFile { path: "scenes/readme.ron".into(), text: page };
-        let desc: FieldDesc = page.parse().unwrap_or_else(|e| panic!("{e}"));
-        let species = desc.crops.iter().map(|c| &c.species).chain(desc.weeds.iter().map(|w| &w.species));
-        for file in species {
-            page.need_file(file).unwrap_or_else(|e| panic!("{e}"));
+fn every_page_is_in_the_summary() {
+    let summary = links(&read("docs/SUMMARY.md"));
+    for page in pages() {
+        let listed = summary.iter().filter(|link| format!("docs/{link}") == page).count();
+        assert_eq!(listed, 1, "{page} stands {listed} times in docs/SUMMARY.md");
+    }
+    for link in &summary {
+        let path = format!("docs/{link}");
+        assert!(root().join(&path).is_file() || generated(&path), "docs/SUMMARY.md lists {link}");
+    }
+}
+
+/// A path with its `..` taken back, relative to the repository; `None` where it leads out.
+fn joined(folder: &str, link: &str) -> Option<String> {
+    let mut parts: Vec<&str> = folder.split('/').filter(|part| !part.is_empty()).collect();
+    for part in link.split('/') {
+        match part {
+            ".." => {
+                parts.pop()?;
+            }
+            "." | "" => {}
+            part => parts.push(part),
         }
     }
+    Some(parts.join("/"))
+}
+
+/// What is wrong with a link of a page; `None` for one that leads somewhere.
+fn fault(page: &str, text: &str, link: &str) -> Option<String> {
+    if link.contains("://") {
+        return None;
+    }
+    let (path, anchor) = link.split_once('#').unwrap_or((link, ""));
+    let folder = page.rsplit_once('/').map_or("", |(folder, _)| folder);
+    let to = if path.is_empty() { Some(page.to_owned()) } else { joined(folder, path) };
+    let Some(to) = to else { return Some("it leaves the repository".into()) };
+    if page.starts_with("docs/") && !to.starts_with("docs/") {
+        return Some("it leaves the book".into());
+    }
+    if !root().join(&to).exists() {
+        return (!generated(&to)).then(|| format!("{to} is not there"));
+    }
+    if anchor.is_empty() {
+        return None;
+    }
+    let known = anchors(&if path.is_empty() { text.to_owned() } else { read(&to) });
+    (!known.iter().any(|a| a == anchor)).then(|| format!("{to} has no heading #{anchor}: {known:?}"))
+}
+
+#[test]
+fn every_link_leads_somewhere() {
+    let mut checked = 0;
+    for page in documents().into_iter().chain(["CHANGELOG.md".into(), "docs/SUMMARY.md".into()]) {
+        let text = read(&page);
+        for link in links(&text) {
+            let fault = fault(&page, &text, &link);
+            assert!(fault.is_none(), "{page}: the link to {link}: {}", fault.unwrap_or_default());
+            checked += 1;
+        }
+    }
+    assert!(checked > 100, "{checked}");
+    // The test must be able to fail.
+    let page = "# One heading\n\n[a](b.md) [b](guide/lessons.md#8-condition) [c](#one-heading) [d](../README.md) [e](#two) [f](../../x)\n";
+    let faults: Vec<bool> = links(page).iter().map(|link| fault("docs/glossary.md", page, link).is_some()).collect();
+    assert_eq!(faults, [true, false, false, true, true, true]);
+}
+
+/// Expected: files that a page names in backticks are there, and so is the function of a test.
+#[test]
+fn files_and_tests_that_pages_name_are_there() {
+    let folders = ["scenes/", "src/", "tests/", "textures/", "benches/", "examples/", ".ci/", ".libtorch/", "docs/"];
+    let mut checked = 0;
+    for page in documents() {
+        for name in quoted(&read(&page)) {
+            let ours = name == "LICENSE" || folders.iter().any(|folder| name.starts_with(folder));
+            let pattern = ["/x.rs", "/x.ron", " ", "*", "…"].iter().any(|p| name.contains(p));
+            if !ours || pattern || page == "docs/reference/files.md" {
+                continue;
+            }
+            let (path, function) = name.split_once("::").unwrap_or((&name, ""));
+            assert!(root().join(path).exists(), "{page} names {name}");
+            if !function.is_empty() {
+                assert!(read(path).contains(&format!("fn {function}(")), "{page} names {name}");
+            }
+            checked += 1;
+        }
+    }
+    assert!(checked > 150, "{checked}");
+}
+
+/// Parses a piece of RON as a page says what it is; `None` for a file, which `tests/guide.rs` gives to the program.
+fn parsed(note: &str, text: &str) -> Option<furrow::Result<()>> {
+    let file = RonFile { path: "scenes/page.ron".into(), text: text.into() };
+    Some(match note {
+        "camera" => file.parse::<CameraDesc>().map(drop),
+        "sensor" => file.parse::<SensorDesc>().map(drop),
+        "light" => file.parse::<LightDesc>().map(drop),
+        "soil" => file.parse::<SoilDesc>().map(drop),
+        "model" => file.parse::<ModelDesc>().map(drop),
+        "leaf" => file.parse::<LeafDesc>().map(drop),
+        "scenes" => file.parse::<FieldDesc>().and_then(|desc| {
+            let mut species = desc.crops.iter().map(|c| &c.species).chain(desc.weeds.iter().map(|w| &w.species));
+            species.try_for_each(|name| file.need_file(name).map(drop))
+        }),
+        file if file.starts_with("file=") => return None,
+        _ => panic!("a block of RON says what it is: {note:?}"),
+    })
+}
+
+#[test]
+fn every_piece_of_ron_is_what_it_says() {
+    let mut kinds = std::collections::BTreeSet::new();
+    for page in documents().into_iter().filter(|page| written_by_people(page)) {
+        for block in blocks(&read(&page)).into_iter().filter(|block| block.language == "ron") {
+            if let Some(read) = parsed(&block.note, &block.text) {
+                read.unwrap_or_else(|e| panic!("{page}: {e}\n{}", block.text));
+            }
+            kinds.insert(block.note);
+        }
+    }
+    for kind in ["camera", "sensor", "light", "soil", "model", "leaf", "scenes"] {
+        assert!(kinds.contains(kind), "no page shows a {kind}");
+    }
+    assert!(
+        parsed("camera", "JaiAd130(hight_m: 1)").is_some_and(|read| read.is_err()),
+        "the test must be able to fail"
+    );
+}
+
+/// Expected: every command that a page shows is one that its program takes: subcommand, flags and values. `--help` stands behind each, so
+/// that it is parsed and not run.
+#[test]
+fn every_command_is_taken_by_its_program() {
+    let mut checked = 0;
+    for page in documents() {
+        for block in blocks(&read(&page)).into_iter().filter(|block| block.language == "sh") {
+            for command in commands(&block) {
+                // What the README's first line hands to `cargo run` is the program's.
+                let command = command
+                    .split_once("cargo run --release -- ")
+                    .map_or(command.clone(), |(_, rest)| format!("trace {rest}"));
+                let Some(program) = program(&command) else { continue };
+                if program == "train" && !cfg!(feature = "train") {
+                    continue;
+                }
+                let output = shell(&format!("{} --help", command.replace("target/release/", "")), root());
+                let words = String::from_utf8_lossy(&output.stderr);
+                assert!(output.status.success(), "{page}: {command}: {words}");
+                checked += 1;
+            }
+        }
+    }
+    assert!(checked > 40, "{checked}");
+    let wrong = format!("trace --scene {SMALL} --sp 3 --help");
+    assert!(!shell(&wrong, root()).status.success(), "the test must be able to fail");
 }
 
 #[test]
 fn the_test_command_is_the_one_that_is_run() {
-    let readme = read("README.md");
     let run = read(".ci/run");
-    let command = blocks(&readme, "sh").into_iter().find(|b| b.contains("cargo test")).unwrap();
-    assert_eq!(command.trim().lines().count(), 1);
-    assert_eq!(run.trim().lines().last().unwrap(), command.trim());
+    let all = blocks(&read("README.md"));
+    let command = all.iter().find(|b| b.language == "sh" && b.text.contains("cargo test")).unwrap().text.trim();
+    assert_eq!(command.lines().count(), 1);
+    assert_eq!(run.trim().lines().last().unwrap(), command);
 }
 
+/// Expected: each part of the results tells command, commit, seeds, split and machine above its tables.
 #[test]
-fn files_that_the_readme_names_are_there() {
-    let readme = read("README.md");
-    let mut checked = 0;
-    for name in readme.split('`').skip(1).step_by(2) {
-        let path = Path::new(name);
-        let ours =
-            ["scenes/", "src/", "tests/", "textures/", ".ci/", "LICENSE", "docs/"].iter().any(|f| name.starts_with(f));
-        if ours && !name.contains("/x.rs") && !name.contains("/x.ron") && !name.contains(' ') {
-            assert!(Path::new(env!("CARGO_MANIFEST_DIR")).join(path).exists(), "README.md names {name}");
-            checked += 1;
-        }
+fn every_result_says_how_it_was_measured() {
+    let results = read("docs/results.md");
+    let parts: Vec<&str> = results.split("\n## ").skip(1).collect();
+    assert!(parts.len() >= 6, "{}", parts.len());
+    for part in parts {
+        assert!(part.contains("| command | commit | seeds | split | machine |"), "{}", part.lines().next().unwrap());
     }
-    assert!(checked > 8, "{checked}");
+    assert!(results.find("> **What was tuned on what.**") < results.find("\n## "), "what was tuned stands on top");
+}
+
+/// Expected: the layers that people read are those that `tests/architecture.rs` holds the sources to.
+#[test]
+fn the_layers_are_those_of_the_library() {
+    let page = read("docs/ARCHITECTURE.md");
+    let library = read("src/lib.rs");
+    let rows = |text: &str, start: &str| -> Vec<String> {
+        let row = |line: &str| line.strip_prefix(start).map(|row| row.replace(['[', ']'], ""));
+        let layer = |row: &String| row.split('|').nth(1).is_some_and(|n| n.trim().parse::<u32>().is_ok());
+        text.lines().filter_map(row).filter(layer).collect()
+    };
+    let (told, held) = (rows(&page, ""), rows(&library, "//! "));
+    assert!(held.len() > 10);
+    assert_eq!(told, held);
+}
+
+/// Expected: pages that `tests/guide.rs` runs are those that CONTRIBUTING lists, and files are written in no other page.
+#[test]
+fn the_pages_that_are_run_are_listed() {
+    let listed: Vec<String> =
+        quoted(&read("CONTRIBUTING.md")).into_iter().filter(|n| n.starts_with("guide/")).collect();
+    assert_eq!(listed, book::RUN);
+    for page in pages() {
+        let writes = blocks(&read(&page)).iter().any(|block| block.note.starts_with("file="));
+        let run = book::RUN.iter().any(|name| page == format!("docs/{name}"));
+        assert!(!writes || run, "{page} writes files and is not run");
+    }
 }
