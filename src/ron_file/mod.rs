@@ -4,7 +4,7 @@
 //! value, `blame` puts an error at the place that a path of fields and items ([`Step`]) leads to. [`Num`] and [`Vary`] are
 //! the numbers of such files: fixed, or drawn for every field from a distribution, within the [`Bound`] that their type says.
 //!
-//! [`quantities`] lists the numbers and distributions of a text with their places, for programs that show or replace one.
+//! `quantities` lists the numbers and distributions of a text with their places, for programs that show or replace one.
 //!
 //! Types that read themselves from raw text use [`from_raw`]; what they refuse is a [`Fault`], which keeps its place.
 

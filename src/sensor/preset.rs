@@ -7,7 +7,6 @@ use super::settings::{SensorDesc, SensorWritten};
 use crate::ron_file::{self, Num, Vary};
 use serde::{Deserialize, Deserializer};
 
-/// What [`sensor`] knows.
 /// Names of sensors, each that of a camera too.
 pub const PRESETS: [&str; 3] = ["JaiAd130", "Phone", "MachineVision"];
 
