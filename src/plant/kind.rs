@@ -44,7 +44,7 @@ pub enum Shape {
         /// Angle between rachis and leaflet, lowest pair and foremost.
         spread_deg: (Num<Positive>, Num<Positive>),
         /// Length of a leaflet at the rachis' tip over that of those beside it; 0 for none. With one, the pairs stand below the tip.
-        #[serde(default = "num::<NonNegative, 0>", skip_serializing_if = "is_zero")]
+        #[serde(default = "num::<NonNegative, 0>", skip_serializing_if = "Num::is_zero")]
         terminal: Num<NonNegative>,
     },
 }
@@ -139,11 +139,6 @@ fn blade() -> OrganKind {
 
 fn stalk() -> String {
     "stalk".into()
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
-fn is_zero(number: &Num<NonNegative>) -> bool {
-    number.get() == 0.0
 }
 
 fn num<B: crate::ron_file::Bound, const N: i32>() -> Num<B> {

@@ -67,9 +67,7 @@ fn variant(types: &Types, part: &Part<'_>, path: &[&str]) -> String {
     if let Some(example) = part.example.filter(|_| path.is_empty()) {
         return format!("{}{example}", part.name);
     }
-    if !part.schema.get("type").is_some_and(|t| t != "string" || part.schema.get("const").is_none())
-        && part.schema.get("$ref").is_none()
-    {
+    if part.schema.is_null() {
         return part.name.into();
     }
     let inside = value(types, part.schema, path);

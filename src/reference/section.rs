@@ -43,10 +43,11 @@ impl Section {
     }
 }
 
-/// The unit that a field's name tells.
+/// The unit that a field's name tells: by its end where the table has a `_` before it, else by the whole name.
 pub(super) fn unit(name: &str) -> &'static str {
-    const UNITS: [(&str, &str); 14] = [
+    const UNITS: [(&str, &str); 18] = [
         ("_m_s", "m/s"),
+        ("_per_m2", "m⁻²"),
         ("per_m2", "m⁻²"),
         ("_m", "m"),
         ("_mm", "mm"),
@@ -60,10 +61,12 @@ pub(super) fn unit(name: &str) -> &'static str {
         ("AgeDays", "days"),
         ("chlorophyll", "µg/cm²"),
         ("carotenoid", "µg/cm²"),
+        ("anthocyanin", "µg/cm²"),
+        ("water", "cm"),
+        ("dry_matter", "g/cm²"),
     ];
-    // A table of days by stage is no number of days.
-    let unit = UNITS.iter().find(|(end, _)| name.ends_with(end)).map_or("", |(_, unit)| unit);
-    if name == "cover_days" { "" } else { unit }
+    let is = |of: &str| if of.starts_with('_') { name.ends_with(of) } else { name == of };
+    UNITS.iter().find(|(of, _)| is(of)).map_or("", |(_, unit)| unit)
 }
 
 /// Doc comments as readers see them: no code, no links, one line a paragraph.

@@ -46,11 +46,11 @@ pub(super) fn path_at(text: &str, offset: usize) -> Vec<&str> {
         if !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || c == '_') {
             path.push(name);
         }
-        let inside =
-            entries(text, &at).into_iter().find(|entry| entry.value.start <= offset && offset < entry.value.end);
-        let Some(entry) = inside else { break };
-        path.extend(entry.field);
-        at = entry.value;
+        let Some((key, value)) = members(text, &at).into_iter().find(|(_, value)| value.contains(&offset)) else {
+            break;
+        };
+        path.extend(key.filter(is_field));
+        at = value;
     }
     path
 }
@@ -59,10 +59,9 @@ pub(super) fn path_at(text: &str, offset: usize) -> Vec<&str> {
 /// no such value.
 pub(super) fn lacks(text: &str, parent: &str, field: &str) -> Option<usize> {
     let start = skip(text, 0);
-    let whole = entries(text, &(start..value_end(text, start)));
-    let value = whole.into_iter().find(|entry| entry.field == Some(parent))?.value;
+    let value = find(text, &(start..value_end(text, start)), Step::Field(parent))?;
     let open = text[value.clone()].find('(')? + value.start;
-    (!entries(text, &value).iter().any(|entry| entry.field == Some(field))).then_some(open + 1)
+    find(text, &value, Step::Field(field)).is_none().then_some(open + 1)
 }
 
 /// Names of the fields that stand beside a byte of the text, in the innermost brackets about it.
@@ -70,50 +69,29 @@ pub(super) fn fields_around(text: &str, offset: usize) -> Vec<&str> {
     let start = skip(text, 0);
     let mut at = start..value_end(text, start);
     loop {
-        let all = entries(text, &at);
-        match all.iter().find(|entry| entry.value.start <= offset && offset < entry.value.end) {
-            Some(entry) => at = entry.value.clone(),
-            None => return all.into_iter().filter_map(|entry| entry.field).collect(),
+        let all = members(text, &at);
+        match all.iter().find(|(_, value)| value.contains(&offset)) {
+            Some((_, value)) => at = value.clone(),
+            None => return all.into_iter().filter_map(|(key, _)| key.filter(is_field)).collect(),
         }
     }
-}
-
-/// A field, or an item, of a bracketed value.
-struct Inside<'a> {
-    /// The field's name; `None` for items and for keys in quotes.
-    field: Option<&'a str>,
-    value: Range<usize>,
-}
-
-fn entries<'a>(text: &'a str, whole: &Range<usize>) -> Vec<Inside<'a>> {
-    let mut all = Vec::new();
-    let Some(open) = text[whole.clone()].find(['(', '[', '{']).map(|i| whole.start + i) else { return all };
-    let mut at = skip(text, open + 1);
-    while at < whole.end && !text[at..].starts_with([')', ']', '}']) {
-        let end = value_end(text, at);
-        let key = key_end(text, at).filter(|k| text[skip(text, *k)..].starts_with(':'));
-        let value = key.map_or(at, |k| skip(text, skip(text, k) + 1).min(end));
-        let field = key.map(|k| &text[at..k]).filter(|name| !name.starts_with('"'));
-        all.push(Inside { field, value: value..end });
-        at = skip(text, end);
-        if !text[at..].starts_with(',') {
-            break;
-        }
-        at = skip(text, at + 1);
-    }
-    all
 }
 
 /// The value one step into the bracketed value at `whole`.
 fn find(text: &str, whole: &Range<usize>, step: Step<'_>) -> Option<Range<usize>> {
     let wanted = |(number, (key, _)): &(usize, (Option<&str>, Range<usize>))| match step {
-        Step::Field(name) => *key == Some(name),
+        Step::Field(name) => key.is_some_and(|key| key.trim_matches('"') == name),
         Step::Item(n) => n == *number,
     };
     members(text, whole).into_iter().enumerate().find(wanted).map(|(_, (_, value))| value)
 }
 
-/// The values one step into the bracketed value at `whole`, each with its field's name or its key where it has one.
+/// Whether a member's key is the name of a field, not a key of a table, which stands in quotes.
+fn is_field(key: &&str) -> bool {
+    !key.starts_with('"')
+}
+
+/// The values one step into the bracketed value at `whole`, each with its field's name, or its key as it is written, where it has one.
 pub(super) fn members<'t>(text: &'t str, whole: &Range<usize>) -> Vec<(Option<&'t str>, Range<usize>)> {
     let mut all = Vec::new();
     let Some(open) = text[whole.clone()].find(['(', '[', '{']) else { return all };
@@ -121,9 +99,7 @@ pub(super) fn members<'t>(text: &'t str, whole: &Range<usize>) -> Vec<(Option<&'
     while at < whole.end && !text[at..].starts_with([')', ']', '}']) {
         let end = value_end(text, at);
         let (key, value) = match key_end(text, at).map(|k| (k, skip(text, k))) {
-            Some((k, colon)) if text[colon..].starts_with(':') => {
-                (Some(text[at..k].trim_matches('"')), skip(text, colon + 1))
-            }
+            Some((k, colon)) if text[colon..].starts_with(':') => (Some(&text[at..k]), skip(text, colon + 1)),
             _ => (None, at),
         };
         all.push((key, value.min(end)..end));

@@ -63,7 +63,7 @@ fn gather(text: &str, whole: &Range<usize>, path: String, depth: usize, all: &mu
     for (number, (key, at)) in inner.into_iter().enumerate() {
         let dot = if path.is_empty() { "" } else { "." };
         let path = match (key, name) {
-            (Some(key), _) => format!("{path}{dot}{key}"),
+            (Some(key), _) => format!("{path}{dot}{}", key.trim_matches('"')),
             // A variant that holds one value: `AgeDays(20)`.
             (None, Some(name)) if alone => format!("{path}{dot}{name}"),
             (None, _) => format!("{path}[{number}]"),

@@ -22,10 +22,6 @@ pub const DRAWN: &str = "number or distribution";
 /// A value, or one of several.
 pub const PICKED: &str = "value or choice";
 
-fn number<B: Bound>(kind: &str) -> Schema {
-    json_schema!({ "type": "number", "x-kind": kind, "x-range": B::WORDS })
-}
-
 /// Names of the fields that a struct or variant of `T`'s file must have: that of this name which has the field `missing`.
 pub(super) fn required<T: JsonSchema>(name: &str, missing: &str) -> Vec<String> {
     fn look(schema: &Value, key: Option<&str>, name: &str, missing: &str) -> Option<Vec<String>> {
@@ -46,32 +42,27 @@ pub(super) fn required<T: JsonSchema>(name: &str, missing: &str) -> Vec<String> 
     look(&schema, None, name, missing).unwrap_or_default()
 }
 
-impl<B: Bound> JsonSchema for Num<B> {
-    fn inline_schema() -> bool {
-        true
-    }
+macro_rules! numbers {
+    ($($name:ident => $kind:expr,)*) => {$(
+        impl<B: Bound> JsonSchema for $name<B> {
+            fn inline_schema() -> bool {
+                true
+            }
 
-    fn schema_name() -> Cow<'static, str> {
-        "Num".into()
-    }
+            fn schema_name() -> Cow<'static, str> {
+                stringify!($name).into()
+            }
 
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        number::<B>(FIXED)
-    }
+            fn json_schema(_: &mut SchemaGenerator) -> Schema {
+                json_schema!({ "type": "number", "x-kind": $kind, "x-range": B::WORDS })
+            }
+        }
+    )*};
 }
 
-impl<B: Bound> JsonSchema for Vary<B> {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> Cow<'static, str> {
-        "Vary".into()
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        number::<B>(DRAWN)
-    }
+numbers! {
+    Num => FIXED,
+    Vary => DRAWN,
 }
 
 impl<T: JsonSchema> JsonSchema for Pick<T> {

@@ -195,7 +195,7 @@ impl Library {
                 let cut = self.picture(&own, path, range)?;
                 // Pictures that the program drew are sound.
                 if !leaf.calibrated {
-                    self.told.entry(full.clone()).or_default().extend(doubt(path, cut.mask.as_deref()));
+                    self.told.entry(full.clone()).or_default().extend(unlikely(path, cut.mask.as_deref()));
                 }
                 all.push(cut);
             }
@@ -377,7 +377,7 @@ fn read_off(albedo: &Texture) -> Height {
 const WHOLE: f64 = 0.95;
 
 /// What looks wrong with a photograph of a leaf.
-fn doubt(path: &str, mask: Option<&AlphaMask>) -> Option<String> {
+fn unlikely(path: &str, mask: Option<&AlphaMask>) -> Option<String> {
     let Some(mask) = mask else {
         return Some(format!(
             "{path} has no transparent pixels, so its whole rectangle is the blade; cut the leaf out"

@@ -3,7 +3,6 @@
 mod builder;
 mod census;
 mod condition;
-mod doubts;
 mod field;
 mod ground;
 mod identity;
@@ -12,6 +11,7 @@ mod known;
 mod lighting;
 mod models;
 mod season;
+mod unlikely;
 mod view;
 
 use super::desc::{FieldDesc, Growth, SpeciesDesc};
@@ -257,8 +257,8 @@ impl<'a> Builder<'a> {
         let wanted = self.desc.soil.is_some() || !self.desc.crops.is_empty() || !self.desc.weeds.is_empty();
         let View { area: view, open } = if wanted { self.view()? } else { View::NONE };
         let (sown, shown) = (view.grown(PLANT_MARGIN), wanted.then_some(view));
-        self.doubt_camera();
-        self.doubt_plants()?;
+        self.warn_of_camera();
+        self.warn_of_plants()?;
         let mut known = None;
         let planted;
         let mut plants = match &self.desc.soil {
@@ -297,7 +297,7 @@ impl<'a> Builder<'a> {
         };
         let species = self.species()?;
         known::number_kinds(&mut plants, &species);
-        self.doubt_view(&plants, shown);
+        self.warn_of_view(&plants, shown);
         let conditions = Conditions {
             camera: self.scene.camera.record(),
             sensor: self.desc.sensor.build(&mut self.stream(Purpose::Sensor, 0)).record(),

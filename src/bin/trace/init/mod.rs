@@ -1,7 +1,7 @@
 //! `trace init`: a folder to begin with: a scene file with comments, the species and textures that it names, a page to read.
 
 use furrow::input::shipped;
-use furrow::output::write_atomically;
+use furrow::output::write_files;
 use furrow::ron_file::RonFile;
 use furrow::scene::desc::{FieldDesc, SpeciesDesc};
 use furrow::{Error, Result, cli};
@@ -25,14 +25,8 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     refuse_full(&args.dir)?;
     cli::check_folder(&args.dir)?;
     let files = files(&shipped::folder()?)?;
-    let mut paths = Vec::new();
-    for (name, bytes) in &files {
-        let path = args.dir.join(name);
-        let folder = path.parent().unwrap_or(&args.dir);
-        std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
-        write_atomically(&path, bytes)?;
-        paths.push(path);
-    }
+    let files: Vec<(&str, Vec<u8>)> = files.iter().map(|(name, bytes)| (name.as_str(), bytes.clone())).collect();
+    let paths = write_files(&args.dir, &files)?;
     furrow::tell!("{}: now run trace --scene {} --spp 16", args.dir.display(), args.dir.join("field.ron").display());
     Ok(paths)
 }

@@ -16,8 +16,8 @@ const WIDE_ROWS_M: f32 = 2.0;
 const HIGH_M: f32 = 5.0;
 
 impl Builder<'_> {
-    /// Doubts about the camera and the sensor.
-    pub(super) fn doubt_camera(&mut self) {
+    /// Warnings about the camera and the sensor.
+    pub(super) fn warn_of_camera(&mut self) {
         let height = self.scene.camera.pose().height();
         if height > HIGH_M {
             self.warnings.push(format!(
@@ -38,8 +38,8 @@ impl Builder<'_> {
         }
     }
 
-    /// Doubts about rows and growth stages of the crops that this field has, and about growth stages of its weeds and plants.
-    pub(super) fn doubt_plants(&mut self) -> Result<()> {
+    /// Warnings about rows and growth stages of the crops that this field has, and about growth stages of its weeds and plants.
+    pub(super) fn warn_of_plants(&mut self) -> Result<()> {
         let (page, desc) = (self.page, self.desc);
         for k in self.sown.clone() {
             let crop = &desc.crops[k];
@@ -64,8 +64,8 @@ impl Builder<'_> {
         Ok(())
     }
 
-    /// Doubts about what stands in view.
-    pub(super) fn doubt_view(&mut self, plants: &[PlantRecord], shown: Option<Rect>) {
+    /// Warnings about what stands in view.
+    pub(super) fn warn_of_view(&mut self, plants: &[PlantRecord], shown: Option<Rect>) {
         let (Some(view), false) = (shown, self.sown.is_empty()) else { return };
         let near = |plant: &&PlantRecord| view.grown(plant.radius).contains(plant.position.truncate());
         if plants.iter().filter(near).any(|plant| plant.class == Class::Crop) {
