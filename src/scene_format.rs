@@ -34,6 +34,8 @@ pub use crate::scatter::{ClustersDesc, RowsDesc, WeedsDesc};
 #[doc(inline)]
 pub use crate::scene::desc::{CropDesc, FieldDesc, Growth, ModelDesc, PlacedDesc, Role, SpeciesDesc, WeedDesc};
 #[doc(inline)]
+pub use crate::scene::drive::{DriveDesc, MountedDesc, PathDesc, ShakeDesc};
+#[doc(inline)]
 pub use crate::sensor::{
     AdcDesc, ApertureDesc, CameraDesc, DistortionDesc, ExposureDesc, IntrinsicsDesc, JpegDesc, MatrixDesc, MosaicDesc,
     MotionDesc, NoiseDesc, PoseDesc, PsfDesc, SensorDesc, SharpenDesc, Tone, WhiteBalanceDesc,

@@ -159,6 +159,7 @@ fn every_format_takes_an_image_that_little_is_known_of() {
             name: Set::name(2),
             source: Some("photo.jpg".into()),
             split: recipe.split.of(2),
+            capture: None,
             width: 4,
             height: 2,
             classes: Vec::new(),

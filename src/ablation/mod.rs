@@ -87,7 +87,12 @@ impl Edit {
         match self.change {
             Change::Lights(change) => change(&mut scene.lights),
             Change::Materials(feature) => scene.materials.iter_mut().for_each(|m| m.leave_out(feature)),
-            Change::Lens(change) => change(&mut scene.camera, &mut scene.filter),
+            Change::Lens(change) => {
+                change(&mut scene.camera, &mut scene.filter);
+                for capture in &mut field.captures {
+                    change(&mut capture.camera, &mut scene.filter);
+                }
+            }
             Change::Sensor(change) => change(&mut field.sensor),
             Change::Nothing | Change::Growth(_) | Change::Rendering(_) | Change::Photograph(_) | Change::Labels(_) => {}
         }

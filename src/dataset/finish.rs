@@ -49,7 +49,7 @@ pub fn lacks(set: &Set, missing: &[u64], shards: Option<u64>) -> Error {
     let again = match shards {
         None => "run `trace dataset render` again; it makes what is missing".to_owned(),
         Some(of) => {
-            let lacking: BTreeSet<u64> = missing.iter().map(|k| k % of).collect();
+            let lacking: BTreeSet<u64> = missing.iter().map(|k| set.recipe.field_of(*k).0 % of).collect();
             let lacking: Vec<u64> = lacking.into_iter().collect();
             format!("run the shards again that have them: --array={}", ranges(&lacking))
         }
@@ -128,7 +128,7 @@ fn manifest(set: &Set, files: &BTreeMap<String, Checksum>, out: &mut Stream<'_>)
     out.put("\n},\n\"images\": [")?;
     let image = |(index, hash): (u64, String)| {
         let name = Set::name(index);
-        Ok(serde_json::json!({ "index": index, "name": name, "split": recipe.split.of(index), "seal": hash }))
+        Ok(serde_json::json!({ "index": index, "name": name, "split": recipe.split_of(index), "seal": hash }))
     };
     out.items(seals.into_iter().map(image))?;
     out.put("],\n\"content_sha256\": ")?;

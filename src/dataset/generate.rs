@@ -5,7 +5,7 @@
 //! a part of another, and may take up all of it.) Memory grows with the images at once, not with the dataset.
 
 use super::checksum_record::{ChecksumRecord, write_files};
-use super::render::{Times, render, renderer, scene_file};
+use super::render::{Kept, Times, render, renderer, scene_file};
 use super::set::Set;
 use super::timing_log::{ImageTiming, TimingLog};
 use super::{File, format, native};
@@ -20,7 +20,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-/// Which of the images a run is for: those with index % of == number.
+/// Which of the images a run is for: those of the fields whose number % of == number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
     /// From 0.
@@ -32,6 +32,11 @@ pub struct Shard {
 impl Shard {
     /// All images.
     pub const ALL: Self = Self { number: 0, of: 1 };
+
+    /// Whether it holds a field.
+    pub fn holds(self, field: u64) -> bool {
+        field % self.of == self.number
+    }
 
     /// Reads `k/N`, k from 0 to N − 1.
     pub fn parse(text: &str) -> Result<Self, String> {
@@ -101,13 +106,17 @@ pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()>
     let all = Threads::new(work.threads)?;
     let threads = all.count();
     let shard = work.shard;
-    let wanted: Vec<u64> = (0..set.recipe.count).filter(|k| k % shard.of == shard.number).collect();
+    let held = |k: &u64| shard.holds(set.recipe.field_of(*k).0);
+    let wanted: Vec<u64> = (0..set.recipe.count).filter(held).collect();
     let tasks: Vec<(u64, Task)> =
         all.install(|| wanted.into_par_iter().map(|k| task(set, k).map(|t| (k, t))).collect::<Result<Vec<_>>>())?;
     let wanted = tasks.len();
     let tasks: Vec<(u64, Task)> = tasks.into_iter().filter(|(_, t)| *t != Task::Done).collect();
     (callbacks.begin)(tasks.len());
-    let at_once = if work.at_once == 0 { threads.min(MOST_AT_ONCE) } else { work.at_once }.min(tasks.len()).max(1);
+    // Images of one field follow each other on one worker, which grows it once.
+    let fields: Vec<&[(u64, Task)]> =
+        tasks.chunk_by(|a, b| set.recipe.field_of(a.0).0 == set.recipe.field_of(b.0).0).collect();
+    let at_once = if work.at_once == 0 { threads.min(MOST_AT_ONCE) } else { work.at_once }.min(fields.len()).max(1);
     let workers: Vec<Threads> =
         (0..at_once).map(|worker| Threads::new(share(threads, at_once, worker))).collect::<Result<_>>()?;
     let run = Run {
@@ -135,15 +144,18 @@ pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()>
     std::thread::scope(|scope| {
         for worker in &workers {
             scope.spawn(|| {
-                while !stopped() && !failed.load(Ordering::Relaxed) {
-                    let Some((index, task)) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
-                    match worker.install(|| run.image(*index, *task, worker)) {
-                        Ok(()) => {
-                            made.fetch_add(1, Ordering::Relaxed);
-                            (callbacks.done)(*index);
+                let ended = || stopped() || failed.load(Ordering::Relaxed);
+                while let Some(field) = fields.get(next.fetch_add(1, Ordering::Relaxed)).filter(|_| !ended()) {
+                    let mut kept = Kept::default();
+                    for (index, task) in field.iter().take_while(|_| !ended()) {
+                        match worker.install(|| run.image(*index, *task, worker, &mut kept)) {
+                            Ok(()) => {
+                                made.fetch_add(1, Ordering::Relaxed);
+                                (callbacks.done)(*index);
+                            }
+                            Err(e) if e.kind() == Kind::Interrupted => break,
+                            Err(e) => fail(*index, e),
                         }
-                        Err(e) if e.kind() == Kind::Interrupted => break,
-                        Err(e) => fail(*index, e),
                     }
                 }
             });
@@ -220,7 +232,7 @@ pub(super) fn remaining(set: &Set, checksums: &ChecksumRecord) -> Result<Task> {
     }
     let mut task = Task::Done;
     for (name, format) in format::all(&set.recipe)? {
-        if !checksums.files.keys().any(|path| in_format(path, name)) {
+        if format.has_images() && !checksums.files.keys().any(|path| in_format(path, name)) {
             if format.needs_film() {
                 return Ok(Task::All);
             }
@@ -248,7 +260,7 @@ struct Run<'a> {
 
 impl Run<'_> {
     /// Makes one image and writes its checksums.
-    fn image(&self, index: u64, task: Task, threads: &Threads) -> Result<()> {
+    fn image(&self, index: u64, task: Task, threads: &Threads, kept: &mut Kept) -> Result<()> {
         let begin = Instant::now();
         let Set { folder, recipe } = self.set;
         // Another run may have made it meanwhile.
@@ -260,7 +272,7 @@ impl Run<'_> {
         } else {
             let (scene, renderer) = self.source.as_ref().ok_or_else(|| lost(self.set, index))?;
             let watch = Watch { done: &|_| (), stop: self.callbacks.now };
-            let made = render(self.set, &scene.clone().threads(threads), index, renderer, watch)?;
+            let made = render(self.set, &scene.clone().threads(threads), index, renderer, watch, kept)?;
             super::invariants::check(recipe, &made.sample)?;
             let mut files = native::files(&made.sample, &made.text)?;
             files.extend(formatted(self.set, &made.sample)?);

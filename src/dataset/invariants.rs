@@ -97,7 +97,7 @@ fn numbers(recipe: &Recipe, sample: &Sample) -> Vec<String> {
     if let Some(most) = sample.species.iter().max().filter(|m| usize::from(**m) > known) {
         all.push(format!("species {most} is not among the {known} of the recipe"));
     }
-    if record.split != recipe.split.of(record.index) {
+    if record.split != recipe.split_of(record.index) {
         all.push(format!("it is in the split {}, where it does not belong", record.split.name()));
     }
     let points = record

@@ -41,6 +41,8 @@ pub mod cluster;
 #[doc(hidden)]
 pub mod finish;
 #[doc(hidden)]
+pub mod flow;
+#[doc(hidden)]
 pub mod format;
 mod gather;
 #[doc(hidden)]

@@ -93,6 +93,7 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
             scene,
             scene_sha256,
             seed: field.seed,
+            captures: source.captures(),
             width: camera.width(),
             height: camera.height(),
             engine: options.engine,

@@ -3,7 +3,7 @@
 //! Everything that decides a byte of an image stands here or in the `scene/` beside it, and nothing else does: no clock, no path
 //! of a machine, no number of threads. So any shard on any machine that has the folder can go on with it.
 
-use super::split::Shares;
+use super::split::{Shares, Split};
 use crate::ablation::{self, Edit};
 use crate::input::{Scope, below};
 use crate::scene::record::SpeciesRecord;
@@ -54,8 +54,11 @@ pub struct Rendering {
     pub scene: String,
     /// SHA-256 of the scene file and every species file, texture and table that it names.
     pub scene_sha256: String,
-    /// Seed; image k is field k of the scene file with this seed.
+    /// Seed; image k is field k of the scene file with this seed, or belongs to field k / `captures`.
     pub seed: u64,
+    /// How many images are taken of each field, one after another.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub captures: u64,
     /// Pixels across.
     pub width: u32,
     /// Pixels down.
@@ -77,6 +80,15 @@ pub struct Rendering {
     /// What was changed of the field, by its name among [`ablation::EDITS`]. What an edit of the drawing changes stands above as well.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub edit: Option<String>,
+}
+
+fn one() -> u64 {
+    1
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference to the field")]
+fn is_one(captures: &u64) -> bool {
+    *captures == 1
 }
 
 impl Rendering {
@@ -138,6 +150,24 @@ impl Recipe {
     pub fn fingerprint(&self) -> Result<String> {
         let same = Self { count: 0, formats: Vec::new(), licence: String::new(), ..self.clone() };
         Ok(hex::encode(Sha256::digest(json(&same)?)))
+    }
+
+    /// How many images are taken of each field; 1 of what was imported.
+    pub fn captures(&self) -> u64 {
+        match &self.made {
+            Made::Rendered(rendering) => rendering.captures.max(1),
+            Made::Imported { .. } => 1,
+        }
+    }
+
+    /// The field that an image shows, and which image of it this is.
+    pub fn field_of(&self, index: u64) -> (u64, u64) {
+        (index / self.captures(), index % self.captures())
+    }
+
+    /// The split of an image: all images of a field are in one.
+    pub fn split_of(&self, index: u64) -> Split {
+        self.split.of(self.field_of(index).0)
     }
 
     /// How it is rendered; an error for images from elsewhere.

@@ -21,6 +21,9 @@ pub struct Record {
     pub source: Option<String>,
     /// Which split it is in.
     pub split: Split,
+    /// Which image of its field it is, where several are taken.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub capture: Option<CaptureRecord>,
     /// Pixels across.
     pub width: u32,
     /// Pixels down.
@@ -52,6 +55,19 @@ fn sorted<S: Serializer>(conditions: &Option<Conditions>, serializer: S) -> Resu
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference to the field")]
 fn is_zero(n: &u64) -> bool {
     *n == 0
+}
+
+/// One image of a drive or of a rig.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CaptureRecord {
+    /// Number of the field.
+    pub field: u64,
+    /// How many images its camera took before.
+    pub frame: u32,
+    /// Name of the camera.
+    pub camera: String,
+    /// When, seconds after the first image.
+    pub time_s: f64,
 }
 
 /// How the sensor was set: by these numbers the photographs are the radiance's.

@@ -2,13 +2,15 @@
 
 use super::annotate::{self, keypoint, of_255};
 use super::recipe::{self, Recipe};
-use super::record::{Exposure, Grown, Leaf, Plant, Record, Seen};
+use super::record::{CaptureRecord, Exposure, Grown, Leaf, Plant, Record, Seen};
 use super::sample::{Rendered, Sample};
 use super::set::Set;
-use crate::job::{Image, Renderer, Request, SceneFile};
+use super::{flow, format};
+use crate::job::{Field, Image, Renderer, Request, SceneFile};
 use crate::output::half;
 use crate::render::{self, LabelMap, Watch};
-use crate::scene::{Field, PlantRecord};
+use crate::scene::drive::Capture;
+use crate::scene::{self, PlantRecord};
 use crate::settings::Engine;
 use crate::{Error, Result};
 use std::collections::BTreeMap;
@@ -70,6 +72,31 @@ pub fn renderer(set: &Set) -> Result<Option<Renderer>> {
     Ok(Some(renderer))
 }
 
+/// The field that was grown last, for the next image of it.
+#[derive(Default)]
+pub struct Kept(Option<Field>);
+
+impl Kept {
+    /// The field that an image of a dataset shows, as that image has it, and how long it took to grow and build it now.
+    fn at(&mut self, set: &Set, scene_file: &SceneFile, index: u64) -> Result<(&Field, Duration)> {
+        let Set { folder, recipe } = set;
+        let rendering = recipe.rendering()?;
+        let (number, capture) = recipe.field_of(index);
+        let known = self.0.take().filter(|field| field.grown().index == number);
+        let new = known.is_none();
+        let mut field = known.map_or_else(|| scene_file.field(number), Ok)?;
+        if field.grown().hash != rendering.scene_sha256 {
+            let help = format!("restore {}/scene/, or begin another dataset", folder.display());
+            let words = "the scene file or something that it names was changed since the dataset was begun";
+            return Err(Error::misuse(words).help(help).in_file(folder.join(&rendering.scene)));
+        }
+        field.take(capture)?;
+        field.geometry()?;
+        let (grow, build) = field.times();
+        Ok((self.0.insert(field), if new { grow + build } else { Duration::ZERO }))
+    }
+}
+
 /// Makes image `index` of a dataset from its [`scene_file`], whose threads do the work.
 pub fn render(
     set: &Set,
@@ -77,41 +104,41 @@ pub fn render(
     index: u64,
     renderer: &Renderer,
     watch: Watch<'_>,
+    kept: &mut Kept,
 ) -> Result<RenderedSample> {
-    let Set { folder, recipe } = set;
-    let rendering = recipe.rendering()?;
-    let field = scene_file.field(index)?;
-    if field.grown().hash != rendering.scene_sha256 {
-        let help = format!("restore {}/scene/, or begin another dataset", folder.display());
-        return Err(Error::misuse("the scene file or something that it names was changed since the dataset was begun")
-            .help(help)
-            .in_file(folder.join(&rendering.scene)));
-    }
-    field.geometry()?;
-    let (grow, build) = field.times();
-    let image = renderer.render(&field, &Request { watch, ..Request::default() })?;
+    let (field, grow) = kept.at(set, scene_file, index)?;
+    let image = renderer.render(field, &Request { watch, ..Request::default() })?;
     image.check_denoised()?;
     let begin = Instant::now();
     let (draw, label) = (image.times.draw, image.times.label);
     let text = image.provenance.photograph_text(image.denoised.is_some());
-    let sample = field.threads().install(|| describe(recipe, image));
-    Ok(RenderedSample { sample, text, times: Times { grow: grow + build, draw, label: label + begin.elapsed() } })
+    let sample = field.threads().install(|| describe(&set.recipe, index, image))?;
+    Ok(RenderedSample { sample, text, times: Times { grow, draw, label: label + begin.elapsed() } })
 }
 
 /// The sample of an image.
-fn describe(recipe: &Recipe, image: Image<'_>) -> Sample {
+fn describe(recipe: &Recipe, index: u64, image: Image<'_>) -> Result<Sample> {
     let photograph = image.photograph();
     let field = image.field().grown();
+    let flows = if format::all(recipe)?.iter().any(|(_, format)| format.needs_flow()) {
+        flow::flows(&field.captures, field.capture, &image.labels.depth, image.field().geometry()?)
+    } else {
+        Vec::new()
+    };
     let tags = field.scene.tags();
     let Image { film, labels, .. } = image;
     let kinds: BTreeMap<u16, u16> = field.plants.iter().map(|p| (p.number, p.kind)).collect();
     let kind = |plant: u16| kinds.get(&plant).copied().unwrap_or(0);
     let mut sample = Sample {
         record: Record {
-            index: field.index,
-            name: Set::name(field.index),
+            index,
+            name: Set::name(index),
             source: None,
-            split: recipe.split.of(field.index),
+            split: recipe.split_of(index),
+            capture: (recipe.captures() > 1).then(|| {
+                let Capture { name, frame, time_s, .. } = &field.captures[field.capture];
+                CaptureRecord { field: field.index, frame: *frame, camera: name.clone(), time_s: *time_s }
+            }),
             width: film.window.width(),
             height: film.window.height(),
             classes: Vec::new(),
@@ -139,12 +166,12 @@ fn describe(recipe: &Recipe, image: Image<'_>) -> Sample {
     };
     (sample.record.classes, sample.record.ignored) = annotate::classes(&sample);
     sample.record.plants = plants(field, &labels, &sample);
-    sample.film = Some(Rendered { film, labels, tags });
-    sample
+    sample.film = Some(Rendered { film, labels, tags, flows });
+    Ok(sample)
 }
 
 /// The plants of a field that its image shows or hides, in the order of their numbers.
-fn plants(field: &Field, labels: &LabelMap, sample: &Sample) -> Vec<Plant> {
+fn plants(field: &scene::Field, labels: &LabelMap, sample: &Sample) -> Vec<Plant> {
     let extents = render::extents(&field.scene, labels);
     let camera = &field.scene.camera;
     let mut shown: BTreeMap<u16, Plant> = annotate::plants(sample).into_iter().map(|p| (p.number, p)).collect();

@@ -41,6 +41,19 @@ pub struct Rendered {
     pub labels: LabelMap,
     /// Class, plant and leaf of each part.
     pub tags: Vec<crate::scene::tag::Tag>,
+    /// Where what this image shows lies in others of its field; none unless a format asks for it.
+    pub flows: Vec<Flow>,
+}
+
+/// Where what is at each pixel's centre lies in another image of the same field.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Flow {
+    /// Which image: `next` of the same camera, or another camera of the same frame by its name.
+    pub to: String,
+    /// From here to there, pixels right and down; not a number where nothing is, or behind the other lens.
+    pub pixels: Vec<[f32; 2]>,
+    /// Whether the other image shows it.
+    pub visible: Vec<bool>,
 }
 
 /// Stands for "no label" in [`Sample::semantics`].

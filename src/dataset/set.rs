@@ -36,7 +36,7 @@ impl Set {
 
     /// The names of a split's images, in the order of their numbers.
     pub fn names(&self, split: Split) -> Vec<String> {
-        (0..self.recipe.count).filter(|k| self.recipe.split.of(*k) == split).map(Self::name).collect()
+        (0..self.recipe.count).filter(|k| self.recipe.split_of(*k) == split).map(Self::name).collect()
     }
 
     /// The records of a split's images, read one by one in the order of their numbers.

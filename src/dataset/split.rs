@@ -1,8 +1,8 @@
 //! Training, validation and test images.
 //!
-//! Every image is a field of its own, with plants and ground of its own, so a split by images lets no plant and no patch of soil
-//! into two splits. Splits alternate in a fixed pattern over the image numbers: a longer dataset begins with the same images in
-//! the same splits, and every stretch of it is shared out alike.
+//! Every field has plants and ground of its own, and all its images are in one split, so no plant and no patch of soil is in two. Splits
+//! alternate in a fixed pattern over the numbers of the fields: a longer dataset begins with the same images in the same splits, and
+//! every stretch of it is shared out alike.
 
 use serde::{Deserialize, Serialize};
 
@@ -55,7 +55,7 @@ impl Shares {
         Ok(Self(shares.map(|n| n / divisor)))
     }
 
-    /// The split of an image.
+    /// The split of a field.
     pub fn of(self, index: u64) -> Split {
         let [train, val, test] = self.0.map(u64::from);
         let place = index % (train + val + test).max(1);

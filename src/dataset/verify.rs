@@ -4,7 +4,7 @@ use super::checksum::Checksum;
 use super::checksum_record::ChecksumRecord;
 use super::finish::{MANIFEST, lacks, ranges};
 use super::generate::Task;
-use super::render::{render, scene_file};
+use super::render::{Kept, render, scene_file};
 use super::set::Set;
 use super::split::Split;
 use super::{File, format, generate, invariants, native, timing_log};
@@ -133,7 +133,7 @@ fn shared_between_splits(set: &Set, looked: &[Looked]) -> Vec<String> {
     let mut places: BTreeMap<&str, BTreeSet<Split>> = BTreeMap::new();
     for (index, looked) in looked.iter().enumerate() {
         if let Some(hash) = &looked.photograph {
-            places.entry(hash).or_default().insert(set.recipe.split.of(index as u64));
+            places.entry(hash).or_default().insert(set.recipe.split_of(index as u64));
         }
     }
     let twice = places.values().filter(|splits| splits.len() > 1).count();
@@ -214,7 +214,7 @@ fn rerender(
     stop: &AtomicBool,
 ) -> Result<Option<String>> {
     let watch = Watch { done: &|_| (), stop };
-    let made = render(set, scene, index, renderer, watch)?;
+    let made = render(set, scene, index, renderer, watch, &mut Kept::default())?;
     let mut files = native::files(&made.sample, &made.text)?;
     for (_, format) in format::all(&set.recipe)? {
         files.extend(format.image(&set.recipe, &made.sample)?);

@@ -28,6 +28,23 @@ impl Field {
         &self.grown
     }
 
+    /// The same field as another of its images has it: `capture` counts from 0, all cameras of a frame and then those of the next. What was
+    /// grown and built is kept.
+    ///
+    /// # Errors
+    /// Where there are fewer images of it.
+    pub fn take(&mut self, capture: u64) -> Result<()> {
+        let captures = self.grown.captures.len();
+        let place = usize::try_from(capture).ok().filter(|place| *place < captures);
+        let place = place.ok_or_else(|| {
+            Error::misuse(format!("image {capture} of a field of which {captures} are taken")).help("they count from 0")
+        })?;
+        if place != self.grown.capture {
+            self.grown.take(place);
+        }
+        Ok(())
+    }
+
     /// What was changed of it.
     pub fn edit(&self) -> &'static Edit {
         self.edit

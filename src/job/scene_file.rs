@@ -78,6 +78,11 @@ impl SceneFile {
         self
     }
 
+    /// How many images are taken of each field.
+    pub fn captures(&self) -> u64 {
+        self.source.captures()
+    }
+
     /// Grows field `index`: always the same for the same file, seed and index, and without growing those before it.
     pub fn field(&self, index: u64) -> Result<Field> {
         let begin = Instant::now();

@@ -4,7 +4,7 @@ mod frame;
 mod spectrum;
 
 pub use frame::Frame;
-pub use glam::{DMat4, DQuat, DVec3, Mat3, Quat, Vec2, Vec3, Vec4, vec2, vec3};
+pub use glam::{DMat3, DMat4, DQuat, DVec3, Mat3, Quat, Vec2, Vec3, Vec4, vec2, vec3};
 pub use spectrum::Spectrum;
 
 /// Hermite step: 0 below `a`, 1 above `b`, smooth between.

@@ -8,6 +8,7 @@ use crate::plant::{ConditionDesc, PlantDesc, Stage};
 use crate::ron_file::{self, Finite, Fraction, NonNegative, Num, Pick, Positive, PositiveCount, Vary};
 use crate::sampling::Stream;
 use crate::scatter::{RowsDesc, WeedsDesc};
+use crate::scene::drive::{DriveDesc, MountedDesc};
 use crate::scene::tag::Class;
 use crate::sensor::{CameraDesc, SensorDesc};
 use crate::soil::SoilDesc;
@@ -35,6 +36,13 @@ pub struct FieldDesc {
     pub seed: u64,
     /// Who looks.
     pub camera: CameraDesc,
+    /// Further cameras that are carried with it: a stereo pair, a camera of near infrared with a lens of its own.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cameras: Vec<MountedDesc>,
+    /// A vehicle that carries them through the field and takes several images of it; one image of each camera unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "(frames: 20, path: AlongRows(speed_m_s: 0.5))"))]
+    pub drive: Option<DriveDesc>,
     /// How the film becomes a picture.
     #[serde(default)]
     pub sensor: SensorDesc,

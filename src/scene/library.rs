@@ -1,6 +1,7 @@
 //! Everything that scene files name, read once: species, pictures, soil layers.
 
 use super::desc::{ModelDesc, SpeciesDesc};
+use super::drive;
 use super::growing::Growing;
 use super::shipped::species as shipped_species;
 use crate::error::{Kind, Place};
@@ -12,6 +13,7 @@ use crate::math::{Spectrum, Vec2};
 use crate::model::{Model, Up};
 use crate::optics::{Pigments, soil};
 use crate::ron_file::{Pick, RENAMED, RonFile, Step, choose};
+use crate::sensor::Pose;
 use crate::soil::{LayerDesc, LayerMaps};
 use crate::texture::{ColorSpace, Height, HeightFromBrightness, Maps, Texture, Wrap};
 use crate::{Error, Result};
@@ -314,6 +316,15 @@ impl Library {
         })?);
         self.environment_maps.insert(key, table.clone());
         Ok(table)
+    }
+
+    /// The file of poses that `page` names.
+    pub(super) fn poses(&mut self, page: &RonFile, path: &str) -> Result<Vec<(f64, Pose)>> {
+        let full = self.need(page, path)?;
+        self.note(&full)?;
+        let bytes = input::read(&full, input::LARGEST).map_err(|refusal| refusal.into_error(&full))?;
+        let poses = drive::read_poses(&String::from_utf8_lossy(&bytes));
+        poses.map_err(|e| at_its_place(page, path, "", e.in_file(&full)))
     }
 
     /// A soil layer's textures.

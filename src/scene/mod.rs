@@ -2,6 +2,7 @@
 
 pub mod assemble;
 pub mod desc;
+pub mod drive;
 mod growing;
 mod library;
 pub mod record;

@@ -4,7 +4,8 @@ use clap::builder::{PathBufValueParser, TypedValueParser};
 use furrow::ablation::Edit;
 use furrow::input::shipped;
 use furrow::job::{Field, SceneFile, Threads};
-use furrow::{Result, cli};
+use furrow::scene::drive::FIRST;
+use furrow::{Error, Result, cli};
 use std::path::{Path, PathBuf};
 
 /// A scene's distribution over fields, at one size.
@@ -49,6 +50,12 @@ pub(crate) struct FieldArgs {
     /// Which field of the distribution.
     #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
     index: u64,
+    /// Which frame of a drive, from 0.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    frame: u32,
+    /// Which of the scene file's cameras, by its name; the first unless given.
+    #[arg(long, value_name = "NAME", default_value = FIRST)]
+    camera: String,
 }
 
 impl FieldArgs {
@@ -65,7 +72,19 @@ impl FieldArgs {
     /// Grows the field as an edit has it.
     pub(crate) fn grow(&self, edit: &'static Edit, threads: &Threads) -> Result<Field> {
         let SceneArgs { seed, width, height, .. } = self.scene;
-        SceneFile::edited(self.path(), edit)?.seed(seed).width(width).height(height).threads(threads).field(self.index)
+        let scene = SceneFile::edited(self.path(), edit)?.seed(seed).width(width).height(height).threads(threads);
+        let mut field = scene.field(self.index)?;
+        let captures = &field.grown().captures;
+        let place = captures.iter().position(|c| c.frame == self.frame && c.name == self.camera);
+        let Some(place) = place else {
+            let frames = captures.last().map_or(0, |last| last.frame);
+            let names: Vec<&str> = captures.iter().take_while(|c| c.frame == 0).map(|c| c.name.as_str()).collect();
+            let words = format!("there is no frame {} of a camera `{}`", self.frame, self.camera);
+            let help = format!("frames 0 to {frames} of {}", names.join(", "));
+            return Err(Error::misuse(words).help(help).in_file(self.path()));
+        };
+        field.take(place as u64)?;
+        Ok(field)
     }
 
     /// `out/<name of the scene file>`.

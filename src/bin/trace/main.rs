@@ -17,6 +17,7 @@ mod pages;
 mod preview;
 mod quality;
 mod render;
+mod sequence;
 mod texture;
 mod watch;
 
@@ -50,6 +51,7 @@ Examples:
   trace watch scenes/field.ron                          a page that shows the field whenever the file is saved
   trace preview scenes/field.ron --indices 0..12 --out sheet.png   twelve fields of the same kind on one sheet
   trace dataset --scene scenes/field.ron --count 100 --out data   a hundred of them, labelled, resumable
+  trace sequence --scene scenes/09-drive.ron --out drive          a stereo pair that drives along a row
   trace ablate --scene scenes/field.ron --count 100 --out ab      the same hundred with one thing changed at a time
   trace export --scene scenes/field.ron --format gltf   the same field for another program
   trace compare out/field out/noisy                     how far one image is from another: PSNR, SSIM, FLIP, by class
@@ -71,7 +73,7 @@ Files of an image:
   *_denoised.png, denoised.exr   with --denoise
 
 More samples make less noise: twice the --spp takes twice the time and leaves 0.7 of it.
-The scene files scenes/01-one-leaf.ron to 08 teach how a scene is written. From any folder, --scene field finds what ships.
+The scene files scenes/01-one-leaf.ron to 09 teach how a scene is written. From any folder, --scene field finds what ships.
 Paths go to stdout, everything else to stderr.
 Exit codes: 0 done, 1 failed, 2 wrong input, 75 stopped cleanly (Ctrl-C, TERM, HUP, USR1).";
 
@@ -83,6 +85,8 @@ enum Verb {
     Compare(compare::Args),
     /// Make many fields with all their labels, in the formats of other tools.
     Dataset(Box<dataset::Cli>),
+    /// Drive through a field and take all images of its cameras: poses, optical flow, tracks.
+    Sequence(Box<sequence::Args>),
     /// Make a dataset, and the same again with one thing changed at a time: what does each matter to a network?
     Ablate(Box<ablate::Args>),
     /// Write a field as a scene of another program.
@@ -118,6 +122,7 @@ fn main() -> ExitCode {
         Some(Verb::Compare(args)) => compare::run(&args),
         Some(Verb::Dataset(args)) => dataset::run(&args, &signals),
         Some(Verb::Ablate(args)) => ablate::run(&args, &signals),
+        Some(Verb::Sequence(args)) => sequence::run(&args, &signals),
         Some(Verb::Export(args)) => export::run(&args),
         Some(Verb::Texture(args)) => texture::run(&args),
         Some(Verb::Leaf(args)) => leaf::run(&args),

@@ -138,6 +138,7 @@ mod tests {
             name: "000007".into(),
             source: None,
             split: Split::Train,
+            capture: None,
             width: 1,
             height: 1,
             classes: Vec::new(),

@@ -11,6 +11,9 @@
 //! `attributes`, which `pycocotools` passes over and datumaro and CVAT read, tell the number in `plants.png` and `leaves.png`, the
 //! species, and how much is visible.
 //!
+//! Of drives and rigs, images have the keys of video data sets, `video_id` (the field, from 1) and `frame_id`, and their `camera`;
+//! `track_id` among the attributes is the identity of a plant or a leaf, which stays the same in all images of its field.
+//!
 //! Source: COCO data format, <https://cocodataset.org/#format-data>; cocoapi issue 332 on id 0.
 
 use super::{Format, Whole, picture};
@@ -75,13 +78,27 @@ pub(super) fn image_id(record: &Record) -> u64 {
 }
 
 fn image(record: &Record) -> Value {
-    json!({
+    let mut image = json!({
         "id": image_id(record),
         "file_name": format!("{}.png", record.name),
         "width": record.width,
         "height": record.height,
         "license": 1,
-    })
+    });
+    if let Some(capture) = &record.capture {
+        image["video_id"] = (capture.field + 1).into();
+        image["frame_id"] = capture.frame.into();
+        image["camera"] = capture.camera.clone().into();
+    }
+    image
+}
+
+/// Adds the identity that a plant or a leaf has in all images of a field where there are several.
+fn tracked(set: &Set, id: Option<u32>, mut about: Value) -> Value {
+    if set.recipe.captures() > 1 {
+        about["track_id"] = id.into();
+    }
+    about
 }
 
 /// The category of a class: its number.
@@ -138,7 +155,7 @@ fn of_plant(set: &Set, record: &Record, plant: &Plant) -> Vec<Annotation> {
             "inside_fraction": leaf.seen.inside_fraction(),
         });
         let Leaf { base, tip, .. } = leaf;
-        all.push(annotation(record, LEAF, &leaf.seen, [None, *base, *tip], about));
+        all.push(annotation(record, LEAF, &leaf.seen, [None, *base, *tip], tracked(set, leaf.id, about)));
     }
     all
 }
@@ -179,11 +196,12 @@ fn keypoint(point: Option<Keypoint>) -> Option<[Value; 3]> {
 }
 
 fn about(set: &Set, plant: &Plant) -> Value {
-    json!({
+    let about = json!({
         "plant": plant.number,
         "species": set.recipe.species_name(plant.kind),
         "bbch": plant.grown.as_ref().map(|g| g.bbch),
         "visible_fraction": plant.seen.visible_fraction(),
         "inside_fraction": plant.seen.inside_fraction(),
-    })
+    });
+    tracked(set, plant.id, about)
 }

@@ -101,7 +101,7 @@ impl Format for Writer {
 
     fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
         for split in Split::ALL {
-            let of_split = (0..set.recipe.count).filter(|k| set.recipe.split.of(*k) == split);
+            let of_split = (0..set.recipe.count).filter(|k| set.recipe.split_of(*k) == split);
             let names: String = of_split.map(|k| name(k) + "\n").collect();
             if !names.is_empty() {
                 out.file(&format!("{FOLDER}/{}.txt", split.name()), |w| w.put(names))?;

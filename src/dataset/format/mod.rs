@@ -11,7 +11,14 @@ use crate::{Error, Result};
 /// A way to write a dataset down. Paths of files are relative to the dataset's folder and begin with the format's name.
 pub trait Format: Sync {
     /// The files that belong to one image.
-    fn image(&self, recipe: &Recipe, sample: &Sample) -> Result<Vec<File>>;
+    fn image(&self, _recipe: &Recipe, _sample: &Sample) -> Result<Vec<File>> {
+        Ok(Vec::new())
+    }
+
+    /// Whether [`Self::image`] makes files at all.
+    fn has_images(&self) -> bool {
+        true
+    }
 
     /// The files that belong to all images together, for [`Whole::file`] to write. Called when every image is there.
     fn whole(&self, _set: &Set, _out: &mut Whole<'_>) -> Result<()> {
@@ -23,6 +30,11 @@ pub trait Format: Sync {
         false
     }
 
+    /// Whether it holds [`Rendered::flows`](crate::dataset::sample::Rendered::flows), which are worked out for it alone.
+    fn needs_flow(&self) -> bool {
+        false
+    }
+
     /// What it cannot hold, or what its readers expect otherwise: one sentence each, told once.
     fn warnings(&self, _recipe: &Recipe) -> Vec<String> {
         Vec::new()
@@ -30,6 +42,7 @@ pub trait Format: Sync {
 }
 
 mod conditions;
+mod drives;
 mod outline;
 mod picture;
 
@@ -58,16 +71,26 @@ formats! {
         r#"datumaro.Dataset.import_from("cityscapes", "cityscapes")"#;
     "coco" => coco: "COCO instances and keypoints of plants and leaves, for `pycocotools`",
         r#"COCO("coco/annotations/instances_train.json")"#;
+    "colmap" => colmap: "COLMAP's text models: cameras and poses of each field's images, for `pycolmap` and NeRF programs",
+        r#"pycolmap.Reconstruction("colmap/000000")"#;
     "cropandweed" => cropandweed: "CropAndWeed: boxes with stems as CSV, label maps, parameters",
         r#"csv.reader(open("cropandweed/bboxes/CropAndWeed/ave-0000-0000.csv"))"#;
+    "flow" => flow: "OpenEXR: exact optical flow to the next frame and disparity to the other cameras, with what is hidden there",
+        r#"OpenEXR.File("flow/000000.exr").channels()["next.x"].pixels"#;
     "imagefolder" => imagefolder: "Hugging Face ImageFolder: images, masks, metadata and card for `datasets`",
         r#"datasets.load_dataset("imagefolder")["train"][0]["plants"]"#;
     "layers" => layers: "OpenEXR: radiance, variance, ids, coverage and Cryptomattes in one file an image",
         r#"OpenEXR.File("layers/train/000000.exr").channels()"#;
+    "mots" => mots: "MOTS: masks of plants whose numbers stay the same over a drive, a text file for each camera",
+        r#"[line.split() for line in open("mots/000000-camera.txt")]"#;
+    "nerf" => nerf: "transforms.json of each field: cameras and poses, for nerfstudio and instant-ngp",
+        r#"json.load(open("nerf/000000/transforms.json"))["frames"]"#;
     "panoptic" => panoptic: "COCO panoptic: plants as things, soil as stuff, for `panopticapi` and `datumaro`",
         r#"datumaro.Dataset.import_from("panoptic", "coco_panoptic")"#;
     "phenobench" => phenobench: "PhenoBench: semantics, plants, leaves and visibility, for `phenobench`",
         r#"PhenoBench("phenobench", "train", target_types=["semantics", "plant_instances", "leaf_instances"])[0]"#;
+    "tum" => tum: "TUM RGB-D trajectories: time, position and quaternion of each camera's images",
+        r#"numpy.loadtxt("tum/000000-camera.txt")"#;
     "yolo" => yolo: "YOLO segmentation: a polygon a plant, with what is lost by it, for Ultralytics and `supervision`",
         r#"supervision.DetectionDataset.from_yolo("yolo/images/train", "yolo/labels/train", "yolo/data.yaml", force_masks=True)"#;
 }

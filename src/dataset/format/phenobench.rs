@@ -67,7 +67,7 @@ impl Format for Writer {
 
     fn warnings(&self, recipe: &Recipe) -> Vec<String> {
         let mut all = Vec::new();
-        if (0..recipe.count).any(|k| recipe.split.of(k) == Split::Test) {
+        if (0..recipe.count).any(|k| recipe.split_of(k) == Split::Test) {
             all.push("images of the split test have no labels, as in the original; `images/` and other formats have them".into());
         }
         if let Ok(Rendering { width, height, .. }) = recipe.rendering()

@@ -35,6 +35,7 @@ fn record(conditions: Option<Conditions>) -> Record {
         name: "000000".into(),
         source: None,
         split: Split::Train,
+        capture: None,
         width: 16,
         height: 12,
         classes: Vec::new(),

@@ -126,6 +126,12 @@ pub fn encode_geometry(width: u32, height: u32, depth: &[f32], normals: &[[f32; 
     write(Window::full(width, height), channels, "")
 }
 
+/// Encodes any channels of single precision; their names do not repeat.
+pub fn encode_planes(width: u32, height: u32, planes: Vec<(String, Vec<f32>)>) -> Result<Vec<u8>> {
+    let channels = planes.into_iter().map(|(name, values)| channel(&name, FlatSamples::F32(values))).collect();
+    write(Window::full(width, height), channels, "")
+}
+
 /// Width, height, depths, normals.
 pub type Geometry = (u32, u32, Vec<f32>, Vec<[f32; 3]>);
 

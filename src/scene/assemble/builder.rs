@@ -8,6 +8,7 @@ use crate::material::LeafMaterial;
 use crate::plant::OrganKind;
 use crate::ron_file::RonFile;
 use crate::scene::desc::FieldDesc;
+use crate::scene::drive::Capture;
 use crate::scene::library::Library;
 use crate::scene::{Part, Scene};
 use crate::soil::Ground;
@@ -31,6 +32,8 @@ pub(super) struct Builder<'a> {
     pub(super) lights: Vec<LightRecord>,
     pub(super) lighting: Vec<Lighting>,
     pub(super) scene: Scene,
+    /// The images that are taken of it.
+    pub(super) captures: Vec<Capture>,
     /// What the plants' parts are, in the order of the parts; those of models and of the ground have none.
     pub(super) organs: Vec<OrganKind>,
     pub(super) warnings: Vec<String>,

@@ -5,6 +5,7 @@ use crate::math::Spectrum;
 use crate::plant::OrganKind;
 use crate::sampling::rng::mix;
 use crate::sampling::{Purpose, Stream};
+use crate::scene::drive::Capture;
 use crate::scene::record::{Conditions, SpeciesRecord};
 use crate::scene::{PlantRecord, Scene};
 use crate::sensor::{Linear, Photograph, SensorDesc};
@@ -15,6 +16,10 @@ use std::path::PathBuf;
 pub struct Field {
     /// What is out there.
     pub scene: Scene,
+    /// The images that are taken of it, one at least.
+    pub captures: Vec<Capture>,
+    /// Place of the one whose camera the scene has.
+    pub capture: usize,
     /// What the scene's parts are, in their order; none for what is not grown here.
     pub organs: Vec<Option<OrganKind>>,
     /// Its plants, in the order of their numbers.
@@ -42,9 +47,17 @@ pub struct Field {
 }
 
 impl Field {
+    /// The same field as another of its images has it; `capture` is below the number of [`Self::captures`].
+    pub fn take(&mut self, capture: usize) {
+        self.capture = capture;
+        self.scene.camera = self.captures[capture].camera;
+        self.conditions.camera = self.scene.camera.record();
+    }
+
     /// Seed of the samples: a field of its own noise for every image.
     pub fn sample_seed(&self) -> u64 {
-        mix(mix(self.seed) ^ self.index)
+        let first = mix(mix(self.seed) ^ self.index);
+        if self.capture == 0 { first } else { mix(first ^ self.capture as u64) }
     }
 
     /// Where the field came from, one `key: value` a line: program, scene files, seed, index.
@@ -56,10 +69,12 @@ impl Field {
     /// Takes the photograph of a film of this field.
     pub fn photograph(&self, film: &Film) -> Photograph {
         let stream = |k| Stream::of(self.seed, self.index, Purpose::Sensor, k);
+        // One sensor for all images of a field, noise of its own for each.
+        let noise = 1 + self.capture as u64;
         let illuminant = self.scene.lights.iter().fold(Spectrum::ZERO, |sum, l| sum + l.horizontal_irradiance());
         let pixels: Vec<Spectrum> = film.pixels.iter().map(|p| p.mean).collect();
         let window = film.window;
         let linear = Linear { pixels: &pixels, width: window.width(), left: window.x0, top: window.y0 };
-        self.sensor.build(&mut stream(0)).expose(linear, &self.scene.camera, illuminant, &stream(1))
+        self.sensor.build(&mut stream(0)).expose(linear, &self.scene.camera, illuminant, &stream(noise))
     }
 }

@@ -10,6 +10,7 @@ mod individual;
 mod known;
 mod lighting;
 mod models;
+mod rig;
 mod season;
 mod unlikely;
 mod view;
@@ -27,9 +28,10 @@ use crate::material::{BakedGround, Material};
 use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3, vec2};
 use crate::optics::soil::LOESS;
 use crate::plant::{self, ConditionDesc, LeafAxis, OrganKind};
-use crate::ron_file::{Positive, RENAMED, RonFile, Step, Vary};
+use crate::ron_file::{Positive, RENAMED, RonFile, Vary};
 use crate::sampling::{Purpose, Stream};
 use crate::scatter::{self, Disc, Spot};
+use crate::sensor::Camera;
 use crate::soil::Rect;
 use crate::{Error, Result};
 use builder::{Builder, Floor, Grown};
@@ -69,8 +71,8 @@ const SEASON: u64 = 1 << 32;
 const LIGHTING: u64 = 2 << 32;
 /// Address of the stream from which the crop that is sown is drawn.
 const SOWN: u64 = 3 << 32;
-/// Most pixels of an image.
-const MOST_PIXELS: u64 = 1 << 28;
+/// Address of the stream from which the drive is drawn, and of the first of those of further cameras.
+const DRIVE: u64 = 4 << 32;
 /// About the most texels of the ground's maps: a larger view has larger ones.
 const MOST_TEXELS: f32 = 2.4e8;
 
@@ -136,6 +138,12 @@ impl Source {
         self
     }
 
+    /// How many images are taken of each field.
+    pub fn captures(&self) -> u64 {
+        let frames = self.desc.drive.as_ref().map_or(1, |drive| drive.frames.get() as u64);
+        frames * (1 + self.desc.cameras.len() as u64)
+    }
+
     /// Builds field `options.index`. Call it inside a pool.
     pub fn field(&self, options: &Options) -> Result<Field> {
         let held = || self.library.lock().unwrap_or_else(PoisonError::into_inner);
@@ -178,23 +186,7 @@ impl<'a> Builder<'a> {
     fn new(page: &'a RonFile, desc: &'a FieldDesc, options: &Options, mut library: Library) -> Result<Self> {
         let (seed, index) = (options.seed.unwrap_or(desc.seed), options.index);
         let mut stream = Stream::of(seed, index, Purpose::Page, 0);
-        let camera = desc.camera.build(&mut stream).map_err(|e| page.blame(&[Step::Field("camera")], e))?;
-        let camera = match (options.width, options.height) {
-            (None, None) => camera,
-            (w, h) => {
-                let (w0, h0) = (camera.width(), camera.height());
-                let aspect = f64::from(h0) / f64::from(w0);
-                let width = w.unwrap_or_else(|| h.map_or(w0, |h| (f64::from(h) / aspect).round().max(1.0) as u32));
-                let height = h.unwrap_or_else(|| (f64::from(width) * aspect).round().max(1.0) as u32);
-                camera.with_size(width, height)
-            }
-        };
-        let (w, h) = (camera.width(), camera.height());
-        if u64::from(w) * u64::from(h) > MOST_PIXELS {
-            let fault = Error::input(format!("an image of {w} × {h} pixels is too large"))
-                .help(format!("at most {MOST_PIXELS} pixels, 16384 × 16384"));
-            return Err(page.blame(&[Step::Field("camera"), Step::Field("size")], fault));
-        }
+        let camera = rig::first(page, desc, options, &mut stream)?;
         let (mut lights, mut light_records) = (Vec::new(), Vec::new());
         let lists = |place| Stream::of(seed, index, Purpose::Page, LIGHTING + place as u64);
         let (lighting, listed) = Lighting::draw(page, &desc.lights, lists)?;
@@ -216,6 +208,10 @@ impl<'a> Builder<'a> {
         let scene = Scene { parts: Vec::new(), materials: Vec::new(), lights, camera, filter: desc.filter.footprint() };
         let season = Season::draw(page, desc, &mut Stream::of(seed, index, Purpose::Page, SEASON))?;
         let sown = desc.sown.draw(desc.crops.len(), &mut Stream::of(seed, index, Purpose::Page, SOWN));
+        let captures = rig::captures(page, desc, &mut library, camera, sown.clone(), &|purpose, k| {
+            Stream::of(seed, index, purpose, k)
+        })?;
+        let scene = Scene { camera: captures.first().map_or(camera, |first| first.camera), ..scene };
         Ok(Self {
             page,
             desc,
@@ -227,6 +223,7 @@ impl<'a> Builder<'a> {
             lights: light_records,
             lighting,
             scene,
+            captures,
             organs: Vec::new(),
             warnings,
         })
@@ -236,11 +233,15 @@ impl<'a> Builder<'a> {
         Stream::of(self.seed, self.index, purpose, index)
     }
 
-    /// Side of a pixel on the ground in the image's middle, metres; 1 mm where the camera does not look down.
+    /// Side of the smallest pixel on the ground in an image's middle, metres; 1 mm where no camera looks down.
     fn ground_pixel(&self) -> f32 {
-        let camera = &self.scene.camera;
-        let (origin, direction) = camera.centre_ray(camera.width() / 2, camera.height() / 2);
-        if direction.z < -0.05 { origin.z / -direction.z * camera.pixel_angle() } else { 1e-3 }
+        let side = |camera: &Camera| {
+            let (origin, direction) = camera.centre_ray(camera.width() / 2, camera.height() / 2);
+            (direction.z < -0.05).then(|| origin.z / -direction.z * camera.pixel_angle())
+        };
+        // One moment of each camera is as good as another.
+        let first = self.captures.iter().take_while(|capture| capture.frame == 0);
+        first.filter_map(|capture| side(&capture.camera)).reduce(f32::min).unwrap_or(1e-3)
     }
 
     fn material(&mut self, material: Material) -> u32 {
@@ -315,6 +316,8 @@ impl<'a> Builder<'a> {
         self.warnings.extend(self.library.warnings());
         let field = Field {
             scene: self.scene,
+            captures: self.captures,
+            capture: 0,
             organs,
             plants,
             species,

@@ -7,6 +7,7 @@
 use super::builder::{Builder, FARTHEST};
 use crate::math::{Vec2, Vec3, vec2};
 use crate::ron_file::Step;
+use crate::sensor::Camera;
 use crate::soil::Rect;
 use crate::{Error, Result};
 
@@ -32,6 +33,13 @@ pub(super) struct View {
 impl View {
     /// That of a scene in which nothing grows.
     pub(super) const NONE: Self = Self { area: Rect::new(-0.5, -0.5, 0.5, 0.5), open: false };
+
+    /// The least rectangle that holds both.
+    fn join(self, other: Self) -> Self {
+        let ([lo, hi], [a, b]) = (self.area.corners(), other.area.corners());
+        let (lo, hi) = (lo.min(a), hi.max(b));
+        Self { area: Rect::new(lo.x, lo.y, hi.x, hi.y), open: self.open || other.open }
+    }
 }
 
 /// Where a ray meets the plane z = 0: at a place, or where it says that it sees the horizon; `None` for a ray above it.
@@ -39,10 +47,31 @@ fn meets(origin: Vec3, direction: Vec3) -> Option<Vec2> {
     (direction.z < 0.0 && origin.z > 0.0).then(|| (origin + direction * (origin.z / -direction.z)).truncate())
 }
 
+/// Most ground that is grown for one field, m²: that of a camera which sees as far as [`REACH`] on all sides.
+const MOST_AREA: f32 = 4.0 * REACH * REACH;
+
 impl Builder<'_> {
-    /// The ground that the camera sees, with a warning where some of it is not planted.
+    /// The ground that all images see together, with a warning where some of it is not planted.
     pub(super) fn view(&mut self) -> Result<View> {
-        let camera = &self.scene.camera;
+        let cameras: Vec<Camera> = self.captures.iter().map(|capture| capture.camera).collect();
+        let mut whole: Option<View> = None;
+        for camera in &cameras {
+            let view = self.view_of(camera, whole.is_some_and(|before| before.open))?;
+            whole = Some(whole.map_or(view, |before| before.join(view)));
+        }
+        let whole = whole.unwrap_or(View::NONE);
+        let area = whole.area.area();
+        // A single camera is bounded by its reach, and by what its shutter travels.
+        if cameras.len() > 1 && area > MOST_AREA {
+            let words = format!("the drive sees {area:.0} m² of ground, more than the {MOST_AREA} m² of one field");
+            let help = "take fewer frames, drive along a row to the north or east, or drive through several fields";
+            return Err(self.page.blame(&[Step::Field("drive")], Error::input(words).help(help)));
+        }
+        Ok(whole)
+    }
+
+    /// The ground that one camera sees; with a warning where some of it is not planted, unless that was `told`.
+    fn view_of(&mut self, camera: &Camera, told: bool) -> Result<View> {
         let (w, h) = (camera.width() as f32, camera.height() as f32);
         let below = camera.pose().position.truncate();
         if below.abs().max_element() > FARTHEST {
@@ -75,7 +104,7 @@ impl Builder<'_> {
         if level.is_empty() && [lo, hi] == all {
             return Ok(View { area, open: false });
         }
-        let (bare, farthest) = self.beyond(area, below);
+        let (bare, farthest) = beyond(camera, area, below);
         if bare <= 0.0 {
             return Ok(View { area, open: false });
         }
@@ -89,27 +118,28 @@ impl Builder<'_> {
         if bare > TOO_BARE {
             return Err(self.page.blame(&[Step::Field("camera")], Error::input(words).help(help)));
         }
-        self.warnings.push(format!("{words}; {help}"));
+        if !told {
+            self.warnings.push(format!("{words}; {help}"));
+        }
         Ok(View { area, open: true })
     }
+}
 
-    /// Share of the image's ground that lies beyond an area, and how far from `below` the farthest of it is, metres.
-    fn beyond(&self, area: Rect, below: Vec2) -> (f32, f32) {
-        let camera = &self.scene.camera;
-        let size = vec2(camera.width() as f32, camera.height() as f32);
-        let area = area.grown(1e-3);
-        let (mut ground, mut bare, mut farthest) = (0.0_f32, 0.0_f32, 0.0_f32);
-        for k in 0..=RAYS {
-            for i in 0..=RAYS {
-                let (origin, direction) = camera.ray(size * vec2(i as f32, k as f32) / RAYS as f32, [0.5; 2]);
-                let Some(at) = meets(origin, direction) else { continue };
-                ground += 1.0;
-                if !area.contains(at) {
-                    bare += 1.0;
-                    farthest = farthest.max(at.distance(below));
-                }
+/// Share of an image's ground that lies beyond an area, and how far from `below` the farthest of it is, metres.
+fn beyond(camera: &Camera, area: Rect, below: Vec2) -> (f32, f32) {
+    let size = vec2(camera.width() as f32, camera.height() as f32);
+    let area = area.grown(1e-3);
+    let (mut ground, mut bare, mut farthest) = (0.0_f32, 0.0_f32, 0.0_f32);
+    for k in 0..=RAYS {
+        for i in 0..=RAYS {
+            let (origin, direction) = camera.ray(size * vec2(i as f32, k as f32) / RAYS as f32, [0.5; 2]);
+            let Some(at) = meets(origin, direction) else { continue };
+            ground += 1.0;
+            if !area.contains(at) {
+                bare += 1.0;
+                farthest = farthest.max(at.distance(below));
             }
         }
-        (bare / ground.max(1.0), farthest)
     }
+    (bare / ground.max(1.0), farthest)
 }

@@ -179,6 +179,11 @@ impl Camera {
         Some(vec2(x as f32, y as f32))
     }
 
+    /// Where the lens's centre is while the row at coordinate `row` is exposed, world.
+    pub fn eye(&self, row: f32) -> Vec3 {
+        self.position(f64::from(row), 0.0)
+    }
+
     /// Whether pixel coordinates lie in the image.
     pub fn contains(&self, px: Vec2) -> bool {
         px.x >= 0.0 && px.y >= 0.0 && px.x < self.width as f32 && px.y < self.height as f32

@@ -7,6 +7,7 @@
 
 use super::camera::Camera;
 use super::motion::Motion;
+use super::pose::Pose;
 use crate::math::Vec3;
 
 /// Most secants towards the row that sees a point.
@@ -17,6 +18,20 @@ impl Camera {
     #[must_use]
     pub fn with_motion(mut self, motion: Motion) -> Self {
         self.motion = motion;
+        self
+    }
+
+    /// The same camera elsewhere.
+    #[must_use]
+    pub fn with_pose(mut self, pose: Pose) -> Self {
+        self.pose = pose;
+        self
+    }
+
+    /// The same camera at another velocity, m/s, world.
+    #[must_use]
+    pub fn with_velocity(mut self, velocity: Vec3) -> Self {
+        self.motion.velocity = velocity;
         self
     }
 

@@ -69,10 +69,10 @@ impl Selection {
     /// The set and the numbers of its images; `otherwise` where no pick was written.
     pub fn open(&self, otherwise: Pick, seed: u64) -> Result<(Set, Vec<u64>)> {
         let set = Set::open(&self.folder)?;
-        let (count, split) = (set.recipe.count, set.recipe.split);
+        let count = set.recipe.count;
         let numbers: Vec<u64> = match self.pick.unwrap_or(otherwise) {
             Pick::All => (0..count).collect(),
-            Pick::Split(wanted) => (0..count).filter(|k| split.of(*k) == wanted).collect(),
+            Pick::Split(wanted) => (0..count).filter(|k| set.recipe.split_of(*k) == wanted).collect(),
             Pick::Range(from, to) if to <= count => (from..to).collect(),
             Pick::Every(first, of) => (first..count).step_by(of as usize).collect(),
             Pick::Random(n) if n <= count => sample(count, n, seed),

@@ -51,7 +51,7 @@ pub(crate) struct ImageArgs {
 }
 
 /// The names of the formats, with what they are.
-pub(super) fn formats() -> clap::builder::PossibleValuesParser {
+pub(crate) fn formats() -> clap::builder::PossibleValuesParser {
     let value = |(name, words): &(&'static str, &'static str)| clap::builder::PossibleValue::new(*name).help(*words);
     clap::builder::PossibleValuesParser::new(format::NAMES.iter().map(value))
 }

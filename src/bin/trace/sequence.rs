@@ -1,0 +1,60 @@
+//! `trace sequence`: all images of a drive through one field or several, as a dataset.
+
+use crate::dataset::order::{begin, formats};
+use crate::dataset::render::{WorkArgs, generate};
+use crate::field::SceneArgs;
+use crate::quality::{TechniqueArgs, samples};
+use furrow::cli::signal::Signals;
+use furrow::dataset::finish;
+use furrow::dataset::generate::Shard;
+use furrow::dataset::plan::Order;
+use furrow::job::SceneFile;
+use furrow::settings::Quality;
+use furrow::{Error, Result};
+use std::path::PathBuf;
+
+/// Which drives, and how they are written.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// How many fields are driven through, from number 0.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    fields: u64,
+    /// Folder of the dataset.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Formats to write beside the native one, separated by commas.
+    #[arg(long, value_delimiter = ',', value_name = "FORMAT", default_value = "colmap,flow,mots,nerf,tum", value_parser = formats())]
+    format: Vec<String>,
+    /// Samples a pixel.
+    #[arg(long, default_value_t = Quality::SPP, value_parser = samples())]
+    spp: u32,
+    /// Take the noise of few samples out of the photographs; needs Open Image Denoise.
+    #[arg(long)]
+    denoise: bool,
+    #[command(flatten)]
+    technique: TechniqueArgs,
+    #[command(flatten)]
+    work: WorkArgs,
+}
+
+/// Makes what is missing of the dataset.
+pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
+    args.scene.check()?;
+    let captures = SceneFile::open(args.scene.path())?.captures();
+    if captures == 1 {
+        return Err(Error::input("it takes one image of each field, which is no sequence")
+            .help("add `drive: (frames: 20, path: AlongRows())` to it, or further `cameras`; see: trace explain drive")
+            .in_file(args.scene.path()));
+    }
+    let mut order = Order::new(args.scene.path(), args.fields * captures);
+    (order.seed, order.width, order.height) = (args.scene.seed, args.scene.width, args.scene.height);
+    order.formats.clone_from(&args.format);
+    order.formats.sort();
+    order.formats.dedup();
+    order.options = args.technique.options(Quality { denoise: args.denoise, ..Quality::spp(args.spp) });
+    let set = begin(&args.out, &order)?;
+    generate(&set, &args.work, Shard::ALL, signals)?;
+    finish::finish(&set, None)
+}

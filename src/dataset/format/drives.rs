@@ -1,0 +1,96 @@
+//! The images of a field with their cameras: what formats of poses and tracks are made of.
+
+use crate::dataset::native;
+use crate::dataset::recipe::Recipe;
+use crate::dataset::record::{CaptureRecord, Record};
+use crate::dataset::set::Set;
+use crate::math::{DMat3, DQuat, DVec3};
+use crate::scene::drive::FIRST;
+use crate::sensor::CameraRecord;
+use crate::{Error, Result};
+use std::collections::BTreeMap;
+
+/// One image of a field.
+pub(super) struct Taken {
+    pub(super) record: Record,
+    pub(super) camera: CameraRecord,
+    pub(super) capture: CaptureRecord,
+}
+
+/// The numbers of a dataset's fields.
+pub(super) fn fields(set: &Set) -> std::ops::Range<u64> {
+    0..set.recipe.count.div_ceil(set.recipe.captures())
+}
+
+/// The images of a field that the dataset has, in their order.
+pub(super) fn images(set: &Set, field: u64) -> Result<Vec<Taken>> {
+    let captures = set.recipe.captures();
+    let (begin, end) = (field * captures, ((field + 1) * captures).min(set.recipe.count));
+    (begin..end).map(|index| taken(native::read_record(&set.folder, &Set::name(index))?)).collect()
+}
+
+fn taken(mut record: Record) -> Result<Taken> {
+    let camera = record.conditions.take().map(|conditions| conditions.camera).ok_or_else(|| {
+        Error::misuse(format!("image {} was imported, and nothing tells its camera", record.name))
+            .help("formats of poses are of rendered images")
+    })?;
+    let capture = record.capture.clone().unwrap_or_else(|| CaptureRecord {
+        field: record.index,
+        frame: 0,
+        camera: FIRST.into(),
+        time_s: 0.0,
+    });
+    Ok(Taken { record, camera, capture })
+}
+
+/// Images by the name of their camera.
+pub(super) fn by_camera(images: &[Taken]) -> BTreeMap<&str, Vec<&Taken>> {
+    let mut all: BTreeMap<&str, Vec<&Taken>> = BTreeMap::new();
+    for image in images {
+        all.entry(image.capture.camera.as_str()).or_default().push(image);
+    }
+    all
+}
+
+/// The photograph of an image, below `images/`.
+pub(super) fn photograph(image: &Taken) -> String {
+    format!("{}/rgb.png", image.record.name)
+}
+
+/// The camera's axes right, down and forward in the world, as columns; and its place, metres.
+pub(super) fn camera_to_world(camera: &CameraRecord) -> (DMat3, DVec3) {
+    let [right, down, forward] = camera.world_to_camera.map(DVec3::from_array);
+    (DMat3::from_cols(right, down, forward), DVec3::from_array(camera.position_m))
+}
+
+/// A rotation as a quaternion x, y, z, w.
+pub(super) fn quaternion(axes: &DMat3) -> [f64; 4] {
+    DQuat::from_mat3(axes).normalize().to_array()
+}
+
+/// What formats of poses cannot hold of a scene's images.
+pub(super) fn warnings(recipe: &Recipe) -> Vec<String> {
+    let alone = recipe.captures() == 1;
+    alone.then(|| "each field has one image; `drive` in a scene file takes several".to_owned()).into_iter().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::vec3;
+    use crate::sensor::{Camera, Distortion, Pose};
+
+    /// Expected: what a pose's quaternion and place put in front of the camera is what the camera itself sees there.
+    #[test]
+    fn quaternions_turn_as_the_camera_does() {
+        for (yaw, pitch, roll) in [(0.0, 0.0, 0.0), (30.0, 8.0, -5.0), (200.0, -20.0, 40.0), (90.0, 60.0, 0.0)] {
+            let pose = Pose::nadir(vec3(0.3, -0.2, 1.4), yaw, pitch, roll);
+            let camera = Camera::new((64, 48), [50.0; 2], [32.0, 24.0], Distortion::default(), pose).unwrap();
+            let (axes, place) = camera_to_world(&camera.record());
+            let turn = DQuat::from_array(quaternion(&axes));
+            let seen = turn * DVec3::new(0.1, -0.2, 1.5) + place;
+            let back = pose.point_to_camera(seen.as_vec3());
+            assert!((back[0] - 0.1).abs() < 1e-5 && (back[1] + 0.2).abs() < 1e-5 && (back[2] - 1.5).abs() < 1e-5);
+        }
+    }
+}

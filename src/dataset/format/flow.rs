@@ -1,0 +1,56 @@
+//! Exact optical flow and disparity: `NAME.exr`, in single precision.
+//!
+//! | channels | hold |
+//! |---|---|
+//! | `next.x`, `next.y` | from a pixel's centre to where its point lies in the next frame of the same camera, pixels right and down |
+//! | `next.visible` | 1 where that frame shows the point, 0 where it lies outside of it or something hides it |
+//! | `CAMERA.x`, `.y`, `.visible` | the same to the other cameras of the same frame; of a stereo pair side by side, disparity is −x |
+//!
+//! Values are not numbers (NaN) where a pixel shows nothing, or what lies behind the other lens. A field's last frame has no `next`, and an
+//! image without any other has one channel, `none`, of zeros. Lens distortion and rolling shutters of both images are in it.
+//!
+//! Source: the surface at each pixel's centre, as labels have it, and the cameras; nothing is matched.
+
+use super::Format;
+use crate::dataset::recipe::Recipe;
+use crate::dataset::sample::{Flow, Sample};
+use crate::dataset::File;
+use crate::output;
+use crate::{Error, Result};
+
+pub(super) struct Writer;
+
+const FOLDER: &str = "flow";
+
+impl Format for Writer {
+    fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
+        let record = &sample.record;
+        let rendered = sample.film.as_ref().ok_or_else(|| {
+            Error::misuse(format!("image {}: only the renderer knows what --format {FOLDER} holds", record.name))
+        })?;
+        let mut planes: Vec<(String, Vec<f32>)> = rendered.flows.iter().flat_map(planes).collect();
+        if planes.is_empty() {
+            planes.push(("none".into(), vec![0.0; sample.pixels()]));
+        }
+        let bytes = output::encode_planes(record.width, record.height, planes)?;
+        Ok(vec![File { path: format!("{FOLDER}/{}.exr", record.name), bytes }])
+    }
+
+    fn needs_film(&self) -> bool {
+        true
+    }
+
+    fn needs_flow(&self) -> bool {
+        true
+    }
+
+    fn warnings(&self, recipe: &Recipe) -> Vec<String> {
+        super::drives::warnings(recipe)
+    }
+}
+
+fn planes(Flow { to, pixels, visible }: &Flow) -> [(String, Vec<f32>); 3] {
+    let axis = |i: usize| pixels.iter().map(|moved| moved[i]).collect();
+    let seen = visible.iter().map(|visible| f32::from(u8::from(*visible))).collect();
+    [(format!("{to}.x"), axis(0)), (format!("{to}.y"), axis(1)), (format!("{to}.visible"), seen)]
+}

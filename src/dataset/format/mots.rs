@@ -1,0 +1,46 @@
+//! Tracks of plants: `FIELD-CAMERA.txt` in the text format of MOTS, one mask a line: frame, track, class, height, width, mask.
+//!
+//! A track is a plant's identity, which stays the same over all frames and cameras of a field. Classes are 1 crop, 2 weed. Masks are
+//! compressed run lengths as pycocotools writes them. A plant that a frame does not show has no line there.
+//!
+//! Source: Voigtlaender et al. 2019, "MOTS: Multi-object tracking and segmentation"; mots_tools, "txt format".
+
+use super::drives;
+use super::{Format, Whole};
+use crate::dataset::recipe::Recipe;
+use crate::dataset::set::Set;
+use crate::Result;
+use std::fmt::Write;
+
+pub(super) struct Writer;
+
+const FOLDER: &str = "mots";
+
+impl Format for Writer {
+    fn has_images(&self) -> bool {
+        false
+    }
+
+    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+        for field in drives::fields(set) {
+            let images = drives::images(set, field)?;
+            for (name, of) in drives::by_camera(&images) {
+                let mut text = String::new();
+                for image in of {
+                    for plant in image.record.seen() {
+                        let (Some(id), Some(mask)) = (plant.id, &plant.seen.mask) else { continue };
+                        let ([height, width], class) = (mask.size, plant.class as u8);
+                        let frame = image.capture.frame;
+                        let _ = writeln!(text, "{frame} {id} {class} {height} {width} {}", mask.counts);
+                    }
+                }
+                out.file(&format!("{FOLDER}/{}-{name}.txt", Set::name(field)), |w| w.put(text))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn warnings(&self, recipe: &Recipe) -> Vec<String> {
+        drives::warnings(recipe)
+    }
+}
