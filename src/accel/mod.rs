@@ -2,6 +2,7 @@
 
 pub mod brute;
 mod embree;
+mod rtc;
 
 use crate::geometry::{AlphaMask, Mesh};
 use std::sync::Arc;

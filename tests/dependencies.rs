@@ -1,0 +1,71 @@
+//! What the programs and their tests are built of: licences and sources of all dependencies.
+//!
+//! Rationale: who passes a program on must keep to the licences of all that is in it. Expected: each dependency comes from crates.io and can be
+//! had under licences of the list in `deny.toml`, each of which some dependency needs. Source: `cargo metadata`.
+
+use std::collections::BTreeSet;
+use std::process::Command;
+
+/// Licences that are allowed, from `deny.toml`.
+fn allowed() -> BTreeSet<String> {
+    let text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/deny.toml")).expect("deny.toml");
+    let list = text.split("\nallow = [").nth(1).and_then(|rest| rest.split(']').next()).expect("a list");
+    list.split('"').skip(1).step_by(2).map(str::to_owned).collect()
+}
+
+/// Whether an SPDX expression can be met with these licences. AND is taken to bind less than OR, which can only refuse more; `/` is the old OR.
+fn can_be_met(expression: &str, allowed: &BTreeSet<String>) -> bool {
+    let expression = expression.replace('/', " OR ");
+    let name = |part: &str| part.trim_matches(['(', ')', ' ']).to_owned();
+    expression.split(" AND ").all(|all| all.split(" OR ").any(|one| allowed.contains(&name(one))))
+}
+
+#[test]
+fn every_dependency_has_an_allowed_licence_and_comes_from_crates_io() {
+    let mut metadata = Command::new(env!("CARGO"));
+    metadata.args(["metadata", "--format-version", "1", "--locked", "--all-features"]);
+    metadata.args(["--filter-platform", "x86_64-unknown-linux-gnu"]).current_dir(env!("CARGO_MANIFEST_DIR"));
+    let output = metadata.output().expect("cargo");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let metadata: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let list = |value: &serde_json::Value| value.as_array().expect("a list").clone();
+    let used: BTreeSet<String> =
+        list(&metadata["resolve"]["nodes"]).iter().map(|node| node["id"].to_string()).collect();
+    let packages = list(&metadata["packages"]);
+    let packages: Vec<_> = packages.iter().filter(|package| used.contains(&package["id"].to_string())).collect();
+    assert!(packages.len() > 100, "{}", packages.len());
+
+    let ours = |package: &serde_json::Value| package["name"] == "furrow";
+    let crates_io = "registry+https://github.com/rust-lang/crates.io-index";
+    let elsewhere = packages.iter().filter(|p| !ours(p) && p["source"] != crates_io);
+    assert_eq!(elsewhere.map(|p| p["id"].to_string()).collect::<Vec<_>>(), Vec::<String>::new());
+
+    let refused = |allowed: &BTreeSet<String>| -> Vec<String> {
+        let refused = packages.iter().filter(|p| !p["license"].as_str().is_some_and(|of| can_be_met(of, allowed)));
+        refused.map(|p| format!("{} {}: {}", p["name"], p["version"], p["license"])).collect()
+    };
+    let allowed = allowed();
+    assert_eq!(refused(&allowed), Vec::<String>::new(), "choose another, or allow its licence in deny.toml");
+    for licence in &allowed {
+        let others = allowed.iter().filter(|other| *other != licence).cloned().collect();
+        assert!(!refused(&others).is_empty(), "nothing needs {licence}: take it from deny.toml");
+    }
+}
+
+#[test]
+fn expressions_are_met_by_one_of_several_and_all_of_several() {
+    let allowed = ["MIT", "ISC"].map(str::to_owned).into();
+    for met in ["MIT", "MIT/Apache-2.0", "GPL-3.0-only OR MIT", "(MIT OR GPL-3.0-only) AND ISC", "ISC AND MIT"] {
+        assert!(can_be_met(met, &allowed), "{met}");
+    }
+    for not in [
+        "GPL-3.0-only",
+        "",
+        "MIT AND GPL-3.0-only",
+        "(MIT OR ISC) AND GPL-3.0-only",
+        "MIT-0",
+        "Apache-2.0/GPL-3.0-only",
+    ] {
+        assert!(!can_be_met(not, &allowed), "{not}");
+    }
+}
