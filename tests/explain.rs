@@ -65,6 +65,12 @@ fn what_is_not_there_is_refused_with_the_nearest() {
     let words = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2));
     assert!(words.contains("there is no `soil.clouds`") && words.contains("did you mean `soil.clods`"), "{words}");
+    for path in ["camera.Fone.height_m", "soil.moisture.mean.nothing"] {
+        let words = String::from_utf8(trace(&["explain", path]).stderr).unwrap();
+        assert!(words.contains(&format!("there is no `{path}`")), "{words}");
+    }
+    let words = said(&trace(&["explain", "distribution"]));
+    assert!(words.contains("LogNormal") && words.contains("median"), "{words}");
 }
 
 #[test]
@@ -101,6 +107,14 @@ fn messages_tell_what_to_write() {
     assert!(words.contains("see:  trace explain soil.layers"), "{words}");
     let words = told("Field(camera: JaiAd130(height_m: Normal(0.8, 0.02)))");
     assert!(words.contains("write Normal(mean: 0.8, sd: 0.02)"), "{words}");
+    let words = told("Field(camera: JaiAd130(), crops: [(species: \"maize\", growth: 18, rows: ())])");
+    assert!(words.contains("write AgeDays(18) or Bbch(18)"), "{words}");
+    let words = told("Field(camera: Phone, soil: ())");
+    assert!(words.contains("Phone has no brackets") && words.contains("write Phone()"), "{words}");
+    // A path is named as far as it exists.
+    let words = told("Field(camera: JaiAd130(), soyl: (clods: (max_mm 3)))");
+    let see = words.lines().find_map(|line| line.strip_prefix(" see:  ")).unwrap_or_else(|| panic!("{words}"));
+    assert_eq!(see, "trace explain", "{words}");
     let words = told("Field(camera: JaiAd130(height_m: [0.8, 0.9]))");
     assert!(words.contains("write Uniform(0.8, 0.9)"), "{words}");
 }

@@ -170,6 +170,7 @@ fn page(report: &Report, shots: &[Shot]) -> String {
         lead: "Two images & a curve.",
         facts: &[("weights".into(), "a<b".into())],
         effects: None,
+        plots: &[],
         report: Some(report),
         charts: &[chart(true), chart(false)],
         shots,

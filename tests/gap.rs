@@ -6,12 +6,14 @@
 
 mod common;
 
-use common::program::trace;
+use common::program::{small_text, trace};
 use furrow::compare::Region;
+use furrow::compare::gap::advice::{self, Step, Way};
 use furrow::compare::gap::{Distance, FILES, Feature, Gap, Options};
-use furrow::output::{Picture as Png, write_png};
+use furrow::output::{Picture as Png, read_gray, read_rgb, write_png};
+use furrow::reference::{answer, scene, species};
 use furrow::sampling::{Purpose, Stream};
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::path::Path;
 use std::process::Output;
 
@@ -52,7 +54,7 @@ fn set(folder: &Path, seed: u64, pictures: u64, lift: i32) {
 }
 
 fn compared(real: &Path, synthetic: &Path) -> Gap {
-    Gap::of(real, synthetic, &Options { shown: 0 }, &|_| (), &|| ()).unwrap()
+    Gap::of(real, synthetic, &Options { shown: 0, ..Options::default() }, &|_| (), &|| ()).unwrap()
 }
 
 fn run(folder: &Path, arguments: &[&str]) -> Output {
@@ -70,7 +72,9 @@ fn a_set_is_no_distance_from_itself() {
         assert_eq!(*distance, 0.0, "{feature:?}");
         assert!(halves.is_some());
     }
-    assert!(gap.warnings.is_empty(), "{:?}", gap.warnings);
+    assert!(gap.advice().is_empty());
+    // Pictures alone do not tell how much ground they show.
+    assert!(gap.warnings.len() == 1 && gap.warnings[0].contains("--pixel-mm"), "{:?}", gap.warnings);
 }
 
 /// L* of gray is 116 f(Y) − 16, of which ten more are a Wasserstein distance of 10 in one channel of three, and no distance in structure.
@@ -147,6 +151,107 @@ fn files_say_the_same_whatever_the_threads() {
             && page.matches("<img").count() == 2 * 8 - 2
             && page.contains("data-curve=\"synthetic\"")
     );
+}
+
+/// The record of a rendered picture whose pixels see so many millimetres, with a sampling error.
+fn record(pixel_mm: f64, error: f64) -> String {
+    let camera = json!({
+        "width_px": 192, "height_px": 128, "fx_px": 1000.0 / pixel_mm, "fy_px": 1000.0 / pixel_mm, "cx_px": 96.0, "cy_px": 64.0,
+        "k1": 0.0, "k2": 0.0, "p1": 0.0, "p2": 0.0, "k3": 0.0, "position_m": [0.0, 0.0, 1.0],
+        "world_to_camera": [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]], "aperture": null,
+    });
+    json!({ "conditions": { "camera": camera }, "sampling": { "spp": 16.0, "relative_error": error } }).to_string()
+}
+
+/// Expected: pictures of twice the pixels over the same ground are, made as coarse as the others, the same pictures: no distance; as they are, they are
+/// far in the sizes of plants. Noise of few samples beside that of the real set is told, with samples that would do.
+#[test]
+fn sets_are_brought_to_one_pixel_size_and_sampling_noise_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let (real, made) = (folder.path().join("real"), folder.path().join("made"));
+    set(&real, 1, 4, 0);
+    let (width, height) = SIZE;
+    for k in 0..4_u64 {
+        let out = made.join(format!("images/{k:06}"));
+        std::fs::create_dir_all(&out).unwrap();
+        let (_, _, rgb) = read_rgb(&real.join(format!("images/{k:03}.png"))).unwrap();
+        let (_, _, labels) = read_gray(&real.join(format!("labels/{k:03}.png"))).unwrap();
+        let places = || (0..4 * width * height).map(|p| (p / (2 * width) / 2 * width + p % (2 * width) / 2) as usize);
+        let rgb: Vec<[u8; 3]> = places().map(|at| rgb[at]).collect();
+        let labels: Vec<u8> = places().map(|at| labels[at]).collect();
+        write_png(&out.join("rgb.png"), 2 * width, 2 * height, &Png::Rgb(&rgb), "").unwrap();
+        write_png(&out.join("semantics.png"), 2 * width, 2 * height, &Png::Gray(&labels), "").unwrap();
+        std::fs::write(out.join("record.json"), record(0.25, 0.3)).unwrap();
+    }
+    let with = |pixel_mm| Gap::of(&real, &made, &Options { shown: 0, pixel_mm }, &|_| (), &|| ()).unwrap();
+    let known = with(Some(0.5));
+    assert_eq!(known.pixels.factors(), [1.0, 2.0]);
+    for Distance { feature, distance, .. } in &known.distances {
+        assert!(*distance < 1e-9, "{feature:?}: {distance}");
+    }
+    assert!(known.advice().iter().all(|advice| advice.step == Step::PixelSize && !advice.turns.is_empty()));
+    let told = |gap: &Gap, words: &str| gap.warnings.iter().any(|warning| warning.contains(words));
+    assert!(told(&known, "samples a pixel") && told(&known, "--spp "), "{:?}", known.warnings);
+    assert!(!told(&known, "--pixel-mm"));
+    let blind = with(None);
+    assert!(told(&blind, "--pixel-mm"), "{:?}", blind.warnings);
+    // Four times the area is 0.6 decades.
+    let size = blind.distance(Feature::BlobSize(Region::Crop)).unwrap().distance;
+    assert!((size - 4.0_f64.log10()).abs() < 0.06, "{size}");
+    for k in 0..4 {
+        std::fs::write(made.join(format!("images/{k:06}/record.json")), record(0.25, 0.001)).unwrap();
+    }
+    assert!(!told(&with(Some(0.5)), "samples a pixel"));
+}
+
+/// Rationale: advice that names what is not there, or the wrong way, costs days. Expected: each path is one that `trace explain` explains.
+#[test]
+fn every_field_that_advice_names_exists() {
+    let references = [scene(), species()];
+    let fields = advice::fields();
+    assert!(fields.len() > 30, "{fields:?}");
+    for field in &fields {
+        let said = answer(field, &references, "trace").unwrap_or_else(|e| panic!("{field}: {e}"));
+        let name = field.rsplit('.').next().unwrap();
+        assert!(said.lines().next().unwrap().ends_with(name), "{field} is explained as {said}");
+    }
+    assert!(answer("sensor.exposure.Auto.lewel", &references, "trace").is_err());
+}
+
+/// Rationale: people follow advice. Expected: where fields are rendered again with half the exposure, the advice is to raise it, and first; where the same
+/// fields are wetter under the same exposure, it is to lower the moisture, and not to turn the exposure. Source: what was changed.
+#[test]
+fn what_was_changed_in_a_scene_file_is_advised_to_be_turned_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let make = |name: &str, white: f64, moisture: f64| {
+        let text = small_text()
+            .replace("Field(", &format!("Field(\n    sensor: (exposure: White(level: {white}), noise: (on: false)),"))
+            .replace("soil: (", &format!("soil: (moisture: (mean: {moisture}, spread: 0), "));
+        // Its paths count from the repository's folder.
+        let text = text.replace("\"textures", &format!("\"{}/textures", env!("CARGO_MANIFEST_DIR")));
+        let text = text.replace("\"scenes", &format!("\"{}/scenes", env!("CARGO_MANIFEST_DIR")));
+        let file = folder.path().join(format!("{name}.ron"));
+        std::fs::write(&file, text).unwrap();
+        let out = folder.path().join(name);
+        let arguments =
+            ["dataset", "--scene", file.to_str().unwrap(), "--count", "6", "--spp", "8", "--quiet", "--out"];
+        let output = trace(&arguments).arg(&out).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        out
+    };
+    let real = make("real", 0.6, 0.15);
+    let advised = |gap: &Gap, field: &str| -> Vec<Way> {
+        let turns = gap.advice().into_iter().flat_map(|advice| advice.turns);
+        turns.filter(|turn| turn.field == field).map(|turn| turn.way).collect()
+    };
+    let dark = compared(&real, &make("dark", 0.3, 0.15));
+    assert_eq!(dark.advice()[0].step, Step::Exposure, "{:?}", dark.advice());
+    assert_eq!(advised(&dark, "sensor.exposure.White.level"), [Way::Raise]);
+    let wet = compared(&real, &make("wet", 0.6, 0.85));
+    let ways = advised(&wet, "soil.moisture.mean");
+    assert!(!ways.is_empty() && ways[0] == Way::Lower, "{:?}", wet.advice());
+    assert!(advised(&wet, "sensor.exposure.White.level").is_empty(), "{:?}", wet.advice());
+    assert!(wet.pixels.real_mm.is_some() && wet.pixels.real_mm == wet.pixels.synthetic_mm);
 }
 
 #[test]

@@ -41,11 +41,22 @@ struct Watched {
 
 impl Watched {
     fn start(more: &[&str]) -> Self {
+        Self::spawn(Command::new(env!("CARGO_BIN_EXE_trace")), more)
+    }
+
+    /// The same with at most so many open files.
+    fn limited(files: u32) -> Self {
+        let mut shell = Command::new("sh");
+        shell.args(["-c", &format!("ulimit -n {files}; exec \"$0\" \"$@\""), env!("CARGO_BIN_EXE_trace")]);
+        Self::spawn(shell, &[])
+    }
+
+    fn spawn(mut command: Command, more: &[&str]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let species = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/species/sugar_beet.ron");
         std::fs::write(folder.path().join("a.ron"), SCENE.replace("SPECIES", &format!("\"{}\"", species.display())))
             .unwrap();
-        let mut program = Command::new(env!("CARGO_BIN_EXE_trace"))
+        let mut program = command
             .current_dir(folder.path())
             .args(["watch", "a.ron", "--spp", "2", "--threads", "2"])
             .args(more)
@@ -406,4 +417,41 @@ fn a_sheet_shows_several_indices() {
     assert!(width > 4 * 48 && height > 2 * 36, "{width} × {height}");
     assert_eq!(run("9..3", &out).status.code(), Some(2));
     assert_eq!(run("0..2", watched.folder.path()).status.code(), Some(2));
+}
+
+/// Rationale: pages that are open in many windows, or scanners, must not end a session. Expected: more connections than the program may have open files
+/// leave it alive: once they are closed it answers again, and ends as ever. The limit is the shell's.
+#[cfg(target_os = "linux")]
+#[test]
+fn too_many_connections_end_nothing() {
+    const LIMIT: u32 = 96;
+    let watched = Watched::limited(LIMIT);
+    watched.events().done();
+    let address = watched.host.parse().unwrap();
+    let connect = || TcpStream::connect_timeout(&address, Duration::from_secs(1));
+    // Until its files are open, and some connections more than it can take.
+    let files = || std::fs::read_dir(format!("/proc/{}/fd", watched.program.id())).unwrap().count() as u32;
+    let (mut idle, begin) = (Vec::new(), Instant::now());
+    while files() + 2 < LIMIT {
+        idle.extend(connect());
+        assert!(begin.elapsed() < PATIENCE, "{} connections, {} files", idle.len(), files());
+    }
+    idle.extend((0..8).filter_map(|_| connect().ok()));
+    drop(idle);
+    let begin = Instant::now();
+    let answers = || {
+        let mut stream = connect().ok()?;
+        stream.set_read_timeout(Some(Duration::from_secs(5))).ok()?;
+        write!(stream, "GET {} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n\r\n", watched.base, watched.host).ok()?;
+        let mut said = Vec::new();
+        stream.read_to_end(&mut said).ok()?;
+        said.starts_with(b"HTTP/1.1 200").then_some(())
+    };
+    while answers().is_none() {
+        assert!(begin.elapsed() < PATIENCE, "it never answered again");
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    let (code, said) = watched.end("TERM");
+    assert_eq!(code, Some(75), "{said}");
+    assert!(said.contains("too many connections"), "the limit was not met: {said}");
 }

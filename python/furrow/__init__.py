@@ -61,8 +61,20 @@ def _read(path: Path, kind: type[np.generic]) -> np.ndarray[Any, Any]:
     try:
         with Image.open(path) as picture:
             return np.array(picture).astype(kind)
-    except OSError as error:
+    # What Pillow raises for files that are no pictures, or are cut short.
+    except (OSError, SyntaxError, ValueError) as error:
         raise Error(f"{path}: {error}") from error
+
+
+def _json(path: Path) -> Dict[str, Any]:
+    """What stands in a JSON file that holds an object."""
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise Error(f"{path}: {error}") from error
+    if not isinstance(found, dict):
+        raise Error(f"{path}: this is no JSON object")
+    return found
 
 
 def _sample(folder: Path, photographs: str = "") -> Sample:
@@ -95,15 +107,18 @@ class Dataset:
         self.path = Path(path)
         self.transform = transform
         try:
-            self.recipe: Dict[str, Any] = json.loads((self.path / "dataset.json").read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
+            self.recipe = _json(self.path / "dataset.json")
+        except Error as error:
             raise Error(f"{self.path} is no dataset: {error}") from error
         if split is not None and split not in SPLITS:
             raise ValueError(f"split is one of {', '.join(SPLITS)}, not {split!r}")
         # Of any so many images in a row, the first are for training, then validation, then test.
-        pattern = [name for name, share in zip(SPLITS, self.recipe["split"]) for _ in range(share)]
-        every = range(self.recipe["count"])
-        self.indices = [k for k in every if split is None or pattern[k % len(pattern)] == split]
+        try:
+            pattern = [name for name, share in zip(SPLITS, self.recipe["split"]) for _ in range(share)]
+            every = range(self.recipe["count"])
+            self.indices = [k for k in every if split is None or pattern[k % len(pattern)] == split]
+        except (KeyError, TypeError, ZeroDivisionError) as error:
+            raise Error(f"{self.path}/dataset.json is damaged: {error!r}") from error
 
     def __len__(self) -> int:
         return len(self.indices)
@@ -111,7 +126,7 @@ class Dataset:
     def __getitem__(self, item: SupportsIndex) -> Any:
         folder = self.path / "images" / f"{self.indices[operator.index(item)]:06d}"
         sample = _sample(folder)
-        sample["record"] = json.loads((folder / "record.json").read_text(encoding="utf-8"))
+        sample["record"] = _json(folder / "record.json")
         return sample if self.transform is None else self.transform(sample)
 
     def __iter__(self) -> Iterator[Any]:

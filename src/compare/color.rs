@@ -6,7 +6,7 @@
 use super::picture::Picture;
 use palette::color_difference::Ciede2000;
 use palette::white_point::D65;
-use palette::{IntoColor, Lab, Srgb};
+use palette::{IntoColor, Lab, LinSrgb, Srgb};
 use rayon::prelude::*;
 
 /// ΔE₀₀ of two colours in CIELAB, each L*, a*, b*.
@@ -24,6 +24,11 @@ pub(super) fn lab([r, g, b]: [u8; 3]) -> [f32; 3] {
 /// Linear values of the codes of 8-bit sRGB, 0 to 1.
 pub(super) fn linear() -> [f32; 256] {
     std::array::from_fn(|code| Srgb::new(code as u8, 0, 0).into_linear::<f32>().red)
+}
+
+/// The code of 8-bit sRGB of a linear value.
+pub(super) fn coded(value: f32) -> u8 {
+    Srgb::<f32>::from_linear(LinSrgb::new(value, value, value)).into_format::<u8>().red
 }
 
 /// ΔE₀₀ of each pixel; CIELAB of the white of sRGB, D65. The pictures are of one size.

@@ -6,6 +6,7 @@ mod tally;
 use crate::geometry::Window;
 use crate::math::{Spectrum, Vec3};
 use glam::{DVec4, Vec4};
+use serde::{Deserialize, Serialize};
 
 pub use filter::{Filter, Footprint};
 pub use tally::Tally;
@@ -90,6 +91,15 @@ impl Accumulator {
     }
 }
 
+/// How well an image is sampled.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sampling {
+    /// Samples of the mean pixel.
+    pub spp: f64,
+    /// Median over pixels of [`Pixel::relative_error`].
+    pub relative_error: f32,
+}
+
 /// A rendered image, row by row from the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {
@@ -118,6 +128,12 @@ impl Film {
     /// Median over pixels of [`Pixel::relative_error`]: one honest figure.
     pub fn median_relative_error(&self) -> f32 {
         median_relative_error(&self.pixels)
+    }
+
+    /// How well it is sampled; `None` where one sample a pixel tells no error, and of a rasterizer.
+    pub fn sampling(&self) -> Option<Sampling> {
+        let relative_error = self.median_relative_error();
+        (relative_error > 0.0).then(|| Sampling { spp: self.samples().1, relative_error })
     }
 
     /// Samples of the pixel that has the fewest, of the mean pixel, of the one that has the most.

@@ -69,7 +69,7 @@ pub fn observer(wavelength_nm: f64) -> [f64; 3] {
 }
 
 /// Linear Rec.709 from XYZ. Source: IEC 61966-2-1.
-fn rec709([x, y, z]: [f64; 3]) -> [f64; 3] {
+pub(super) fn rec709([x, y, z]: [f64; 3]) -> [f64; 3] {
     [
         3.2404542 * x - 1.5371385 * y - 0.4985314 * z,
         -0.9692660 * x + 1.8760108 * y + 0.0415560 * z,

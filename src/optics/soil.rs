@@ -55,6 +55,16 @@ pub fn at(rgb: [f32; 3], like: Spectrum) -> Spectrum {
     Spectrum::new(rgb[0], rgb[1], rgb[2], nir).clamp(0.0, 0.9)
 }
 
+/// The measured soil whose colour is the most similar: of the smallest squared differences of log₂ R, G, B.
+pub fn most_similar(rgb: [f32; 3]) -> Spectrum {
+    let far = |soil: &Spectrum| -> f32 {
+        let of = soil.to_array();
+        (0..3).map(|k| (rgb[k].max(1e-4) / of[k]).log2().powi(2)).sum()
+    };
+    let measured = [LOAM, LOESS, SANDY, HUMIC, REDDISH, CHALKY];
+    measured.into_iter().min_by(|a, b| far(a).total_cmp(&far(b))).unwrap_or(LOAM)
+}
+
 /// Refractive index of water in the visible.
 const WATER_INDEX: f64 = 1.33;
 /// Refractive index of soil minerals.

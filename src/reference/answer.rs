@@ -5,7 +5,7 @@ use crate::ron_file::nearest;
 use crate::{Error, Result};
 
 /// The tree of all paths for none; else the section or entry of a path. A path begins with the name of a kind of file, such as `species`, or is
-/// one of the first kind. A name alone is found wherever it stands; where it stands in several places, they are listed.
+/// one of the first kind. A name alone, or the end of a path, is found wherever it stands; where it stands in several places, they are listed.
 pub fn answer(path: &str, references: &[Reference], program: &str) -> Result<String> {
     let (first, rest) = path.split_once('.').unwrap_or((path, ""));
     let chosen = references.iter().find(|of| of.root == first);
@@ -26,6 +26,9 @@ pub fn answer(path: &str, references: &[Reference], program: &str) -> Result<Str
     let candidates = if chosen.is_some() { std::slice::from_ref(main) } else { references };
     let found: Vec<(&Reference, String)> =
         candidates.iter().flat_map(|of| of.named(name).into_iter().map(move |path| (of, path))).collect();
+    // No step is passed over.
+    let ends = |path: &str| path == inside || path.ends_with(&format!(".{inside}"));
+    let found: Vec<(&Reference, String)> = found.into_iter().filter(|(_, path)| ends(path)).collect();
     match found.as_slice() {
         [(of, path)] => match of.find(path) {
             Some((section, entry)) => Ok(of.explain(section, entry)),

@@ -21,6 +21,7 @@ pub use manual::manual;
 pub use section::{Entry, Section};
 pub use walk::Reference;
 
+use crate::ron_file::Distribution;
 use crate::scene::desc::{FieldDesc, SpeciesDesc};
 use crate::texture::draw::Recipe;
 
@@ -37,6 +38,11 @@ pub fn species() -> Reference {
 /// Recipes of textures: `Leaf(…)` or `Soil(…)`.
 pub fn texture() -> Reference {
     Reference::of::<Recipe>("texture", "", "Texture recipes")
+}
+
+/// What a number may be drawn from: `Uniform(…)` and others.
+pub fn distribution() -> Reference {
+    Reference::of::<Distribution>("distribution", "", "Distributions, where a number or distribution may stand")
 }
 
 /// Experiment files: `Experiment(…)`.

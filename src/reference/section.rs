@@ -37,6 +37,11 @@ pub struct Section {
 }
 
 impl Section {
+    /// Whether it is a value that has one of several forms.
+    pub fn has_variants(&self) -> bool {
+        self.entries.iter().any(|entry| entry.variant)
+    }
+
     /// An entry by its name.
     pub fn entry(&self, name: &str) -> Option<&Entry> {
         self.entries.iter().find(|entry| entry.name == name)

@@ -71,6 +71,10 @@ fn paths_lead_where_they_say() {
     assert_eq!(find("weeds.condition"), find("crops.condition"));
     assert_eq!(find("camera.JaiAd130.height_m.Normal.mean"), at("camera.JaiAd130", Some("height_m")));
     assert_eq!(find("soil.clouds"), None);
+    // A step that does not exist is not passed over.
+    for path in ["camera.Fone.height_m", "soil.moisture.mean.patch", "soil.clods.max_mm.Uniform", "sown.All.of"] {
+        assert_eq!(find(path), None, "{path}");
+    }
     assert_eq!(scene.named("max_mm"), ["soil.clods.max_mm", "soil.stones.max_mm"]);
     let (_, entry) = scene.find("soil.clods.over_5mm_per_m2").unwrap();
     let entry = entry.unwrap();

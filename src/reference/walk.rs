@@ -4,7 +4,7 @@ use super::node::{Node, Object, Part, Types, parts, tuple};
 use super::ron;
 use super::sample;
 use super::section::{Entry, Section, prose, unit};
-use crate::ron_file::{self, KIND, RANGE};
+use crate::ron_file::{self, DISTRIBUTION_WORDS, KIND, RANGE};
 use schemars::JsonSchema;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -44,19 +44,24 @@ impl Reference {
         let mut entry = None;
         let steps: Vec<&str> =
             path.split(['.', '[', ']']).filter(|step| !step.is_empty() && step.parse::<usize>().is_err()).collect();
-        for step in &steps {
+        for (k, step) in steps.iter().enumerate() {
             let found = at.entry(step).map(|e| (at, e)).or_else(|| self.within_variants(at, step));
             match found {
                 Some((section, e)) => {
                     at = e.section.as_deref().and_then(|path| self.section(path)).unwrap_or(section);
                     entry = Some((section, e));
-                    // What follows is inside a number: a distribution and its ends.
                     if e.section.is_none() {
+                        // What follows is inside a number: a distribution and its ends.
+                        let drawn = e.kind.contains("distribution");
+                        let inside = |step: &&str| drawn && DISTRIBUTION_WORDS.contains(step);
+                        if !steps[k + 1..].iter().all(inside) {
+                            return None;
+                        }
                         break;
                     }
                 }
-                // The name of a struct, as in `materials.Leaf`.
-                None if step.starts_with(char::is_uppercase) && steps.len() > 1 => {}
+                // The name in front of a struct's fields, as in `materials.Leaf` or `sensor.Phone`.
+                None if step.starts_with(char::is_uppercase) && steps.len() > 1 && !at.has_variants() => {}
                 None => return None,
             }
         }

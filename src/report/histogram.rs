@@ -117,6 +117,13 @@ impl Histogram {
         sum / self.total().max(1) as f64
     }
 
+    /// Standard deviation of the values, as exact as the bins are narrow; 0 of none.
+    pub fn deviation(&self) -> f64 {
+        let mean = self.mean();
+        let square = |(bin, n): (usize, &u64)| (self.middle(bin) - mean).powi(2) * *n as f64;
+        (self.counts.iter().enumerate().map(square).sum::<f64>() / self.total().max(1) as f64).sqrt()
+    }
+
     /// W₁ to another one of the same bins, in the values' unit, of logarithmic bins in bins; neither is empty.
     pub fn distance(&self, other: &Self) -> f64 {
         let (all, others) = (self.total() as f64, other.total() as f64);

@@ -1,14 +1,15 @@
-//! The colour of a whole field: a mix of measured soils, into which the layers' pictures are moved.
+//! The colour of a whole field: a mix of soils that were measured or named, into which the layers' pictures are moved.
 
 use super::LayerMaps;
+use crate::Result;
 use crate::math::{Spectrum, vec2};
-use crate::optics::soil;
+use crate::optics::{Munsell, soil};
 use crate::ron_file::{Fraction, Num};
 use crate::sampling::Stream;
 use serde::{Deserialize, Serialize};
 
 /// A dry soil whose reflectance is known; the book's page on soil has their sources.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub enum SoilColor {
     /// Common loam.
     Loam,
@@ -25,15 +26,22 @@ pub enum SoilColor {
     /// A soil of your own: reflectance of the dry soil in R, G, B and NIR, as a spectrometer or a photograph with a grey card gives it.
     #[schemars(extend("x-example" = "(0.2, 0.15, 0.11, 0.28)"))]
     Rgbn(Num<Fraction>, Num<Fraction>, Num<Fraction>, Num<Fraction>),
+    /// The dry soil's place in a Munsell chart: hue, value and chroma. Near infrared is that of the measured soil with the most similar colour.
+    #[schemars(extend("x-example" = "(\"10YR 5/3\")"))]
+    Munsell(Munsell),
+    /// A spectrum of the dry soil from a CSV file: wavelength in nm, reflectance from 0 to 1, at least from 420 to 900 nm. Its path counts from
+    /// the scene file's folder.
+    #[schemars(extend("x-example" = "(\"soil.csv\")"))]
+    Spectrum(String),
 }
 
 impl SoilColor {
-    /// All of them.
+    /// Those that ship.
     pub const ALL: [Self; 6] = [Self::Loam, Self::Loess, Self::Sandy, Self::Humic, Self::Reddish, Self::Chalky];
 
-    /// Reflectance of the dry soil: R, G, B, NIR.
-    pub fn reflectance(self) -> Spectrum {
-        match self {
+    /// Reflectance of the dry soil: R, G, B, NIR. `read` opens the file of a spectrum.
+    pub fn reflectance(&self, read: &mut dyn FnMut(&str) -> Result<Spectrum>) -> Result<Spectrum> {
+        Ok(match self {
             Self::Loam => soil::LOAM,
             Self::Loess => soil::LOESS,
             Self::Sandy => soil::SANDY,
@@ -41,7 +49,9 @@ impl SoilColor {
             Self::Reddish => soil::REDDISH,
             Self::Chalky => soil::CHALKY,
             Self::Rgbn(r, g, b, nir) => Spectrum::new(r.f32(), g.f32(), b.f32(), nir.f32()),
-        }
+            Self::Munsell(color) => color.reflectance(),
+            Self::Spectrum(file) => read(file)?,
+        })
     }
 }
 
@@ -60,7 +70,7 @@ impl Shift {
 
     /// Moves the mean of the first layer's picture to a random mix of `colors`, evenly drawn among all mixes; the other layers go
     /// with it. Without colours nothing moves.
-    pub(super) fn draw<L: LayerMaps>(colors: &[SoilColor], first: &L, stream: &mut Stream) -> Self {
+    pub(super) fn draw<L: LayerMaps>(colors: &[Spectrum], first: &L, stream: &mut Stream) -> Self {
         if colors.is_empty() {
             return Self::NONE;
         }
@@ -69,7 +79,7 @@ impl Shift {
         let sum: f32 = weights.iter().sum();
         let mut like = Spectrum::ZERO;
         for (color, weight) in colors.iter().zip(&weights) {
-            like += color.reflectance() * (weight / sum);
+            like += *color * (weight / sum);
         }
         let mean = mean(first);
         let wanted = like.to_array();
@@ -99,21 +109,26 @@ mod tests {
     #[test]
     fn mixes_stay_between_the_soils_and_one_alone_is_itself() {
         let plain = Plain { albedo: [0.2, 0.1, 0.05], height: 0.5 };
-        let draw = |colors: &[SoilColor], k| Shift::draw(colors, &plain, &mut Stream::of(3, k, Purpose::Test, 0));
-        let alone = draw(&[SoilColor::Sandy], 0);
+        let draw = |colors: &[Spectrum], k| Shift::draw(colors, &plain, &mut Stream::of(3, k, Purpose::Test, 0));
+        let alone = draw(&[soil::SANDY], 0);
         let got: Vec<f32> = alone.gain.iter().zip(plain.albedo).map(|(g, a)| g * a).collect();
         let sandy = soil::SANDY.to_array();
         assert!((0..3).all(|k| (got[k] - sandy[k]).abs() < 1e-4), "{got:?}");
         let (mut least, mut most) = (f32::MAX, 0f32);
         for k in 0..200 {
-            let red = draw(&[SoilColor::Humic, SoilColor::Sandy], k).like.0.x;
+            let red = draw(&[soil::HUMIC, soil::SANDY], k).like.0.x;
             (least, most) = (least.min(red), most.max(red));
         }
         assert!(least > soil::HUMIC.0.x && most < soil::SANDY.0.x, "{least} {most}");
         assert!(most - least > 0.9 * (soil::SANDY.0.x - soil::HUMIC.0.x), "{least} {most}");
         assert_eq!(draw(&[], 0), Shift::NONE);
-        let own: SoilColor = ron::from_str("Rgbn(0.3, 0.2, 0.1, 0.4)").unwrap();
-        assert_eq!(own.reflectance(), Spectrum::new(0.3, 0.2, 0.1, 0.4));
+        let own = |text: &str| {
+            let color: SoilColor = ron::from_str(text).unwrap();
+            color.reflectance(&mut |file| Ok(Spectrum::splat(file.len() as f32))).unwrap()
+        };
+        assert_eq!(own("Rgbn(0.3, 0.2, 0.1, 0.4)"), Spectrum::new(0.3, 0.2, 0.1, 0.4));
+        assert_eq!(own("Spectrum(\"a.csv\")"), Spectrum::splat(5.0));
+        assert_eq!(own("Munsell(\"10YR 5/3\")"), Munsell::parse("10YR 5/3").unwrap().reflectance());
         assert!(ron::from_str::<SoilColor>("Rgbn(0.3, 0.2, 0.1, 1.4)").is_err());
     }
 }

@@ -34,6 +34,32 @@ pub struct Cutting {
     pub grey: Option<([u32; 4], f32)>,
 }
 
+/// A second piece is told as another leaf above this share of the first: it is no speck of weed or mirrored light.
+const ANOTHER: f64 = 0.15;
+/// Share of a leaf's pixels on the photograph's border above which it is said to be cut by it.
+const CUT: f64 = 0.002;
+
+/// What may not be meant in a photograph, one sentence each; those of `cut_out` come as errors.
+pub fn doubts(width: u32, height: u32, rgb: &[[u8; 3]]) -> Vec<String> {
+    let (width, height) = (width as usize, height as usize);
+    let mut green = green(rgb);
+    let first = largest(&green, width, height);
+    let count = |piece: &[bool]| piece.iter().filter(|inside| **inside).count() as f64;
+    green.iter_mut().zip(&first).for_each(|(green, taken)| *green &= !taken);
+    let mut all = Vec::new();
+    if count(&largest(&green, width, height)) > ANOTHER * count(&first) {
+        all.push("there is more than one leaf: the largest is cut out; photograph one at a time".to_owned());
+    }
+    let border = |i: &usize| [0, width - 1].contains(&(i % width)) || [0, height - 1].contains(&(i / width));
+    let beyond = (0..first.len()).filter(|i| first[*i] && border(i)).count() as f64;
+    if beyond > (CUT * count(&first)).max(4.0) {
+        all.push(
+            "the leaf reaches the photograph's border, so a part of it is missing: leave room around it".to_owned(),
+        );
+    }
+    all
+}
+
 /// The leaf of a photograph, upright, with opacity; sRGB.
 pub fn cut_out(width: u32, height: u32, rgb: &[[u8; 3]], cutting: &Cutting) -> Result<Drawn> {
     let mut leaf = largest(&green(rgb), width as usize, height as usize);
@@ -348,6 +374,27 @@ mod tests {
             let (left, right) = (opaque(12, 95), opaque(w - 13, 95));
             assert!(left && !right, "{k}: the notch is on the right: {left} {right}");
         }
+    }
+
+    /// Expected: one leaf in the middle is doubted by nobody; a second one beside it is told, a speck is not; one that the border cuts is told.
+    #[test]
+    fn what_a_photograph_should_not_show_is_told() {
+        let photo = photograph(0.0);
+        assert_eq!(doubts(400, 400, &photo), Vec::<String>::new());
+        let green = |size: usize| {
+            let mut photo = photo.clone();
+            for i in
+                (0..400 * 400).filter(|i| (10..10 + size).contains(&(i % 400)) && (10..10 + size).contains(&(i / 400)))
+            {
+                photo[i] = [70, 120, 50];
+            }
+            doubts(400, 400, &photo)
+        };
+        assert_eq!(green(10), Vec::<String>::new());
+        let told = green(80);
+        assert!(told.len() == 1 && told[0].contains("more than one leaf"), "{told:?}");
+        let told = doubts(400, 250, &photo[150 * 400..]);
+        assert!(told.len() == 1 && told[0].contains("border"), "{told:?}");
     }
 
     #[test]

@@ -16,7 +16,7 @@ mod rgbe;
 mod srgb;
 mod texels;
 
-pub use cutout::{Cutting, cut_out};
+pub use cutout::{Cutting, cut_out, doubts};
 pub use height::Height;
 pub use maps::{AmbientOcclusion, HeightFromBrightness, Maps, NormalMap};
 pub use pyramid::Wrap;

@@ -1,6 +1,7 @@
 """The module `furrow`: what it reads and renders is what the program writes. Arguments: a dataset of two images, a folder."""
 
 import os
+import shutil
 import sys
 from pathlib import Path
 
@@ -38,6 +39,33 @@ for wrong, error in [(lambda: data[2], IndexError), (lambda: furrow.Dataset(fold
         pass
     else:
         raise AssertionError(error)
+
+# What is damaged is told as the module's own error, with its place.
+def told(path: str, content: bytes) -> str:
+    copy = folder / "broken"
+    shutil.rmtree(copy, ignore_errors=True)
+    shutil.copytree(dataset, copy)
+    (copy / path).write_bytes(content)
+    try:
+        furrow.Dataset(copy)[0]
+    except furrow.Error as error:
+        return str(error)
+    finally:
+        shutil.rmtree(copy)
+    raise AssertionError(path)
+
+
+picture = (dataset / "images/000000/rgb.png").read_bytes()
+for path, content in [
+    ("images/000000/rgb.png", picture[: len(picture) // 2]),
+    ("images/000000/rgb.png", b""),
+    ("images/000000/record.json", b"{"),
+    ("images/000000/record.json", b"[]"),
+    ("dataset.json", b"[]"),
+    ("dataset.json", b"{}"),
+]:
+    words = told(path, content)
+    assert str(folder / "broken") in words and path.split("/")[-1] in words, words
 
 # Rendering leaves no file behind, and is what the program does with the same field.
 rendered = furrow.render("field", index=1, spp=1, width=64)

@@ -22,6 +22,10 @@ pub(crate) struct Args {
     /// The pictures that are to be like the real ones: a folder of the same kind, as a rule a dataset.
     #[arg(long, value_name = "DIR", requires = "real")]
     synthetic: Option<PathBuf>,
+    /// Millimetres of ground that a pixel of the real pictures sees, so that the finer set can be made as coarse as the other; read off their records
+    /// where they have such.
+    #[arg(long, value_name = "MM", requires = "real", value_parser = pixel_mm)]
+    pixel_mm: Option<f64>,
     /// Labels as PNG files (0 soil, 1 crop, 2 weed, 255 none), for figures of each class; semantics.png beside the reference unless given.
     #[arg(long, value_name = "PATH")]
     labels: Option<PathBuf>,
@@ -47,6 +51,14 @@ fn pixels_per_degree(text: &str) -> Result<f32, String> {
     text.parse().ok().filter(|n| (1.0..=500.0).contains(n)).ok_or_else(|| "write a number from 1 to 500".into())
 }
 
+/// Parses a pixel's side on the ground.
+fn pixel_mm(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|mm| (0.001..=10_000.0).contains(mm))
+        .ok_or_else(|| "write millimetres, such as 0.3".into())
+}
+
 /// Measures what was asked for, writes tables and a page, and shows the figures.
 pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     cli::check_folder(&args.out)?;
@@ -59,7 +71,7 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
 
 fn sets(args: &Args, real: &Path, synthetic: &Path) -> Result<Vec<PathBuf>> {
     let progress = Progress::new(Instant::now(), args.quiet);
-    let options = gap::Options { shown: args.show };
+    let options = gap::Options { shown: args.show, pixel_mm: args.pixel_mm };
     let start = |pictures: usize| progress.expect(pictures as u64);
     let pool = render::pool(args.threads)?;
     let gap = pool.install(|| gap::Gap::of(real, synthetic, &options, &start, &|| progress.add()))?;

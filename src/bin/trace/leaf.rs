@@ -1,7 +1,7 @@
 //! `trace leaf`: cuts a leaf out of a photograph, as a texture for a species file.
 
 use furrow::output::{read_color_photo, write_atomically};
-use furrow::texture::{Cutting, cut_out, draw};
+use furrow::texture::{Cutting, cut_out, doubts, draw};
 use furrow::{Result, cli};
 use std::path::PathBuf;
 
@@ -45,6 +45,9 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     let grey = args.grey.map(|g| ([g.x0, g.y0, g.width(), g.height()], args.reflectance));
     let cutting = Cutting { flip: args.flip, stalk: args.stalk, holes: args.holes, height: args.height, grey };
     let leaf = cut_out(width, height, &rgb, &cutting).map_err(|e| e.in_file(&args.photo))?;
+    for doubt in doubts(width, height, &rgb) {
+        furrow::tell!("warning: {}: {doubt}", args.photo.display());
+    }
     furrow::tell!("{} × {} pixels; width over length of the blade {:.2}", leaf.width, leaf.height, aspect(&leaf));
     write_atomically(&args.out, &draw::encode(&leaf, "cut out of a photograph by furrow"))?;
     Ok(vec![args.out.clone()])

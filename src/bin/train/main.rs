@@ -4,6 +4,7 @@
 
 mod baseline;
 mod calibrate;
+mod curves;
 mod eval;
 mod explain;
 mod export;
@@ -43,6 +44,7 @@ Examples:
   train export runs/d --format onnx                       the network for a robot
   train baseline exg-size --from data/real@0..10 --set data/real@12..20
   train table scenes/experiments/paper.ron --real jai=DIR the paper's tables, from scenes and real folders
+  train report runs/a runs/b --out out/losses             losses of several runs over each other
   train explain hyperparameters.rate                      what may stand in an experiment file
 
 A run that was stopped or killed goes on with the same command, and ends the same.
@@ -65,6 +67,8 @@ enum Verb {
     Baseline(baseline::Args),
     /// Run an experiment file: datasets, trainings, evaluations, tables.
     Table(Box<table::Args>),
+    /// Draw the losses and validation scores of several runs over each other, on one page.
+    Report(curves::Args),
     /// Explain what may stand in an experiment file: every field with its range, default and an example.
     Explain(explain::Args),
     /// Write the generated pages of the documentation.
@@ -86,6 +90,7 @@ fn main() -> ExitCode {
         Verb::Export(args) => export::run(&args),
         Verb::Baseline(args) => baseline::run(&args, &signals),
         Verb::Table(args) => table::run(&args, &signals),
+        Verb::Report(args) => curves::run(&args),
         Verb::Explain(args) => explain::run(&args),
         Verb::Reference(args) => pages::run::<Cli>(&args),
     };

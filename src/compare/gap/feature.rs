@@ -189,6 +189,19 @@ impl Pool {
         }
     }
 
+    /// Standard deviation of each channel; of power zeros.
+    pub fn spreads(&self) -> Vec<f64> {
+        match self {
+            Self::Counts(channels) => channels.iter().map(Histogram::deviation).collect(),
+            Self::Values(values) => {
+                let mean = self.means()[0];
+                let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+                vec![(squares / values.len() as f64).sqrt()]
+            }
+            Self::Power(power) => vec![0.0; power.len()],
+        }
+    }
+
     /// Mean of each channel; of power each band in decibels.
     pub fn means(&self) -> Vec<f64> {
         match self {

@@ -22,20 +22,27 @@
 //! |---|---|
 //! | `source` | which pictures there are |
 //! | `feature` | what is measured, and how sets differ in it |
+//! | `known`, `pixel` | what records of rendered pictures tell; one pixel size for both sets |
 //! | `measure` | one picture, measured |
 //! | `wasserstein`, `frequency`, `noise`, `regions`, `outline` | how |
 //! | `sets` | all of it, from two folders to distances |
+//! | `sampling` | noise of few samples, beside that of real cameras |
+//! | [`advice`] | which fields of a scene file to turn, and which way |
 //! | `window` | what the page shows of a picture |
 //! | `table`, `curves`, `page`, `write` | how it is written: JSON, CSV, text; curves; one HTML page |
 
+pub mod advice;
 mod curves;
 mod feature;
 mod frequency;
+mod known;
 mod measure;
 mod noise;
 mod outline;
 mod page;
+mod pixel;
 mod regions;
+mod sampling;
 mod sets;
 mod source;
 mod table;
@@ -44,6 +51,7 @@ mod window;
 mod write;
 
 pub use feature::{Feature, Pool};
+pub use pixel::PixelSizes;
 pub use sets::{Distance, Gap, LARGE, Options, Set};
 pub use source::{Photo, photos};
 pub use window::Window;

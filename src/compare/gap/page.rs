@@ -3,7 +3,7 @@
 use super::curves::charts;
 use super::feature::Feature;
 use super::sets::{Distance, Gap, Set};
-use super::table::{cells, named, verdict};
+use super::table::{ORDER, cells, named, verdict};
 use super::window::Window;
 use crate::compare::Region;
 use crate::report::{Number, Page, chart, count, data_url, legend, list, numbers, section};
@@ -19,6 +19,7 @@ pub(super) fn html(of: &Gap) -> String {
     let body = html! {
         (figures(of))
         (section("Distances", html! { (distances(of)) (reading()) }))
+        (section("What to turn", turns(of)))
         (section("Side by side", beside(of)))
         (section("Curves", curves(of)))
         (section("Left out", list(&of.warnings)))
@@ -78,6 +79,21 @@ fn distances(of: &Gap) -> Markup {
                             @for cell in cells(of, distance) { td { (cell) } }
                         }
                     }
+                }
+            }
+        }
+    }
+}
+
+/// What to do about large distances.
+fn turns(of: &Gap) -> Markup {
+    let advice = of.advice();
+    html! {
+        @if !advice.is_empty() {
+            p.reading { (ORDER) }
+            ol.turns {
+                @for one in &advice {
+                    li { (one.words) @for turn in &one.turns { div { (turn.way.name()) " " code { (turn.field) } } } }
                 }
             }
         }

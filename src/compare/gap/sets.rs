@@ -1,9 +1,11 @@
 //! All of it: from two folders to distances.
 
 use super::feature::{Feature, Pool, Samples};
+use super::known::Known;
+use super::pixel::{PixelSizes, coarsen, coarser_size};
 use super::source::{Photo, photos, warnings};
 use super::window::Window;
-use super::{frequency, measure, wasserstein};
+use super::{frequency, measure, sampling, wasserstein};
 use crate::compare::{Picture, pairs, read_labels};
 use crate::sampling::rng::{Purpose, Stream};
 use crate::{Result, output};
@@ -17,15 +19,17 @@ pub const LARGE: f64 = 2.0;
 const HALVES: u64 = 32;
 
 /// How sets are compared.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Pictures of each set that the page shows; 0 where only numbers are wanted.
     pub shown: usize,
+    /// Side of a real picture's pixel on the ground, millimetres; what its records say unless given.
+    pub pixel_mm: Option<f64>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { shown: 12 }
+        Self { shown: 12, pixel_mm: None }
     }
 }
 
@@ -73,6 +77,8 @@ pub struct Gap {
     pub real: Set,
     /// The other.
     pub synthetic: Set,
+    /// How much ground a pixel of each set sees; the finer set was made as coarse as the other where both are known.
+    pub pixels: PixelSizes,
     /// Side of the tiles of spectra, pixels; `None` where pictures are too small for them.
     pub tile: Option<usize>,
     /// Each feature that both sets have.
@@ -92,20 +98,28 @@ impl Gap {
     ) -> Result<Self> {
         let (name, other) = pairs::names(real, synthetic);
         let (real, synthetic) = (photos(real, "--real")?, photos(synthetic, "--synthetic")?);
+        let known = [Known::of(&real)?, Known::of(&synthetic)?];
+        let pixels = PixelSizes { real_mm: options.pixel_mm.or(known[0].pixel_mm), synthetic_mm: known[1].pixel_mm };
+        let factors = pixels.factors();
         let mut least = u32::MAX;
-        for photo in real.iter().chain(&synthetic) {
-            let (width, height) = output::photo_size(&photo.rgb)?;
-            least = least.min(width).min(height);
+        for (photos, factor) in [(&real, factors[0]), (&synthetic, factors[1])] {
+            for photo in photos {
+                let (width, height) = coarser_size(output::photo_size(&photo.rgb)?, factor);
+                least = least.min(width).min(height);
+            }
         }
         let tile = frequency::tile(least);
         start(real.len() + synthetic.len());
         let mut warned = [warnings("--real", &real), warnings("--synthetic", &synthetic)].concat();
         warned.extend(one_sided(&real, &synthetic));
+        warned.extend(unknown(&pixels));
         if tile.is_none() {
             warned.push(format!("pictures of fewer than {} pixels a side have no spectrum", frequency::TILES.1));
         }
-        let (of_real, real) = set(name, real, tile, options.shown, done)?;
-        let (_, synthetic) = set(other, synthetic, tile, options.shown, done)?;
+        let [take_real, take_synthetic] = factors.map(|factor| Take { factor, tile, shown: options.shown });
+        let (of_real, real) = set(name, real, &take_real, done)?;
+        let (_, synthetic) = set(other, synthetic, &take_synthetic, done)?;
+        warned.extend(noisy(&known[1], &real, &synthetic, factors[1]));
         if of_real.len() < 2 {
             warned.push("a single real picture has no halves: there are distances but no ratios".into());
         }
@@ -115,13 +129,40 @@ impl Gap {
             Some(Distance { feature, distance, halves: halves.get(&feature).copied() })
         });
         let distances = distances.collect();
-        Ok(Self { real, synthetic, tile, distances, warnings: warned })
+        Ok(Self { real, synthetic, pixels, tile, distances, warnings: warned })
     }
 
     /// How far the sets are in a feature; `None` where one has none of it.
     pub fn distance(&self, feature: Feature) -> Option<&Distance> {
         self.distances.iter().find(|distance| distance.feature == feature)
     }
+}
+
+/// A sentence where the sets cannot be brought to one pixel size.
+fn unknown(pixels: &PixelSizes) -> Option<String> {
+    let what = match (pixels.real_mm, pixels.synthetic_mm) {
+        (None, _) => "how much ground a pixel of --real sees is not known: tell it by --pixel-mm",
+        (Some(_), None) => {
+            "how much ground a pixel of --synthetic sees is not known: it has no records of cameras that look down"
+        }
+        (Some(_), Some(_)) => return None,
+    };
+    Some(format!("{what}; pixels are compared as they are"))
+}
+
+/// A sentence where the synthetic pictures have so few samples that their noise counts, or where nobody knows.
+fn noisy(known: &Known, real: &Set, synthetic: &Set, factor: f64) -> Option<String> {
+    let values = |set: &Set, feature| match set.pools.get(&feature) {
+        Some(Pool::Values(values)) => wasserstein::median(values.clone()),
+        _ => None,
+    };
+    let Some((spp, error)) = known.sampling else {
+        return known.rendered.then(|| {
+            "how much sampling noise --synthetic has is not known: it was denoised, or its records do not tell".into()
+        });
+    };
+    let luminance = values(synthetic, Feature::Exposure)?.exp2();
+    sampling::warning(spp, sampling::levels(luminance, error, factor), values(real, Feature::Noise)?)
 }
 
 /// What only one of the sets has.
@@ -139,21 +180,24 @@ fn one_sided(real: &[Photo], synthetic: &[Photo]) -> Vec<String> {
     labels.into_iter().chain(infrared).collect()
 }
 
-/// Measures every picture of a set.
-fn set(
-    name: String,
-    photos: Vec<Photo>,
+/// How the pictures of a set are taken.
+struct Take {
+    /// How many pixels become one, along each axis.
+    factor: f64,
     tile: Option<usize>,
     shown: usize,
-    done: &(dyn Fn() + Sync),
-) -> Result<(Vec<Samples>, Set)> {
-    let shown = shown.min(photos.len());
+}
+
+/// Measures every picture of a set.
+fn set(name: String, photos: Vec<Photo>, take: &Take, done: &(dyn Fn() + Sync)) -> Result<(Vec<Samples>, Set)> {
+    let shown = take.shown.min(photos.len());
     // Evenly over the names, the middle one of each part.
     let is_shown = |k: usize| (0..shown).any(|s| (2 * s + 1) * photos.len() / (2 * shown) == k);
     let measured = photos.par_iter().enumerate().map(|(k, photo)| {
         let picture = Picture::read(&photo.rgb, photo.nir.as_deref())?;
         let labels = photo.labels.as_ref().map(|path| read_labels(path, picture.size())).transpose()?;
-        let samples = measure::measure(&picture, labels.as_deref(), tile);
+        let (picture, labels) = coarsen(picture, labels, take.factor);
+        let samples = measure::measure(&picture, labels.as_deref(), take.tile);
         let window = is_shown(k).then(|| Window::take(&photo.name, &picture, labels.as_deref())).transpose()?;
         done();
         Ok((samples, window))

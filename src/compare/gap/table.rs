@@ -1,11 +1,13 @@
 //! Distances as JSON and CSV for programs, as a table for people.
 
+use super::advice::{Advice, Turn};
 use super::feature::Pool;
 use super::frequency;
 use super::sets::{Distance, Gap, Set};
 use crate::report::{self, Cell, Lines, Table, count, number};
 use crate::{Error, Result};
 use serde::Serialize;
+use std::fmt::Write;
 
 #[derive(Serialize)]
 struct Document<'a> {
@@ -15,6 +17,7 @@ struct Document<'a> {
     /// Middles of the bands of `spectrum`, cycles a pixel.
     frequencies: Vec<f64>,
     distances: Vec<DistanceRow>,
+    advice: &'a [Advice],
     warnings: &'a [String],
 }
 
@@ -24,6 +27,8 @@ struct About<'a> {
     images: usize,
     labelled: usize,
     near_infrared: usize,
+    /// Millimetres of ground that a pixel sees before sets are brought to one size.
+    pixel_mm: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -40,12 +45,13 @@ struct DistanceRow {
 }
 
 impl<'a> About<'a> {
-    fn of(set: &'a Set) -> Self {
+    fn of(set: &'a Set, pixel_mm: Option<f64>) -> Self {
         Self {
             name: &set.name,
             images: set.photos.len(),
             labelled: set.photos.iter().filter(|photo| photo.labels.is_some()).count(),
             near_infrared: set.photos.iter().filter(|photo| photo.nir.is_some()).count(),
+            pixel_mm,
         }
     }
 }
@@ -72,10 +78,11 @@ fn means(set: &Set, distance: &Distance) -> Vec<f64> {
 pub(super) fn json(of: &Gap) -> Result<String> {
     let document = Document {
         furrow: env!("CARGO_PKG_VERSION"),
-        real: About::of(&of.real),
-        synthetic: About::of(&of.synthetic),
+        real: About::of(&of.real, of.pixels.real_mm),
+        synthetic: About::of(&of.synthetic, of.pixels.synthetic_mm),
         frequencies: of.tile.map(frequency::frequencies).unwrap_or_default(),
         distances: rows(of),
+        advice: &of.advice(),
         warnings: &of.warnings,
     };
     let text = serde_json::to_string_pretty(&document);
@@ -86,25 +93,45 @@ pub(super) fn json(of: &Gap) -> Result<String> {
 pub(super) fn csv(of: &Gap) -> String {
     let value = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
     let list = |values: &[f64]| values.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
+    let advice = of.advice();
+    let turned = |key: &String| {
+        let about = advice.iter().filter(|one| one.features.contains(key));
+        about.flat_map(|one| &one.turns).map(Turn::words).collect::<Vec<_>>().join("; ")
+    };
     let rows = rows(of).into_iter().zip(&of.distances).map(|(row, distance)| {
+        let turn = turned(&row.key);
         let (halves, ratio) = (value(row.halves), value(distance.ratio()));
         let (real, synthetic) = (list(&row.real_mean), list(&row.synthetic_mean));
         let [distance, large] = [row.distance.to_string(), row.large.to_string()];
-        vec![row.key, row.unit.to_owned(), distance, halves, ratio, large, real, synthetic]
+        vec![row.key, row.unit.to_owned(), distance, halves, ratio, large, real, synthetic, turn]
     });
-    let heads = ["feature", "unit", "distance", "halves", "ratio", "large", "real_mean", "synthetic_mean"];
+    let heads = ["feature", "unit", "distance", "halves", "ratio", "large", "real_mean", "synthetic_mean", "turn"];
     report::csv(&heads, rows, Lines::Lf)
 }
 
-/// The table, then what is large.
+/// The table, then what is large, then what to do about it.
 pub(super) fn text(of: &Gap) -> String {
     let mut table = Table::new("", ["", "distance", "halves", "ratio", "real", "synthetic"]);
     for distance in &of.distances {
         let name = Cell::text(named(distance));
         table.push([name].into_iter().chain(cells(of, distance).into_iter().map(Cell::Shown)));
     }
-    table.markdown() + "\n" + &verdict(of) + "\n"
+    let advice = of.advice();
+    let mut text = table.markdown() + "\n" + &verdict(of) + "\n";
+    if !advice.is_empty() {
+        let _ = writeln!(text, "\n{ORDER}");
+    }
+    for (k, one) in advice.iter().enumerate() {
+        let _ = writeln!(text, "{}. {}", k + 1, one.words);
+        for turn in &one.turns {
+            let _ = writeln!(text, "   {}", turn.words());
+        }
+    }
+    text
 }
+
+/// How advice is to be read.
+pub(super) const ORDER: &str = "What to turn in the scene file, in this order; render and compare again after each, for the first move the later ones:";
 
 /// Feature and unit.
 pub(super) fn named(distance: &Distance) -> String {

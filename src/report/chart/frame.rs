@@ -8,13 +8,18 @@ pub(super) const WIDTH: f64 = 320.0;
 const TALL: f64 = 190.0;
 
 /// A chart `height` units high with its title and its unit, which may be empty.
-#[expect(clippy::needless_pass_by_value, reason = "markup is made where it is used")]
 pub(super) fn figure(title: &str, unit: &str, height: f64, body: Markup) -> Markup {
     html! {
-        figure.chart.tall[height > TALL] {
-            figcaption { (title) @if !unit.is_empty() { small { (unit) } } }
-            svg viewBox={ "0 0 " (WIDTH) " " (height) } role="img" aria-label=(title) { (body) }
-        }
+        figure.chart.tall[height > TALL] { (drawing(title, unit, (WIDTH, height), body)) }
+    }
+}
+
+/// What stands in the figure around a chart of another size.
+#[expect(clippy::needless_pass_by_value, reason = "markup is made where it is used")]
+pub(super) fn drawing(title: &str, unit: &str, (width, height): (f64, f64), body: Markup) -> Markup {
+    html! {
+        figcaption { (title) @if !unit.is_empty() { small { (unit) } } }
+        svg viewBox={ "0 0 " (width) " " (height) } role="img" aria-label=(title) { (body) }
     }
 }
 

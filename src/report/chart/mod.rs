@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `bars` | histograms below each other on one axis |
 //! | `lines` | curves on common axes, in a page or as a file |
+//! | `forest` | effects with error bars and a line at zero |
 //! | `shares` | parts of a whole as bars |
 //! | `colors` | colours side by side |
 //! | `suns` | places of the sun in the sky |
@@ -11,6 +12,7 @@
 
 mod bars;
 mod colors;
+mod forest;
 mod frame;
 mod lines;
 mod shares;
@@ -18,6 +20,7 @@ mod suns;
 
 pub use bars::{Series, histograms};
 pub use colors::colors;
+pub use forest::{Effect, forest};
 pub use lines::{Chart, Curve};
 pub use shares::shares;
 pub use suns::suns;

@@ -10,7 +10,7 @@ mod sheet;
 mod shot;
 mod shots;
 
-pub use page::Page;
+pub use page::{Page, Plot};
 pub use sheet::{Sheet, sheet};
 pub use shot::{Shot, spread};
 pub use shots::Shots;

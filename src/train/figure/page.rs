@@ -4,10 +4,11 @@ use super::shot::{CONFUSED, INVENTED, MISSED, Shot};
 use crate::Result;
 use crate::dataset::sample::IGNORE;
 use crate::output::{self, Picture};
-use crate::report::chart::Chart;
+use crate::report::chart::{Chart, Effect, forest};
 use crate::report::{
     self, Number, Table, count, data_url, keyed, legend, number, numbers, pairs, percent, section, swatch, whole,
 };
+use crate::train::measure::report::ImageScores;
 use crate::train::measure::{Confusion, Interval, Report};
 use maud::{Markup, html};
 
@@ -28,6 +29,8 @@ pub struct Page<'a> {
     pub facts: &'a [(String, String)],
     /// The table of the effect of each change on a training set, first on the page and as wide as it.
     pub effects: Option<&'a Table>,
+    /// The same drawn, above the table.
+    pub plots: &'a [Plot],
     /// The evaluation of a set of images.
     pub report: Option<&'a Report>,
     /// Curves over training.
@@ -44,6 +47,15 @@ pub struct Page<'a> {
     pub tables: &'a [Table],
 }
 
+/// The effects of changes on one score.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plot {
+    /// Of which score.
+    pub title: String,
+    /// The effects, in percent of I/U.
+    pub effects: Vec<Effect>,
+}
+
 impl Page<'_> {
     /// The page.
     pub fn html(&self) -> Result<String> {
@@ -55,7 +67,9 @@ impl Page<'_> {
                 (section("Scores", scores(report)))
                 (section("Confusion matrix", matrix(&report.confusion, &report.classes)))
             }
-            @if let Some(effects) = self.effects { (section("Effect of each change", html! { div.wide { (effects.html()) } })) }
+            @if let Some(effects) = self.effects {
+                (section("Effect of each change", html! { (self.forests()) div.wide { (effects.html()) } }))
+            }
             @if !self.charts.is_empty() {
                 (section("Curves", html! { div.plots { @for chart in self.charts { (chart.plot()) } } }))
             }
@@ -75,6 +89,12 @@ impl Page<'_> {
         Ok(page.html(env!("CARGO_PKG_VERSION")))
     }
 
+    /// The effects of changes, drawn.
+    fn forests(&self) -> Markup {
+        let one = |plot: &Plot| forest(&plot.title, FOREST, &plot.effects);
+        html! { div.plots { @for plot in self.plots { (one(plot)) } } }
+    }
+
     fn images(&self) -> Result<Markup> {
         if self.shots.is_empty() {
             return Ok(html! {});
@@ -87,9 +107,16 @@ impl Page<'_> {
             heads.push(self.predictors.get(k).map_or("prediction", String::as_str));
             heads.extend(known.then_some("errors"));
         }
-        let rows: Vec<Markup> = self.shots.iter().map(|shot| self.row(shot)).collect::<Result<_>>()?;
+        let mut shots: Vec<&Shot> = self.shots.iter().collect();
+        // The worst first; pictures without a score stay as they come.
+        shots.sort_by(|a, b| self.score(a).unwrap_or(f64::MAX).total_cmp(&self.score(b).unwrap_or(f64::MAX)));
+        let rows: Vec<Markup> = shots.into_iter().map(|shot| self.row(shot)).collect::<Result<_>>()?;
         Ok(html! {
             (self.colors(known))
+            p.reading {
+                @if self.report.is_some() { "The worst first. " }
+                "A click, or the space bar, enlarges a picture and puts it back."
+            }
             div.heads { @for head in heads { span { (head) } } }
             @for row in &rows { (row) }
         })
@@ -129,17 +156,28 @@ impl Page<'_> {
                 figcaption { b { (shot.name) } (self.words(shot)) }
                 div {
                     @for (what, source) in &cells {
-                        img src=(source) width=(w) height=(h) alt={ (what) " of " (shot.name) };
+                        label {
+                            input type="checkbox" aria-label={ "enlarge " (what) " of " (shot.name) };
+                            img src=(source) width=(w) height=(h) alt={ (what) " of " (shot.name) };
+                        }
                     }
                 }
             }
         })
     }
 
+    /// What the report knows of the image.
+    fn known(&self, shot: &Shot) -> Option<&ImageScores> {
+        self.report?.images.iter().find(|image| image.name == shot.name)
+    }
+
+    fn score(&self, shot: &Shot) -> Option<f64> {
+        self.known(shot)?.mean_iou
+    }
+
     /// I/U of the image, where the report knows it.
     fn words(&self, shot: &Shot) -> String {
-        let image = self.report.and_then(|report| report.images.iter().find(|image| image.name == shot.name));
-        let Some(image) = image else { return String::new() };
+        let Some(image) = self.known(shot) else { return String::new() };
         let classes = self.classes.iter().zip(&image.ious).map(|(name, iou)| (name.as_str(), *iou));
         let all = [("mean I/U", image.mean_iou)].into_iter().chain(classes);
         let words: Vec<String> = all.map(|(name, iou)| format!("{name} {}", share(iou))).collect();
@@ -150,6 +188,10 @@ impl Page<'_> {
 const SIZES: &str = "A plant's size is its pixels; each bin is twice as large across as the one before. Detected are plants of which at least \
                      half of the pixels have the right class. Soil taken for a plant counts to the plant that it touches, or by its own \
                      size.";
+
+/// What a forest plot is of.
+const FOREST: &str =
+    "change of I/U, percentage points; bars are the standard deviation over seeds, and those that reach 0 are pale";
 
 fn share(value: Option<f64>) -> String {
     value.map_or_else(|| "–".into(), percent)
@@ -245,10 +287,12 @@ fn matrix(matrix: &Confusion, classes: &[String]) -> Markup {
 }
 
 fn each_image(report: &Report) -> Markup {
+    let mut report = report.clone();
+    report.images.sort_by(|a, b| a.mean_iou.unwrap_or(f64::MAX).total_cmp(&b.mean_iou.unwrap_or(f64::MAX)));
     let table = Table { title: String::new(), ..report.image_table() };
     html! {
         details {
-            summary { "Each of " (count(report.images.len() as u64, "image", "images")) }
+            summary { "Each of " (count(report.images.len() as u64, "image", "images")) ", the worst first" }
             div.wide { (table.html()) }
         }
     }

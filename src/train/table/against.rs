@@ -12,9 +12,10 @@ use crate::Result;
 use crate::compare::{Band, Comparison, Options, Pairs, Region};
 use crate::dataset::recipe::{FILE, Rendering};
 use crate::dataset::{Set, native, timing_log};
+use crate::report::chart::Effect;
 use crate::report::{Cell, Table};
 use crate::train::data::Pick;
-use crate::train::figure::Shot;
+use crate::train::figure::{Plot, Shot};
 use crate::train::measure::Report;
 use crate::train::run;
 use serde::{Deserialize, Serialize};
@@ -94,6 +95,28 @@ pub(super) fn table(bound: &Bound, seen: &[Seen], out: &Path) -> Result<Option<T
         }
     }
     Ok(Some(table))
+}
+
+/// The table as forest plots: for each network, test set and class the effect of each change, names at the left.
+pub(super) fn plots(table: &Table) -> Vec<Plot> {
+    let word = |cell: &Cell| cell.shown();
+    let number = |cell: &Cell| if let Cell::Number(value, _) = cell { *value } else { None };
+    let mut networks: Vec<String> = table.rows.iter().map(|row| word(&row[0])).collect();
+    networks.dedup();
+    let spread_behind = |head: &usize| table.columns.get(head + 1).is_some_and(|next| next.ends_with(" ±"));
+    let heads: Vec<usize> = (0..table.columns.len()).filter(spread_behind).collect();
+    let mut plots = Vec::new();
+    for network in &networks {
+        for &head in &heads {
+            let rows = table.rows.iter().filter(|row| word(&row[0]) == *network);
+            let effect = |row: &Vec<Cell>| {
+                Some(Effect { name: word(&row[1]), mean: number(&row[head])?, spread: number(&row[head + 1]) })
+            };
+            let title = format!("{network}: {}", table.columns[head]);
+            plots.push(Plot { title, effects: rows.filter_map(effect).collect() });
+        }
+    }
+    plots
 }
 
 /// Mean change of I/U of a class, or of vegetation, on a test set; its spread; whether it is beyond that.

@@ -178,6 +178,7 @@ pub(super) fn page(bound: &Bound, tables: &Tables, out: &Path) -> Result<PathBuf
         fact("sets", names(experiment.sets.iter().map(|(name, _)| name.as_str()).collect())),
     ];
     let effects = tables.0.iter().find(|(name, _)| *name == AGAINST).map(|(_, table)| table);
+    let plots = effects.map(against::plots).unwrap_or_default();
     let shown: Vec<Table> =
         tables.0.iter().filter(|(name, _)| ![TIMES, AGAINST].contains(name)).map(|(_, t)| t.clone()).collect();
     let (title, lead) = match &experiment.against {
@@ -195,6 +196,7 @@ pub(super) fn page(bound: &Bound, tables: &Tables, out: &Path) -> Result<PathBuf
         lead,
         facts: &facts,
         effects,
+        plots: &plots,
         tables: &shown,
         shots: &shots,
         predictors: &predictors,

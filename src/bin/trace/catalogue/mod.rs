@@ -1,8 +1,8 @@
 //! `trace catalogue`: every species at every stage, from above and from the side, with a scale, to be looked at plant by plant.
 //!
 //! A species is one sheet, one column a stage: above, the camera looks straight down; below, from some 30° above the ground. It is
-//! the same plant in all of them. A sheet says inside what it was made of; asked again, one that would come out the same is
-//! kept.
+//! the same plant in all of them. A sheet holds the pictures alone, and says in its comment what it was made of; asked again, one that
+//! would come out the same is kept. Words and scales stand on the page.
 
 mod page;
 mod sheet;
@@ -13,7 +13,6 @@ use furrow::cli::{self, signal::Signals};
 use furrow::geometry::Window;
 use furrow::input::shipped;
 use furrow::integrator::{PathTracer, World};
-use furrow::math::vec3;
 use furrow::output::{self, Picture};
 use furrow::render::{self, Settings, Watch};
 use furrow::ron_file::{RENAMED, RonFile};
@@ -21,8 +20,8 @@ use furrow::sampling::Points;
 use furrow::scene::desc::SpeciesDesc;
 use furrow::scene::{Field, PlantRecord, assemble};
 use furrow::{Error, Result};
-use page::Entry;
-use sheet::{Column, View};
+use page::{Entry, Look, Stage};
+use sheet::{Sheet, Shot, View};
 use std::path::{Path, PathBuf};
 
 /// Angle of view: narrow, so that near and far leaves have nearly one scale.
@@ -132,18 +131,15 @@ impl Args {
         let path = self.out.join(page.file_stem().unwrap_or_default()).with_extension("png");
         let (spp, size) = (self.spp, self.size);
         let from: Vec<&str> = stages.iter().map(|(_, of)| of.as_str()).collect();
-        let from = format!("{}\nspp: {spp}\nsize: {size}", from.join("\n"));
+        let from = format!("{}\nspp: {spp}\nsize: {size}\nwords: none", from.join("\n"));
         let kept = std::fs::read(&path).is_ok_and(|old| contains(&old, from.as_bytes()));
         if !kept {
             let mut columns = Vec::new();
             for (plant, _) in &stages {
-                let views = [View::above(plant), View::aside(plant)];
-                let shots = views.iter().map(|view| self.shoot(page, plant.bbch, view, signals));
-                let shots: Vec<_> = shots.collect::<Result<_>>()?;
-                columns.push(Column { title: format!("BBCH {}", plant.bbch), shots });
+                let shots = View::both(plant).map(|view| self.shoot(page, plant.bbch, &view, signals));
+                columns.push(shots.into_iter().collect::<Result<Vec<Shot>>>()?);
             }
-            let title = format!("{}  {}", desc.name, desc.eppo);
-            let sheet = sheet::compose(&title, &columns, size as usize);
+            let sheet = sheet::compose(&columns, size as usize);
             let (width, height) = (sheet.width as u32, sheet.height as u32);
             output::write_png(&path, width, height, &Picture::Rgb(&sheet.pixels), &from)?;
         }
@@ -151,8 +147,18 @@ impl Args {
             furrow::tell!("{}: {} stages{}", page.display(), stages.len(), if kept { ", kept" } else { "" });
         }
         let (width, height, pixels) = output::read_rgb(&path)?;
-        let stages = stages.into_iter().map(|(plant, _)| plant).collect();
-        Ok((path, Entry { desc, stages, picture: output::encode_jpeg(width, height, &pixels, 88)? }))
+        let sheet = Sheet { width: width as usize, height: height as usize, pixels };
+        let stages = stages.into_iter().enumerate().map(|(i, (plant, _))| {
+            let views = View::both(&plant);
+            let look = |(k, view): (usize, &View)| {
+                let shot = sheet::part(&sheet, (i, k), views.len(), size as usize);
+                Ok(Look { jpeg: output::encode_jpeg(size, size, &shot, 88)?, width_mm: view.width_mm() })
+            };
+            let looks = views.iter().enumerate().map(look).collect::<Result<Vec<Look>>>()?;
+            Ok(Stage { plant, looks })
+        });
+        let stages = stages.collect::<Result<Vec<Stage>>>()?;
+        Ok((path, Entry { desc, stages }))
     }
 
     /// The field with one plant, on bare ground where somebody looks, else on none.
@@ -178,8 +184,8 @@ impl Args {
         assemble::field_of(&scene, &assemble::Options { seed: Some(self.seed), ..Default::default() })
     }
 
-    /// One picture, and how many of its pixels are a millimetre at the plant's foot.
-    fn shoot(&self, page: &Path, bbch: u32, view: &View, signals: &Signals) -> Result<sheet::Shot> {
+    /// One picture.
+    fn shoot(&self, page: &Path, bbch: u32, view: &View, signals: &Signals) -> Result<Shot> {
         let field = self.field(page, bbch, Some(view))?;
         let geometry = EmbreeAccel::build(&field.scene.surfaces(), self.threads.max(1) as u32)?;
         let world = World { scene: &field.scene, geometry: &geometry };
@@ -187,13 +193,7 @@ impl Args {
         let settings = Settings { spp: self.spp, seed: field.sample_seed(), window, points: Points::Sobol };
         let watch = Watch { done: &|_| {}, stop: signals.heed() };
         let film = render::render(&world, &PathTracer::default(), &settings, &watch)?;
-        let foot = field.plants.first().map_or(vec3(0.0, 0.0, 0.0), |p| p.position);
-        let ends = [-5e-4, 5e-4].map(|x| field.scene.camera.project(foot + vec3(x, 0.0, 0.0)));
-        let [Some(from), Some(to)] = ends else {
-            return Err(Error::input("the plant is out of sight").in_file(page));
-        };
-        let pixels = field.photograph(&film).rgb.as_chunks::<3>().0.to_vec();
-        Ok(sheet::Shot { pixels, pixels_per_mm: from.distance(to) })
+        Ok(field.photograph(&film).rgb.as_chunks::<3>().0.to_vec())
     }
 }
 
@@ -207,6 +207,11 @@ fn reach(plant: &PlantRecord) -> f32 {
 }
 
 impl View {
+    /// From above, and from the side.
+    fn both(plant: &PlantRecord) -> [Self; 2] {
+        [Self::above(plant), Self::aside(plant)]
+    }
+
     /// From straight above.
     fn above(plant: &PlantRecord) -> Self {
         Self::of(reach(plant), 90.0, 0.0)

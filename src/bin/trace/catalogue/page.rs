@@ -1,21 +1,39 @@
-//! The HTML page that shows all sheets, in one file.
+//! The HTML page that shows all species at all stages, in one file.
 
 use furrow::report::{Cell, Page, Table, data_url, number, section};
 use furrow::scene::PlantRecord;
 use furrow::scene::desc::{Role, SpeciesDesc};
-use maud::html;
+use maud::{Markup, html};
 
 /// Style rules beyond those of every page.
-const STYLE: &str = ".sheet-wide { width: 100%; height: auto; border-radius: 6px; margin-bottom: .8rem; }\n";
+const STYLE: &str = include_str!("page.css");
+/// The longest a scale may be, of its picture's width.
+const LONGEST: f32 = 0.38;
+/// Side of a picture in the units of what is drawn over it.
+const SIDE: f32 = 200.0;
 
 /// One species.
 pub(super) struct Entry {
     /// Its species file.
     pub(super) desc: SpeciesDesc,
-    /// The plant that the sheet shows, at each stage.
-    pub(super) stages: Vec<PlantRecord>,
-    /// The sheet, a JPEG.
-    pub(super) picture: Vec<u8>,
+    /// Its stages, youngest first.
+    pub(super) stages: Vec<Stage>,
+}
+
+/// One stage.
+pub(super) struct Stage {
+    /// The plant that is shown.
+    pub(super) plant: PlantRecord,
+    /// Its pictures, from above down.
+    pub(super) looks: Vec<Look>,
+}
+
+/// A picture, as wide as high.
+pub(super) struct Look {
+    /// The picture.
+    pub(super) jpeg: Vec<u8>,
+    /// How many millimetres it is wide where the plant stands.
+    pub(super) width_mm: f32,
 }
 
 /// The page.
@@ -25,7 +43,7 @@ pub(super) fn html(entries: &[Entry]) -> String {
             @let SpeciesDesc { name, eppo, role, .. } = &entry.desc;
             @let role = if *role == Role::Crop { "crop" } else { "weed" };
             (section(&format!("{name} · {eppo} · {role}"), html! {
-                img.sheet-wide src=(data_url("jpeg", &entry.picture)) alt=(name);
+                div.stages { @for stage in &entry.stages { (figure(name, stage)) } }
                 div.wide { (table(&entry.stages).html()) }
             }))
         }
@@ -38,9 +56,35 @@ pub(super) fn html(entries: &[Entry]) -> String {
     Page { kind: "Catalogue", title: "Species", lead, style: STYLE, body, script: "" }.html(env!("CARGO_PKG_VERSION"))
 }
 
-fn table(stages: &[PlantRecord]) -> Table {
+/// A stage's pictures below each other, each with its scale.
+fn figure(name: &str, stage: &Stage) -> Markup {
+    let code = stage.plant.bbch;
+    html! {
+        figure.stage {
+            figcaption { "BBCH " (code) }
+            @for (look, from) in stage.looks.iter().zip(["above", "the side"]) {
+                @let mm = round_length(LONGEST * look.width_mm);
+                @let long = SIDE * mm / look.width_mm;
+                svg viewBox={ "0 0 " (SIDE) " " (SIDE) } role="img" aria-label={ (name) ", BBCH " (code) ", from " (from) } {
+                    image href=(data_url("jpeg", &look.jpeg)) width=(SIDE) height=(SIDE) {}
+                    rect.shade x="6" y=(SIDE - 32.0) width=(long.max(44.0) + 12.0) height="26" rx="4" {}
+                    text x="12" y=(SIDE - 18.0) { (number(f64::from(mm))) " mm" }
+                    rect.bar x="12" y=(SIDE - 13.0) width=(long) height="3" data-mm=(mm) {}
+                }
+            }
+        }
+    }
+}
+
+/// The longest of 1, 2, 5, 10, 20, … that is not above `most`.
+fn round_length(most: f32) -> f32 {
+    let ten = 10.0_f32.powf(most.log10().floor());
+    [5.0, 2.0, 1.0].into_iter().map(|k| k * ten).find(|length| *length <= most).unwrap_or(ten)
+}
+
+fn table(stages: &[Stage]) -> Table {
     let mut table = Table::new("", ["stage", "days", "leaves", "longest blade, mm", "height, mm", "span, mm"]);
-    for plant in stages {
+    for Stage { plant, .. } in stages {
         let mm = |metres: f32| Cell::Shown(number(f64::from((metres * 1e3).round())));
         let longest = plant.leaf_axes.iter().map(|a| a.base.distance(a.tip)).fold(0.0, f32::max);
         table.push([
@@ -53,4 +97,16 @@ fn table(stages: &[PlantRecord]) -> Table {
         ]);
     }
     table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scales_have_round_lengths() {
+        for (most, length) in [(1.2, 1.0), (9.9, 5.0), (47.0, 20.0), (50.0, 50.0), (130.0, 100.0)] {
+            assert_eq!(round_length(most), length);
+        }
+    }
 }

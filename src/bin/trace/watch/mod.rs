@@ -24,7 +24,7 @@ mod sliders;
 mod tev;
 mod worker;
 
-use crate::field::scene_file;
+use crate::field::{MemoryArgs, scene_file};
 use crate::quality::{samples, threads};
 use clap::ValueEnum;
 use furrow::cli::{self, signal::Signals};
@@ -70,6 +70,8 @@ pub(crate) struct Args {
     /// page's address see the pictures, unencrypted, and write values into the scene file. `ssh -L` is the safer way.
     #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
     host: IpAddr,
+    #[command(flatten)]
+    memory: MemoryArgs,
     /// Threads; 0 for one on each core.
     #[arg(long, default_value_t = 0, value_parser = threads)]
     threads: usize,
@@ -95,11 +97,11 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let session = Arc::new(Session::new(args.scene.clone(), wish, args.spp));
     session.show(|shown| shown.photo = photo.is_some());
     let guard = Guard::new(args.host)?;
-    let server = Server::open(args.host, args.port, guard, session.clone(), photo)?;
+    let mut server = Server::open(args.host, args.port, guard, session.clone(), photo)?;
     server.tell();
     let files = files::watch(session.clone())?;
     let tev = args.display.map(|Display::Tev| tev::Tev::default());
-    let worker = Worker::new(session.clone(), files, &threads, tev)?;
+    let worker = Worker::new(session.clone(), files, (&threads, args.memory.bytes), tev)?;
     let thread = std::thread::Builder::new()
         .name("render".into())
         .spawn(move || worker.run())

@@ -10,10 +10,10 @@ use furrow::{Error, Result};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::io::{Read, Write};
-use std::net::{IpAddr, SocketAddr};
+use std::net::{IpAddr, SocketAddr, TcpListener};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tiny_http::{Method, Request};
 
 /// Requests that are answered at once; browsers open six connections to a page.
@@ -23,6 +23,8 @@ const LARGEST: u64 = 64 << 10;
 /// How often a silent stream of events says that it is alive, and how soon a stop is seen.
 const BEAT: Duration = Duration::from_secs(10);
 const GLANCE: Duration = Duration::from_millis(50);
+/// How often it is looked whether the page is still listened for.
+const LOOK: Duration = Duration::from_secs(1);
 /// Samples of a pixel that is explained in words.
 const EXPLAINED: u32 = 64;
 
@@ -123,9 +125,18 @@ impl Server {
     }
 
     /// Answers until `stop` is raised.
-    pub(super) fn serve(&self, stop: &AtomicBool) {
+    pub(super) fn serve(&mut self, stop: &AtomicBool) {
+        let mut looked = Instant::now();
         while !stop.load(Ordering::Relaxed) {
-            let Ok(Some(request)) = self.http.recv_timeout(GLANCE) else { continue };
+            let request = match self.http.recv_timeout(GLANCE) {
+                Ok(Some(request)) => request,
+                Ok(None) if looked.elapsed() < LOOK => continue,
+                Ok(None) | Err(_) => {
+                    looked = Instant::now();
+                    self.listen_again();
+                    continue;
+                }
+            };
             let desk = self.desk.clone();
             let Some(request) = bearable(request) else { continue };
             if desk.busy.fetch_add(1, Ordering::SeqCst) >= MOST {
@@ -141,6 +152,18 @@ impl Server {
             if std::thread::Builder::new().name("answer".into()).spawn(work).is_err() {
                 self.desk.busy.fetch_sub(1, Ordering::SeqCst);
             }
+        }
+    }
+}
+
+impl Server {
+    /// Listens at the same address anew where nobody does any more: the thread that takes connections ends, with an error or in a panic, where no
+    /// more files can be opened.
+    fn listen_again(&mut self) {
+        let Ok(listener) = TcpListener::bind(self.address) else { return };
+        if let Ok(http) = tiny_http::Server::from_listener(listener, None) {
+            furrow::tell!("warning: there were too many connections at once; listening again");
+            self.http = http;
         }
     }
 }

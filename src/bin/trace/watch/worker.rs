@@ -22,6 +22,8 @@ pub(super) struct Worker {
     session: Arc<Session>,
     files: Files,
     threads: Threads,
+    /// Most bytes that a field may take.
+    memory: Option<u64>,
     renderer: Renderer,
     tev: Option<Tev>,
     /// The last scene file that could be read, with its textures and species.
@@ -32,10 +34,15 @@ pub(super) struct Worker {
 
 impl Worker {
     /// One that has done nothing yet.
-    pub(super) fn new(session: Arc<Session>, files: Files, threads: &Threads, tev: Option<Tev>) -> Result<Self> {
+    pub(super) fn new(
+        session: Arc<Session>,
+        files: Files,
+        (threads, memory): (&Threads, Option<u64>),
+        tev: Option<Tev>,
+    ) -> Result<Self> {
         let renderer = Renderer::open(&RenderOptions::path_traced(Quality::spp(session.spp())))?;
         let threads = threads.clone();
-        Ok(Self { session, files, threads, renderer, tev, known: None, own_width: None })
+        Ok(Self { session, files, threads, memory, renderer, tev, known: None, own_width: None })
     }
 
     /// Works until the session ends.
@@ -48,8 +55,13 @@ impl Worker {
                 Err(error) if error.kind() == Kind::Interrupted => {}
                 Err(error) => {
                     self.files.follow(session.path(), &[]);
+                    // A slider that is moved on must not print the same words again and again.
+                    let words = format!("error: {error}");
+                    if session.shown(|shown| shown.error.as_ref() != Some(&words)) {
+                        furrow::tell!("{words}");
+                    }
                     session.show(|shown| {
-                        (shown.doing, shown.error) = ("", Some(format!("error: {error}")));
+                        (shown.doing, shown.error) = ("", Some(words));
                     });
                 }
                 Ok(()) => session.show(|shown| shown.doing = ""),
@@ -78,7 +90,7 @@ impl Worker {
             Some(known) => known.reread(Some(&text))?,
             None => SceneFile::open(session.path())?.threads(&self.threads).reread(Some(&text))?,
         };
-        let scene = scene.seed(wish.seed);
+        let scene = scene.seed(wish.seed).memory(self.memory);
         let field = Arc::new(self.grow(&scene, wish)?);
         self.files.follow(session.path(), &field.grown().files);
         self.known = Some(scene.clone());
