@@ -12,6 +12,7 @@
 //! ```
 
 use std::fmt;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// The library's result.
@@ -129,7 +130,7 @@ impl Error {
     pub fn io(path: &Path) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.to_path_buf();
         move |source| {
-            let mut error = Self::new(Kind::Io, source.to_string()).in_file(path);
+            let mut error = Self::new(Kind::Io, source.to_string()).help(advice(&source)).in_file(path);
             error.0.source = Some(source);
             error
         }
@@ -140,9 +141,10 @@ impl Error {
     pub fn reading(path: &Path) -> impl FnOnce(std::io::Error) -> Self {
         let failed = Self::io(path);
         move |source| {
-            let absent = source.kind() == std::io::ErrorKind::NotFound;
+            // Nor does another try help with what is no file, or a link to itself.
+            let wrong = matches!(source.kind(), ErrorKind::NotFound | ErrorKind::InvalidInput) || is_loop(&source);
             let mut error = failed(source);
-            if absent {
+            if wrong {
                 error.0.kind = Kind::Input;
             }
             error
@@ -232,6 +234,29 @@ impl Error {
     }
 }
 
+/// `ELOOP` of Linux: links that lead to each other.
+const LOOP: i32 = 40;
+
+fn is_loop(error: &std::io::Error) -> bool {
+    error.raw_os_error() == Some(LOOP)
+}
+
+/// What to do where the system refuses.
+fn advice(error: &std::io::Error) -> &'static str {
+    match error.kind() {
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "make room on the disk, and give the same command again",
+        ErrorKind::PermissionDenied => "give yourself the right to it, or name another place",
+        ErrorKind::ReadOnlyFilesystem => "nothing can be written there; name another place",
+        ErrorKind::NotFound => "look at the path: something of it is not there",
+        ErrorKind::IsADirectory => "a folder stands where a file is to be; name another one",
+        ErrorKind::NotADirectory => "a file stands where a folder is to be; name another one",
+        ErrorKind::InvalidFilename => "give it a shorter name",
+        ErrorKind::InvalidInput => "name a file that can be read from its beginning to its end",
+        _ if is_loop(error) => "this is a symbolic link that leads back to itself; name a file",
+        _ => "this is the system's word; where the disk is at fault, look at the system's log",
+    }
+}
+
 impl Error {
     /// Place and message, without the help.
     fn words(&self) -> String {
@@ -303,7 +328,6 @@ impl fmt::Display for Span {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::io::ErrorKind;
 
     #[test]
     fn the_exit_code_and_whether_other_fields_are_made_follow_from_the_kind() {

@@ -17,6 +17,7 @@ use furrow::train::data::{Normalization, Pick, Resize, Selection, Shape, Store};
 use furrow::train::fit::checkpoint::History;
 use furrow::train::fit::{Hyperparameters, Plan};
 use furrow::train::measure::{Evaluation, Prediction, Report};
+use furrow::train::net;
 use furrow::train::run::{self, Identity, ModelCard, Results, TrainedModel};
 use furrow::train::table::{self, Bound, Callbacks, Experiment, Only, Order, Predictor, Real};
 use furrow::train::weights::{self, Array};
@@ -72,6 +73,12 @@ struct Players {
     patience: Cell<Option<usize>>,
 }
 
+/// How many numbers a plan's network learns, as its card must say.
+fn trainable(plan: &Plan) -> usize {
+    let all = net::parameters(plan.network, plan.shape.bands.len(), plan.classes.len());
+    all.iter().filter(|p| p.role.is_trainable()).map(net::Parameter::len).sum()
+}
+
 impl Players {
     fn call(&self, words: String) -> Result<()> {
         if let Some(left) = self.patience.get() {
@@ -93,7 +100,7 @@ impl Players {
         let card = ModelCard {
             furrow: "test".into(),
             network: plan.network,
-            parameters: 1,
+            parameters: trainable(plan),
             input: plan.shape.clone(),
             normalization: Normalization::Image,
             resize: Resize::default(),

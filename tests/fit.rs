@@ -165,6 +165,34 @@ fn a_training_that_is_stopped_or_killed_ends_with_the_same_bytes() {
     }
 }
 
+/// Expected: whatever write of a training fails, of plan, logs, checkpoints or weights, exit code 1 and one error; the same command goes on and
+/// ends with the weights of a training that met none.
+#[cfg(all(target_os = "linux", target_arch = "x86_64"))]
+#[test]
+fn a_training_whose_disk_fails_ends_with_the_same_bytes() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path();
+    let set = set(folder, 4);
+    let more = format!("--network unet --steps 4 --validate-every 2 --val {}@0..1", set.display());
+    let begin = |out: &Path| fit(&set, out, &more);
+    let whole = folder.join("whole");
+    let undisturbed = common::faults::run(begin(&whole), &whole, 0, false);
+    assert!(undisturbed.output.status.success(), "{}", undisturbed.said());
+    for at in common::faults::moments(undisturbed.changes, 9) {
+        let out = folder.join(format!("at-{at}"));
+        let ended = common::faults::run(begin(&out), &out, at, at % 2 == 0);
+        let said = ended.said();
+        assert_eq!(ended.output.status.code(), Some(1), "change {at}, {}: {said}", ended.failed);
+        assert!(said.contains("error: ") && said.contains(" help: "), "change {at}, {}: {said}", ended.failed);
+        succeed(&mut fit(&set, &out, &more));
+        assert_eq!(weights(&out), weights(&whole), "change {at}");
+        assert_eq!(results(&out).history, results(&whole).history);
+        let hidden =
+            fs::read_dir(&out).unwrap().filter(|e| e.as_ref().unwrap().file_name().to_string_lossy().starts_with('.'));
+        assert_eq!(hidden.count(), 0, "change {at}");
+    }
+}
+
 #[test]
 fn seeds_decide_and_their_runs_lie_beside_each_other() {
     let scratch = tempfile::tempdir().unwrap();
@@ -260,7 +288,20 @@ fn weights_of_other_classes_and_damaged_ones_are_refused() {
     let forged = [
         ("width", "\"width\": 64", "\"width\": 1000000000", "networks do not see 1000000000"),
         ("height", "\"height\": 48", "\"height\": 0", "networks do not see"),
+        ("side", "\"height\": 48", "\"height\": 16", "networks do not see 64 × 16"),
         ("bands", "\"green\"", "\"red\"", "are no bands of an image"),
+        ("classes", "\"name\": \"plant\"", "\"name\": \"soil\"", "each class needs a name of its own"),
+        ("labels", "\"crop\",", "\"soil\",", "a label belongs to one class alone"),
+        ("network", "\"unet\"", "\"segnet\"", "parameters: this network"),
+        (
+            "normalisation",
+            "\"normalisation\": \"band\"",
+            "\"normalisation\": {\"fixed\": {\"mean\": [0.5], \"sd\": [0.1]}}",
+            "is not one of 3 bands",
+        ),
+        ("pixel", "\"weights\":", "\"pixel_mm\": 0.0, \"weights\":", "its pixels have no size"),
+        ("resize", "\"weights\":", "\"resize\": {\"scale\": 0.0}, \"weights\":", "not by 0"),
+        ("sides", "\"weights\":", "\"resize\": {\"long_sides\": [1000000000]}, \"weights\":", "long sides are 1 to 8"),
         (
             "weights",
             "\"weights.safetensors\"",

@@ -133,14 +133,19 @@ fn killed_at_many_moments_it_ends_as_if_never_killed() {
     let (_, expected, once) = whole();
     let (_keep, out) = scratch();
     let mut alive = 0;
-    for moment in [0.02, 0.05, 0.08, 0.12, 0.3, 0.1, 0.2, 0.07, 0.3, 0.15, 0.25] {
+    // Twenty of them, most early: what is there makes the next run shorter.
+    let moments = [
+        0.02, 0.05, 0.08, 0.12, 0.3, 0.1, 0.2, 0.07, 0.3, 0.15, 0.03, 0.06, 0.09, 0.12, 0.04, 0.05, 0.1, 0.07, 0.02,
+        0.25,
+    ];
+    for moment in moments {
         let mut child = spawn(table(&out, &[]));
         std::thread::sleep(once.mul_f64(moment));
         alive += u32::from(child.try_wait().expect("a child").is_none());
         child.kill().expect("a kill");
         child.wait().expect("an end");
     }
-    assert!(alive > 5, "{alive} of 11 kills hit a running program");
+    assert!(alive > 8, "{alive} of 20 kills hit a running program");
     // No kill is sure to fall into the writing of a file.
     for within in ["", "runs/unet/synthetic/seed-1/eval"] {
         std::fs::create_dir_all(out.join(within)).expect("a folder");
@@ -148,6 +153,25 @@ fn killed_at_many_moments_it_ends_as_if_never_killed() {
     }
     succeed(table(&out, &[]));
     same(&files(&out), &files(expected));
+}
+
+/// Expected: wherever the disk fails first, exit code 1 and one error; then the same command ends with the same tables.
+#[cfg(all(target_os = "linux", target_arch = "x86_64"))]
+#[test]
+fn a_disk_that_fails_is_told_and_the_table_goes_on() {
+    let (_, expected, _) = whole();
+    let expected = files(expected);
+    let (_keep, out) = scratch();
+    // One folder through all of them, as a disk that is cleared bit by bit: each run comes further than the one before.
+    for at in [1, 4, 40, 150, 60, 30] {
+        let ended = common::faults::run(table(&out, &[]), &out, at, at % 4 == 0);
+        let said = ended.said();
+        assert_ne!(ended.failed, "none", "it ended before change {at}: {said}");
+        assert_eq!(ended.output.status.code(), Some(1), "change {at}, {}: {said}", ended.failed);
+        assert!(said.starts_with("error: ") && said.contains(" help: "), "change {at}, {}: {said}", ended.failed);
+    }
+    succeed(table(&out, &[]));
+    same(&files(&out), &expected);
 }
 
 #[test]

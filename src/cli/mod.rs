@@ -84,6 +84,14 @@ pub fn check_folder(folder: &Path) -> Result<()> {
             return Err(Error::misuse(format!("this link leads to no folder: {e}")).in_file(there).help(help));
         }
     }
+    // The names of the files that would lie in it are about as long as this one.
+    if let Err(e) = folder.join("semantics.png").symlink_metadata()
+        && e.kind() == io::ErrorKind::InvalidFilename
+    {
+        return Err(Error::misuse("this name is too long for the file system")
+            .in_file(folder)
+            .help("give --out a shorter one"));
+    }
     // Not by its permissions: root may write where they say no, and nobody on a file system that is read-only.
     tempfile::tempfile_in(there).map_err(Error::io(there)).map(drop)
 }
@@ -127,6 +135,11 @@ fn check_ron(file: &Path, what: &str, shipped: &[String]) -> Result<()> {
     if file.exists() {
         return Ok(());
     }
+    if file.is_symlink() {
+        return Err(Error::input("this is a symbolic link that leads to no file")
+            .in_file(file)
+            .help("let the link lead to a file, or name the file itself"));
+    }
     let folder = file.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut files: Vec<String> = std::fs::read_dir(folder)
         .map(|entries| entries.filter_map(|e| e.ok()?.file_name().into_string().ok()).collect())
@@ -139,7 +152,12 @@ fn check_ron(file: &Path, what: &str, shipped: &[String]) -> Result<()> {
         (Some(near), ..) => format!("did you mean {}?", folder.join(near).display()),
         (None, Some(near), _) => format!("did you mean {near}, which ships with the program?"),
         (None, None, false) => format!("{what}s in {} are {}", folder.display(), files.join(", ")),
-        (None, None, true) => format!("there is none in {}; those that ship lie in scenes/", folder.display()),
+        (None, None, true) if shipped.is_empty() => format!("there is none in {}", folder.display()),
+        (None, None, true) => format!(
+            "there is none in {}; `trace init DIR` begins one, and those that ship are found by their names: {}",
+            folder.display(),
+            shipped.join(", ")
+        ),
     };
     Err(Error::input(format!("there is no such {what}")).in_file(file).help(help))
 }

@@ -1,6 +1,7 @@
 //! Shapes without optics: meshes, alpha masks, rays and what they hit.
 
 pub mod alpha;
+mod cost;
 mod interaction;
 mod margin;
 pub mod mesh;
@@ -9,6 +10,7 @@ mod ray;
 mod window;
 
 pub use alpha::AlphaMask;
+pub use cost::Cost;
 pub use interaction::Interaction;
 pub use margin::Margin;
 pub use mesh::Mesh;

@@ -52,6 +52,20 @@ impl Refusal {
     }
 }
 
+impl From<Refusal> for io::Error {
+    fn from(refusal: Refusal) -> Self {
+        match refusal {
+            Refusal::Io(error) => error,
+            other => Self::new(io::ErrorKind::InvalidInput, other.to_string()),
+        }
+    }
+}
+
+/// The bytes of a regular file of any kind that is read whole, of at most [`LARGEST`] bytes; otherwise as [`std::fs::read`].
+pub fn contents(path: &Path) -> io::Result<Vec<u8>> {
+    Ok(read(path, LARGEST)?)
+}
+
 /// Opens a regular file.
 pub fn open(path: &Path) -> std::result::Result<File, Refusal> {
     check(&std::fs::metadata(path).map_err(Refusal::Io)?)?;

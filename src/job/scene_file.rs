@@ -6,6 +6,7 @@ use crate::Result;
 use crate::ablation::{Edit, FULL};
 use crate::input::Scope;
 use crate::scene::assemble::{Options, Source};
+use crate::scene::estimate::Estimate;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -71,6 +72,21 @@ impl SceneFile {
         self
     }
 
+    /// With fields that may take so many bytes of memory; one that would take more is refused before it grows. `None`: three quarters of
+    /// what the machine has.
+    #[must_use]
+    pub fn memory(mut self, bytes: impl Into<Option<u64>>) -> Self {
+        self.options.memory = bytes.into();
+        self
+    }
+
+    /// About what field `index` will take, before it grows.
+    #[doc(hidden)]
+    pub fn estimate(&self, index: u64) -> Result<Estimate> {
+        let options = Options { index, ..self.options };
+        self.threads.install(|| self.source.estimate(&options))
+    }
+
     /// With its work done by these threads. It shares what it has read with the scene file that it was made from.
     #[must_use]
     pub fn threads(mut self, threads: &Threads) -> Self {
@@ -81,6 +97,11 @@ impl SceneFile {
     /// How many images are taken of each field.
     pub fn captures(&self) -> u64 {
         self.source.captures()
+    }
+
+    /// About how many plants stand in view of field `index`.
+    pub(super) fn expected_plants(&self, index: u64) -> Result<f64> {
+        self.source.expected_plants(&Options { index, ..self.options })
     }
 
     /// Grows field `index`: always the same for the same file, seed and index, and without growing those before it.

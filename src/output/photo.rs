@@ -1,6 +1,6 @@
 //! Photographs that people bring, in whatever form they come; and ours made small, for HTML pages.
 
-use crate::{Error, Result};
+use crate::{Error, Result, input};
 use image::codecs::jpeg::JpegEncoder;
 use image::{DynamicImage, ExtendedColorType, GrayImage, ImageError, ImageReader, RgbImage, imageops};
 use std::fs::File;
@@ -14,8 +14,15 @@ pub fn read_photo(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
     Ok((w, h, photo.into_raw().as_chunks::<3>().0.to_vec()))
 }
 
-/// The same; an error for a picture in gray, in which colours cannot be told from each other.
+/// The same; an error for a picture in gray, in which colours cannot be told from each other, and for a JPEG whose end is missing, which
+/// decoders fill with grey.
 pub fn read_color_photo(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
+    let bytes = std::fs::read(path).map_err(Error::reading(path))?;
+    if is_cut_short(&bytes) {
+        return Err(Error::input("this JPEG is cut short: its end is missing")
+            .help("copy it anew from the camera")
+            .in_file(path));
+    }
     let photo = decode(path)?;
     if !photo.color().has_color() {
         return Err(Error::input("this picture is gray, and the network sees colours")
@@ -25,6 +32,23 @@ pub fn read_color_photo(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
     let photo = photo.into_rgb8();
     let (w, h) = photo.dimensions();
     Ok((w, h, photo.into_raw().as_chunks::<3>().0.to_vec()))
+}
+
+/// Whether these are the bytes of a JPEG of which the end is missing: no end marker stands behind the header of its first scan. What is in
+/// segments before, such as a small picture with an end of its own, is passed over. Source: ITU-T T.81, annex B.
+fn is_cut_short(bytes: &[u8]) -> bool {
+    const SCAN: u8 = 0xda;
+    if !bytes.starts_with(&[0xff, 0xd8]) {
+        return false;
+    }
+    let mut at = 2;
+    while let Some([0xff, marker, high, low]) = bytes.get(at..at + 4) {
+        at += 2 + usize::from(u16::from_be_bytes([*high, *low]));
+        if *marker == SCAN {
+            return !bytes.get(at..).is_some_and(|scan| scan.windows(2).any(|pair| pair == [0xff, 0xd9]));
+        }
+    }
+    true
 }
 
 /// Width and height of a PNG or JPEG photograph, from its first bytes.
@@ -44,7 +68,8 @@ fn decode(path: &Path) -> Result<DynamicImage> {
 }
 
 fn open(path: &Path) -> Result<ImageReader<BufReader<File>>> {
-    ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(Error::reading(path))
+    let file = input::open(path).map_err(|refusal| refusal.into_error(path))?;
+    ImageReader::new(BufReader::new(file)).with_guessed_format().map_err(Error::reading(path))
 }
 
 fn unreadable(path: &Path, error: ImageError) -> Error {
@@ -96,6 +121,18 @@ pub fn encode_jpeg(width: u32, height: u32, rgb: &[[u8; 3]], quality: u8) -> Res
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Rationale: half a photograph is grey below, which is no soil. Expected: a JPEG is whole as it was written, and cut short wherever it was
+    /// cut; a PNG is no JPEG.
+    #[test]
+    fn a_jpeg_without_its_end_is_found() {
+        let rgb: Vec<[u8; 3]> = (0..64 * 48).map(|k| [k as u8, (k / 7) as u8, 90]).collect();
+        let whole = encode_jpeg(64, 48, &rgb, 90).unwrap();
+        assert!(!is_cut_short(&whole) && !is_cut_short(b"\x89PNG\r\n"));
+        for length in [whole.len() - 2, whole.len() / 2, 40, 3] {
+            assert!(is_cut_short(&whole[..length]), "{length}");
+        }
+    }
 
     #[test]
     fn a_picture_keeps_its_shape_and_its_mean() {

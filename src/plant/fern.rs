@@ -4,7 +4,7 @@
 //! plan with pinnules, and each pinnule is cut into lobes with a pointed tip. The ribbons are those of mayweed.
 
 use super::blade::Rest;
-use super::ribbons::Ribbons;
+use super::ribbons::{MOST, Ribbons};
 use super::skeleton::Skeleton;
 use crate::math::{Vec3, lerp, vec3};
 use crate::sampling::Stream;
@@ -32,6 +32,7 @@ pub(super) fn blade(
 ) -> Rest {
     let length = skeleton.length();
     // Small leaves have fewer, not finer, segments.
+    let (pairs, pinnules) = (pairs.min(MOST), pinnules.min(MOST));
     let pairs = pairs.min((length / (2.4 * segment)) as usize).max(1);
     let mut ribbons = Ribbons { rest: Rest::default(), skeleton, width: segment, count: 0 };
     ribbons.strip(Vec3::ZERO, vec3(0.0, length, 0.0), Vec3::Z, Vec3::ZERO, segment, 2 * pairs.min(8) as u32);

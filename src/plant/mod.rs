@@ -20,6 +20,7 @@
 
 mod axis;
 pub mod blade;
+mod bound;
 mod cane;
 pub mod condition;
 mod desc;
@@ -41,6 +42,7 @@ mod tube;
 mod tuft;
 mod whorl;
 
+pub use bound::most_triangles;
 pub use condition::{Condition, ConditionDesc};
 pub use desc::{Form, PlantDesc, Stage};
 pub use kind::{LeafKind, Shape};

@@ -12,7 +12,7 @@ use crate::sampling::Stream;
 use std::f32::consts::PI;
 
 /// The most ribbons of one blade: a guard against species files that ask for a million lobes.
-const MOST: usize = 600;
+pub(super) const MOST: usize = 600;
 
 /// A blade of ribbons while it grows.
 pub(super) struct Ribbons<'a> {
@@ -90,8 +90,8 @@ pub(super) fn blade(
 ) -> Rest {
     let length = skeleton.length();
     // Small leaves have fewer, not finer, segments.
-    let pairs = pairs.min((length / (2.2 * segment)) as usize).max(1);
-    let lobes = lobes.min((0.5 * width / (3.0 * segment)) as usize);
+    let pairs = pairs.min(MOST).min((length / (2.2 * segment)) as usize).max(1);
+    let lobes = lobes.min(MOST).min((0.5 * width / (3.0 * segment)) as usize);
     let mut ribbons = Ribbons { rest: Rest::default(), skeleton, width: segment, count: 0 };
     ribbons.strip(Vec3::ZERO, vec3(0.0, length, 0.0), Vec3::Z, Vec3::ZERO, 1.25 * segment, 2 * pairs.min(12) as u32);
     for k in 0..pairs {

@@ -27,6 +27,9 @@ pub struct Fault {
     pub help: String,
 }
 
+/// What is said where a name is missing.
+pub(super) const NAME_EXPECTED: &str = "a name is expected here";
+
 const MARK: char = '\u{1}';
 
 impl fmt::Display for Fault {
@@ -214,7 +217,7 @@ fn explain(code: &Ron) -> (String, String) {
             ("an opening bracket is expected here", "fields stand in round brackets: (name: value)")
         }
         Ron::ExpectedIdentifier | Ron::InvalidIdentifier(_) | Ron::SuggestRawIdentifier(_) => {
-            ("a name is expected here", "names are letters, digits and _, without quotes")
+            (NAME_EXPECTED, "names are letters, digits and _, without quotes")
         }
         Ron::Eof => ("the file ends too early", "a bracket or a quote that was opened above is not closed"),
         Ron::UnclosedBlockComment => ("this comment has no end", "close it with */"),

@@ -1,9 +1,9 @@
 //! A RON file: its text, and the way from it to a value or to an error that shows its place.
 
-use super::fault::{Fault, locate, plain};
+use super::fault::{Fault, NAME_EXPECTED, locate, plain};
 use super::place::{Step, fields_around, lacks, offset_of, path_at, place, quoted};
 use super::renamed::{self, Renamed};
-use super::schema;
+use super::schema::{self, Name};
 use super::suggest::nearest;
 use crate::error::{Kind, Place, Span};
 use crate::input::{self, Refusal};
@@ -77,7 +77,7 @@ impl RonFile {
                 .fault(&Fault { raw_len: 0, start: 0, end: 0, message: "this file is empty".to_owned(), help })
                 .lasting());
         }
-        options().from_str(&self.text).map_err(|e| self.refused(&e, |_, _| Vec::new()))
+        options().from_str(&self.text).map_err(|e| self.refused(&e, |_, _| Vec::new(), |path| (path.len(), Vec::new())))
     }
 
     /// The same of a type that knows its fields: all that are missing in one place are told at once.
@@ -85,27 +85,37 @@ impl RonFile {
         if self.text.trim().is_empty() {
             return self.parse();
         }
-        options().from_str(&self.text).map_err(|e| self.refused(&e, schema::required::<T>))
+        options().from_str(&self.text).map_err(|e| self.refused(&e, schema::required::<T>, schema::known::<T>))
     }
 
-    /// What the parser refused; `required` tells which fields a struct of a name must have beside one that is missing.
-    fn refused(&self, error: &SpannedError, required: impl Fn(&str, &str) -> Vec<String>) -> Error {
+    /// What the parser refused; `required` tells which fields a struct of a name must have beside one that is missing, `known` how much of a
+    /// path exists and which names may stand at its end.
+    fn refused(
+        &self,
+        error: &SpannedError,
+        required: impl Fn(&str, &str) -> Vec<String>,
+        known: impl Fn(&[&str]) -> (usize, Vec<Name>),
+    ) -> Error {
         let fault = locate(&self.text, error);
-        let help = decimal_comma(&self.text, &fault).unwrap_or(fault.help.clone());
-        let fault = Fault { help, ..fault };
+        let path = path_at(&self.text, fault.start);
+        let (depth, names) = known(&path);
+        let exists = |told: Error| told.see(more(&path[..depth]));
+        let help = decimal_comma(&self.text, &fault).or_else(|| named_value(&self.text, &fault, &names));
+        let fault = Fault { help: help.unwrap_or(fault.help.clone()), ..fault };
+        let fault = unopened(&self.text, error).unwrap_or(fault);
         let ron::Error::MissingStructField { field, outer: Some(outer) } = &error.code else {
-            return self.fault(&fault).lasting();
+            return exists(self.fault(&fault).lasting());
         };
         let there = fields_around(&self.text, fault.start);
         let mut missing = required(outer, field);
         missing.retain(|name| !there.contains(&name.as_str()));
         if missing.len() < 2 {
-            return self.fault(&fault).lasting();
+            return exists(self.fault(&fault).lasting());
         }
         let list = |each: fn(&String) -> String| missing.iter().map(each).collect::<Vec<_>>().join(", ");
         let message = format!("fields {} of {} are missing", list(|name| format!("`{name}`")), plain(outer));
         let help = format!("add `{}` before this bracket closes", list(|name| format!("{name}: …")));
-        self.fault(&Fault { message, help, ..fault }).lasting()
+        exists(self.fault(&Fault { message, help, ..fault }).lasting())
     }
 
     /// The text of a file that reads as `value`.
@@ -184,6 +194,10 @@ impl RonFile {
             let what = if full.is_dir() { "a folder" } else { "a pipe, a socket or a device" };
             return Err(self.about(path, format!("`{path}` is {what}, not a file"), "name a file"));
         }
+        if full.is_symlink() {
+            let help = "let the link lead to a file, or name the file itself";
+            return Err(self.about(path, format!("`{path}` is a symbolic link that leads to no file"), help));
+        }
         let folder = named(full.parent().unwrap_or(Path::new("")));
         let name = full.file_name().unwrap_or_default().to_string_lossy();
         let mut files: Vec<String> = std::fs::read_dir(&folder)
@@ -214,13 +228,12 @@ impl RonFile {
         let width = text.get(start..end).map_or(1, |t| t.trim_end().chars().count()).max(1);
         let span = Some(Span { line, column, width, text: line_text.to_owned() });
         let place = Place { file: self.path.clone(), span };
-        Error::input(fault.message.as_str()).help(fault.help.as_str()).at(place).see(more(text, fault.start))
+        Error::input(fault.message.as_str()).help(fault.help.as_str()).at(place).see(more(&path_at(text, fault.start)))
     }
 }
 
-/// The command that tells what may stand at a byte of a file; `None` for files that have no such pages.
-fn more(text: &str, offset: usize) -> Option<String> {
-    let path = path_at(text, offset);
+/// The command that tells what may stand where a path leads; `None` for files that have no such pages.
+fn more(path: &[&str]) -> Option<String> {
     let (root, rest) = path.split_first()?;
     let (program, mut steps) = match *root {
         "Field" => ("trace", Vec::new()),
@@ -242,6 +255,35 @@ fn unquoted(text: &str) -> Option<String> {
 fn named(folder: &Path) -> PathBuf {
     let short = input::tidy(folder);
     if short.as_os_str().is_empty() { ".".into() } else { short }
+}
+
+/// What to tell who leaves out the name around a value: `growth: 18`.
+fn named_value(text: &str, fault: &Fault, names: &[Name]) -> Option<String> {
+    if fault.message != NAME_EXPECTED || names.is_empty() {
+        return None;
+    }
+    let value = text.get(fault.start..fault.end).filter(|value| value.parse::<f64>().is_ok());
+    let form = |name: &&Name| value.map(|value| format!("{}({value})", name.name));
+    let forms: Vec<String> = names.iter().filter(|name| name.takes_number).filter_map(|name| form(&name)).collect();
+    let all = names.iter().map(|name| name.name.as_str()).collect::<Vec<_>>().join(", ");
+    let begin = if forms.is_empty() { String::new() } else { format!("write {}; ", forms.join(" or ")) };
+    Some(format!("{begin}names that can stand here are {all}"))
+}
+
+/// What to tell who leaves out the brackets behind a name: `camera: Phone`.
+fn unopened(text: &str, error: &SpannedError) -> Option<Fault> {
+    if !matches!(error.code, ron::Error::ExpectedStructLike | ron::Error::ExpectedNamedStructLike(_)) {
+        return None;
+    }
+    let before = text[..offset_of(text, error.span.start.line, error.span.start.col)].trim_end();
+    let name = &before[before.rfind(|c: char| !c.is_alphanumeric() && c != '_').map_or(0, |i| i + 1)..];
+    name.starts_with(char::is_uppercase).then(|| Fault {
+        raw_len: text.len(),
+        start: before.len() - name.len(),
+        end: before.len(),
+        message: format!("{name} has no brackets"),
+        help: format!("write {name}(), with the fields that differ from their defaults in the brackets"),
+    })
 }
 
 /// What to tell who writes 0,85: a comma ends a number, which then is out of range, or is followed by what is no field.

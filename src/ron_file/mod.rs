@@ -30,4 +30,4 @@ pub use quantities::{Quantity, Value, quantities};
 pub use renamed::{Keyword, RENAMED, Renamed};
 pub use schema::{DRAWN, FIXED, KIND, PICKED, RANGE};
 pub use suggest::{choose, nearest};
-pub use vary::{Distribution, Pick, Vary};
+pub use vary::{DISTRIBUTION_WORDS, Distribution, Pick, Vary};

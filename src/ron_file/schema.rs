@@ -42,6 +42,68 @@ pub(super) fn required<T: JsonSchema>(name: &str, missing: &str) -> Vec<String> 
     look(&schema, None, name, missing).unwrap_or_default()
 }
 
+/// How many of the names that lead to a value of `T`'s file exist, the file's own name first, and the names that may stand at their end. What
+/// follows inside a number is taken as it is.
+pub(super) fn known<T: JsonSchema>(path: &[&str]) -> (usize, Vec<Name>) {
+    let root = SchemaGenerator::default().into_root_schema_for::<T>().to_value();
+    let mut at = resolved(&root, &root);
+    for (k, step) in path.iter().enumerate() {
+        if at.get(KIND).is_some() {
+            return (path.len(), Vec::new());
+        }
+        match within(&root, at, step) {
+            Some(inner) => at = inner,
+            // The file's own name, or that in front of a struct's fields.
+            None if k == 0 || step.starts_with(char::is_uppercase) && at.get("properties").is_some() => {}
+            None => return (k, Vec::new()),
+        }
+    }
+    (path.len(), names(&root, at))
+}
+
+/// A name that may stand in a place, and whether a number stands in its brackets.
+pub(super) struct Name {
+    pub(super) name: String,
+    pub(super) takes_number: bool,
+}
+
+/// A schema behind references, options, lists and tables.
+fn resolved<'a>(root: &'a Value, schema: &'a Value) -> &'a Value {
+    let reference = schema.get("$ref").and_then(Value::as_str).and_then(|path| path.strip_prefix("#/$defs/"));
+    let some = schema.get("anyOf").and_then(Value::as_array);
+    let inner = reference
+        .and_then(|name| root.get("$defs")?.get(name))
+        .or_else(|| some?.iter().find(|of| of.get("type") != Some(&"null".into())))
+        .or_else(|| schema.get("items").filter(|of| of.is_object()))
+        .or_else(|| schema.get("additionalProperties").filter(|of| of.is_object()));
+    inner.map_or(schema, |inner| resolved(root, inner))
+}
+
+/// What stands behind a field's colon, or in the brackets of a variant, whichever `at` has of this name.
+fn within<'a>(root: &'a Value, at: &'a Value, step: &str) -> Option<&'a Value> {
+    let field = at.get("properties").and_then(|fields| fields.get(step));
+    let inside = || variants(at).find_map(|variant| variant.get("properties")?.get(step));
+    let bare = || variants(at).find(|variant| variant.get("const").is_some_and(|name| name == step));
+    field.or_else(inside).or_else(bare).map(|inner| resolved(root, inner))
+}
+
+fn variants(at: &Value) -> impl Iterator<Item = &Value> {
+    at.get("oneOf").and_then(Value::as_array).into_iter().flatten()
+}
+
+fn names(root: &Value, at: &Value) -> Vec<Name> {
+    let mut all = Vec::new();
+    for variant in variants(at) {
+        if let Some(name) = variant.get("const").and_then(Value::as_str) {
+            all.push(Name { name: name.into(), takes_number: false });
+        }
+        for (name, inner) in variant.get("properties").and_then(Value::as_object).into_iter().flatten() {
+            all.push(Name { name: name.clone(), takes_number: resolved(root, inner).get(KIND).is_some() });
+        }
+    }
+    all
+}
+
 macro_rules! numbers {
     ($($name:ident => $kind:expr,)*) => {$(
         impl<B: Bound> JsonSchema for $name<B> {

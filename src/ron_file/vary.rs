@@ -57,6 +57,10 @@ pub enum Distribution {
     Weighted(Vec<(f64, f64)>),
 }
 
+/// Names that may stand inside a number that is drawn.
+pub const DISTRIBUTION_WORDS: [&str; 11] =
+    ["Uniform", "Normal", "LogNormal", "Choice", "Weighted", "mean", "sd", "median", "sigma", "min", "max"];
+
 const fn lowest() -> f64 {
     f64::MIN
 }

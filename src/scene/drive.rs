@@ -214,7 +214,11 @@ fn moments(desc: &DriveDesc, first: Option<&Pose>, around: &Around, stream: &mut
         PathDesc::Poses(file) => {
             if around.poses.len() < frames {
                 let words = format!("{file} holds {} poses, fewer than the {frames} frames", around.poses.len());
-                return Err(Error::input(words).help("set `frames` to as many as there are, or less"));
+                let help = match around.poses.len() {
+                    0 => "write a pose on each line: time x y z qx qy qz qw, with blanks or commas between".to_owned(),
+                    most => format!("set `frames` to {most} or less"),
+                };
+                return Err(Error::input(words).help(help));
             }
             return Ok(flown(&around.poses[..frames], first.copied().unwrap_or_default()));
         }
@@ -325,9 +329,17 @@ fn flown(poses: &[(f64, Pose)], first: Pose) -> Vec<Moment> {
     poses.iter().enumerate().map(moment).collect()
 }
 
+/// Farthest place along an axis, metres: single precision tells 0.06 mm apart there.
+const FARTHEST: f64 = 1000.0;
+/// Latest time, seconds: three thousand years after the epoch.
+const LATEST: f64 = 1e11;
+/// Shortest time from one pose to the next, seconds.
+const SHORTEST: f64 = 1e-6;
+
 /// Reads times and poses as [`PathDesc::Poses`] has them; `#` begins a comment. The error names the line.
 pub(super) fn read_poses(text: &str) -> Result<Vec<(f64, Pose)>> {
     let mut all: Vec<(f64, Pose)> = Vec::new();
+    let mut first = true;
     for (k, line) in text.lines().enumerate() {
         let line = line.split('#').next().unwrap_or_default();
         let words: Vec<&str> = line.split(|c: char| c.is_whitespace() || c == ',').filter(|w| !w.is_empty()).collect();
@@ -339,8 +351,9 @@ pub(super) fn read_poses(text: &str) -> Result<Vec<(f64, Pose)>> {
         };
         let numbers: Option<Vec<f64>> = words.iter().map(|w| w.parse().ok().filter(|x: &f64| x.is_finite())).collect();
         // The first line of a CSV file names its columns.
+        let heading = std::mem::replace(&mut first, false);
         let Some(numbers) = numbers else {
-            if all.is_empty() && words.iter().all(|w| w.parse::<f64>().is_err()) {
+            if heading && words.len() > 1 && words.iter().all(|w| w.parse::<f64>().is_err()) {
                 continue;
             }
             return Err(wrong("holds something that is no number"));
@@ -352,7 +365,10 @@ pub(super) fn read_poses(text: &str) -> Result<Vec<(f64, Pose)>> {
         if !(0.9..1.1).contains(&norm) {
             return Err(wrong("holds no quaternion of length 1"));
         }
-        if all.last().is_some_and(|(before, _)| *before >= time) {
+        if time.abs() > LATEST || [x, y, z].iter().any(|v| v.abs() > FARTHEST) {
+            return Err(wrong(&format!("lies beyond {FARTHEST} m from the world's origin, or beyond {LATEST} s")));
+        }
+        if all.last().is_some_and(|(before, _)| time - before < SHORTEST) {
             return Err(wrong("is not later than the one before"));
         }
         let q = [qx, qy, qz, qw].map(|v| (v / norm) as f32);
@@ -474,6 +490,9 @@ mod tests {
             ("0 0 0 1 0 0 0 0", "no quaternion"),
             ("1 0 0 1 1 0 0 0\n1 0 0 1 1 0 0 0", "line 2 is not later"),
             ("0 0 0 NaN 1 0 0 0", "line 1 holds something"),
+            ("a b\nc d\n0 0 0 1 1 0 0 0", "line 2 holds something"),
+            ("0 1e300 0 1 1 0 0 0", "line 1 lies beyond 1000 m"),
+            ("-1e300 0 0 1 1 0 0 0", "line 1 lies beyond"),
         ] {
             let error = read_poses(text).unwrap_err().to_string();
             assert!(error.contains(words), "{error}");

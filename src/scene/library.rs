@@ -11,7 +11,7 @@ use crate::light::{Infrared, Table};
 use crate::material::{LeafMaterial, Picture, Tones};
 use crate::math::{Spectrum, Vec2};
 use crate::model::{Model, Up};
-use crate::optics::{Pigments, soil};
+use crate::optics::{Pigments, measured, soil};
 use crate::ron_file::{Pick, RENAMED, RonFile, Step, choose};
 use crate::sensor::Pose;
 use crate::soil::{LayerDesc, LayerMaps};
@@ -321,10 +321,19 @@ impl Library {
     /// The file of poses that `page` names.
     pub(super) fn poses(&mut self, page: &RonFile, path: &str) -> Result<Vec<(f64, Pose)>> {
         let full = self.need(page, path)?;
-        self.note(&full)?;
         let bytes = input::read(&full, input::LARGEST).map_err(|refusal| refusal.into_error(&full))?;
+        self.files.insert(full.clone(), Sha256::digest(&bytes).into());
         let poses = drive::read_poses(&String::from_utf8_lossy(&bytes));
         poses.map_err(|e| at_its_place(page, path, "", e.in_file(&full)))
+    }
+
+    /// Band means of the soil whose spectrum `page` names.
+    pub(super) fn soil_spectrum(&mut self, page: &RonFile, path: &str) -> Result<Spectrum> {
+        let full = self.need(page, path)?;
+        let bytes = input::read(&full, input::LARGEST).map_err(|refusal| refusal.into_error(&full))?;
+        self.files.insert(full.clone(), Sha256::digest(&bytes).into());
+        let text = String::from_utf8_lossy(&bytes);
+        measured::reflectance(&text).map_err(|e| at_its_place(page, path, "", e.in_file(full)))
     }
 
     /// A soil layer's textures.

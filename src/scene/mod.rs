@@ -3,6 +3,7 @@
 pub mod assemble;
 pub mod desc;
 pub mod drive;
+pub mod estimate;
 mod growing;
 mod library;
 pub mod record;

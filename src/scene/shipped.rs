@@ -32,18 +32,32 @@ impl Shipped {
     }
 }
 
-/// All species that ship, in order of their files' names.
-pub fn all_species() -> Result<Vec<Shipped>> {
-    let read = |file: PathBuf| Ok(Shipped { desc: RonFile::read(&file)?.parse()?, file });
-    shipped::species_files()?.into_iter().map(read).collect()
+/// Files that cannot be read, and what is wrong with them.
+type Faults = Vec<(PathBuf, Error)>;
+
+/// All species that ship, in order of their files' names, and what is wrong with files that cannot be read.
+pub fn all_species() -> Result<(Vec<Shipped>, Faults)> {
+    let (mut all, mut faults) = (Vec::new(), Vec::new());
+    for file in shipped::species_files()? {
+        match RonFile::read(&file).and_then(|page| page.parse()) {
+            Ok(desc) => all.push(Shipped { file, desc }),
+            Err(fault) => faults.push((file, fault)),
+        }
+    }
+    Ok((all, faults))
 }
 
 /// The file of the species that a name means: `cirsium`, `cirsium.ron`, `CIRAR`, `creeping thistle`, `Cirsium arvense`, or a word of the
 /// English name that no other species has, `thistle`. `None` where it is the name of another file; an error where it is no file's name
 /// and no species is called that.
 pub fn species(name: &str) -> Result<Option<PathBuf>> {
-    let all = all_species()?;
+    let (all, faults) = all_species()?;
     let (wanted, is_file) = name.strip_suffix(".ron").map_or((name, false), |stem| (stem, true));
+    // A file that cannot be read has only its own name.
+    let stem = |file: &Path| file.file_stem().is_some_and(|stem| stem.eq_ignore_ascii_case(wanted));
+    if let Some((_, fault)) = faults.into_iter().find(|(file, _)| stem(file)) {
+        return Err(fault);
+    }
     if is_file {
         return Ok(all.into_iter().find(|species| species.stem() == wanted).map(|species| species.file));
     }
@@ -80,7 +94,7 @@ mod tests {
 
     #[test]
     fn every_name_of_a_species_leads_to_its_file() {
-        for species in all_species().unwrap() {
+        for species in all_species().unwrap().0 {
             for name in species.names() {
                 assert!(!name.is_empty(), "{}", species.file.display());
                 assert_eq!(super::species(&name).unwrap().as_ref(), Some(&species.file), "{name}");

@@ -37,6 +37,9 @@ struct Tile {
     clods: f32,
 }
 
+/// Octaves beyond these are 2⁻³² as high as the first, less than single precision tells apart.
+const MOST_OCTAVES: u32 = 32;
+
 impl Blend {
     pub(super) fn new(desc: &BlendDesc, layers: &[LayerDesc], stream: &Stream) -> Self {
         let child = |k| stream.child(Purpose::Texture, k);
@@ -60,7 +63,7 @@ impl Blend {
         Self {
             tiles,
             frequency: 1.0 / desc.scale_m.draw(&mut child(0)),
-            octaves: desc.octaves.get() as u32,
+            octaves: (desc.octaves.get() as u32).min(MOST_OCTAVES),
             sharpness: desc.sharpness.draw32(&mut child(1)),
             height: desc.height.f32(),
         }

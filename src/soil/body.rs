@@ -37,6 +37,11 @@ pub(super) struct Cut {
 /// Details of the sphere: 32, 80, 320, 1280, 5120 triangles.
 pub(super) const LEVELS: usize = 5;
 
+/// Triangles of a whole shape of a level.
+pub(super) fn triangles(level: usize) -> usize {
+    [32, 80, 320, 1280, 5120][level]
+}
+
 /// A unit sphere of triangles.
 fn sphere(level: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let (mut corners, mut triangles) = if level == 0 { octahedron() } else { icosahedron() };
@@ -195,7 +200,7 @@ mod tests {
         for level in 0..LEVELS - 1 {
             for k in 0..24 {
                 let shape = Shape::new(level, cut, &mut Stream::of(1, 0, Purpose::Test, k));
-                assert_eq!(shape.triangles.len(), [32, 80, 320, 1280][level]);
+                assert_eq!(shape.triangles.len(), triangles(level));
                 let volume: f32 = shape
                     .triangles
                     .iter()

@@ -5,8 +5,9 @@
 //! the ground are left out: half of them, which no ray finds.
 
 use super::body::{self, Cut, LEVELS, Pose, Shape};
-use super::{Canopy, Ground, Pile};
-use crate::geometry::Mesh;
+use super::crumb::Local;
+use super::{Canopy, Ground, Pile, Rect};
+use crate::geometry::{Cost, Mesh};
 use crate::math::{Spectrum, Vec2, vec2, vec3};
 use crate::sampling::{Purpose, Stream};
 
@@ -40,6 +41,21 @@ const UNDER_LEAF_M: f32 = 0.0008;
 /// Share of the small clods that fall on a larger one and stay there; the others are shaken off.
 const STAY: f32 = 0.05;
 
+/// Steps of length by which [`cost`] counts.
+const BINS: i32 = 24;
+
+/// Share of a clod's triangles that do not face down into the ground.
+const VISIBLE: f64 = 0.6;
+
+/// Bytes and seconds of one core for each clod that is looked at.
+const BYTES_EACH: f64 = 24.0;
+const SECONDS_EACH: f64 = 1e-6;
+
+/// Level of detail of a clod; `scale` is that of [`FINE_M`] over the grid's spacing.
+fn level(mm: f32, scale: f32) -> usize {
+    FROM_MM.iter().rposition(|from| mm * scale >= *from).unwrap_or(0)
+}
+
 /// One clod before it is laid.
 struct Candidate {
     at: Vec2,
@@ -70,7 +86,7 @@ pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy) -> Vec<Clods> {
     let mut groups: Vec<Mesh> = vec![Mesh::default(); 2 * HUES * TONES];
     for clod in candidates(ground, &stream) {
         let mut s = own.child(Purpose::Debris, u64::from(clod.key));
-        let level = FROM_MM.iter().rposition(|from| clod.mm * scale >= *from).unwrap_or(0);
+        let level = level(clod.mm, scale);
         let k = s.index(SHAPES);
         let shape = shapes[level][k]
             .get_or_insert_with(|| Shape::new(level, CUT, &mut stream.child(Purpose::Texture, k as u64)));
@@ -139,6 +155,31 @@ fn hues(sigma: f32, stream: &mut Stream) -> [Spectrum; HUES] {
         let (green, blue) = (sigma * beyond_mean(k), -sigma * beyond_mean(order[k]));
         Spectrum::new((-0.5 * green).exp(), (0.5 * green).exp(), (0.5 * green + blue).exp(), 1.0)
     })
+}
+
+/// What the clods on so much ground take; `law` tells how many lie at a place, `places` are some of the ground's.
+pub(super) fn cost(places: &[Local], mm: (f32, f32), step: f32, area: Rect) -> Cost {
+    let scale = (FINE_M / step).min(1.0);
+    let share = f64::from(area.area()) / places.len().max(1) as f64;
+    let ratio = (mm.1 / mm.0).powf(1.0 / BINS as f32);
+    // Largest first, as they are laid: what lies on another is shaken off, so the more is covered, the fewer stay.
+    places
+        .iter()
+        .map(|law| {
+            let (mut covered, mut cost) = (0.0_f64, Cost::default());
+            for bin in (0..BINS).rev() {
+                let (lo, hi) = (mm.0 * ratio.powi(bin), mm.0 * ratio.powi(bin + 1));
+                let (number, middle) = (f64::from(law.number(lo, hi)), (lo * hi).sqrt());
+                let free = (-covered).exp();
+                let stay = free + f64::from(STAY) * (1.0 - free);
+                cost = cost + Cost::of(VISIBLE * body::triangles(level(middle, scale)) as f64, 0.0) * (number * stay);
+                cost = cost + Cost::work(number * BYTES_EACH, number * SECONDS_EACH);
+                covered +=
+                    number * f64::from(AXES.0) * std::f64::consts::FRAC_PI_4 * (f64::from(middle) * 1e-3).powi(2);
+            }
+            cost * share
+        })
+        .sum()
 }
 
 /// All clods, largest first.

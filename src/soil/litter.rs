@@ -6,14 +6,42 @@
 
 use super::record::LitterRecord;
 use super::{Debris, DebrisKind, Ground, LitterDesc, Pile, Rect, cell_stream, cells, residue};
-use crate::geometry::Mesh;
+use crate::geometry::{Cost, Mesh};
 use crate::math::{Spectrum, Vec2, Vec3, vec2};
+use crate::ron_file::{Positive, Vary};
 use crate::sampling::{Purpose, Stream};
 use std::f32::consts::{PI, TAU};
 
 /// Reflectance of wood: measured bark; the bits are rotten leaves, redder and darker.
 const WOOD: Spectrum = Spectrum::new(0.22, 0.16, 0.12, 0.38);
 const ROTTEN: Spectrum = Spectrum::new(0.20, 0.09, 0.05, 0.32);
+
+/// Corners of the sections of straw and bits, of sticks, and of stubs.
+const ARC: usize = 14;
+const ROUND: usize = 8;
+const STUB: usize = 6;
+
+/// Points along the path of a stub and of a bit.
+const STUB_POINTS: usize = 4;
+const BIT_POINTS: usize = 6;
+
+/// Seconds of one core to heap up one cell of the pile.
+const HEAP_SECONDS: f64 = 4e-9;
+
+/// Points along the path of a straw of a length, metres.
+fn straw_points(length: f32) -> usize {
+    ((length / 0.004) as usize).clamp(6, 24)
+}
+
+/// Points along the path of a stick of a length, metres.
+fn stick_points(length: f32) -> usize {
+    ((length / 0.005) as usize).clamp(8, 32)
+}
+
+/// Triangles of what [`sweep`] makes: its wall and its two ends.
+fn swept(points: usize, corners: usize) -> usize {
+    2 * (points - 1) * corners + 2 * (corners - 2)
+}
 
 /// Side of the cells that litter is addressed by.
 const CELL_M: f32 = 0.1;
@@ -23,10 +51,7 @@ pub fn litter(desc: &LitterDesc, ground: &Ground, pile: &mut Pile, stream: &Stre
     let mut all = Vec::new();
     let child = |k| own(stream, k);
     let drawn = LitterRecord::draw(desc, stream);
-    // Straws differ in length and width; the mean of both gives the number that covers what was asked for.
-    let mut s = child(1);
-    let one = (0..256).map(|_| desc.straw_mm.draw32(&mut s) * desc.straw_width_mm.draw32(&mut s)).sum::<f32>() / 256e6;
-    let straws = -(1.0 - drawn.straw_cover.min(0.95)).ln() / one;
+    let straws = straws_per_m2(desc, &drawn, stream);
     for (kind, per_m2, k) in [
         (DebrisKind::Stick, drawn.sticks_per_m2, 4),
         (DebrisKind::Straw, straws, 5),
@@ -42,6 +67,41 @@ pub fn litter(desc: &LitterDesc, ground: &Ground, pile: &mut Pile, stream: &Stre
         }
     }
     all
+}
+
+/// Straws, m⁻².
+fn straws_per_m2(desc: &LitterDesc, drawn: &LitterRecord, stream: &Stream) -> f32 {
+    // They differ in length and width; the mean of both gives the number that covers what was asked for.
+    let mut s = own(stream, 1);
+    let one = (0..256).map(|_| desc.straw_mm.draw32(&mut s) * desc.straw_width_mm.draw32(&mut s)).sum::<f32>() / 256e6;
+    -(1.0 - drawn.straw_cover.min(0.95)).ln() / one
+}
+
+/// What straw, sticks and bits on so much ground take, each.
+pub(super) fn costs(desc: &LitterDesc, area: Rect, stream: &Stream) -> [Cost; 3] {
+    let drawn = LitterRecord::draw(desc, stream);
+    let s = own(stream, 8);
+    let mean = |of: &dyn Fn(&mut Stream) -> usize| {
+        (0..256).map(|k| of(&mut s.child(Purpose::Debris, k))).sum::<usize>() as f64 / 256.0
+    };
+    let straw = mean(&|s| swept(straw_points(desc.straw_mm.draw32(s) * 1e-3), ARC));
+    let stick = mean(&|s| swept(stick_points(desc.stick_mm.draw32(s) * 1e-3), ROUND));
+    let stubs = mean(&|s| desc.stubs.draw(s) as usize) * swept(STUB_POINTS, STUB) as f64;
+    let bit = swept(BIT_POINTS, ARC) as f64;
+    // Each heaps the pile up around its path.
+    let heaps = |width_mm: f64, points: usize, number: f64| {
+        let cells = (width_mm * 1e-3 / 1e-3).powi(2).min(f64::from(area.area()) / 1e-6);
+        Cost::work(0.0, HEAP_SECONDS * cells * points as f64 * number)
+    };
+    let on_it = f64::from(area.area());
+    let [straws, sticks, bits] =
+        [straws_per_m2(desc, &drawn, stream), drawn.sticks_per_m2, drawn.bits_per_m2].map(|n| on_it * f64::from(n));
+    let widest = |width: &Vary<Positive>| width.usual().1;
+    [
+        Cost::of(straw, 1.0) * straws + heaps(widest(&desc.straw_width_mm), 24, straws),
+        Cost::of(stick + stubs, 1.0) * sticks + heaps(widest(&desc.stick_width_mm), 32, sticks),
+        Cost::of(bit, 1.0) * bits,
+    ]
 }
 
 /// The streams of the litter.
@@ -172,7 +232,7 @@ fn debris(kind: DebrisKind, mesh: Mesh, albedo: Spectrum, path: &[Vec3], s: &mut
 fn straw(desc: &LitterDesc, weathering: f32, pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
     let length = desc.straw_mm.draw32(s) * 1e-3;
     let width = desc.straw_width_mm.draw32(s) * 1e-3;
-    let n = ((length / 0.004) as usize).clamp(6, 24);
+    let n = straw_points(length);
     let opening = s.range32(0.9, 4.2);
     let points = path(at, length, 0.25, n, s);
     let path = lay(&points, 0.2 * width, 0.85, pile);
@@ -192,22 +252,22 @@ fn straw(desc: &LitterDesc, weathering: f32, pile: &mut Pile, at: Vec2, s: &mut 
 fn stick(desc: &LitterDesc, pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
     let length = desc.stick_mm.draw32(s) * 1e-3;
     let half = 0.5e-3 * desc.stick_width_mm.draw32(s);
-    let n = ((length / 0.005) as usize).clamp(8, 32);
+    let n = stick_points(length);
     let points = path(at, length, 0.5, n, s);
     let path = lay(&points, half, 0.9, pile);
     let knots = (s.range32(0.0, TAU), s.range32(20.0, 60.0));
     let taper = s.range32(0.35, 0.75);
     let size = |t: f32| Vec2::splat(half * (1.0 - (1.0 - taper) * t) * (1.0 + 0.08 * (knots.0 + knots.1 * t).sin()));
-    let mut mesh = sweep(&path, &round(8), size, 0.0);
+    let mut mesh = sweep(&path, &round(ROUND as u8), size, 0.0);
     for _ in 0..desc.stubs.draw(s) as u32 {
         let i = 1 + s.index(n - 2);
         let along = (path[i + 1] - path[i]).normalize_or(Vec3::X);
         let side = along.cross(Vec3::Z).normalize_or(Vec3::Y) * if s.chance(0.5) { 1.0 } else { -1.0 };
         let to = (along + side * s.range32(0.6, 1.4) + Vec3::Z * s.range32(-0.1, 0.5)).normalize_or(Vec3::X);
         let long = half * s.range32(2.5, 9.0);
-        let stub: Vec<Vec3> = (0..4u8).map(|k| path[i] + to * (long * f32::from(k) / 3.0)).collect();
+        let stub: Vec<Vec3> = (0..STUB_POINTS as u8).map(|k| path[i] + to * (long * f32::from(k) / 3.0)).collect();
         let thick = size(i as f32 / n as f32).x * s.range32(0.35, 0.65);
-        mesh.append(&sweep(&stub, &round(6), |t| Vec2::splat(thick * (1.0 - 0.5 * t)), 0.0));
+        mesh.append(&sweep(&stub, &round(STUB as u8), |t| Vec2::splat(thick * (1.0 - 0.5 * t)), 0.0));
     }
     raise(pile, &path, half);
     debris(DebrisKind::Stick, mesh, WOOD, &path, s)
@@ -216,7 +276,7 @@ fn stick(desc: &LitterDesc, pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris
 fn bit(desc: &LitterDesc, weathering: f32, pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
     let length = desc.bit_mm.draw32(s) * 1e-3;
     let half = 0.5 * length * s.range32(0.12, 0.5);
-    let points = path(at, length, 0.5, 6, s);
+    let points = path(at, length, 0.5, BIT_POINTS, s);
     let mut path = lay(&points, 1e-4, 0.6, pile);
     // Dry leaves curl up at their ends.
     let curl = length * s.range32(0.0, 0.25);

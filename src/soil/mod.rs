@@ -17,6 +17,7 @@ mod color;
 mod crumb;
 mod debris;
 mod desc;
+mod estimate;
 mod grid;
 mod ground;
 mod litter;
@@ -40,6 +41,7 @@ pub use desc::{
     BlendDesc, ClodsDesc, CrumbsDesc, LAYERS, LayerDesc, LitterDesc, MoistureDesc, ReliefDesc, RowReliefDesc, SoilDesc,
     StonesDesc,
 };
+pub use estimate::{Expected, expected};
 pub use ground::Ground;
 pub use litter::litter;
 pub use pile::Pile;

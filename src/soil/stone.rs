@@ -3,7 +3,7 @@
 use super::body::{self, Cut, Pose, Shape};
 use super::stone_cover::{cover, own};
 use super::{Debris, DebrisKind, Ground, Pile, Rect, StonesDesc, cell_stream, cells};
-use crate::geometry::Mesh;
+use crate::geometry::{Cost, Mesh};
 use crate::math::{Vec2, vec2, vec3};
 use crate::sampling::{Purpose, Stream};
 
@@ -15,6 +15,9 @@ const AXES: (f32, f32) = (0.75, 0.65);
 
 /// How far pieces of a group lie apart, in lengths of its first: the deviation along each axis. By eye, from fertiliser on frames of a robot.
 const APART: f32 = 0.8;
+
+/// Seconds of one core for each triangle of a shape: noise at its corners.
+const SHAPE_SECONDS: f64 = 1e-6;
 
 /// Side of the cells that stones are addressed by.
 const CELL_M: f32 = 0.1;
@@ -43,16 +46,35 @@ fn length(desc: &StonesDesc, stream: &mut Stream) -> f32 {
     desc.median_mm.f32().clamp(min, max.max(min))
 }
 
-/// Places and lengths, largest first.
-fn sizes(desc: &StonesDesc, area: Rect, stream: &Stream) -> Vec<(Vec2, f32, Stream)> {
+/// Number of pieces that lie together around a place; `s` is the place's own.
+fn together(desc: &StonesDesc, s: &Stream) -> u64 {
+    desc.together.draw32(&mut s.child(Purpose::Page, 0)) as u64
+}
+
+/// Groups of a population, m⁻², and the mean number of stones in one.
+fn density(desc: &StonesDesc, stream: &Stream) -> (f32, f32) {
     let cover = cover(desc, stream);
     // The mean disc of the law, from 512 stones: the cover asked for divides by it.
     let mut s = stream.child(Purpose::Page, 1);
     let disc = (0..512).map(|_| disc_m2(length(desc, &mut s))).sum::<f32>() / 512.0;
-    let together = |s: &Stream| desc.together.draw32(&mut s.child(Purpose::Page, 0)) as u64;
-    let group = (0..512).map(|k| together(&s.child(Purpose::Debris, k))).sum::<u64>() as f32 / 512.0;
+    let group = (0..512).map(|k| together(desc, &s.child(Purpose::Debris, k))).sum::<u64>() as f32 / 512.0;
     // Discs fall independently: 1 − exp(−λ·disc) of the ground is covered. Of a group they touch rather than lie on each other.
-    let per_m2 = -(1.0 - cover.min(0.98)).ln() / (disc * group);
+    (-(1.0 - cover.min(0.98)).ln() / (disc * group), group)
+}
+
+/// What a population on so much ground takes.
+pub(super) fn cost(desc: &StonesDesc, area: Rect, stream: &Stream) -> Cost {
+    let (per_m2, group) = density(desc, stream);
+    let number = f64::from(area.area()) * f64::from(per_m2) * f64::from(group);
+    let mut s = stream.child(Purpose::Page, 2);
+    let triangles = (0..512).map(|_| body::triangles(level(length(desc, &mut s)))).sum::<usize>() as f64 / 512.0;
+    // Each has a shape of its own, which is made whole; what lies in the ground is left out of it.
+    Cost::of(0.75 * triangles, 1.0) * number + Cost::work(0.0, SHAPE_SECONDS * triangles * number)
+}
+
+/// Places and lengths, largest first.
+fn sizes(desc: &StonesDesc, area: Rect, stream: &Stream) -> Vec<(Vec2, f32, Stream)> {
+    let (per_m2, _) = density(desc, stream);
     let mut all = Vec::new();
     for (i, j) in cells(area, CELL_M) {
         let mut cell = cell_stream(stream, i, j);
@@ -60,7 +82,7 @@ fn sizes(desc: &StonesDesc, area: Rect, stream: &Stream) -> Vec<(Vec2, f32, Stre
             let mut s = cell.child(Purpose::Debris, k);
             let at = (vec2(i as f32, j as f32) + vec2(s.uniform32(), s.uniform32())) * CELL_M;
             let mm = length(desc, &mut s);
-            for piece in 1..together(&s) {
+            for piece in 1..together(desc, &s) {
                 let mut s = s.child(Purpose::Debris, piece);
                 let apart = vec2(s.normal() as f32, s.normal() as f32) * (APART * 1e-3 * mm);
                 let mm = length(desc, &mut s);
@@ -82,14 +104,18 @@ fn disc_m2(mm: f32) -> f32 {
     std::f32::consts::FRAC_PI_4 * AXES.0 * (mm * 1e-3).powi(2)
 }
 
-fn stone(desc: &StonesDesc, ground: &Ground, pile: &mut Pile, at: Vec2, mm: f32, s: &mut Stream) -> Debris {
-    let level = match mm {
+/// Detail of a stone of a length.
+fn level(mm: f32) -> usize {
+    match mm {
         ..2.5 => 0,
         2.5..6.0 => 1,
         6.0..12.0 => 2,
         _ => 3,
-    };
-    let shape = Shape::new(level, CUT, s);
+    }
+}
+
+fn stone(desc: &StonesDesc, ground: &Ground, pile: &mut Pile, at: Vec2, mm: f32, s: &mut Stream) -> Debris {
+    let shape = Shape::new(level(mm), CUT, s);
     let mut vary = |mean: f32| (mean * (1.0 + 0.12 * s.normal() as f32)).clamp(0.6 * mean, 1.0);
     let middle = vary(AXES.0);
     let axes = vec3(1.0, middle, middle * vary(AXES.1)) * (0.5e-3 * mm);

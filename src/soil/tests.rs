@@ -39,7 +39,7 @@ fn stream() -> Stream {
 }
 
 fn ground(desc: &SoilDesc, size: f32) -> Ground {
-    Ground::new(desc, &MAPS, &site(size), &stream()).unwrap()
+    Ground::new(desc, &[], &MAPS, &site(size), &stream()).unwrap()
 }
 
 fn root(parent: &mut [usize], mut i: usize) -> usize {
@@ -136,7 +136,7 @@ fn the_baked_maps_and_the_mesh_together_have_the_slopes_of_the_whole_relief() {
     page.clods.over_5mm_per_m2 = Vary::fixed(0.0);
     let maps = [Waves(150.0, [0.2; 3])];
     let site = Site { grid_m: 0.002, ..site(0.05) };
-    let ground = Ground::new(&page, &maps, &site, &stream()).unwrap();
+    let ground = Ground::new(&page, &[], &maps, &site, &stream()).unwrap();
     let baked = ground.bake(&maps, 0.0001);
     let height = |p: Vec2| ground.blend.displacement([1.0, 0.0, 0.0, 0.0], ground.blend.heights(&maps, p));
     let mut off = 0.0;
@@ -169,7 +169,7 @@ fn the_same_address_gives_the_same_ground_and_a_larger_area_holds_it() {
         let (x, y) = (-0.04 + 0.004 * (k % 20) as f32, -0.04 + 0.004 * (k / 20) as f32);
         assert!((a.height(x, y) - large.height(x, y)).abs() < 2e-4);
     }
-    let other = Ground::new(&page, &MAPS, &site(0.05), &Stream::of(21, 5, Purpose::Soil, 0)).unwrap();
+    let other = Ground::new(&page, &[], &MAPS, &site(0.05), &Stream::of(21, 5, Purpose::Soil, 0)).unwrap();
     assert_ne!(a.height(0.0, 0.0), other.height(0.0, 0.0));
 }
 
@@ -247,7 +247,7 @@ fn a_seedbed_stays_within_its_budget_and_keeps_stems_clear() {
     page.clods.exponent = Vary::fixed(3.3);
     let maps = [Plain { albedo: [0.2, 0.15, 0.1], height: 0.5 }];
     let site = Site { area: Rect::new(0.0, 0.0, 0.3, 0.2), grid_m: 0.001, margin_m: 0.1, rows: None };
-    let ground = Ground::new(&page, &maps, &site, &stream()).unwrap();
+    let ground = Ground::new(&page, &[], &maps, &site, &stream()).unwrap();
     let stem = vec2(0.15, 0.1);
     let mut canopy = Canopy::none(&ground);
     canopy.add(&sheet(stem - 0.004, stem + 0.004, ground.height(stem.x, stem.y)));
@@ -312,7 +312,7 @@ fn the_trend_is_the_slope_of_a_plane() {
     page.relief.tilt_deg = Vary::fixed(9.0);
     page.clods.over_5mm_per_m2 = Vary::fixed(0.0);
     let maps = [Plain { albedo: [0.2, 0.15, 0.1], height: 0.5 }];
-    let ground = Ground::new(&page, &maps, &site(0.05), &stream()).unwrap();
+    let ground = Ground::new(&page, &[], &maps, &site(0.05), &stream()).unwrap();
     for normal in [ground.trend(0.0, 0.01, 0.02), ground.normal(0.01, 0.0)] {
         assert!((normal.z.acos().to_degrees() - 9.0).abs() < 0.05, "{normal}");
     }
@@ -321,7 +321,7 @@ fn the_trend_is_the_slope_of_a_plane() {
 #[test]
 fn impossible_pages_are_refused_in_words() {
     let try_page =
-        |page: &SoilDesc| Ground::new(page, &MAPS, &site(0.02), &stream()).map(|_| ()).unwrap_err().to_string();
+        |page: &SoilDesc| Ground::new(page, &[], &MAPS, &site(0.02), &stream()).map(|_| ()).unwrap_err().to_string();
     let mut one = page();
     one.layers.truncate(1);
     assert!(try_page(&one).contains("1 layers but 2 were loaded"));
@@ -332,5 +332,5 @@ fn impossible_pages_are_refused_in_words() {
     clods.clods.max_mm = Num::new(1.0);
     assert!(try_page(&clods).contains("min_mm"));
     let thin = Site { grid_m: 1e-7, ..site(1.0) };
-    assert!(Ground::new(&page(), &MAPS, &thin, &stream()).is_err());
+    assert!(Ground::new(&page(), &[], &MAPS, &thin, &stream()).is_err());
 }

@@ -8,6 +8,7 @@ use crate::dataset::Recipe;
 use crate::dataset::sample::IGNORE;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::fmt;
 
 /// The labels of `semantics.png` by their number.
@@ -69,11 +70,27 @@ impl Classes {
             }
             classes.push(Class { name: name.trim().into(), labels });
         }
-        match classes.len() {
-            0 | 1 => Err("two classes at least are needed, such as `soil; plant=crop,weed`".into()),
-            2..=64 => Ok(Self(classes)),
-            n => Err(format!("{n} classes are too many: 64 at most")),
+        let classes = Self(classes);
+        classes.check().map(|()| classes)
+    }
+
+    /// Refuses too few and too many, and names and labels that are there twice or say nothing.
+    pub fn check(&self) -> Result<(), String> {
+        match self.len() {
+            0 | 1 => return Err("two classes at least are needed, such as `soil; plant=crop,weed`".into()),
+            2..=64 => {}
+            n => return Err(format!("{n} classes are too many: 64 at most")),
         }
+        let names: BTreeSet<&str> = self.0.iter().map(|c| c.name.trim()).collect();
+        let labels: Vec<&String> = self.0.iter().flat_map(|c| &c.labels).collect();
+        let distinct: BTreeSet<&String> = labels.iter().copied().collect();
+        if names.len() < self.len() || names.contains("") || self.0.iter().any(|c| c.labels.is_empty()) {
+            return Err("each class needs a name of its own, and labels".into());
+        }
+        if distinct.len() < labels.len() {
+            return Err("a label belongs to one class alone".into());
+        }
+        Ok(())
     }
 
     /// How many there are.

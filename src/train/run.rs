@@ -13,7 +13,7 @@ use super::data::{Band, Normalization, Resize, Shape, Store};
 use super::fit::Plan;
 use super::fit::checkpoint::History;
 use super::fit::hyper::SIDES;
-use super::net::{Network, Pretrained};
+use super::net::{Network, Parameter, Pretrained, parameters};
 use super::weights::{self, Array};
 use crate::input::below;
 use crate::output::{Together, write_atomically, write_together};
@@ -131,14 +131,24 @@ impl ModelCard {
             return Err(format!("`{}` are no bands of an image", names.join(",")));
         }
         self.resize.check()?;
+        self.classes.check()?;
+        if [width, height].iter().any(|side| **side < self.network.least_side()) {
+            return Err(format!("{} does not see {width} × {height} pixels", self.network.name()));
+        }
+        let learnt = parameters(self.network, bands.len(), self.classes.len());
+        let trainable = learnt.iter().filter(|p| p.role.is_trainable()).map(Parameter::len).sum::<usize>();
+        if self.parameters != trainable {
+            let words = "parameters: this network with these bands and classes has";
+            return Err(format!("it tells of {} {words} {trainable}", self.parameters));
+        }
         if self.pixel_mm.is_some_and(|mm| !(mm.is_finite() && mm > 0.0)) {
             return Err("its pixels have no size".into());
         }
         if let Normalization::Fixed { mean, sd } = &self.normalization
             && (mean.len() != bands.len()
                 || sd.len() != bands.len()
-                || !mean.iter().all(|m| m.is_finite())
-                || !sd.iter().all(|s| s.is_finite() && *s > 0.0))
+                || !mean.iter().all(|m| (0.0..=1.0).contains(m))
+                || !sd.iter().all(|s| (f32::MIN_POSITIVE..=1.0).contains(s)))
         {
             return Err(format!("its normalization is not one of {} bands", bands.len()));
         }
@@ -223,7 +233,7 @@ pub fn results(folder: &Path) -> Result<Option<Results>> {
 
 /// Reads a JSON file of a run.
 pub fn read_json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T> {
-    let bytes = std::fs::read(path).map_err(Error::reading(path))?;
+    let bytes = crate::input::contents(path).map_err(Error::reading(path))?;
     let unreadable = |e| {
         Error::damaged(format!("this file cannot be read: {e}")).help("delete it to have it made again").in_file(path)
     };

@@ -53,7 +53,7 @@ pub fn read(path: &Path) -> Result<(Vec<Array>, String)> {
     let damaged = |e: &dyn std::fmt::Display| {
         unusable(path, &format!("these are no weights of `train`, or they are damaged: {e}"))
     };
-    let bytes = std::fs::read(path).map_err(Error::reading(path))?;
+    let bytes = crate::input::contents(path).map_err(Error::reading(path))?;
     let (_, header) = SafeTensors::read_metadata(&bytes).map_err(|e| damaged(&e))?;
     let text =
         header.metadata().as_ref().and_then(|m| m.get(KEY)).ok_or_else(|| damaged(&"words of ours are missing"))?;
@@ -67,7 +67,7 @@ pub fn read(path: &Path) -> Result<(Vec<Array>, String)> {
 
 /// Reads arrays that another program wrote, in the order of their names; those that are not of single precision are left out.
 pub fn read_foreign(path: &Path) -> Result<Vec<Array>> {
-    let bytes = std::fs::read(path).map_err(Error::reading(path))?;
+    let bytes = crate::input::contents(path).map_err(Error::reading(path))?;
     let all = SafeTensors::deserialize(&bytes);
     let fault = |e: &dyn std::fmt::Display| unusable(path, &format!("this is no safetensors file: {e}"));
     let all = all.map_err(|e| fault(&e))?;

@@ -6,6 +6,7 @@ pub mod browser;
 pub mod chi2;
 pub mod dataset;
 pub mod devtools;
+pub mod faults;
 pub mod layers;
 pub mod pictures;
 pub mod program;

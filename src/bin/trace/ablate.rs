@@ -93,7 +93,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
             continue;
         }
         say(format!("{} of {}: {}, {}", i + 1, edits.len(), edit.name, edit.about));
-        generate(set, &args.work, args.shard.unwrap_or(Shard::ALL), signals)?;
+        generate(set, &args.work, args.shard.unwrap_or(Shard::ALL), args.images.memory.bytes, signals)?;
         if args.shard.is_none() {
             paths.extend(finish::finish(set, None)?);
         }

@@ -25,6 +25,21 @@ pub(crate) struct SceneArgs {
     pub(crate) height: Option<u32>,
 }
 
+/// How much memory a field may take.
+#[derive(clap::Args)]
+pub(crate) struct MemoryArgs {
+    /// Most memory that a field may take, GiB; three quarters of this machine's unless given. One that would take more is refused before
+    /// it grows. No file depends on it.
+    #[arg(long = "memory", value_name = "GIB", value_parser = bytes)]
+    pub(crate) bytes: Option<u64>,
+}
+
+/// Bytes, written in GiB.
+fn bytes(text: &str) -> Result<u64, String> {
+    let gib = text.parse().ok().filter(|gib: &f64| (0.1..=1e6).contains(gib));
+    gib.map(|gib| (gib * (1_u64 << 30) as f64) as u64).ok_or_else(|| "write GiB from 0.1 to 1000000, such as 24".into())
+}
+
 /// A scene file of the user's, or one that ships.
 pub(crate) fn scene_file() -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().map(shipped::scene_file)
@@ -47,6 +62,8 @@ impl SceneArgs {
 pub(crate) struct FieldArgs {
     #[command(flatten)]
     scene: SceneArgs,
+    #[command(flatten)]
+    memory: MemoryArgs,
     /// Which field of the distribution.
     #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
     index: u64,
@@ -72,8 +89,8 @@ impl FieldArgs {
     /// Grows the field as an edit has it.
     pub(crate) fn grow(&self, edit: &'static Edit, threads: &Threads) -> Result<Field> {
         let SceneArgs { seed, width, height, .. } = self.scene;
-        let scene = SceneFile::edited(self.path(), edit)?.seed(seed).width(width).height(height).threads(threads);
-        let mut field = scene.field(self.index)?;
+        let scene = SceneFile::edited(self.path(), edit)?.seed(seed).width(width).height(height);
+        let mut field = scene.memory(self.memory.bytes).threads(threads).field(self.index)?;
         let captures = &field.grown().captures;
         let place = captures.iter().position(|c| c.frame == self.frame && c.name == self.camera);
         let Some(place) = place else {

@@ -14,7 +14,11 @@ use std::path::PathBuf;
 /// Species: file, scientific and English name, EPPO code, role, growth stages.
 pub(crate) fn species() -> Result<Vec<PathBuf>> {
     let mut rows = Vec::new();
-    for species in all_species()? {
+    let (all, faults) = all_species()?;
+    for (_, fault) in faults {
+        furrow::tell!("warning: {fault}");
+    }
+    for species in all {
         let desc = &species.desc;
         let codes = || desc.plant.stages.iter().map(|stage| stage.bbch).chain(desc.plant.cover_days.keys().copied());
         let role = if desc.role == Role::Crop { "crop" } else { "weed" };
@@ -65,7 +69,7 @@ fn chip(sensor: &SensorDesc, readout_ms: f64) -> String {
 pub(crate) fn soils() -> Result<Vec<PathBuf>> {
     let mut rows: Vec<[String; 3]> = Vec::new();
     for color in SoilColor::ALL {
-        let [r, g, b, nir] = color.reflectance().to_array();
+        let [r, g, b, nir] = color.reflectance(&mut |_| unreachable!("soils that ship name no file"))?.to_array();
         let reflectance = format!("reflectance R {r:.3}, G {g:.3}, B {b:.3}, NIR {nir:.3}");
         rows.push([format!("{color:?}"), format!("colors: [{color:?}]"), reflectance]);
     }

@@ -6,6 +6,8 @@ mod ablate;
 mod catalogue;
 mod compare;
 mod dataset;
+#[cfg(feature = "raster")]
+mod display;
 mod explain;
 mod export;
 mod field;
@@ -115,6 +117,8 @@ enum Verb {
 }
 
 fn main() -> ExitCode {
+    #[cfg(feature = "raster")]
+    display::need_none();
     let signals = signal::Signals::watch();
     let cli = Cli::parse();
     let done = match cli.verb {

@@ -1,6 +1,6 @@
 //! `trace preview`: several fields of a scene file on one sheet, each with its index.
 
-use crate::field::scene_file;
+use crate::field::{MemoryArgs, scene_file};
 use crate::letters;
 use crate::quality::{samples, threads};
 use furrow::cli::{self, signal::Signals};
@@ -49,6 +49,8 @@ pub(crate) struct Args {
     /// Samples a pixel.
     #[arg(long, default_value_t = 8, value_parser = samples())]
     spp: u32,
+    #[command(flatten)]
+    memory: MemoryArgs,
     /// Threads; 0 for one on each core. The file does not depend on it.
     #[arg(long, default_value_t = 0, value_parser = threads)]
     threads: usize,
@@ -83,7 +85,13 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     });
     cli::check_png(&out, &args.scene)?;
     let renderer = Renderer::open(&RenderOptions::path_traced(Quality::spp(args.spp)))?;
-    let scene = SceneFile::open(&args.scene)?.seed(args.seed).width(args.width).threads(&Threads::new(args.threads)?);
+    let scene = SceneFile::open(&args.scene)?.seed(args.seed).width(args.width).memory(args.memory.bytes);
+    let scene = scene.threads(&Threads::new(args.threads)?);
+    if !args.quiet
+        && let Some(crowd) = scene.crowd(MOST)
+    {
+        furrow::tell!("{}", crowd.told());
+    }
     let stop = signals.heed();
     let (mut shots, mut seed) = (Vec::new(), 0);
     for index in args.indices.clone() {

@@ -2,7 +2,7 @@
 
 use crate::dataset::order::{begin, formats};
 use crate::dataset::render::{WorkArgs, generate};
-use crate::field::SceneArgs;
+use crate::field::{MemoryArgs, SceneArgs};
 use crate::quality::{TechniqueArgs, samples};
 use furrow::cli::signal::Signals;
 use furrow::dataset::finish;
@@ -36,6 +36,8 @@ pub(crate) struct Args {
     #[command(flatten)]
     technique: TechniqueArgs,
     #[command(flatten)]
+    memory: MemoryArgs,
+    #[command(flatten)]
     work: WorkArgs,
 }
 
@@ -50,11 +52,12 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     }
     let mut order = Order::new(args.scene.path(), args.fields * captures);
     (order.seed, order.width, order.height) = (args.scene.seed, args.scene.width, args.scene.height);
+    order.memory = args.memory.bytes;
     order.formats.clone_from(&args.format);
     order.formats.sort();
     order.formats.dedup();
     order.options = args.technique.options(Quality { denoise: args.denoise, ..Quality::spp(args.spp) });
     let set = begin(&args.out, &order)?;
-    generate(&set, &args.work, Shard::ALL, signals)?;
+    generate(&set, &args.work, Shard::ALL, args.memory.bytes, signals)?;
     finish::finish(&set, None)
 }

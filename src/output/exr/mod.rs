@@ -138,7 +138,7 @@ pub type Geometry = (u32, u32, Vec<f32>, Vec<[f32; 3]>);
 /// Reads what [`encode_geometry`] wrote.
 pub fn read_geometry(path: &Path) -> Result<Geometry> {
     let wrong = |what: String| Error::input(what).in_file(path);
-    let bytes = std::fs::read(path).map_err(Error::reading(path))?;
+    let bytes = crate::input::contents(path).map_err(Error::reading(path))?;
     let reader = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
     let image = reader.from_buffered(std::io::Cursor::new(bytes)).map_err(|e| wrong(e.to_string()))?;
     let layer = image.layer_data;

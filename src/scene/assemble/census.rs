@@ -3,6 +3,7 @@
 use super::builder::MOST_PLANTS;
 use crate::ron_file::{RonFile, Step};
 use crate::{Error, Result};
+use std::ops::Range;
 
 /// Where in a scene file plants come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,6 +14,23 @@ pub(super) enum Population {
     Weed(usize),
     /// `plants`, all items.
     Placed,
+}
+
+/// A population and the places of its plants among all.
+pub(super) type Members = (Population, Range<usize>);
+
+impl Population {
+    /// The way to what decides how many there are, and what makes them fewer.
+    pub(super) fn place(self) -> (Vec<Step<'static>>, &'static str) {
+        match self {
+            Self::Crop(k) => (
+                vec![Step::Field("crops"), Step::Item(k), Step::Field("rows")],
+                "widen the distances or lower the jitter here",
+            ),
+            Self::Weed(k) => (vec![Step::Field("weeds"), Step::Item(k), Step::Field("spread")], "lower per_m2 here"),
+            Self::Placed => (vec![Step::Field("plants")], "place fewer plants"),
+        }
+    }
 }
 
 /// Counts plants population by population.
@@ -39,29 +57,27 @@ impl<'a> Census<'a> {
         Err(self.refusal(population, places.ceil() + before as f64))
     }
 
+    /// The plants of each population, of so many in all.
+    pub(super) fn populations(&self, plants: usize) -> Vec<Members> {
+        let ends = self.begun.iter().skip(1).map(|(_, before)| *before).chain([plants]);
+        self.begun.iter().zip(ends).map(|((population, before), end)| (*population, *before..end)).collect()
+    }
+
     /// Checks the plants of all populations so far; the largest population is named where they are too many.
     pub(super) fn close(&self, plants: usize) -> Result<()> {
         if plants <= MOST_PLANTS {
             return Ok(());
         }
-        let ends = self.begun.iter().skip(1).map(|(_, before)| *before).chain([plants]);
-        let sizes = self.begun.iter().zip(ends).map(|((population, before), end)| (end - before, *population));
         // The first of several that are equally large.
-        let largest = sizes.reduce(|most, next| if next.0 > most.0 { next } else { most });
-        Err(self.refusal(largest.map_or(Population::Placed, |(_, population)| population), plants as f64))
+        let largest = self
+            .populations(plants)
+            .into_iter()
+            .reduce(|most, next| if next.1.len() > most.1.len() { next } else { most });
+        Err(self.refusal(largest.map_or(Population::Placed, |(population, _)| population), plants as f64))
     }
 
     fn refusal(&self, population: Population, plants: f64) -> Error {
-        let (path, advice) = match population {
-            Population::Crop(k) => (
-                vec![Step::Field("crops"), Step::Item(k), Step::Field("rows")],
-                "widen the distances or lower the jitter here",
-            ),
-            Population::Weed(k) => {
-                (vec![Step::Field("weeds"), Step::Item(k), Step::Field("spread")], "lower per_m2 here")
-            }
-            Population::Placed => (vec![Step::Field("plants")], "place fewer plants"),
-        };
+        let (path, advice) = population.place();
         let words = format!("about {plants:.3e} plants or places for them: labels can number {MOST_PLANTS}");
         let error = Error::input(words).help(format!("{advice}, or lower the camera"));
         self.page.blame(&path, error)

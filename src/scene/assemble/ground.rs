@@ -2,6 +2,7 @@
 
 use super::builder::{Builder, Floor};
 use crate::Result;
+use crate::geometry::Cost;
 use crate::material::{BakedGround, Ground as GroundMaterial, Material, Solid};
 use crate::math::Spectrum;
 use crate::ron_file::Step;
@@ -9,7 +10,9 @@ use crate::sampling::Purpose;
 use crate::sampling::rng::mix;
 use crate::scatter::Rows;
 use crate::scene::library::Layer;
-use crate::soil::{self, Canopy, Clods, Debris, DebrisKind, Ground, Pile, Rect, SeedRows, Site, SoilDesc, SoilRecord};
+use crate::soil::{
+    self, Canopy, Clods, Debris, DebrisKind, Expected, Ground, Pile, Rect, SeedRows, Site, SoilDesc, SoilRecord,
+};
 use std::sync::Arc;
 
 /// Room around the view with fine ground.
@@ -20,6 +23,8 @@ const GROUND_REACH: f32 = 2.5;
 const OPEN_REACH: f32 = 200.0;
 /// About the most cells of the fine ground: a larger view has larger ones.
 const MOST_CELLS: f32 = 1.5e7;
+/// About the most texels of the ground's maps: a larger view has larger ones.
+const MOST_TEXELS: f32 = 2.4e8;
 /// Addresses of what lies on the ground.
 const STONES: u64 = 0;
 const LITTER: u64 = 1;
@@ -57,22 +62,41 @@ impl Builder<'_> {
         for layer in &desc.layers {
             maps.push(self.library.layer(self.page, layer)?);
         }
+        let mut read = |file: &str| self.library.soil_spectrum(self.page, file);
+        let colors = desc.colors.iter().map(|color| color.reflectance(&mut read)).collect::<Result<Vec<Spectrum>>>()?;
+        let site = self.site(view, open);
+        let ground = Ground::new(desc, &colors, &maps, &site, &self.stream(Purpose::Soil, 0))
+            .map_err(|e| self.page.blame(&[Step::Field("soil")], e))?;
+        let mut pile = Pile::new(&ground);
+        let stones = soil::stones(&desc.stones, &ground, &mut pile, &self.stream(Purpose::Debris, STONES));
+        Ok(Earth { ground, maps, pile, stones })
+    }
+
+    /// Which piece of ground is made, and how finely.
+    pub(super) fn site(&self, view: Rect, open: bool) -> Site {
         let pixel = self.ground_pixel();
         let rows = self.sown.clone().next().map(|k| {
             let rows = Rows::draw(&self.desc.crops[k].rows, &self.stream(Purpose::Scatter, k as u64));
             SeedRows { spacing_m: rows.spacing_m, azimuth: rows.azimuth, offset_m: rows.offset_m }
         });
-        let site = Site {
+        Site {
             area: view.grown(GROUND_MARGIN),
             grid_m: (2.5 * pixel).clamp(8e-4, 4e-3).max((view.area() / MOST_CELLS).sqrt()),
             margin_m: if open { OPEN_REACH } else { GROUND_REACH },
             rows,
-        };
-        let ground = Ground::new(desc, &maps, &site, &self.stream(Purpose::Soil, 0))
-            .map_err(|e| self.page.blame(&[Step::Field("soil")], e))?;
-        let mut pile = Pile::new(&ground);
-        let stones = soil::stones(&desc.stones, &ground, &mut pile, &self.stream(Purpose::Debris, STONES));
-        Ok(Earth { ground, maps, pile, stones })
+        }
+    }
+
+    /// Side of a texel of the ground's maps, metres.
+    pub(super) fn texel(&self, view: Rect) -> f32 {
+        (0.9 * self.ground_pixel()).clamp(2e-4, 2e-3).max((view.area() / MOST_TEXELS).sqrt())
+    }
+
+    /// What the ground and each thing on it take, before any of it is made.
+    pub(super) fn expected_soil(&self, desc: &SoilDesc, view: Rect, open: bool) -> (Cost, Vec<Expected>) {
+        let streams = [(Purpose::Soil, 0), (Purpose::Debris, STONES), (Purpose::Debris, LITTER)];
+        let streams = streams.map(|(purpose, index)| self.stream(purpose, index));
+        soil::expected(desc, &self.site(view, open), self.texel(view), streams.each_ref())
     }
 
     /// The ground as it was drawn.

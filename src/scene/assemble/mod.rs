@@ -3,7 +3,9 @@
 mod builder;
 mod census;
 mod condition;
+mod expected;
 mod field;
+mod foresee;
 mod ground;
 mod identity;
 mod individual;
@@ -16,6 +18,7 @@ mod unlikely;
 mod view;
 
 use super::desc::{FieldDesc, Growth, SpeciesDesc};
+use super::estimate::{Estimate, usual_memory};
 pub use super::growing::Growing;
 use super::library::{Library, Species};
 use super::record::Conditions;
@@ -28,14 +31,14 @@ use crate::material::{BakedGround, Material};
 use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3, vec2};
 use crate::optics::soil::LOESS;
 use crate::plant::{self, ConditionDesc, LeafAxis, OrganKind};
-use crate::ron_file::{Positive, RENAMED, RonFile, Vary};
+use crate::ron_file::{Positive, RENAMED, RonFile, Step, Vary};
 use crate::sampling::{Purpose, Stream};
 use crate::scatter::{self, Disc, Spot};
 use crate::sensor::Camera;
 use crate::soil::Rect;
 use crate::{Error, Result};
 use builder::{Builder, Floor, Grown};
-use census::{Census, Population};
+use census::{Census, Members, Population};
 use condition::{Ailing, Bare};
 pub use field::Field;
 use ground::{BakedGrounds, Earth};
@@ -59,6 +62,9 @@ pub struct Options {
     pub width: Option<u32>,
     /// Image height.
     pub height: Option<u32>,
+    /// Most bytes that a field may take; [`usual_memory`](super::estimate::usual_memory) unless given. Nothing of a field depends on it, but whether it is
+    /// made.
+    pub memory: Option<u64>,
 }
 
 /// Room around the view in which plants are grown: they lean in and throw shadows.
@@ -71,10 +77,8 @@ const SEASON: u64 = 1 << 32;
 const LIGHTING: u64 = 2 << 32;
 /// Address of the stream from which the crop that is sown is drawn.
 const SOWN: u64 = 3 << 32;
-/// Address of the stream from which the drive is drawn, and of the first of those of further cameras.
-const DRIVE: u64 = 4 << 32;
-/// About the most texels of the ground's maps: a larger view has larger ones.
-const MOST_TEXELS: f32 = 2.4e8;
+/// Most lights of a field: each is asked at every point that a ray meets.
+const MOST_LIGHTS: usize = 256;
 
 /// Builds field `options.index` of the scene file at `path`.
 pub fn field(path: &Path, options: &Options) -> Result<Field> {
@@ -149,9 +153,17 @@ impl Source {
         let held = || self.library.lock().unwrap_or_else(PoisonError::into_inner);
         // A copy of names and references: fields that are built at once do not wait for each other.
         let library = held().clone();
-        let (field, library) = Builder::new(&self.page, &self.desc, options, library)?.build()?;
+        let (field, library) = Builder::new(&self.page, &self.desc, options, library)?.build(options)?;
         *held() = library;
         Ok(field)
+    }
+
+    /// What field `options.index` takes, before it grows.
+    pub fn estimate(&self, options: &Options) -> Result<Estimate> {
+        let library = self.library.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let mut builder = Builder::new(&self.page, &self.desc, options, library)?;
+        let View { area, open } = builder.looked_at()?;
+        builder.estimate(area, open)
     }
 }
 
@@ -186,10 +198,15 @@ impl<'a> Builder<'a> {
     fn new(page: &'a RonFile, desc: &'a FieldDesc, options: &Options, mut library: Library) -> Result<Self> {
         let (seed, index) = (options.seed.unwrap_or(desc.seed), options.index);
         let mut stream = Stream::of(seed, index, Purpose::Page, 0);
-        let camera = rig::first(page, desc, options, &mut stream)?;
+        let camera = rig::first(page, desc, (options.width, options.height), &mut stream)?;
         let (mut lights, mut light_records) = (Vec::new(), Vec::new());
         let lists = |place| Stream::of(seed, index, Purpose::Page, LIGHTING + place as u64);
         let (lighting, listed) = Lighting::draw(page, &desc.lights, lists)?;
+        if listed.len() > MOST_LIGHTS {
+            let fault = Error::input(format!("{} lights: a field may have {MOST_LIGHTS}", listed.len()))
+                .help("leave some out; one Daylight is sun and sky");
+            return Err(page.blame(&[Step::Field("lights")], fault));
+        }
         // Those of all lists, so that all fields are of one scene whatever each of them draws.
         for file in desc.lights.iter().flat_map(LightDesc::files) {
             library.environment_map_file(page, file)?;
@@ -254,17 +271,18 @@ impl<'a> Builder<'a> {
     }
 
     /// The field, and the library with whatever was read for it.
-    fn build(mut self) -> Result<(Field, Library)> {
-        let wanted = self.desc.soil.is_some() || !self.desc.crops.is_empty() || !self.desc.weeds.is_empty();
-        let View { area: view, open } = if wanted { self.view()? } else { View::NONE };
-        let (sown, shown) = (view.grown(PLANT_MARGIN), wanted.then_some(view));
+    fn build(mut self, options: &Options) -> Result<(Field, Library)> {
+        let View { area: view, open } = self.looked_at()?;
+        let memory = options.memory.unwrap_or_else(usual_memory);
+        self.estimate(view, open)?.check(memory).map_err(|(at, error)| self.page.blame(&at, error))?;
+        let (sown, shown) = (view.grown(PLANT_MARGIN), self.has_ground().then_some(view));
         self.warn_of_camera();
         self.warn_of_plants()?;
         let mut known = None;
         let planted;
         let mut plants = match &self.desc.soil {
             None => {
-                let seedlings = self.seedlings(sown, &[])?;
+                let (seedlings, _) = self.seedlings(sown, &[])?;
                 let plants = self.populate(&seedlings, None, shown)?;
                 planted = self.scene.parts.len();
                 plants
@@ -273,7 +291,7 @@ impl<'a> Builder<'a> {
                 let Earth { ground, maps, mut pile, mut stones } = self.break_ground(soil, view, open)?;
                 let floor = Floor { ground: &ground, flat: soil.flat };
                 known = Some(self.soil_record(soil, &ground));
-                let texel = (0.9 * self.ground_pixel()).clamp(2e-4, 2e-3).max((view.area() / MOST_TEXELS).sqrt());
+                let texel = self.texel(view);
                 // The bake takes as long as everything else, and neither needs the other.
                 let fabric = |wet| Arc::new(BakedGround::bake(&ground.fabric(&maps, texel, wet)));
                 let (baked, rest) = rayon::join(
@@ -284,7 +302,7 @@ impl<'a> Builder<'a> {
                     },
                     || {
                         let taken: Vec<Disc> = stones.iter().map(|s| (s.centre.truncate(), s.radius)).collect();
-                        let seedlings = self.seedlings(sown, &taken)?;
+                        let (seedlings, _) = self.seedlings(sown, &taken)?;
                         // Plants first: what grows moves the clods, not the other way round.
                         let plants = self.populate(&seedlings, Some(floor), shown)?;
                         Ok::<_, Error>((self.cover(soil, &ground, &mut pile, &mut stones), plants))
@@ -334,6 +352,16 @@ impl<'a> Builder<'a> {
         Ok((field, self.library))
     }
 
+    /// Whether it has ground, or plants all over it.
+    fn has_ground(&self) -> bool {
+        self.desc.soil.is_some() || !self.desc.crops.is_empty() || !self.desc.weeds.is_empty()
+    }
+
+    /// The ground that is made, or stands for none.
+    fn looked_at(&mut self) -> Result<View> {
+        if self.has_ground() { self.view() } else { Ok(View::NONE) }
+    }
+
     /// Plants and models.
     fn populate(
         &mut self,
@@ -341,14 +369,16 @@ impl<'a> Builder<'a> {
         floor: Option<Floor<'_>>,
         shown: Option<Rect>,
     ) -> Result<Vec<PlantRecord>> {
+        let outdated = seedlings.iter().find_map(|s| s.condition.as_ref().and_then(ConditionDesc::outdated));
+        self.warnings.extend(outdated.map(str::to_owned));
         let mut plants = self.plant(seedlings, floor, shown)?;
         plants.extend(self.models(seedlings.len(), floor)?);
         identity::settle(&mut plants);
         Ok(plants)
     }
 
-    /// Where plants stand, in an order that adding a species at the end does not change.
-    fn seedlings(&mut self, area: Rect, stones: &[Disc]) -> Result<Vec<Seedling>> {
+    /// Where plants stand, in an order that adding a species at the end does not change, and which of them are of one population.
+    fn seedlings(&mut self, area: Rect, stones: &[Disc]) -> Result<(Vec<Seedling>, Vec<Members>)> {
         let mut all = Vec::new();
         let area = area.corners();
         let (desc, page) = (self.desc, self.page);
@@ -393,9 +423,8 @@ impl<'a> Builder<'a> {
             all.push(seedling.tended(&placed.vigour, placed.condition.as_ref()));
         }
         census.close(all.len())?;
-        let outdated = all.iter().find_map(|s| s.condition.as_ref().and_then(ConditionDesc::outdated));
-        self.warnings.extend(outdated.map(str::to_owned));
-        Ok(all)
+        let populations = census.populations(all.len());
+        Ok((all, populations))
     }
 
     fn seedling(&self, species: &Arc<Species>, growth: &Growth, spot: Spot, population: u64) -> Seedling {

@@ -1,6 +1,5 @@
 //! The cameras of a field, and the images that they take on their way through it.
 
-use super::{DRIVE, Options};
 use crate::math::Vec3;
 use crate::ron_file::{RonFile, Step};
 use crate::sampling::{Purpose, Stream};
@@ -11,19 +10,28 @@ use crate::scene::library::Library;
 use crate::sensor::Camera;
 use crate::{Error, Result};
 
+/// Address of the stream from which the drive is drawn, and of the first of those of further cameras.
+const DRIVE: u64 = 4 << 32;
 /// Most pixels of an image.
 const MOST_PIXELS: u64 = 1 << 28;
 /// Most images of a field.
 const MOST_CAPTURES: u64 = 100_000;
+/// Most letters of a camera's name.
+const LONGEST_NAME: usize = 64;
 /// Names that are no camera's.
 const RESERVED: [&str; 2] = ["next", "none"];
 /// How far the shapes of a rig's images may differ: a pixel of a thousand.
 const SAME_SHAPE: f64 = 1e-3;
 
 /// The first camera, in the size that is asked for.
-pub(super) fn first(page: &RonFile, desc: &FieldDesc, options: &Options, stream: &mut Stream) -> Result<Camera> {
+pub(super) fn first(
+    page: &RonFile,
+    desc: &FieldDesc,
+    (width, height): (Option<u32>, Option<u32>),
+    stream: &mut Stream,
+) -> Result<Camera> {
     let camera = desc.camera.build(stream).map_err(|e| page.blame(&[Step::Field("camera")], e))?;
-    let camera = match (options.width, options.height) {
+    let camera = match (width, height) {
         (None, None) => camera,
         (w, h) => {
             let (w0, h0) = (camera.width(), camera.height());
@@ -57,9 +65,12 @@ pub(super) fn captures(
         let at = [Step::Field("cameras"), Step::Item(k)];
         let blame = |e| page.blame(&at, e);
         let named = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-        if mounted.name.is_empty() || !mounted.name.chars().all(named) {
+        if !(1..=LONGEST_NAME).contains(&mounted.name.len()) || !mounted.name.chars().all(named) {
             let words = format!("`{}` cannot be part of a file's name", mounted.name);
-            return Err(blame(Error::input(words).help("give the camera a name of letters, digits, - and _")));
+            return Err(blame(
+                Error::input(words)
+                    .help(format!("give the camera a name of up to {LONGEST_NAME} letters, digits, - and _")),
+            ));
         }
         if RESERVED.contains(&mounted.name.as_str()) {
             let help = "files of flow call other things so; give the camera another name";

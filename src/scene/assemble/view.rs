@@ -74,9 +74,10 @@ impl Builder<'_> {
     fn view_of(&mut self, camera: &Camera, told: bool) -> Result<View> {
         let (w, h) = (camera.width() as f32, camera.height() as f32);
         let below = camera.pose().position.truncate();
-        if below.abs().max_element() > FARTHEST {
+        if camera.pose().position.abs().max_element() > FARTHEST {
             let words = format!("the camera stands more than {FARTHEST} m from the field's origin");
-            let error = Error::input(words).help("move it near the origin: a field has no end, and is as good there");
+            let error = Error::input(words)
+                .help("move it near the origin: a field has no end, and is as good there; heights are in metres");
             return Err(self.page.blame(&[Step::Field("camera")], error));
         }
         let mut seen: Vec<Vec2> = Vec::new();

@@ -63,17 +63,25 @@ pub fn find(name: &str) -> Result<Device> {
         Some(("cuda", number)) => number.parse().map_err(|_| wrong())?,
         _ => return Err(wrong()),
     };
+    let missing = |what: String| {
+        Error::missing(format!("{name}: {what}")).help(format!(
+            "LD_LIBRARY_PATH must name the folder of a {CUDA} of torch 2.11.0, such as \
+             VENV/lib/python3.11/site-packages/torch/lib after `pip install torch==2.11.0`"
+        ))
+    };
     if std::env::var_os(AGAIN).is_none() {
+        // The loader would complain about what it does not find, and go on.
+        let folders = std::env::var_os("LD_LIBRARY_PATH").unwrap_or_default();
+        if !std::env::split_paths(&folders).any(|folder| folder.join(CUDA).is_file()) {
+            return Err(missing(format!("there is no {CUDA} on LD_LIBRARY_PATH")));
+        }
         return Err(start_again());
     }
     let devices = tch::Cuda::device_count();
     if (number as i64) < devices {
         return Ok(Device::Cuda(number));
     }
-    Err(Error::missing(format!("{name}: libtorch sees {devices} CUDA devices")).help(format!(
-        "LD_LIBRARY_PATH must name the folder of a {CUDA} of torch 2.11.0, such as \
-         VENV/lib/python3.11/site-packages/torch/lib after `pip install torch==2.11.0`"
-    )))
+    Err(missing(format!("libtorch sees {devices} CUDA devices")))
 }
 
 /// Replaces the process by the same with CUDA's kernels in it; returns only where that fails.

@@ -30,7 +30,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         for warning in plan::add_formats(&mut set, &args.format)? {
             furrow::tell!("warning: {warning}");
         }
-        generate(&set, &args.work, Shard::ALL, signals)?;
+        generate(&set, &args.work, Shard::ALL, None, signals)?;
     }
     finish::finish(&set, args.shards)
 }

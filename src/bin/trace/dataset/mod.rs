@@ -66,7 +66,11 @@ struct MakeArgs {
 /// Runs a verb on datasets; returns the paths of the files that matter.
 pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
     match &cli.verb {
-        Some(Verb::Plan(args)) => order::run(args).map(|set| vec![set.folder.join(furrow::dataset::recipe::FILE)]),
+        Some(Verb::Plan(args)) => {
+            let set = order::run(args)?;
+            order::tell_plants(&set, false)?;
+            Ok(vec![set.folder.join(furrow::dataset::recipe::FILE)])
+        }
         Some(Verb::Render(args)) => render::run(args, signals),
         Some(Verb::Finish(args)) => finish::run(args, signals),
         Some(Verb::Import(args)) => import::run(args, signals),
@@ -74,7 +78,9 @@ pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
         Some(Verb::Emit(args)) => emit::run(args),
         None => {
             let set = order::run(&cli.make.order)?;
-            render::generate(&set, &cli.make.work, furrow::dataset::generate::Shard::ALL, signals)?;
+            order::tell_plants(&set, cli.make.work.quiet)?;
+            let memory = cli.make.order.images.memory.bytes;
+            render::generate(&set, &cli.make.work, furrow::dataset::generate::Shard::ALL, memory, signals)?;
             furrow::dataset::finish::finish(&set, None)
         }
     }

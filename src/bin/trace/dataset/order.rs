@@ -1,11 +1,11 @@
 //! What dataset: `trace dataset plan`.
 
-use crate::field::SceneArgs;
+use crate::field::{MemoryArgs, SceneArgs};
 use crate::quality::{TechniqueArgs, samples};
 use furrow::ablation::{Edit, FULL};
 use furrow::dataset::plan::{self, Order};
 use furrow::dataset::split::Shares;
-use furrow::dataset::{Set, format};
+use furrow::dataset::{self, Set, format};
 use furrow::settings::{Quality, RenderOptions};
 use furrow::{Result, cli};
 use std::path::{Path, PathBuf};
@@ -25,6 +25,8 @@ pub(crate) struct Args {
 pub(crate) struct ImageArgs {
     #[command(flatten)]
     scene: SceneArgs,
+    #[command(flatten)]
+    pub(crate) memory: MemoryArgs,
     /// How many images. A dataset may get longer later.
     #[arg(long, value_name = "N", required = true, value_parser = clap::value_parser!(u64).range(1..=99_999_999))]
     count: Option<u64>,
@@ -68,6 +70,15 @@ pub(crate) fn run(args: &Args) -> Result<Set> {
     begin(args.images.folder(), &args.order()?)
 }
 
+/// Tells how many plants images are to be expected to show; `quiet` leaves only warnings.
+pub(super) fn tell_plants(set: &Set, quiet: bool) -> Result<()> {
+    match dataset::render::scene_file(set)?.crowd(set.recipe.count) {
+        Some(crowd) if crowd.warning().is_some() || !quiet => furrow::tell!("{}", crowd.told()),
+        _ => {}
+    }
+    Ok(())
+}
+
 /// Begins a dataset, or finds it begun.
 pub(crate) fn begin(folder: &Path, order: &Order) -> Result<Set> {
     cli::check_folder(folder)?;
@@ -106,6 +117,7 @@ impl ImageArgs {
             licence: self.licence.clone(),
             options: self.options(),
             edit,
+            memory: self.memory.bytes,
         })
     }
 }

@@ -1,6 +1,7 @@
 //! Making the images: `trace dataset render`.
 
 use super::progress::Progress;
+use crate::field::MemoryArgs;
 use crate::quality::threads;
 use furrow::Result;
 use furrow::cli::signal::Signals;
@@ -18,6 +19,8 @@ pub(crate) struct Args {
     #[arg(long, value_name = "k/N", default_value = "0/1", value_parser = Shard::parse)]
     shard: Shard,
     #[command(flatten)]
+    memory: MemoryArgs,
+    #[command(flatten)]
     work: WorkArgs,
 }
 
@@ -27,7 +30,8 @@ pub(crate) struct WorkArgs {
     /// Threads; 0 for one on each core.
     #[arg(long, default_value_t = 0, value_parser = threads)]
     threads: usize,
-    /// Images under way at once, which share the threads; each takes the memory of a field. 0 for one a thread, 16 at most.
+    /// Images under way at once, which share the threads; each takes the memory of a field. 0 for one a thread, 16 at most, and no more
+    /// than the memory is for.
     #[arg(long, default_value_t = 0, value_parser = threads)]
     at_once: usize,
     /// Print nothing but errors, warnings and the paths of the files.
@@ -38,12 +42,12 @@ pub(crate) struct WorkArgs {
 /// Makes the images of a shard.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let set = Set::open(&args.dir)?;
-    generate(&set, &args.work, args.shard, signals)?;
+    generate(&set, &args.work, args.shard, args.memory.bytes, signals)?;
     Ok(Vec::new())
 }
 
 /// Makes the images of a dataset that are missing.
-pub(crate) fn generate(set: &Set, args: &WorkArgs, shard: Shard, signals: &Signals) -> Result<()> {
+pub(crate) fn generate(set: &Set, args: &WorkArgs, shard: Shard, memory: Option<u64>, signals: &Signals) -> Result<()> {
     let begin = Instant::now();
     let (soon, now) = signals.heed_patiently();
     let progress = Progress::new(begin, args.quiet);
@@ -51,7 +55,7 @@ pub(crate) fn generate(set: &Set, args: &WorkArgs, shard: Shard, signals: &Signa
     let done = |_| progress.add();
     let warn = |words: &str| furrow::tell!("warning: {words}");
     let callbacks = Callbacks { begin: &total, warn: &warn, done: &done, soon, now };
-    let work = Work { shard, threads: args.threads, at_once: args.at_once };
+    let work = Work { shard, threads: args.threads, at_once: args.at_once, memory };
     let made = generate::generate(set, &work, &callbacks);
     let (images, rate) = progress.finish();
     if !args.quiet {

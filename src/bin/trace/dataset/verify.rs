@@ -1,10 +1,12 @@
 //! Whether a dataset is whole: `trace dataset verify`.
 
 use super::progress::Progress;
+use crate::field::MemoryArgs;
 use crate::quality::threads;
 use furrow::Result;
 use furrow::cli::signal::Signals;
-use furrow::dataset::{Set, render, verify};
+use furrow::dataset::verify::{self, Again, OtherKernels};
+use furrow::dataset::{Set, render};
 use furrow::job::Threads;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -17,9 +19,11 @@ pub(crate) struct Args {
     /// How many shards it is made in: what is missing is then told as shards too, as Slurm's --array takes them.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     shards: Option<u64>,
-    /// Render so many images again and compare their bytes.
+    /// Render so many images again and compare their bytes; with another version of Embree, see how far they differ.
     #[arg(long, value_name = "N", default_value_t = 0)]
     rerender: u64,
+    #[command(flatten)]
+    memory: MemoryArgs,
     /// Threads; 0 for one on each core.
     #[arg(long, default_value_t = 0, value_parser = threads)]
     threads: usize,
@@ -31,16 +35,23 @@ pub(crate) struct Args {
 /// Checks; says what was found.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let set = Set::open(&args.dir)?;
-    let renderer = if args.rerender > 0 { render::renderer(&set)? } else { None };
+    let renderer = if args.rerender > 0 { render::near_renderer(&set)? } else { None };
+    let again = Again { images: args.rerender, renderer: renderer.as_ref(), memory: args.memory.bytes };
     let progress = Progress::new(Instant::now(), args.quiet);
     progress.expect(set.recipe.count);
     let done = |_| progress.add();
     let threads = Threads::new(args.threads)?;
-    let found = verify::verify(&set, args.rerender, renderer.as_ref(), &threads, &done, signals.heed())?;
+    let found = verify::verify(&set, &again, &threads, &done, signals.heed())?;
     progress.finish();
     if !args.quiet {
+        let again = match &found.kernels {
+            None => "and the same".to_owned(),
+            Some(OtherKernels { there, here, most }) => {
+                format!("by {here} instead of {there}, and nearly the same: they differ in at most {most}")
+            }
+        };
         furrow::tell!(
-            "{}: {} of {} images checked, {} rendered again and the same; {} faults",
+            "{}: {} of {} images checked, {} rendered again {again}; {} faults",
             set.folder.display(),
             found.checked,
             set.recipe.count,

@@ -1,0 +1,97 @@
+//! What a ground takes, before any of it is made: from the same numbers that will decide how much of it there is.
+
+use super::blend::Blend;
+use super::crumb::{Law, Local};
+use super::grid::Grid;
+use super::{MAX_LAYERS, Site, SoilDesc, clod, litter, stone, stone_cover};
+use crate::geometry::Cost;
+use crate::math::{Vec2, vec2};
+use crate::ron_file::Step;
+use crate::sampling::{Purpose, Stream};
+
+/// Places along each side of the ground at which the number of clods is looked up.
+const PLACES: usize = 12;
+/// Bytes of a vertex of the grid, beside those of its two triangles: heights, slopes, noise of the layers, moisture, the pile.
+const BYTES_PER_VERTEX: f64 = 110.0;
+/// Bytes of a texel of the ground's maps, those that are needed for a while among them.
+const BYTES_PER_TEXEL: f64 = 30.0;
+/// Seconds of one core for each.
+const SECONDS_PER_CELL: f64 = 1e-6;
+/// Seconds of one core to draw a crumb, which is done on the grid and on the maps.
+const SECONDS_PER_CRUMB: f64 = 1e-6;
+
+/// What a part of a scene file's soil takes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Expected {
+    /// The way to it from the soil.
+    pub at: Vec<Step<'static>>,
+    /// What it takes.
+    pub cost: Cost,
+    /// What makes it less.
+    pub advice: &'static str,
+}
+
+/// What the ground of a site takes in view of the camera, whose maps have texels of so many metres; and what lies on it. The streams are
+/// those of the ground, of its stones and of its litter.
+pub fn expected(
+    desc: &SoilDesc,
+    site: &Site,
+    texel_m: f32,
+    [ground, debris, leftovers]: [&Stream; 3],
+) -> (Cost, Vec<Expected>) {
+    let area = site.area;
+    let square = f64::from(area.area());
+    let grid = Grid::new(area, site.grid_m, site.margin_m);
+    let (vertices, texels) = ((grid.columns() * grid.rows()) as f64, square / f64::from(texel_m).powi(2));
+    let maps =
+        Cost::work(vertices * BYTES_PER_VERTEX + texels * BYTES_PER_TEXEL, (vertices + texels) * SECONDS_PER_CELL);
+    let bare = Cost::of(2.0 * vertices, 1.0) + maps;
+    let law = Law::new(&desc.clods, ground);
+    let places = places(desc, site, &law, ground);
+    let (min, max) = (desc.clods.min_mm.f32(), desc.clods.max_mm.f32());
+    let mut all = Vec::new();
+    let mut add = |at: &[Step<'static>], cost, advice| all.push(Expected { at: at.to_vec(), cost, advice });
+    if !desc.flat {
+        add(
+            &[Step::Field("clods")],
+            clod::cost(&places, (min, max), site.grid_m, area),
+            "lower over_5mm_per_m2 or raise min_mm",
+        );
+    }
+    let amount = f64::from(desc.crumbs.amount.draw32(&mut ground.child(Purpose::Soil, 20)));
+    let mean =
+        |of: &dyn Fn(&Local) -> f32| places.iter().map(|law| f64::from(of(law))).sum::<f64>() / places.len() as f64;
+    let crumbs = square * amount * mean(&|law| law.number(desc.crumbs.min_mm.f32(), min));
+    add(
+        &[Step::Field("crumbs")],
+        Cost::work(0.0, 2.0 * crumbs * SECONDS_PER_CRUMB),
+        "lower their amount or raise min_mm",
+    );
+    for (i, population) in desc.stones.iter().enumerate() {
+        let cost = stone::cost(population, area, &stone_cover::own(debris, i));
+        add(&[Step::Field("stones"), Step::Item(i)], cost, "lower their cover or raise min_mm and median_mm");
+    }
+    let of = ["straw_cover", "sticks_per_m2", "bits_per_m2"];
+    let advice = ["lower it, or make straws larger", "lower it, or stubs", "lower it"];
+    for ((field, advice), cost) in of.into_iter().zip(advice).zip(litter::costs(&desc.litter, area, leftovers)) {
+        add(&[Step::Field("litter"), Step::Field(field)], cost, advice);
+    }
+    (bare, all)
+}
+
+/// The law of clods at places all over a site.
+fn places(desc: &SoilDesc, site: &Site, law: &Law, stream: &Stream) -> Vec<Local> {
+    let layers = desc.layers.len().min(MAX_LAYERS);
+    let blend = Blend::new(&desc.blend, &desc.layers[..layers], stream);
+    let share = |p: Vec2| {
+        let mut noise = [0.0; MAX_LAYERS];
+        noise.iter_mut().enumerate().take(layers).for_each(|(k, n)| *n = blend.noise(k, p));
+        // All layers at their middle heights: their pictures are not looked at.
+        blend.clods(blend.weights(noise, [0.5; MAX_LAYERS]))
+    };
+    let at = |i: usize, j: usize| {
+        site.area.corners()[0] + site.area.size() * vec2(i as f32 + 0.5, j as f32 + 0.5) / PLACES as f32
+    };
+    let all = (0..PLACES * PLACES).map(|k| at(k % PLACES, k / PLACES));
+    all.map(|p| law.at(p, share(p))).collect()
+}
