@@ -190,7 +190,7 @@ fn misuse_is_answered_with_a_way_out() {
         (&["--scene", "page.ron", "--out", "page.ron"], "this is a file"),
         (&["--scene", "page.ron", "--out", "page.ron/deep"], "this is a file"),
         (&["--scene", "pages.ron"], "did you mean ./page.ron?"),
-        (&["--scene", "nowhere/field.ron"], "there is none in nowhere; those that ship lie in scenes/"),
+        (&["--scene", "nowhere/field.ron"], "there is none in nowhere; `trace init DIR` begins one"),
         (&["--scene", "."], "folder"),
         (&["texture"], "RECIPES"),
         (&["texture", "page.ron"], "Leaf, Soil"),
@@ -259,10 +259,17 @@ fn a_folder_that_cannot_be_is_told_first() {
         ("loop", "this link leads to no folder"),
         ("dangling/x", "this link leads to no folder"),
         ("page.ron/x", "this is a file"),
+        (&"a".repeat(300), "this name is too long"),
+        (&"deep/".repeat(1000), "this name is too long"),
     ] {
         let done = run(at, &["--scene", "page.ron", "--spp", "65536", "--out", out]);
         assert!(done.status.code() == Some(2) && text(&done.stderr).contains(words), "{out}: {}", text(&done.stderr));
     }
+    std::os::unix::fs::symlink("other.ron", at.join("one.ron")).unwrap();
+    std::os::unix::fs::symlink("one.ron", at.join("other.ron")).unwrap();
+    let done = run(at, &["--scene", "one.ron", "--out", "out"]);
+    let said = text(&done.stderr);
+    assert!(done.status.code() == Some(2) && said.contains("a symbolic link that leads to no file"), "{said}");
     let done = run(at, &["--scene", "page.ron", "--spp", "65536", "--out", "/proc/x"]);
     assert_eq!(done.status.code(), Some(1), "{}", text(&done.stderr));
 }

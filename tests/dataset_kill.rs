@@ -123,8 +123,9 @@ fn a_full_disk_is_one_clear_error_and_no_half_file() {
     let Some(output) = on_a_small_disk(&disk, (size / 2048) as u32, &script) else { return };
     let said = String::from_utf8_lossy(&output.stderr);
     let lines: Vec<&str> = said.lines().collect();
-    let [error, code] = lines[..] else { panic!("one error and its code, but: {said}") };
+    let [error, help, code] = lines[..] else { panic!("one error with a help, and its code, but: {said}") };
     assert!(error.starts_with("error: ") && error.contains("No space left on device"), "{error}");
+    assert!(help.contains("make room on the disk"), "{help}");
     assert_eq!(code, "code 1");
     assert!(output.status.success(), "{said}");
     same(&tree(&copy), &tree(&whole));

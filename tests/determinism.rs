@@ -82,7 +82,7 @@ fn files_are_the_same_bytes_at_any_number_of_threads() {
 
 #[test]
 fn another_index_or_seed_is_another_field() {
-    let options = |seed, index| Options { seed, index, width: Some(32), height: None };
+    let options = |seed, index| Options { seed, index, width: Some(32), ..Options::default() };
     let meshes = |o: &Options| field(&small_text(), o).scene.parts.into_iter().map(|p| p.mesh).collect::<Vec<_>>();
     let first = meshes(&options(None, 0));
     assert!(first == meshes(&options(Some(3), 0)), "the page's own seed, given again, should change nothing");

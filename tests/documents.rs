@@ -11,6 +11,7 @@ use furrow::light::LightDesc;
 use furrow::material::LeafDesc;
 use furrow::ron_file::RonFile;
 use furrow::scene::desc::{FieldDesc, ModelDesc};
+use furrow::scene::shipped;
 use furrow::sensor::{CameraDesc, SensorDesc};
 use furrow::soil::SoilDesc;
 
@@ -214,7 +215,10 @@ fn parsed(note: &str, text: &str) -> Option<furrow::Result<()>> {
         "leaf" => file.parse::<LeafDesc>().map(drop),
         "scenes" => file.parse::<FieldDesc>().and_then(|desc| {
             let mut species = desc.crops.iter().map(|c| &c.species).chain(desc.weeds.iter().map(|w| &w.species));
-            species.try_for_each(|name| file.need_file(name).map(drop))
+            species.try_for_each(|name| match shipped::species(name) {
+                Ok(Some(_)) => Ok(()),
+                _ => file.need_file(name).map(drop),
+            })
         }),
         file if file.starts_with("file=") => return None,
         _ => panic!("a block of RON says what it is: {note:?}"),

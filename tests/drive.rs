@@ -177,6 +177,15 @@ fn images_of_a_drive_do_not_depend_on_the_others() {
     succeed(verb("finish", &parts, &[]));
     same(&tree(&parts), &before);
     succeed(verb("verify", &parts, &["--rerender", "3"]));
+    // A further format leaves what only the renderer knows as it is, and so does a derived file that is lost.
+    succeed(verb("finish", &parts, &["--format", "coco", "--quiet"]));
+    std::fs::remove_file(parts.join("coco/images/train/000003.png")).unwrap();
+    succeed(verb("render", &parts, &["--quiet"]));
+    succeed(verb("finish", &parts, &[]));
+    succeed(verb("verify", &parts, &[]));
+    assert_eq!(std::fs::read(parts.join("flow/000003.exr")).unwrap(), before["flow/000003.exr"]);
+    let coco = std::fs::read_to_string(parts.join("coco/annotations/instances_train.json")).unwrap();
+    assert!(coco.contains("\"track_id\"") && coco.contains("\"video_id\""));
     // The single image is the same.
     let one = folder.join("one");
     let alone = [

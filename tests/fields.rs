@@ -472,3 +472,42 @@ fn leaf_soil_and_straw_have_the_ndvi_of_measured_spectra() {
         assert!(pixels.len() > 100 && (bound[0]..bound[1]).contains(&ndvi), "{what}: {ndvi} of {}", pixels.len());
     }
 }
+
+/// Rationale: a soil of one's own must look as its spectrum says, and its file must travel with the scene. Expected: a spectrum that is twice another has
+/// ground twice as bright in each band, colour and near infrared; the file is among those that the field was built from, and decides the hash.
+/// Source: reflection is proportional to reflectance under light from everywhere but for what bounces twice.
+#[test]
+fn soil_has_the_spectrum_of_its_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("textures/soil/dirt.png");
+    let bright = |share: f64| {
+        std::fs::write(folder.path().join("soil.csv"), format!("400,{share}\n1000,{}\n", 2.0 * share)).unwrap();
+        let text = format!(
+            r#"Field(
+                camera: Pinhole(size: (48, 36), intrinsics: FieldOfView(horizontal_deg: 20), pose: Nadir(height_m: 0.5)),
+                lights: [Constant(radiance: (1, 1, 1, 1))],
+                soil: (
+                    layers: [(albedo: {shipped:?}, size_m: 0.5, height_mm: (0, 0.1))],
+                    colors: [Spectrum("soil.csv")],
+                    relief: (rms_mm: 0, tilt_deg: 0), moisture: (mean: 0, spread: 0), clods: (over_5mm_per_m2: 0),
+                    litter: (straw_cover: 0, sticks_per_m2: 0, bits_per_m2: 0),
+                ),
+            )"#
+        );
+        let file = folder.path().join("field.ron");
+        std::fs::write(&file, text).unwrap();
+        let field = assemble::field(&file, &Options::default()).unwrap();
+        assert!(field.files.iter().any(|file| file.ends_with("soil.csv")), "{:?}", field.files);
+        let (film, _) = shoot(&field, 16, 2);
+        let sum = film.pixels.iter().fold(Spectrum::ZERO, |sum, pixel| sum + pixel.mean);
+        ((sum * (1.0 / film.pixels.len() as f32)).to_array(), field.hash)
+    };
+    let ((dim, one), (light, other)) = (bright(0.1), bright(0.2));
+    assert_ne!(one, other);
+    for band in 0..4 {
+        let ratio = light[band] / dim[band];
+        assert!((1.9..2.3).contains(&ratio), "band {band}: {ratio}");
+    }
+    // The spectrum rises from blue to near infrared.
+    assert!(dim[2] < dim[1] && dim[1] < dim[0] && dim[0] < dim[3], "{dim:?}");
+}

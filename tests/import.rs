@@ -341,7 +341,7 @@ fn coco_of_others_comes_in_with_polygons_runs_and_crowds() {
     let mut boxes = document("maize");
     boxes["annotations"][0]["segmentation"] = Value::Null;
     write(boxes);
-    assert!(refused(&another, &arguments).contains("annotation 1 has no mask"));
+    assert!(refused(&another, &arguments).contains("annotation 1 in line 1 has no mask"));
     std::fs::write(&file, "[1, 2").unwrap();
     assert!(refused(&another, &arguments).contains("a.json"));
 }

@@ -115,7 +115,7 @@ fn an_edge_pixel_is_three_quarters_of_one_plant_and_a_quarter_of_the_other() {
 
 #[test]
 fn every_object_of_a_field_is_decoded_with_its_coverage() {
-    let options = Options { seed: None, index: 0, width: Some(96), height: Some(72) };
+    let options = Options { width: Some(96), height: Some(72), ..Options::default() };
     let field = field(&small_text(), &options);
     let (film, labels) = shoot(&field, 8, 2);
     let tags = field.scene.tags();

@@ -86,7 +86,7 @@ fn an_installed_wheel_needs_nothing_else() {
     let site = done(Command::new(venv.join("bin/python")).args(["-c", "import furrow; print(furrow.__path__[0])"]));
     let site = Path::new(site.trim()).parent().expect("a folder");
     let libraries = done(Command::new("ldd").arg(site.join("furrow.scripts/trace")));
-    for library in ["libembree3", "libtbb"] {
+    for library in ["libembree", "libtbb"] {
         assert!(libraries.lines().any(|l| l.contains(library) && l.contains("furrow.libs")), "{libraries}");
     }
 

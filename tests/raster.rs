@@ -256,3 +256,14 @@ fn without_a_driver_it_names_the_package() {
     assert!(output.status.code() == Some(2) && said.contains("mesa-vulkan-drivers"), "{said}");
     assert!(!out.exists());
 }
+
+/// Rationale: servers have no window system, and an error that is none hides those that are. Expected: not a word on stderr.
+#[test]
+fn without_a_window_system_nothing_is_said_of_one() {
+    let (_keep, out) = scratch();
+    let arguments =
+        ["--scene", SMALL, "--engine", "raster", "--width", "8", "--quiet", "--out", out.to_str().expect("UTF-8")];
+    let output = trace(&arguments).env_remove("XDG_RUNTIME_DIR").output().expect("the program");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && said.is_empty(), "{said}");
+}

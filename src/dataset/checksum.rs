@@ -39,7 +39,7 @@ impl Checksum {
             }
             Ok(_) => {}
         }
-        match std::fs::read(path) {
+        match crate::input::contents(path) {
             Err(e) => Some(format!("cannot be read: {e}")),
             Ok(bytes) if Self::of(&bytes) != *self => Some("was changed: its SHA-256 differs".into()),
             Ok(_) => None,

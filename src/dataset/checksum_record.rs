@@ -48,7 +48,7 @@ impl ChecksumRecord {
 
     /// Reads an image's checksums; `None` where there is none or it is damaged.
     pub fn read(folder: &Path, index: u64) -> Option<Self> {
-        let bytes = std::fs::read(Self::path(folder, index)).ok()?;
+        let bytes = crate::input::contents(&Self::path(folder, index)).ok()?;
         let written: Written = serde_json::from_slice(&bytes).ok()?;
         let own = written.checksums.hash().ok()?;
         (own == written.seal_sha256 && written.checksums.index == index).then_some(written.checksums)

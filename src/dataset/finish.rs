@@ -85,7 +85,7 @@ fn own_files(folder: &Path, recipe: &Recipe) -> Result<BTreeMap<String, Checksum
             let whole = entries.filter_map(std::io::Result::ok).filter(|entry| !is_unfinished(&entry.file_name()));
             todo.extend(whole.map(|entry| entry.path()));
         } else {
-            let bytes = std::fs::read(&path).map_err(Error::io(&path))?;
+            let bytes = crate::input::contents(&path).map_err(Error::io(&path))?;
             let name = path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().replace('\\', "/");
             files.insert(name, Checksum::of(&bytes));
         }

@@ -31,7 +31,7 @@ pub(super) fn gather(paths: &[PathBuf], shipped: &BTreeMap<String, PathBuf>, sce
     let mut rewritten = false;
     let mut files = Vec::new();
     for (from, to) in &places {
-        let mut bytes = std::fs::read(from).map_err(Error::reading(from))?;
+        let mut bytes = crate::input::contents(from).map_err(Error::reading(from))?;
         if from.extension().is_some_and(|e| e == "ron")
             && let Ok(text) = std::str::from_utf8(&bytes)
         {

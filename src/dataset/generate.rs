@@ -12,6 +12,7 @@ use super::{File, format, native};
 use crate::error::Kind;
 use crate::job::{Renderer, SceneFile, Threads};
 use crate::render::Watch;
+use crate::scene::estimate::usual_memory;
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -54,14 +55,16 @@ pub struct Work {
     pub shard: Shard,
     /// Workers; 0 for one on each core.
     pub threads: usize,
-    /// Images under way at once; 0 for one on each worker, but no more than 16.
+    /// Images under way at once; 0 for one on each worker, but no more than 16, nor than the memory is for.
     pub at_once: usize,
+    /// Bytes of memory that a field may take; the usual share of the machine's unless given.
+    pub memory: Option<u64>,
 }
 
 impl Default for Work {
     /// All images, on all cores.
     fn default() -> Self {
-        Self { shard: Shard::ALL, threads: 0, at_once: 0 }
+        Self { shard: Shard::ALL, threads: 0, at_once: 0, memory: None }
     }
 }
 
@@ -93,6 +96,13 @@ pub enum Task {
 /// Images under way at once unless said otherwise: more would take more memory than they save time.
 const MOST_AT_ONCE: usize = 16;
 
+/// How many fields like one of them the memory is for. Where that cannot be told, one: its image will say why.
+fn fitting(scene: &SceneFile, index: u64, memory: Option<u64>) -> usize {
+    let memory = memory.unwrap_or_else(usual_memory) as f64;
+    let one = scene.estimate(index).map_or(memory, |estimate| estimate.total().bytes);
+    ((memory / one) as usize).clamp(1, MOST_AT_ONCE)
+}
+
 /// Threads of one worker, of all that are shared out among so many workers; at least one.
 fn share(threads: usize, workers: usize, worker: usize) -> usize {
     (threads / workers + usize::from(worker < threads % workers)).max(1)
@@ -116,16 +126,20 @@ pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()>
     // Images of one field follow each other on one worker, which grows it once.
     let fields: Vec<&[(u64, Task)]> =
         tasks.chunk_by(|a, b| set.recipe.field_of(a.0).0 == set.recipe.field_of(b.0).0).collect();
-    let at_once = if work.at_once == 0 { threads.min(MOST_AT_ONCE) } else { work.at_once }.min(fields.len()).max(1);
+    let rendered = tasks.iter().find(|(_, task)| *task == Task::All).map(|(index, _)| *index);
+    let source = match (rendered, &renderer) {
+        (Some(index), Some(renderer)) => Some((scene_file(set)?.memory(work.memory), index, renderer)),
+        _ => None,
+    };
+    let most = source
+        .as_ref()
+        .map_or(MOST_AT_ONCE, |(scene, index, _)| fitting(scene, set.recipe.field_of(*index).0, work.memory));
+    let at_once = if work.at_once == 0 { threads.min(most) } else { work.at_once }.min(fields.len()).max(1);
     let workers: Vec<Threads> =
         (0..at_once).map(|worker| Threads::new(share(threads, at_once, worker))).collect::<Result<_>>()?;
     let run = Run {
         set,
-        source: renderer
-            .as_ref()
-            .filter(|_| tasks.iter().any(|(_, t)| *t == Task::All))
-            .map(|renderer| scene_file(set).map(|scene| (scene, renderer)))
-            .transpose()?,
+        source: source.map(|(scene, _, renderer)| (scene, renderer)),
         callbacks,
         threads,
         at_once,
@@ -286,7 +300,11 @@ impl Run<'_> {
         if task == Task::Formats
             && let Some(before) = ChecksumRecord::read(folder, index)
         {
-            checksums.files.extend(before.files.into_iter().filter(|(path, _)| path.starts_with("images/")));
+            // What only the renderer knows was whole, or the image would have been rendered again.
+            let films: Vec<&str> =
+                format::all(recipe)?.into_iter().filter(|(_, f)| f.needs_film()).map(|(name, _)| name).collect();
+            let kept = |path: &str| path.starts_with("images/") || films.iter().any(|name| in_format(path, name));
+            checksums.files.extend(before.files.into_iter().filter(|(path, _)| kept(path)));
         }
         checksums.write(folder)?;
         let seconds = begin.elapsed().as_secs_f64();
@@ -310,9 +328,14 @@ pub(super) fn formatted(set: &Set, sample: &super::Sample) -> Result<Vec<File>> 
     Ok(files)
 }
 
-/// The same from the native files.
+/// The files of those formats that follow from the native files.
 fn derived(set: &Set, index: u64) -> Result<Vec<File>> {
-    formatted(set, &native::read(&set.folder, &Set::name(index))?)
+    let sample = native::read(&set.folder, &Set::name(index))?;
+    let mut files = Vec::new();
+    for (_, format) in format::all(&set.recipe)?.into_iter().filter(|(_, format)| !format.needs_film()) {
+        files.extend(format.image(&set.recipe, &sample)?);
+    }
+    Ok(files)
 }
 
 /// An image that nothing can make again.

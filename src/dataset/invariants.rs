@@ -100,6 +100,12 @@ fn numbers(recipe: &Recipe, sample: &Sample) -> Vec<String> {
     if record.split != recipe.split_of(record.index) {
         all.push(format!("it is in the split {}, where it does not belong", record.split.name()));
     }
+    let (field, capture) = recipe.field_of(record.index);
+    let told = record.capture.as_ref().map(|capture| (capture.field, capture.time_s.is_finite()));
+    let frames = record.capture.as_ref().is_none_or(|told| u64::from(told.frame) <= capture);
+    if told != (recipe.captures() > 1).then_some((field, true)) || !frames {
+        all.push("it is not the image of its field that its number says".into());
+    }
     let points = record
         .plants
         .iter()

@@ -25,7 +25,7 @@
 //! | `make` | all of it in one call |
 //! | `plan`, `gather`, `begin`, `generate`, `timing_log`, `finish` | from a scene file, copied with all that it names, to images and a manifest; what remains to be done is found by looking at the disk |
 //! | `cluster` | the same on many machines: job files for schedulers |
-//! | `invariants`, `verify` | what must hold of every image, and whether it does |
+//! | `invariants`, `difference`, `verify` | what must hold of every image; how far two of them lie apart; whether all is so |
 //! | `import` | other people's images and labels |
 //! | `report` | all of it on one page, for people |
 
@@ -38,6 +38,8 @@ pub mod checksum;
 pub mod checksum_record;
 #[doc(hidden)]
 pub mod cluster;
+#[doc(hidden)]
+pub mod difference;
 #[doc(hidden)]
 pub mod finish;
 #[doc(hidden)]

@@ -117,7 +117,7 @@ pub fn read(dataset: &Path, name: &str) -> Result<Sample> {
 /// Reads what is known of an image, without its maps.
 pub fn read_record(dataset: &Path, name: &str) -> Result<Record> {
     let path = dataset.join(folder(name)).join("record.json");
-    let bytes = std::fs::read(&path).map_err(Error::io(&path))?;
+    let bytes = crate::input::contents(&path).map_err(Error::io(&path))?;
     let record: Record = serde_json::from_slice(&bytes)
         .map_err(|e| Error::damaged(format!("this is no record: {e}")).in_file(path.clone()))?;
     // Formats name their files by it.

@@ -35,6 +35,8 @@ pub struct Order {
     pub options: RenderOptions,
     /// What is changed; [`crate::ablation::FULL`] for nothing.
     pub edit: &'static Edit,
+    /// Most bytes of memory that a field may take, where not the usual; no byte depends on it.
+    pub memory: Option<u64>,
 }
 
 impl Order {
@@ -51,6 +53,7 @@ impl Order {
             licence: Self::NO_LICENCE.into(),
             options: RenderOptions::default(),
             edit: &FULL,
+            memory: None,
         }
     }
 
@@ -120,7 +123,7 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
 /// A scene file as an order asks for it.
 fn opened(scene: &Path, order: &Order) -> Result<SceneFile> {
     let scene = SceneFile::edited(scene, order.edit)?;
-    Ok(scene.seed(order.seed).width(order.width).height(order.height))
+    Ok(scene.seed(order.seed).width(order.width).height(order.height).memory(order.memory))
 }
 
 /// SHA-256 of a scene whose copies may name other files than the originals do, found by growing the first field from them in
@@ -160,7 +163,7 @@ pub fn add_formats(set: &mut Set, names: &[String]) -> Result<Vec<String>> {
     }
     recipe.formats.sort();
     if recipe.rendering().is_err()
-        && let Some((name, _)) = format::all(&recipe)?.into_iter().find(|(_, f)| f.needs_film())
+        && let Some((name, _)) = format::all(&recipe)?.into_iter().find(|(_, f)| f.needs_film() || f.needs_camera())
     {
         return Err(Error::input(format!(
             "--format {name} holds what only the renderer knows, and these images were not rendered"

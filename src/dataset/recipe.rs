@@ -126,7 +126,7 @@ impl Recipe {
     /// Reads a dataset's recipe.
     pub fn read(folder: &Path) -> Result<Self> {
         let path = folder.join(FILE);
-        let bytes = match std::fs::read(&path) {
+        let bytes = match crate::input::contents(&path) {
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
                 return Err(Error::input(format!("this is no dataset, it has no {FILE}"))
                     .in_file(folder)

@@ -2,6 +2,7 @@
 
 use super::rle::{Box2, Rle};
 use super::split::Split;
+use crate::film::Sampling;
 use crate::plant::Condition;
 use crate::scene::record::Conditions;
 use crate::scene::tag::{Class, lowercase};
@@ -41,6 +42,9 @@ pub struct Record {
     /// How the sensor was set; null for an imported image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure: Option<Exposure>,
+    /// How well it is sampled; left out where that is not known, and of a denoised image.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sampling: Option<Sampling>,
     /// What whoever made it should know.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,

@@ -48,28 +48,33 @@ pub fn scene_file(set: &Set) -> Result<SceneFile> {
 /// What renders the images of a dataset; `None` for images that were imported. An error where this machine would make other bits than
 /// the one that began the dataset.
 pub fn renderer(set: &Set) -> Result<Option<Renderer>> {
+    let renderer = near_renderer(set)?;
+    if let Some(renderer) = &renderer {
+        same(set, "the ray tracing kernels", &set.recipe.rendering()?.kernels, renderer.kernels())?;
+    }
+    Ok(renderer)
+}
+
+/// The same for images that are compared and not kept: its ray tracing kernels may be others than the dataset's, as long as the images are
+/// [nearly the same](super::difference).
+pub fn near_renderer(set: &Set) -> Result<Option<Renderer>> {
     let Ok(rendering) = set.recipe.rendering() else { return Ok(None) };
-    let same = |what: &str, there: &str, here: &str| {
-        if there == here {
-            return Ok(());
-        }
-        Err(Error::misuse(format!(
-            "{}: the dataset was begun with {what} {there}, this is {here}: its images would differ",
-            set.folder.display()
-        ))
-        .help(format!(
-            "go on with {there}, \
-             or begin another dataset"
-        )))
-    };
-    same("furrow", &set.recipe.furrow, env!("CARGO_PKG_VERSION"))?;
+    same(set, "furrow", &set.recipe.furrow, env!("CARGO_PKG_VERSION"))?;
     let renderer = Renderer::open(&rendering.options())?;
-    let kernels = match rendering.engine {
-        Engine::Trace => "the ray tracing kernels",
-        Engine::Raster => "the graphics card",
-    };
-    same(kernels, &rendering.kernels, renderer.kernels())?;
+    if rendering.engine == Engine::Raster {
+        same(set, "the graphics card", &rendering.kernels, renderer.kernels())?;
+    }
     Ok(Some(renderer))
+}
+
+/// Nothing where this machine has what the dataset was begun with.
+fn same(set: &Set, what: &str, there: &str, here: &str) -> Result<()> {
+    if there == here {
+        return Ok(());
+    }
+    let folder = set.folder.display();
+    let words = format!("{folder}: the dataset was begun with {what} {there}, this is {here}: its images would differ");
+    Err(Error::misuse(words).help(format!("go on with {there}, or begin another dataset")))
 }
 
 /// The field that was grown last, for the next image of it.
@@ -126,7 +131,7 @@ fn describe(recipe: &Recipe, index: u64, image: Image<'_>) -> Result<Sample> {
         Vec::new()
     };
     let tags = field.scene.tags();
-    let Image { film, labels, .. } = image;
+    let Image { film, labels, denoised, .. } = image;
     let kinds: BTreeMap<u16, u16> = field.plants.iter().map(|p| (p.number, p.kind)).collect();
     let kind = |plant: u16| kinds.get(&plant).copied().unwrap_or(0);
     let mut sample = Sample {
@@ -150,6 +155,7 @@ fn describe(recipe: &Recipe, index: u64, image: Image<'_>) -> Result<Sample> {
                 nir_gain: photograph.nir_gain,
                 white_balance: photograph.white_balance,
             }),
+            sampling: if denoised.is_none() { film.sampling() } else { None },
             warnings: field.warnings.clone(),
         },
         rgb: photograph.rgb.as_chunks::<3>().0.to_vec(),

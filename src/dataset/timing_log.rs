@@ -92,7 +92,7 @@ pub fn rows(dataset: &Path) -> Result<Vec<ImageTiming>> {
     paths.sort();
     let mut rows = Vec::new();
     for path in paths {
-        let bytes = std::fs::read(&path).map_err(Error::io(&path))?;
+        let bytes = crate::input::contents(&path).map_err(Error::io(&path))?;
         rows.extend(
             String::from_utf8_lossy(&bytes).lines().filter_map(|l| serde_json::from_str::<ImageTiming>(l).ok()),
         );

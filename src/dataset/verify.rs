@@ -2,14 +2,15 @@
 
 use super::checksum::Checksum;
 use super::checksum_record::ChecksumRecord;
+use super::difference::Difference;
 use super::finish::{MANIFEST, lacks, ranges};
 use super::generate::Task;
-use super::render::{Kept, render, scene_file};
+use super::render::{Kept, RenderedSample, render, scene_file};
 use super::set::Set;
 use super::split::Split;
 use super::{File, format, generate, invariants, native, timing_log};
 use crate::input::below;
-use crate::job::{Renderer, SceneFile, Threads};
+use crate::job::{Renderer, Threads};
 use crate::render::Watch;
 use crate::sampling::rng::mix;
 use crate::{Error, Result};
@@ -26,8 +27,29 @@ pub struct Findings {
     pub faults: Vec<String>,
     /// Images that were checked.
     pub checked: u64,
-    /// Images that were rendered again and came out the same.
+    /// Images that were rendered again and came out the same, or nearly so where that was done by other kernels.
     pub rendered: u64,
+    /// Whether other ray tracing kernels rendered them again than made them.
+    pub kernels: Option<OtherKernels>,
+}
+
+/// Ray tracing kernels that make other bytes of the same images.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OtherKernels {
+    /// Those that made the dataset.
+    pub there: String,
+    /// Those of this program.
+    pub here: String,
+    /// How far the images differ at most.
+    pub most: Difference,
+}
+
+impl OtherKernels {
+    /// Nothing where the renderer has the dataset's kernels.
+    pub fn of(set: &Set, renderer: &Renderer) -> Result<Option<Self>> {
+        let (there, here) = (set.recipe.rendering()?.kernels.clone(), renderer.kernels().to_owned());
+        Ok((there != here).then_some(Self { there, here, most: Difference::NONE }))
+    }
 }
 
 impl Findings {
@@ -45,11 +67,21 @@ impl Findings {
     }
 }
 
-/// Checks every file and every invariant, and renders `again` images anew.
+/// What is rendered anew.
+#[derive(Clone, Copy, Default)]
+pub struct Again<'a> {
+    /// How many images.
+    pub images: u64,
+    /// What renders them; none of imported ones.
+    pub renderer: Option<&'a Renderer>,
+    /// Most bytes of memory that a field may take, where not the usual.
+    pub memory: Option<u64>,
+}
+
+/// Checks every file and every invariant, and renders images anew.
 pub fn verify(
     set: &Set,
-    again: u64,
-    renderer: Option<&Renderer>,
+    again: &Again<'_>,
     threads: &Threads,
     done: &(dyn Fn(u64) + Sync),
     stop: &AtomicBool,
@@ -78,16 +110,20 @@ pub fn verify(
     if found.missing.is_empty() {
         found.faults.extend(listed(set)?);
     }
-    if again == 0 {
-        return Ok(found);
-    }
-    let scene = scene_file(set)?.threads(threads);
-    for index in drawn(count, again) {
+    let Some(renderer) = again.renderer.filter(|_| again.images > 0) else { return Ok(found) };
+    found.kernels = OtherKernels::of(set, renderer)?;
+    let scene = scene_file(set)?.memory(again.memory).threads(threads);
+    let mut kept = Kept::default();
+    for index in drawn(count, again.images) {
         if found.missing.contains(&index) {
             continue;
         }
-        let Some(renderer) = renderer else { continue };
-        match rerender(set, &scene, index, renderer, stop)? {
+        let made = render(set, &scene, index, renderer, Watch { done: &|_| (), stop }, &mut kept)?;
+        let fault = match &mut found.kernels {
+            None => other_bytes(set, &made)?,
+            Some(kernels) => too_far(set, &made, kernels)?,
+        };
+        match fault {
             Some(fault) => found.faults.push(fault),
             None => found.rendered += 1,
         }
@@ -162,7 +198,7 @@ struct Listed {
 /// What the manifest lists and is not so.
 fn listed(set: &Set) -> Result<Vec<String>> {
     let path = set.folder.join(MANIFEST);
-    let bytes = match std::fs::read(&path) {
+    let bytes = match crate::input::contents(&path) {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
             return Ok(vec![format!(
                 "{MANIFEST} is missing: `trace dataset finish {}` writes it",
@@ -206,15 +242,8 @@ fn drawn(count: u64, again: u64) -> Vec<u64> {
     all
 }
 
-fn rerender(
-    set: &Set,
-    scene: &SceneFile,
-    index: u64,
-    renderer: &Renderer,
-    stop: &AtomicBool,
-) -> Result<Option<String>> {
-    let watch = Watch { done: &|_| (), stop };
-    let made = render(set, scene, index, renderer, watch, &mut Kept::default())?;
+/// The files of an image that come out otherwise.
+fn other_bytes(set: &Set, made: &RenderedSample) -> Result<Option<String>> {
     let mut files = native::files(&made.sample, &made.text)?;
     for (_, format) in format::all(&set.recipe)? {
         files.extend(format.image(&set.recipe, &made.sample)?);
@@ -222,4 +251,19 @@ fn rerender(
     let differs = |file: &&File| !Checksum::of(&file.bytes).holds(&set.folder.join(&file.path));
     let wrong: Vec<&str> = files.iter().filter(differs).map(|f| f.path.as_str()).collect();
     Ok((!wrong.is_empty()).then(|| format!("rendered again, these come out otherwise: {}", wrong.join(", "))))
+}
+
+/// That an image comes out further away than other kernels explain.
+fn too_far(set: &Set, made: &RenderedSample, kernels: &mut OtherKernels) -> Result<Option<String>> {
+    let name = &made.sample.record.name;
+    let difference = Difference::between(&native::read(&set.folder, name)?, &made.sample);
+    kernels.most = kernels.most.max(difference);
+    let fault = || {
+        format!(
+            "image {name}: rendered again by {}, it differs in {difference}; other kernels explain {} at most",
+            kernels.here,
+            Difference::ALLOWED
+        )
+    };
+    Ok((!difference.within(Difference::ALLOWED)).then(fault))
 }

@@ -37,7 +37,7 @@ pub fn emit(set: &Set, job: &Job, folder: &Path) -> Result<(Vec<PathBuf>, Vec<St
     }?;
     for file in &files {
         let path = folder.join(&file.path);
-        if std::fs::read(&path).is_ok_and(|there| there != file.bytes) {
+        if crate::input::contents(&path).is_ok_and(|there| there != file.bytes) {
             return Err(Error::misuse("this file is there and says something else: it may have been edited")
                 .in_file(path)
                 .help("remove it, or give another --out"));

@@ -146,6 +146,7 @@ mod tests {
             plants: (1..=count).map(weed).collect(),
             conditions: None,
             exposure: None,
+            sampling: None,
             warnings: Vec::new(),
         }
     }

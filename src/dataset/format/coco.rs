@@ -86,7 +86,7 @@ fn image(record: &Record) -> Value {
         "license": 1,
     });
     if let Some(capture) = &record.capture {
-        image["video_id"] = (capture.field + 1).into();
+        image["video_id"] = capture.field.saturating_add(1).into();
         image["frame_id"] = capture.frame.into();
         image["camera"] = capture.camera.clone().into();
     }

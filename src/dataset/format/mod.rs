@@ -30,6 +30,11 @@ pub trait Format: Sync {
         false
     }
 
+    /// Whether it tells of cameras, which imported images do not.
+    fn needs_camera(&self) -> bool {
+        false
+    }
+
     /// Whether it holds [`Rendered::flows`](crate::dataset::sample::Rendered::flows), which are worked out for it alone.
     fn needs_flow(&self) -> bool {
         false

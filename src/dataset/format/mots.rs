@@ -21,6 +21,10 @@ impl Format for Writer {
         false
     }
 
+    fn needs_camera(&self) -> bool {
+        true
+    }
+
     fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
         for field in drives::fields(set) {
             let images = drives::images(set, field)?;
@@ -34,7 +38,10 @@ impl Format for Writer {
                         let _ = writeln!(text, "{frame} {id} {class} {height} {width} {}", mask.counts);
                     }
                 }
-                out.file(&format!("{FOLDER}/{}-{name}.txt", Set::name(field)), |w| w.put(text))?;
+                // Of a camera that sees no plant there is no file: readers take an empty one for a broken one.
+                if !text.is_empty() {
+                    out.file(&format!("{FOLDER}/{}-{name}.txt", Set::name(field)), |w| w.put(text))?;
+                }
             }
         }
         Ok(())

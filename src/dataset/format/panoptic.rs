@@ -119,7 +119,7 @@ fn segments(sample: &Sample) -> (Vec<u32>, Value) {
 
 fn annotation(set: &Set, record: &Record) -> Result<Value> {
     let path = set.folder.join(segments_path(record.split.name(), &record.name));
-    let bytes = std::fs::read(&path).map_err(Error::reading(&path))?;
+    let bytes = crate::input::contents(&path).map_err(Error::reading(&path))?;
     let segments: Value = serde_json::from_slice(&bytes)
         .map_err(|e| Error::damaged(format!("these are no segments: {e}")).in_file(path))?;
     let file = format!("{}.png", record.name);

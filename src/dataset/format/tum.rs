@@ -21,6 +21,10 @@ impl Format for Writer {
         false
     }
 
+    fn needs_camera(&self) -> bool {
+        true
+    }
+
     fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
         for field in drives::fields(set) {
             let images = drives::images(set, field)?;

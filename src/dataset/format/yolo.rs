@@ -108,7 +108,7 @@ fn loss_path(split: &str, name: &str) -> String {
 
 fn losses(set: &Set, split: Split, name: &str) -> Result<Vec<Loss>> {
     let path = set.folder.join(loss_path(split.name(), name));
-    let bytes = std::fs::read(&path).map_err(Error::reading(&path))?;
+    let bytes = crate::input::contents(&path).map_err(Error::reading(&path))?;
     serde_json::from_slice(&bytes).map_err(|e| Error::damaged(format!("this is no list of losses: {e}")).in_file(path))
 }
 

@@ -132,7 +132,7 @@ impl Coco {
         folder: &Path,
         classes: Option<&Names>,
     ) -> Result<Vec<(Listed, Annotated)>> {
-        let bytes = std::fs::read(path).map_err(Error::reading(path))?;
+        let bytes = crate::input::contents(path).map_err(Error::reading(path))?;
         let _ = writeln!(self.words, "{split:?} {:x?}", Sha256::digest(&bytes));
         let wrong = |what: String| Error::input(what).in_file(path);
         let Document { images, annotations, categories } =
@@ -170,12 +170,13 @@ impl Coco {
         }
         for annotation in annotations {
             let id = annotation.id;
+            let wrong = |what: &str| wrong(format!("{}{what}", named(id, &bytes)));
             let (_, image) = found
                 .get_mut(&annotation.image_id)
-                .ok_or_else(|| wrong(format!("annotation {id} is of image {}, which it lacks", annotation.image_id)))?;
-            let (meaning, names) = kinds.get(&annotation.category_id).ok_or_else(|| {
-                wrong(format!("annotation {id} has the category {}, which it lacks", annotation.category_id))
-            })?;
+                .ok_or_else(|| wrong(&format!("is of image {}, which the file lacks", annotation.image_id)))?;
+            let (meaning, names) = kinds
+                .get(&annotation.category_id)
+                .ok_or_else(|| wrong(&format!("has the category {}, which the file lacks", annotation.category_id)))?;
             image.things.push(Thing {
                 id,
                 meaning: *meaning,
@@ -183,12 +184,25 @@ impl Coco {
                 plant: annotation.attributes["plant"].as_u64().and_then(|n| u32::try_from(n).ok()),
                 segmentation: annotation
                     .segmentation
-                    .ok_or_else(|| wrong(format!("annotation {id} has no mask; boxes alone cannot label pixels")))?,
+                    .ok_or_else(|| wrong("has no mask; boxes alone cannot label pixels"))?,
                 points: ["stem", "base", "tip"].map(|name| point(names, name, &annotation.keypoints)),
             });
         }
         Ok(found.into_values().collect())
     }
+}
+
+/// An annotation by its id and the line where that stands, as the beginning of a sentence. Only annotations are looked through, for images
+/// have ids as well.
+fn named(id: u64, document: &[u8]) -> String {
+    let text = String::from_utf8_lossy(document);
+    let from = text.find("\"annotations\"").unwrap_or(0);
+    let key = text[from..].match_indices("\"id\"").map(|(at, key)| from + at + key.len()).find(|at| {
+        let value = text[*at..].trim_start().strip_prefix(':').map_or("", str::trim_start);
+        value.split(|c: char| !c.is_ascii_digit()).next().and_then(|digits| digits.parse().ok()) == Some(id)
+    });
+    let line = key.map(|at| format!(" in line {}", text[..at].matches('\n').count() + 1)).unwrap_or_default();
+    format!("annotation {id}{line} ")
 }
 
 /// The files of annotations, each with its split where its name tells one.
@@ -322,14 +336,17 @@ fn plant_numbers(things: &[Thing]) -> Vec<u32> {
 /// The pixels of a mask, as places in the image row by row.
 fn pixels(image: &Annotated, thing: &Thing) -> Result<Vec<u32>> {
     let (w, h) = image.size;
-    let wrong = |what: String| Error::input(format!("annotation {}: {what}", thing.id)).in_file(&image.document);
+    let wrong = |what: String| {
+        let document = crate::input::contents(&image.document).unwrap_or_default();
+        Error::input(format!("{}has a wrong mask: {what}", named(thing.id, &document))).in_file(&image.document)
+    };
     let rle = match &thing.segmentation {
         Segmentation::Polygons(polygons) => return Ok(inside(w, h, polygons)),
         Segmentation::Packed(rle) => rle.clone(),
         Segmentation::Runs { size, counts } => Rle::of_runs(*size, counts),
     };
     if rle.size != [h, w] {
-        return Err(wrong(format!("its mask is {} × {} pixels, its image {w} × {h}", rle.size[1], rle.size[0])));
+        return Err(wrong(format!("it is {} × {} pixels, its image {w} × {h}", rle.size[1], rle.size[0])));
     }
     let mut all = Vec::new();
     let mut at = 0;
@@ -409,6 +426,14 @@ mod tests {
         let triangle = vec![0.0, 0.0, 4.0, 0.0, 0.0, 4.0];
         assert_eq!(inside(4, 4, &[triangle]).len(), 6);
         assert_eq!(inside(4, 4, &[vec![]]), Vec::<u32>::new());
+    }
+
+    #[test]
+    fn an_annotation_is_named_with_its_line() {
+        let text = b"{\"images\": [\n{\"id\": 7}],\n\"annotations\": [{\"id\" : 71},\n {\"image_id\": 7, \"id\": 7}]}";
+        assert_eq!(named(7, text), "annotation 7 in line 4 ");
+        assert_eq!(named(71, text), "annotation 71 in line 3 ");
+        assert_eq!(named(8, text), "annotation 8 ");
     }
 
     /// As it was: every row asks every edge.

@@ -179,6 +179,7 @@ fn sample(recipe: &Recipe, listed: &Listed, index: u64, read: Labelled) -> Sampl
             plants: Vec::new(),
             conditions: None,
             exposure: None,
+            sampling: None,
             warnings: read.warnings,
         },
         rgb: read.rgb,

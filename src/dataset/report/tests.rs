@@ -43,6 +43,7 @@ fn record(conditions: Option<Conditions>) -> Record {
         plants: Vec::new(),
         conditions,
         exposure: None,
+        sampling: None,
         warnings: Vec::new(),
     }
 }
