@@ -70,7 +70,7 @@ const ALLOWED: &[(&str, &str)] = &[
     // Vectors are re-exported by `math`; two files sum in double precision.
     ("glam", "math/ film/ accel/brute.rs"),
     // Checksums as text.
-    ("hex", "scene/library.rs dataset/ train/run.rs train/weights.rs report/page.rs"),
+    ("hex", "scene/library.rs dataset/ train/data/photos.rs train/run.rs train/weights.rs report/page.rs"),
     ("humantime", "bin/"),
     ("hw_skymodel", "light/hosek.rs"),
     // Photographs in, and small ones out for pages that people look at.
@@ -97,7 +97,7 @@ const ALLOWED: &[(&str, &str)] = &[
     // Images, plants, the soil's maps and the sensor's pixels: loops over what is many.
     (
         "rayon",
-        "render/ sensor/ job/threads.rs dataset/ compare/ scene/assemble/foresee.rs scene/assemble/mod.rs soil/bake.rs material/ground.rs raster/sheets.rs",
+        "render/ sensor/ job/threads.rs dataset/ compare/ scene/assemble/estimate.rs scene/assemble/mod.rs soil/bake.rs material/ground.rs raster/sheets.rs",
     ),
     // One reader for all RON files; faults inside a value are found where they lie.
     ("ron", "ron_file/"),
@@ -113,7 +113,7 @@ const ALLOWED: &[(&str, &str)] = &[
     ),
     // Weights, as every trainer reads them.
     ("safetensors", "train/weights.rs"),
-    ("sha2", "scene/library.rs dataset/ train/run.rs train/weights.rs"),
+    ("sha2", "scene/library.rs dataset/ train/data/photos.rs train/run.rs train/weights.rs"),
     ("signal_hook", "cli/signal.rs"),
     // Parts that a pixel met: one or two, nearly always.
     ("smallvec", "film/tally.rs output/exr/cryptomatte.rs"),

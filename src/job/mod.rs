@@ -18,12 +18,12 @@
 //! |---|---|
 //! | `threads` | the worker threads |
 //! | `scene_file`, `field` | what is rendered |
-//! | `crowd` | how many plants images show, before any is grown |
+//! | `expected` | how many plants images show, before any is grown |
 //! | `renderer`, `rasterizer` | an engine that is ready to render any number of fields |
 //! | `view` | radiance, or an attribute of the first surface in false colours |
 //! | `image` | what was rendered, and how it is written |
 
-mod crowd;
+mod expected;
 mod field;
 mod image;
 mod rasterizer;
@@ -32,7 +32,7 @@ mod scene_file;
 mod threads;
 mod view;
 
-pub use crowd::Crowd;
+pub use expected::ExpectedPlants;
 pub use field::Field;
 pub use image::{Image, Times};
 pub use renderer::{Renderer, Request};

@@ -88,9 +88,9 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let scene = SceneFile::open(&args.scene)?.seed(args.seed).width(args.width).memory(args.memory.bytes);
     let scene = scene.threads(&Threads::new(args.threads)?);
     if !args.quiet
-        && let Some(crowd) = scene.crowd(MOST)
+        && let Some(plants) = scene.plants_in_view(MOST)
     {
-        furrow::tell!("{}", crowd.told());
+        furrow::tell!("{}", plants.told());
     }
     let stop = signals.heed();
     let (mut shots, mut seed) = (Vec::new(), 0);

@@ -9,10 +9,8 @@
 //!
 //! Source: COLMAP documentation, "Output Format"; `src/colmap/sensor/models.h`.
 
-use super::drives::{self, Taken};
-use super::{Format, Whole};
-use crate::dataset::recipe::Recipe;
-use crate::dataset::set::Set;
+use super::Whole;
+use super::drives::{self, OfFields, Taken};
 use crate::Result;
 use std::fmt::Write;
 
@@ -20,28 +18,12 @@ pub(super) struct Writer;
 
 const FOLDER: &str = "colmap";
 
-impl Format for Writer {
-    fn has_images(&self) -> bool {
-        false
-    }
-
-    fn needs_camera(&self) -> bool {
-        true
-    }
-
-    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
-        for field in drives::fields(set) {
-            let images = drives::images(set, field)?;
-            let folder = format!("{FOLDER}/{}", Set::name(field));
-            out.file(&format!("{folder}/cameras.txt"), |w| w.put(cameras(&images)))?;
-            out.file(&format!("{folder}/images.txt"), |w| w.put(poses(&images)))?;
-            out.file(&format!("{folder}/points3D.txt"), |w| w.put("# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]\n"))?;
-        }
-        Ok(())
-    }
-
-    fn warnings(&self, recipe: &Recipe) -> Vec<String> {
-        drives::warnings(recipe)
+impl OfFields for Writer {
+    fn field(&self, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
+        let folder = format!("{FOLDER}/{name}");
+        out.file(&format!("{folder}/cameras.txt"), |w| w.put(cameras(images)))?;
+        out.file(&format!("{folder}/images.txt"), |w| w.put(poses(images)))?;
+        out.file(&format!("{folder}/points3D.txt"), |w| w.put("# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]\n"))
     }
 }
 

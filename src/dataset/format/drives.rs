@@ -1,5 +1,6 @@
 //! The images of a field with their cameras: what formats of poses and tracks are made of.
 
+use super::{Format, Whole};
 use crate::dataset::native;
 use crate::dataset::recipe::Recipe;
 use crate::dataset::record::{CaptureRecord, Record};
@@ -17,13 +18,33 @@ pub(super) struct Taken {
     pub(super) capture: CaptureRecord,
 }
 
-/// The numbers of a dataset's fields.
-pub(super) fn fields(set: &Set) -> std::ops::Range<u64> {
-    0..set.recipe.count.div_ceil(set.recipe.captures())
+/// A format that is written field by field, of its images' cameras and records alone.
+pub(super) trait OfFields: Sync {
+    /// The files of a field of this name.
+    fn field(&self, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()>;
+}
+
+impl<T: OfFields> Format for T {
+    fn has_images(&self) -> bool {
+        false
+    }
+
+    fn needs_camera(&self) -> bool {
+        true
+    }
+
+    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+        let fields = set.recipe.count.div_ceil(set.recipe.captures());
+        (0..fields).try_for_each(|field| self.field(&Set::name(field), &images(set, field)?, out))
+    }
+
+    fn warnings(&self, recipe: &Recipe) -> Vec<String> {
+        warnings(recipe)
+    }
 }
 
 /// The images of a field that the dataset has, in their order.
-pub(super) fn images(set: &Set, field: u64) -> Result<Vec<Taken>> {
+fn images(set: &Set, field: u64) -> Result<Vec<Taken>> {
     let captures = set.recipe.captures();
     let (begin, end) = (field * captures, ((field + 1) * captures).min(set.recipe.count));
     (begin..end).map(|index| taken(native::read_record(&set.folder, &Set::name(index))?)).collect()

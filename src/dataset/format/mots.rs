@@ -5,10 +5,8 @@
 //!
 //! Source: Voigtlaender et al. 2019, "MOTS: Multi-object tracking and segmentation"; mots_tools, "txt format".
 
-use super::drives;
-use super::{Format, Whole};
-use crate::dataset::recipe::Recipe;
-use crate::dataset::set::Set;
+use super::Whole;
+use super::drives::{self, OfFields, Taken};
 use crate::Result;
 use std::fmt::Write;
 
@@ -16,38 +14,23 @@ pub(super) struct Writer;
 
 const FOLDER: &str = "mots";
 
-impl Format for Writer {
-    fn has_images(&self) -> bool {
-        false
-    }
-
-    fn needs_camera(&self) -> bool {
-        true
-    }
-
-    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
-        for field in drives::fields(set) {
-            let images = drives::images(set, field)?;
-            for (name, of) in drives::by_camera(&images) {
-                let mut text = String::new();
-                for image in of {
-                    for plant in image.record.seen() {
-                        let (Some(id), Some(mask)) = (plant.id, &plant.seen.mask) else { continue };
-                        let ([height, width], class) = (mask.size, plant.class as u8);
-                        let frame = image.capture.frame;
-                        let _ = writeln!(text, "{frame} {id} {class} {height} {width} {}", mask.counts);
-                    }
+impl OfFields for Writer {
+    fn field(&self, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
+        for (camera, of) in drives::by_camera(images) {
+            let mut text = String::new();
+            for image in of {
+                for plant in image.record.seen() {
+                    let (Some(id), Some(mask)) = (plant.id, &plant.seen.mask) else { continue };
+                    let ([height, width], class) = (mask.size, plant.class as u8);
+                    let frame = image.capture.frame;
+                    let _ = writeln!(text, "{frame} {id} {class} {height} {width} {}", mask.counts);
                 }
-                // Of a camera that sees no plant there is no file: readers take an empty one for a broken one.
-                if !text.is_empty() {
-                    out.file(&format!("{FOLDER}/{}-{name}.txt", Set::name(field)), |w| w.put(text))?;
-                }
+            }
+            // Of a camera that sees no plant there is no file: readers take an empty one for a broken one.
+            if !text.is_empty() {
+                out.file(&format!("{FOLDER}/{name}-{camera}.txt"), |w| w.put(text))?;
             }
         }
         Ok(())
-    }
-
-    fn warnings(&self, recipe: &Recipe) -> Vec<String> {
-        drives::warnings(recipe)
     }
 }

@@ -8,10 +8,9 @@
 //!
 //! Source: nerfstudio documentation, "Data conventions".
 
-use super::drives::{self, Taken};
-use super::{Format, Whole};
-use crate::dataset::recipe::{Recipe, json};
-use crate::dataset::set::Set;
+use super::Whole;
+use super::drives::{self, OfFields, Taken};
+use crate::dataset::recipe::json;
 use crate::Result;
 use serde_json::{Map, Value, json};
 
@@ -19,28 +18,12 @@ pub(super) struct Writer;
 
 const FOLDER: &str = "nerf";
 
-impl Format for Writer {
-    fn has_images(&self) -> bool {
-        false
-    }
-
-    fn needs_camera(&self) -> bool {
-        true
-    }
-
-    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
-        for field in drives::fields(set) {
-            let images = drives::images(set, field)?;
-            let mut all = images.first().map(intrinsics).unwrap_or_default();
-            all.insert("frames".into(), images.iter().map(frame).collect());
-            let text = json(&all)?;
-            out.file(&format!("{FOLDER}/{}/transforms.json", Set::name(field)), |w| w.put(text))?;
-        }
-        Ok(())
-    }
-
-    fn warnings(&self, recipe: &Recipe) -> Vec<String> {
-        drives::warnings(recipe)
+impl OfFields for Writer {
+    fn field(&self, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
+        let mut all = images.first().map(intrinsics).unwrap_or_default();
+        all.insert("frames".into(), images.iter().map(frame).collect());
+        let text = json(&all)?;
+        out.file(&format!("{FOLDER}/{name}/transforms.json"), |w| w.put(text))
     }
 }
 

@@ -5,10 +5,8 @@
 //!
 //! Source: Sturm et al. 2012, "A benchmark for the evaluation of RGB-D SLAM systems"; its page "File formats".
 
-use super::drives;
-use super::{Format, Whole};
-use crate::dataset::recipe::Recipe;
-use crate::dataset::set::Set;
+use super::Whole;
+use super::drives::{self, OfFields, Taken};
 use crate::Result;
 use std::fmt::Write;
 
@@ -16,33 +14,18 @@ pub(super) struct Writer;
 
 const FOLDER: &str = "tum";
 
-impl Format for Writer {
-    fn has_images(&self) -> bool {
-        false
-    }
-
-    fn needs_camera(&self) -> bool {
-        true
-    }
-
-    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
-        for field in drives::fields(set) {
-            let images = drives::images(set, field)?;
-            for (name, of) in drives::by_camera(&images) {
-                let mut text = "# time_s x_m y_m z_m qx qy qz qw\n".to_owned();
-                for image in of {
-                    let (axes, place) = drives::camera_to_world(&image.camera);
-                    let [x, y, z, w] = drives::quaternion(&axes);
-                    let time = image.capture.time_s;
-                    let _ = writeln!(text, "{time} {} {} {} {x} {y} {z} {w}", place.x, place.y, place.z);
-                }
-                out.file(&format!("{FOLDER}/{}-{name}.txt", Set::name(field)), |w| w.put(text))?;
+impl OfFields for Writer {
+    fn field(&self, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
+        for (camera, of) in drives::by_camera(images) {
+            let mut text = "# time_s x_m y_m z_m qx qy qz qw\n".to_owned();
+            for image in of {
+                let (axes, place) = drives::camera_to_world(&image.camera);
+                let [x, y, z, w] = drives::quaternion(&axes);
+                let time = image.capture.time_s;
+                let _ = writeln!(text, "{time} {} {} {} {x} {y} {z} {w}", place.x, place.y, place.z);
             }
+            out.file(&format!("{FOLDER}/{name}-{camera}.txt"), |w| w.put(text))?;
         }
         Ok(())
-    }
-
-    fn warnings(&self, recipe: &Recipe) -> Vec<String> {
-        drives::warnings(recipe)
     }
 }

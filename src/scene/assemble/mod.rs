@@ -3,9 +3,9 @@
 mod builder;
 mod census;
 mod condition;
+mod estimate;
 mod expected;
 mod field;
-mod foresee;
 mod ground;
 mod identity;
 mod individual;

@@ -72,8 +72,8 @@ pub(crate) fn run(args: &Args) -> Result<Set> {
 
 /// Tells how many plants images are to be expected to show; `quiet` leaves only warnings.
 pub(super) fn tell_plants(set: &Set, quiet: bool) -> Result<()> {
-    match dataset::render::scene_file(set)?.crowd(set.recipe.count) {
-        Some(crowd) if crowd.warning().is_some() || !quiet => furrow::tell!("{}", crowd.told()),
+    match dataset::render::scene_file(set)?.plants_in_view(set.recipe.count) {
+        Some(plants) if plants.warning().is_some() || !quiet => furrow::tell!("{}", plants.told()),
         _ => {}
     }
     Ok(())

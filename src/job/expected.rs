@@ -10,7 +10,7 @@ const WIDE: f64 = 3.0;
 
 /// Plants that are to be expected in view, over fields.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Crowd {
+pub struct ExpectedPlants {
     /// In the middle field.
     pub median: f64,
     /// Nineteen fields of twenty have more.
@@ -19,7 +19,7 @@ pub struct Crowd {
     pub high: f64,
 }
 
-impl Crowd {
+impl ExpectedPlants {
     /// Of some numbers of plants; `None` of none.
     fn of(mut plants: Vec<f64>) -> Option<Self> {
         plants.sort_by(f64::total_cmp);
@@ -60,11 +60,11 @@ impl SceneFile {
     /// Plants in view over the first of so many fields, from their densities; nothing is grown. Fields that cannot be are left out: each is
     /// told when its image is made. `None` of no fields, and where each is seen by several images.
     #[doc(hidden)]
-    pub fn crowd(&self, count: u64) -> Option<Crowd> {
+    pub fn plants_in_view(&self, count: u64) -> Option<ExpectedPlants> {
         if self.captures() > 1 {
             return None;
         }
-        Crowd::of((0..count.min(ASKED)).filter_map(|index| self.expected_plants(index).ok()).collect())
+        ExpectedPlants::of((0..count.min(ASKED)).filter_map(|index| self.expected_plants(index).ok()).collect())
     }
 }
 
@@ -74,13 +74,13 @@ mod tests {
 
     #[test]
     fn fields_that_differ_much_are_told() {
-        let even = Crowd::of((0..100).map(|k| 10.0 + 0.1 * f64::from(k)).collect()).unwrap();
+        let even = ExpectedPlants::of((0..100).map(|k| 10.0 + 0.1 * f64::from(k)).collect()).unwrap();
         assert_eq!((even.low, even.median, even.high), (10.5, 15.0, 19.4));
         assert_eq!(even.warning(), None);
-        let wide = Crowd::of((0..100).map(f64::from).collect()).unwrap();
+        let wide = ExpectedPlants::of((0..100).map(f64::from).collect()).unwrap();
         assert!(wide.warning().unwrap().starts_with("about 50 plants an image, 5 to 94 in nine of ten, 18.8 times"));
         // Fields of less than a plant are not infinitely far from others.
-        assert_eq!(Crowd::of(vec![0.0, 0.2, 0.1, 2.0]).unwrap().spread(), 2.0);
-        assert_eq!(Crowd::of(Vec::new()), None);
+        assert_eq!(ExpectedPlants::of(vec![0.0, 0.2, 0.1, 2.0]).unwrap().spread(), 2.0);
+        assert_eq!(ExpectedPlants::of(Vec::new()), None);
     }
 }
