@@ -22,6 +22,7 @@
 //! | [`Plan`], [`Settings`] | everything that decides what a training results in; its hyper-parameters as a user gives them |
 //! | [`Selection`] | images of a dataset |
 //! | `fit` | trains a plan into a folder; resumable |
+//! | `adapt` | a trained network goes on learning from photographs without labels |
 //! | `calibrated`, `evaluate` | class-bias calibration; ground truth and prediction to scores |
 //! | [`TrainedModel`], [`Results`], [`Report`] | weights and model card; loss curve and validation passes; scores |
 //! | [`table`] | experiments: networks × training sets × seeds, evaluated on test sets |
@@ -36,6 +37,9 @@
 //! | `baseline` | ExG threshold and component-size rules that a network must beat |
 //! | `deploy` | a trained model as ONNX or TorchScript; predictions for photographs without labels |
 
+#[cfg(feature = "train")]
+#[doc(hidden)]
+pub mod adapt;
 #[doc(hidden)]
 pub mod baseline;
 #[doc(hidden)]

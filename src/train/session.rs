@@ -1,6 +1,6 @@
 //! Training, calibration and evaluation, from files to files.
 
-use super::data::{Pick, Resize, Selection, Store, resize};
+use super::data::{Photos, Pick, Resize, Selection, Store, resize};
 use super::deploy::enlarge::classes_at;
 use super::fit::calibrate::calibrate;
 use super::fit::checkpoint::Checkpoint;
@@ -54,6 +54,18 @@ pub fn fit(
     folder: &Path,
     callbacks: &Callbacks<'_>,
 ) -> Result<Results> {
+    train(plan, begin, None, machine, folder, callbacks)
+}
+
+/// The same with photographs without labels, where the plan is a self-training.
+pub(super) fn train(
+    plan: &Plan,
+    begin: Option<&Path>,
+    photos: Option<Photos>,
+    machine: &Machine,
+    folder: &Path,
+    callbacks: &Callbacks<'_>,
+) -> Result<Results> {
     plan.hyper.check(&plan.shape).map_err(|invalid| invalid.of_flag())?;
     let place = machine.place(&plan.precision)?;
     device::set_threads(plan.threads);
@@ -88,7 +100,7 @@ pub fn fit(
         return Ok(results);
     }
     let hash = identity.hash()?;
-    let data = Data { train: Arc::new(train), val, loaders: machine.loaders };
+    let data = Data { train: Arc::new(train), val, photos: photos.map(Arc::new), loaders: machine.loaders };
     let mut outcome = fit::train(&plan, &hash, &data, &begin, place, folder, callbacks)?;
     if plan.hyper.calibrate > 0 {
         let model = Model::with(plan.network, plan.shape.bands.len(), plan.classes.len(), &outcome.values, place)?;

@@ -5,7 +5,7 @@ use crate::report;
 use furrow::cli::signal::Signals;
 use furrow::train::data::{Band, Selection};
 use furrow::train::fit::checkpoint::ValidationPass;
-use furrow::train::fit::{Callbacks, Plan, Settings};
+use furrow::train::fit::{Adaptation, Callbacks, Plan, Settings};
 use furrow::train::net::Network;
 use furrow::train::run::{self, Identity, Results};
 use furrow::train::session;
@@ -107,7 +107,19 @@ pub(crate) fn fit(
     quiet: bool,
     signals: &Signals,
 ) -> Result<Results> {
-    let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(plan.hyper.steps) };
+    shown(plan.hyper.steps, quiet, signals, |callbacks| {
+        session::fit(plan, begin, &machine.machine(), folder, callbacks)
+    })
+}
+
+/// Has `work` train so many steps and shows its progress.
+pub(crate) fn shown(
+    steps: u64,
+    quiet: bool,
+    signals: &Signals,
+    work: impl FnOnce(&Callbacks<'_>) -> Result<Results>,
+) -> Result<Results> {
+    let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(steps) };
     let style = ProgressStyle::with_template("{bar:30} step {pos} of {len}, {msg}, {eta} left");
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
     let smooth = Cell::new(None);
@@ -131,7 +143,7 @@ pub(crate) fn fit(
         let line = format!(
             "step {} of {}: loss {loss:.4}, validation mean I/U {:.1} ({}){best}",
             pass.step,
-            plan.hyper.steps,
+            steps,
             100.0 * pass.miou,
             iou.join(", ")
         );
@@ -140,12 +152,12 @@ pub(crate) fn fit(
         }
     };
     let callbacks = Callbacks { step: &step, validation: &validation, stop: signals.heed() };
-    let results = session::fit(plan, begin, &machine.machine(), folder, &callbacks);
+    let results = work(&callbacks);
     bar.finish_and_clear();
     results
 }
 
-fn in_words(results: &Results) -> String {
+pub(crate) fn in_words(results: &Results) -> String {
     let why = match results.ended.as_str() {
         "patience" => ", no better validation pass for long",
         "time" => ", the time was up",
@@ -173,7 +185,7 @@ fn facts(plan: &Plan, results: &Results) -> Vec<(String, String)> {
     let sets = |selections: &[Selection]| selections.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
     let bands: Vec<&str> = plan.shape.bands.iter().map(Band::name).collect();
     let fact = |name: &str, value: String| (name.to_owned(), value);
-    vec![
+    let mut facts = vec![
         fact("network", plan.network.about().into()),
         fact("training set", sets(&plan.train)),
         fact("validation set", sets(&plan.val)),
@@ -184,5 +196,11 @@ fn facts(plan: &Plan, results: &Results) -> Vec<(String, String)> {
         fact("data augmentation", plan.hyper.augment.to_string()),
         fact("seed", plan.seed.to_string()),
         fact("result", in_words(results)),
-    ]
+    ];
+    if let Some(Adaptation { photos, confidence, .. }) = plan.adaptation {
+        let words =
+            format!("{photos} photographs without labels, predictions of at least {confidence} taken for labels");
+        facts.insert(2, fact("self-training", words));
+    }
+    facts
 }

@@ -2,6 +2,7 @@
 
 #![warn(clippy::print_stderr)]
 
+mod adapt;
 mod baseline;
 mod calibrate;
 mod curves;
@@ -40,6 +41,7 @@ Examples:
   train fit --set data/d --set data/real@0..10*4 --network unet --size 240x180 --out runs/augmented
   train eval runs/d --set data/real@12..20                scores on a test set of real images
   train predict runs/d photos/ --out predictions          masks of photographs, and masks over them
+  train adapt runs/d --images photos/ --out runs/d3       goes on learning from photographs without labels
   train calibrate runs/d --set data/d --out runs/d2       class biases calibrated
   train export runs/d --format onnx                       the network for a robot
   train baseline exg-size --from data/real@0..10 --set data/real@12..20
@@ -59,6 +61,8 @@ enum Verb {
     Eval(eval::Args),
     /// Predict the classes of images without labels: masks, and masks over the images.
     Predict(predict::Args),
+    /// Go on training on photographs without labels (self-training).
+    Adapt(adapt::Args),
     /// Calibrate the class biases of a trained network against over- and under-prediction, on images with labels.
     Calibrate(calibrate::Args),
     /// Write a trained network for other programs.
@@ -86,6 +90,7 @@ fn main() -> ExitCode {
         Verb::Fit(args) => fit::run(&args, &signals),
         Verb::Eval(args) => eval::run(&args, &signals),
         Verb::Predict(args) => predict::run(&args, &signals),
+        Verb::Adapt(args) => adapt::run(&args, &signals),
         Verb::Calibrate(args) => calibrate::run(&args),
         Verb::Export(args) => export::run(&args),
         Verb::Baseline(args) => baseline::run(&args, &signals),

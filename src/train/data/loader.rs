@@ -3,32 +3,15 @@
 //! Step s takes images s·b to s·b + b − 1 of an endless list: all images in a random order, then all in another, and so on.
 //! The seed and the step alone decide a batch, so a run that goes on after a kill gets the same ones, whatever the threads.
 
-use super::augment::Augment;
 use super::bands::Band;
 use super::crop::Crop;
-use super::normalise::Normalization;
+use super::order::Order;
+use super::photos::{Photos, Views};
 use super::store::Store;
 use crate::Result;
 use crate::sampling::{Purpose, Stream};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, sync_channel};
-
-/// How batches are drawn.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Order {
-    /// Decides the order and every variation.
-    pub seed: u64,
-    /// Images of a batch; ≥ 1.
-    pub batch: usize,
-    /// Width and height of the crop of each image, pixels.
-    pub crop_size: (u32, u32),
-    /// Share of the crops that are centred on rare-class pixels; see [`Crop::rare`].
-    pub rare: f64,
-    /// Data augmentation.
-    pub augment: Augment,
-    /// Input normalization, after that.
-    pub normalization: Normalization,
-}
 
 /// Images in one piece of memory.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,9 +24,9 @@ pub struct Batch {
     pub labels: Vec<u8>,
 }
 
-/// Batches in the order of their steps.
-pub struct Loader {
-    workers: Vec<Receiver<Result<Batch>>>,
+/// Batches, or what else steps take, in the order of their steps.
+pub struct Loader<T = Batch> {
+    workers: Vec<Receiver<Result<T>>>,
     next: usize,
 }
 
@@ -54,14 +37,39 @@ impl Loader {
     /// Begins to load the batches of steps `from..to` with `threads` threads; the store must hold an image. Threads end when the
     /// loader is dropped.
     pub fn start(store: &Arc<Store>, order: &Order, from: u64, to: u64, threads: usize) -> Self {
+        let maker = || {
+            let (store, order) = (Arc::clone(store), order.clone());
+            let mut epochs = Epochs { seed: order.seed, current: None };
+            move |step| make(&store, &order, step, &mut epochs)
+        };
+        Self::of(maker, from, to, threads)
+    }
+}
+
+impl Loader<Views> {
+    /// The same of crops of photographs; there must be one.
+    pub fn photos(photos: &Arc<Photos>, order: &Order, from: u64, to: u64, threads: usize) -> Self {
+        let maker = || {
+            let (photos, order) = (Arc::clone(photos), order.clone());
+            move |step| Ok(photos.views(&order, step))
+        };
+        Self::of(maker, from, to, threads)
+    }
+}
+
+impl<T: Send + 'static> Loader<T> {
+    /// What makers make of steps, one maker a thread.
+    fn of<M>(maker: impl Fn() -> M, from: u64, to: u64, threads: usize) -> Self
+    where
+        M: FnMut(u64) -> Result<T> + Send + 'static,
+    {
         let threads = threads.max(1) as u64;
         let begin = |thread: u64| {
             let (sender, receiver) = sync_channel(AHEAD);
-            let (store, order) = (Arc::clone(store), order.clone());
+            let mut make = maker();
             std::thread::spawn(move || {
-                let mut epochs = Epochs { seed: order.seed, current: None };
                 for step in (from + thread..to).step_by(threads as usize) {
-                    let made = make(&store, &order, step, &mut epochs);
+                    let made = make(step);
                     let failed = made.is_err();
                     // Nobody listens any more: the loader was dropped.
                     if sender.send(made).is_err() || failed {
@@ -75,8 +83,8 @@ impl Loader {
     }
 }
 
-impl Iterator for Loader {
-    type Item = Result<Batch>;
+impl<T> Iterator for Loader<T> {
+    type Item = Result<T>;
 
     fn next(&mut self) -> Option<Self::Item> {
         let worker = &self.workers[self.next % self.workers.len()];

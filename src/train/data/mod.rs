@@ -11,6 +11,9 @@
 //! | `erase` | random erasing |
 //! | `crop` | random crops, some centred on rare-class pixels |
 //! | `normalise` | input normalization |
+//! | `order` | how batches are drawn |
+//! | `photos` | photographs without labels, for self-training |
+//! | `paste` | plants of one batch over the pictures of another |
 //! | `resize` | how a picture of any size is brought to a network |
 //! | `loader` | threads that are ahead of the network, in an order that the seed alone decides |
 
@@ -22,6 +25,9 @@ pub mod example;
 pub mod loader;
 pub mod margin;
 pub mod normalise;
+mod order;
+mod paste;
+pub mod photos;
 pub mod resize;
 pub mod select;
 pub mod store;
@@ -30,8 +36,11 @@ pub use augment::Augment;
 pub use bands::Band;
 pub use crop::Crop;
 pub use example::{Example, Shape};
-pub use loader::{Batch, Loader, Order};
+pub use loader::{Batch, Loader};
 pub use normalise::Normalization;
+pub use order::Order;
+pub use paste::paste;
+pub use photos::{Photos, Views};
 pub use resize::Resize;
 pub use select::{Pick, Selection};
 pub use store::Store;

@@ -10,15 +10,18 @@
 //! | `schedule` | the learning rate, step by step |
 //! | `gradients` | gradients of a step, of several batches where asked for |
 //! | `optimiser` | from gradients to weights, with a state that can be saved |
+//! | `adapt` | self-training on photographs without labels |
 //! | `ema` | an exponential moving average of the weights |
 //! | `log` | the log of a training as it grows: CSV, TensorBoard |
 //! | `checkpoint` | a training on disk, between two steps |
 //! | `trainer` | the training loop, with validation passes |
 //! | `calibrate` | class-bias calibration of a trained network |
 //!
-//! Only `loss`, `gradients`, `optimiser`, `ema`, `trainer` and `calibrate` need libtorch. On a CPU the same plan on the same number of threads gives
+//! Only `adapt`, `loss`, `gradients`, `optimiser`, `ema`, `trainer` and `calibrate` need libtorch. On a CPU the same plan on the same number of threads gives
 //! the same bits, stopped and gone on with or not.
 
+#[cfg(feature = "train")]
+mod adapt;
 #[cfg(feature = "train")]
 pub mod calibrate;
 pub mod checkpoint;
@@ -40,7 +43,7 @@ pub mod settings;
 pub mod trainer;
 
 pub use hyper::Hyperparameters;
-pub use plan::Plan;
+pub use plan::{Adaptation, Plan};
 pub use settings::Settings;
 #[cfg(feature = "train")]
 pub use trainer::{Callbacks, Data, Outcome, train};

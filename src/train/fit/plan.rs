@@ -2,7 +2,7 @@
 
 use super::hyper::Hyperparameters;
 use crate::train::classes::Classes;
-use crate::train::data::{Band, Selection, Shape};
+use crate::train::data::{Band, Normalization, Selection, Shape};
 use crate::train::net::Network;
 use serde::{Deserialize, Serialize};
 
@@ -32,6 +32,23 @@ pub struct Plan {
     pub begin_with: Option<String>,
     /// Most seconds; with it the end is where the clock says.
     pub seconds: Option<u64>,
+    /// Self-training on photographs without labels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub adaptation: Option<Adaptation>,
+}
+
+/// What a self-training has beside a training with labels.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Adaptation {
+    /// Photographs.
+    pub photos: usize,
+    /// Checksum of their pixels.
+    pub photos_sha256: String,
+    /// Probability from which on a prediction is taken for a label, 0 to below 1.
+    pub confidence: f64,
+    /// Input normalization of the network.
+    pub normalization: Normalization,
 }
 
 impl Plan {
@@ -65,6 +82,7 @@ impl Default for Plan {
             threads: 1,
             begin_with: None,
             seconds: None,
+            adaptation: None,
         }
     }
 }

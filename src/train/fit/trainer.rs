@@ -1,5 +1,6 @@
 //! The training loop: a batch, its loss, its gradients, a step of the optimiser; now and then a validation pass.
 
+use super::adapt;
 use super::checkpoint::{Checkpoint, History, LossPoint, ValidationPass};
 use super::class_weights;
 use super::ema::Ema;
@@ -10,7 +11,7 @@ use super::loss;
 use super::optimiser::Optimiser;
 use super::plan::Plan;
 use crate::dataset::sample::IGNORE;
-use crate::train::data::{Batch, Loader, Normalization, Order, Store, augment};
+use crate::train::data::{Batch, Loader, Normalization, Order, Photos, Store, Views, augment};
 use crate::train::figure::{Sheet, Shots, sheet};
 use crate::train::measure::{Confusion, Scores};
 use crate::train::torch::{Model, Pass, Where, classes, failed};
@@ -28,6 +29,8 @@ pub struct Data {
     pub train: Arc<Store>,
     /// Validation set; may be empty.
     pub val: Store,
+    /// Photographs without labels; none unless the plan is a self-training.
+    pub photos: Option<Arc<Photos>>,
     /// Threads that load.
     pub loaders: usize,
 }
@@ -86,10 +89,11 @@ pub fn train(
     callbacks: &Callbacks<'_>,
 ) -> Result<Outcome> {
     let (classes, hyper) = (plan.classes.len(), &plan.hyper);
-    let normalization = match hyper.normalization {
-        NormalizationMode::Band => Normalization::Band,
-        NormalizationMode::Image => Normalization::Image,
-        NormalizationMode::Fixed => Normalization::fixed(&data.train)?,
+    let normalization = match (&plan.adaptation, hyper.normalization) {
+        (Some(adaptation), _) => adaptation.normalization.clone(),
+        (_, NormalizationMode::Band) => Normalization::Band,
+        (_, NormalizationMode::Image) => Normalization::Image,
+        (_, NormalizationMode::Fixed) => Normalization::fixed(&data.train)?,
     };
     let mut at = Checkpoint::read(folder, hash)?.unwrap_or_default();
     let mut model = Model::new(plan.network, plan.shape.bands.len(), classes, plan.seed, place);
@@ -112,6 +116,8 @@ pub fn train(
     let mut log = TrainingLog::begin(folder, &plan.classes.names(), &at.history)?;
     let (first, last) = (at.step * hyper.accumulate, hyper.steps * hyper.accumulate);
     let mut loader = Loader::start(&data.train, &order, first, last, data.loaders);
+    let photos = data.photos.as_ref();
+    let mut photos = photos.map(|photos| Loader::photos(photos, &order, first, last, data.loaders));
     let (begun, before) = (Instant::now(), at.seconds);
     let every = (hyper.steps / POINTS).max(1);
     let out_of_patience = |at: &Checkpoint| at.history.since_best() >= hyper.patience && !data.val.is_empty();
@@ -131,14 +137,23 @@ pub fn train(
             let words = format!("stopped after step {} of {}, where it goes on", at.step, hyper.steps);
             return Err(Error::stopped(words).help("the same command goes on with it").in_file(folder));
         }
-        let mut next = || loader.next().unwrap_or_else(|| Err(Error::failed("the loading threads have ended")));
-        let batches: Vec<Batch> = (0..hyper.accumulate).map(|_| next()).collect::<Result<_>>()?;
+        let batches: Vec<Batch> = (0..hyper.accumulate).map(|_| next(&mut loader)).collect::<Result<_>>()?;
+        let views = photos.as_mut().map(|p| (0..hyper.accumulate).map(|_| next(p)).collect::<Result<Vec<Views>>>());
+        let photographs = match (&plan.adaptation, &ema, views.transpose()?) {
+            (Some(adaptation), Some(teacher), Some(views)) => {
+                let numbers = at.step * hyper.accumulate..;
+                let of =
+                    |((views, batch), number)| adapt::batch(teacher.model(), views, batch, adaptation, plan, number);
+                views.into_iter().zip(&batches).zip(numbers).map(of).collect::<Result<Vec<_>>>()?
+            }
+            _ => Vec::new(),
+        };
         let in_time = plan.seconds.map_or(0.0, |most| at.seconds / most as f64);
         let done = in_time.max(at.step as f64 / hyper.steps as f64);
         let rate = hyper.rate * hyper.schedule.share(done);
         let weights = Tensor::from_slice(&hyper.class_weights.weights(&rarities, done)).to_device(place.device);
         let encoder = if at.step < hyper.freeze { 0.0 } else { hyper.encoder_rate };
-        let loss = step(&model, &mut optimiser, &batches, plan, &weights, [rate, encoder])?;
+        let loss = step(&model, &mut optimiser, &batches, &photographs, plan, &weights, [rate, encoder])?;
         if loss.is_some_and(|loss| !loss.is_finite()) {
             let help = format!("a smaller --rate than {} (this training lies in {})", hyper.rate, folder.display());
             return Err(Error::input(format!("the loss of step {} is no number any more", at.step + 1)).help(help));
@@ -180,6 +195,13 @@ pub fn train(
     Ok(Outcome { values, normalization, history: at.history, steps: at.step, ended, seconds: at.seconds })
 }
 
+fn next<T>(loader: &mut Loader<T>) -> Result<T>
+where
+    Loader<T>: Iterator<Item = Result<T>>,
+{
+    loader.next().unwrap_or_else(|| Err(Error::failed("the loading threads have ended")))
+}
+
 fn save(
     at: &mut Checkpoint,
     model: &Model,
@@ -194,24 +216,34 @@ fn save(
     at.write(folder, hash)
 }
 
-/// One step of this learning rate, in the encoder of a share of it; the mean loss of its batches. A batch without a labelled pixel has
-/// none; where no batch has one, nothing changes.
+/// One step of this learning rate, in the encoder of a share of it; the mean loss of its batches, those of photographs each with a
+/// weight. A batch without a labelled pixel has none; where no batch has one, nothing changes.
 fn step(
     model: &Model,
     optimiser: &mut Optimiser,
     batches: &[Batch],
+    photographs: &[(Batch, f64)],
     plan: &Plan,
     weights: &Tensor,
     [rate, encoder]: [f64; 2],
 ) -> Result<Option<f64>> {
     let size = plan.crop_size();
-    let pass = if encoder > 0.0 { Pass::Training } else { Pass::Decoder };
+    let pass = match (encoder > 0.0, photographs.is_empty()) {
+        (false, _) => Pass::Decoder,
+        (true, true) => Pass::Training,
+        (true, false) => Pass::Batch,
+    };
+    let batches = batches.iter().map(|batch| (batch, pass, 1.0));
+    let photographs = photographs.iter().map(|(batch, share)| (batch, Pass::Training, *share));
     let mut gradients = Gradients::new(model, encoder > 0.0);
-    let mut losses: Vec<f64> = Vec::with_capacity(batches.len());
-    for batch in batches.iter().filter(|batch| batch.labels.iter().any(|l| *l != IGNORE)) {
+    let mut losses: Vec<f64> = Vec::new();
+    for (batch, pass, weight) in batches.chain(photographs) {
+        if batch.labels.iter().all(|l| *l == IGNORE) {
+            continue;
+        }
         let x = model.images(&batch.pixels, size);
         let y = labels(model, &batch.labels, batch.images, size);
-        let loss = loss::loss(plan.hyper.loss, &model.forward(&x, pass), &y, weights);
+        let loss = loss::loss(plan.hyper.loss, &model.forward(&x, pass), &y, weights) * weight;
         gradients.add(&loss);
         losses.push(f64::try_from(loss).map_err(|e| failed(&e))?);
     }

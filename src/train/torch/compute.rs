@@ -14,6 +14,8 @@ pub enum Pass {
     Training,
     /// The batch's in the decoder, the running ones in the encoder.
     Decoder,
+    /// The batch's; the running ones stay as they are.
+    Batch,
 }
 
 /// Computes what it walks over. In bf16 convolutions take rounded copies of their weights, which themselves stay in single
@@ -54,10 +56,11 @@ impl Operations for Compute<'_> {
             .map(|what| Some(&self.tensors[&format!("{name}.{what}")]));
         let training = match self.pass {
             Pass::Inference => false,
-            Pass::Training => true,
+            Pass::Training | Pass::Batch => true,
             Pass::Decoder => !is_encoder(name),
         };
-        x.batch_norm(gain, shift, mean, variance, training, 0.1, norm.epsilon, true)
+        let momentum = if self.pass == Pass::Batch { 0.0 } else { 0.1 };
+        x.batch_norm(gain, shift, mean, variance, training, momentum, norm.epsilon, true)
     }
 
     fn relu(&mut self, x: &Tensor) -> Tensor {

@@ -1,0 +1,123 @@
+//! Self-training of a trained network on photographs without labels, from files to files.
+
+use super::data::{Augment, Normalization, Photos, Selection};
+use super::deploy::pictures::Picture;
+use super::fit::class_weights::ClassWeights;
+use super::fit::hyper::NormalizationMode;
+use super::fit::{Adaptation, Callbacks, Hyperparameters, Plan};
+use super::net::Pretrained;
+use super::run::{self, Identity, ModelCard, Results, TrainedModel};
+use super::session::{self, Machine};
+use crate::{Error, Result};
+use std::path::Path;
+
+/// Decay of the average that labels the photographs, where the run had none.
+const EMA: f64 = 0.99;
+/// Side of the crops of a network whose plan is not there, pixels, at most.
+const CROP: (u32, u32) = (320, 256);
+
+/// A self-training as a user asks for it.
+pub struct Asked<'a> {
+    /// Folder of the run that it begins with.
+    pub run: &'a Path,
+    /// Images with labels; the training set of the run unless given.
+    pub sets: &'a [Selection],
+    /// Steps.
+    pub steps: u64,
+    /// Learning rate; a fifth of the run's unless given.
+    pub rate: Option<f64>,
+    /// Probability from which on a prediction is taken for a label, 0 to below 1.
+    pub confidence: f64,
+    /// Photographs that are used at most, evenly picked.
+    pub most: usize,
+    /// Seed.
+    pub seed: u64,
+    /// `f32` or `bf16`.
+    pub precision: &'a str,
+    /// Threads that compute.
+    pub threads: usize,
+}
+
+impl Asked<'_> {
+    /// The plan of the training, but for its photographs.
+    fn plan(&self, card: &ModelCard) -> Result<Plan> {
+        let path = self.run.join(run::PLAN);
+        let before = path.exists().then(|| run::read_json::<Identity>(&path)).transpose()?.map(|i| i.plan);
+        let crop = (CROP.0.min(card.input.width), CROP.1.min(card.input.height));
+        let hyper = before.as_ref().map_or_else(
+            || Hyperparameters { crop_size: Some(crop), augment: Augment::default(), ..Hyperparameters::default() },
+            |before| before.hyper.clone(),
+        );
+        let train = match (self.sets, &before) {
+            ([], Some(before)) => before.train.clone(),
+            ([], None) => {
+                return Err(Error::misuse("nothing here tells what this network was trained on")
+                    .in_file(self.run)
+                    .help("name labelled images with --set DIR: without them a network comes to believe itself"));
+            }
+            (sets, _) => sets.to_vec(),
+        };
+        let hyper = Hyperparameters {
+            steps: self.steps,
+            rate: self.rate.unwrap_or(0.2 * hyper.rate),
+            class_weights: ClassWeights::None,
+            calibrate: 0,
+            pretrained: Pretrained::None,
+            freeze: 0,
+            encoder_rate: if hyper.encoder_rate > 0.0 { hyper.encoder_rate } else { 1.0 },
+            ema: if hyper.ema > 0.0 { hyper.ema } else { EMA },
+            resize: card.resize.clone(),
+            normalization: match card.normalization {
+                Normalization::Band => NormalizationMode::Band,
+                Normalization::Image => NormalizationMode::Image,
+                Normalization::Fixed { .. } => NormalizationMode::Fixed,
+            },
+            ..hyper
+        };
+        Ok(Plan {
+            network: card.network,
+            classes: card.classes.clone(),
+            shape: card.input.clone(),
+            train,
+            val: Vec::new(),
+            seed: self.seed,
+            hyper,
+            precision: self.precision.into(),
+            threads: self.threads,
+            ..Plan::default()
+        })
+    }
+
+    /// Goes on with the training of the run on these photographs, into another folder; interrupted, the same call goes on.
+    pub fn adapt(
+        &self,
+        pictures: &[Picture],
+        machine: &Machine,
+        folder: &Path,
+        callbacks: &Callbacks<'_>,
+    ) -> Result<Results> {
+        if !(0.0..1.0).contains(&self.confidence) {
+            return Err(Error::misuse(format!("--confidence: {} is out of range", self.confidence))
+                .help("write a probability from 0 to below 1, such as 0.9"));
+        }
+        let TrainedModel { card, .. } = TrainedModel::open(self.run)?;
+        let plan = self.plan(&card)?;
+        let mut photos = Photos::new(&card.input.bands, (card.input.width, card.input.height), card.resize);
+        let used = pictures.len().min(self.most.max(1));
+        for picture in (0..used).map(|k| &pictures[k * pictures.len() / used]) {
+            let found = picture.read()?;
+            photos.add((found.width, found.height), &found.planes).map_err(|e| e.in_file(picture.photo.clone()))?;
+        }
+        if photos.is_empty() {
+            return Err(Error::misuse("there is no photograph to learn from"));
+        }
+        let adaptation = Adaptation {
+            photos: photos.len(),
+            photos_sha256: photos.checksum(),
+            confidence: self.confidence,
+            normalization: card.normalization,
+        };
+        let plan = Plan { adaptation: Some(adaptation), ..plan };
+        session::train(&plan, Some(self.run), Some(photos), machine, folder, callbacks)
+    }
+}

@@ -1,0 +1,170 @@
+//! Self-training: photographs without labels make a network better on them.
+//!
+//! Rationale: a network that comes to believe itself gets worse without a word, and one that reads the labels of what it is tested on is
+//! no result. Expected: on pictures in another light than those it was trained on, better overlap after self-training on others of that
+//! light; the same weights whatever labels lie beside them, stopped or not; one clear error for what cannot be begun. Source: the
+//! pictures' construction, and what `train adapt --help` says.
+
+use furrow::output::{Picture, write_png};
+use furrow::sampling::{Purpose, Stream};
+use furrow::train::measure::Report;
+use furrow::train::run;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+const SIZE: (u32, u32) = (64, 48);
+
+/// Colours of soil, large plants and small ones: a field in daylight, and the same under a warm lamp through haze.
+const DAY: [[u8; 3]; 3] = [[120, 95, 70], [70, 150, 50], [80, 150, 45]];
+const LAMP: [[u8; 3]; 3] = [[150, 135, 95], [112, 145, 72], [122, 148, 70]];
+
+/// A set of ground with large discs, the crop, and small ones, the weeds. Without labels every pixel is 255.
+fn set(folder: &Path, colors: [[u8; 3]; 3], first: u64, labelled: bool) -> PathBuf {
+    let (photos, masks, out) = (folder.join("images"), folder.join("masks"), folder.join("set"));
+    let (w, h) = SIZE;
+    for k in first..first + 8 {
+        let mut stream = Stream::of(6, k, Purpose::Test, 0);
+        let mut draw = |radius: f32| (stream.range32(0.0, w as f32), stream.range32(0.0, h as f32), radius);
+        let discs = [draw(11.0), draw(9.0), draw(3.0), draw(2.5), draw(3.0)];
+        let class = |x: u32, y: u32| {
+            let inside = |(cx, cy, r): &(f32, f32, f32)| (x as f32 - cx).hypot(y as f32 - cy) < *r;
+            discs.iter().find(|d| inside(d)).map_or(0, |d| if d.2 > 5.0 { 1 } else { 2 })
+        };
+        let labels: Vec<u8> = (0..w * h).map(|i| class(i % w, i / w)).collect();
+        let mut noise = |v: u8| (f32::from(v) + stream.range32(-12.0, 12.0)) as u8;
+        let rgb: Vec<[u8; 3]> = labels.iter().map(|c| colors[usize::from(*c)].map(&mut noise)).collect();
+        let name = format!("{k:03}.png");
+        write_png(&photos.join(&name), w, h, &Picture::Rgb(&rgb), "").unwrap();
+        let labels = if labelled { labels } else { vec![255; labels.len()] };
+        write_png(&masks.join(&name), w, h, &Picture::Gray(&labels), "").unwrap();
+    }
+    let import = ["dataset", "import", "--format", "masks"].map(Into::into);
+    let named = [("--images", &photos), ("--masks", &masks), ("--out", &out)];
+    let named = named.iter().flat_map(|(flag, path)| [flag.into(), path.as_os_str().to_owned()]);
+    let made = Command::new(env!("CARGO_BIN_EXE_trace")).args(import.into_iter().chain(named)).output().unwrap();
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    out
+}
+
+fn train(arguments: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_train"));
+    command.args(arguments.split_whitespace()).args(["--threads", "1", "--precision", "f32"]).stdin(Stdio::null());
+    command
+}
+
+fn succeed(arguments: &str) {
+    let output = train(arguments).output().unwrap();
+    assert!(output.status.success(), "{arguments}: {}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// A network trained on eight images of the first light, in a folder.
+fn trained(folder: &Path) -> PathBuf {
+    let (set, out) = (set(&folder.join("day"), DAY, 0, true), folder.join("run"));
+    let how = "--network unet --size 64x48 --steps 80 --rate 0.003 --augment flip,crop --normalization image";
+    succeed(&format!("fit --set {}@all --out {} {how} --batch 4", set.display(), out.display()));
+    out
+}
+
+/// Mean I/U of the classes.
+fn score(run: &Path, set: &Path) -> f64 {
+    succeed(&format!("eval {} --set {}@all", run.display(), set.display()));
+    let report: Report = run::read_json(&run.join("eval/set/report.json")).unwrap();
+    report.scores.mean_iou.unwrap()
+}
+
+fn weights(run: &Path) -> Vec<u8> {
+    fs::read(run.join(run::WEIGHTS)).unwrap()
+}
+
+#[test]
+fn photographs_without_labels_make_a_network_better_on_others_like_them() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path();
+    let run = trained(folder);
+    let photos = set(&folder.join("photos"), LAMP, 100, false);
+    let labelled = set(&folder.join("labelled"), LAMP, 100, true);
+    let test = set(&folder.join("test"), LAMP, 200, true);
+    let before = score(&run, &test);
+    let adapt = |from: &str, out: &Path| {
+        format!("adapt {} --images {from} --out {} --steps 60 --confidence 0.7", run.display(), out.display())
+    };
+    let adapted = folder.join("adapted");
+    let images = photos.display().to_string();
+    succeed(&adapt(&images, &adapted));
+    let after = score(&adapted, &test);
+    assert!(after > before + 0.05, "{before:.3} before, {after:.3} after");
+
+    // Labels that lie beside the photographs are not read; neither does it matter where these are.
+    let (with_labels, of_folder) = (folder.join("with-labels"), folder.join("of-folder"));
+    succeed(&adapt(&labelled.display().to_string(), &with_labels));
+    assert_eq!(weights(&with_labels), weights(&adapted));
+    succeed(&adapt(&folder.join("photos/images").display().to_string(), &of_folder));
+    assert_eq!(weights(&of_folder), weights(&adapted));
+
+    // Stopped, the same command goes on and ends the same.
+    let stopped = folder.join("stopped");
+    let mut stops = 0;
+    for pause in [400, 900, 1500] {
+        let mut child = train(&adapt(&images, &stopped)).stderr(Stdio::null()).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(pause));
+        let _ = Command::new("sh").arg("-c").arg(format!("kill -TERM {}", child.id())).status();
+        stops += usize::from(!child.wait().unwrap().success());
+    }
+    assert!(stops > 0, "it was always done before it was stopped");
+    succeed(&adapt(&images, &stopped));
+    assert_eq!(weights(&stopped), weights(&adapted));
+
+    // The report and the plan say what it was.
+    let page = fs::read_to_string(adapted.join("report.html")).unwrap();
+    assert!(page.contains("8 photographs without labels"), "the report does not tell of photographs");
+    let plan = fs::read_to_string(adapted.join(run::PLAN)).unwrap();
+    assert!(plan.contains("photos_sha256"), "{plan}");
+
+    // Another folder of photographs is another training.
+    let others = set(&folder.join("others"), LAMP, 300, false);
+    let refused = refuse(&adapt(&others.display().to_string(), &adapted));
+    assert!(refused.contains("another training lies in this folder"), "{refused}");
+}
+
+fn refuse(arguments: &str) -> String {
+    let output = train(arguments).output().unwrap();
+    let words = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{words}");
+    words
+}
+
+#[test]
+fn what_cannot_be_adapted_is_told() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path();
+    let run = trained(folder);
+    let (run_name, images) = (run.display(), folder.join("day/images"));
+    let out = folder.join("out");
+    let adapt = |more: &str| refuse(&format!("adapt {run_name} --out {} {more}", out.display()));
+    let images = images.display();
+    for (more, words) in [
+        (format!("--images {images} --confidence 1"), "--confidence"),
+        (format!("--images {images} --confidence nan"), "--confidence"),
+        (format!("--images {images} --rate 0"), "rate"),
+        (format!("--images {images} --steps 0"), "--steps"),
+        (format!("--images {}/none", folder.display()), "none"),
+        (format!("--images {}", run.display()), "no picture"),
+    ] {
+        let said = adapt(&more);
+        assert!(said.contains(words), "{more}: {said}");
+        assert!(!out.exists(), "{more} has left a folder");
+    }
+    // Weights alone, without a plan: what they were trained on must be named.
+    let alone = folder.join("alone");
+    fs::create_dir(&alone).unwrap();
+    for file in [run::WEIGHTS, run::MODEL] {
+        fs::copy(run.join(file), alone.join(file)).unwrap();
+    }
+    let said = refuse(&format!("adapt {} --images {images} --out {}", alone.display(), out.display()));
+    assert!(said.contains("--set DIR"), "{said}");
+    let set = folder.join("day/set");
+    let (alone, set, out) = (alone.display(), set.display(), out.display());
+    succeed(&format!("adapt {alone} --images {images} --set {set}@all --out {out} --steps 2"));
+}
