@@ -87,33 +87,36 @@ fn photographs_without_labels_make_a_network_better_on_others_like_them() {
     let labelled = set(&folder.join("labelled"), LAMP, 100, true);
     let test = set(&folder.join("test"), LAMP, 200, true);
     let before = score(&run, &test);
-    let adapt = |from: &str, out: &Path| {
-        format!("adapt {} --images {from} --out {} --steps 60 --confidence 0.7", run.display(), out.display())
+    let adapt = |from: &str, out: &Path, steps: u64| {
+        format!("adapt {} --images {from} --out {} --steps {steps}", run.display(), out.display())
     };
     let adapted = folder.join("adapted");
     let images = photos.display().to_string();
-    succeed(&adapt(&images, &adapted));
+    succeed(&adapt(&images, &adapted, 40));
     let after = score(&adapted, &test);
     assert!(after > before + 0.05, "{before:.3} before, {after:.3} after");
 
     // Labels that lie beside the photographs are not read; neither does it matter where these are.
-    let (with_labels, of_folder) = (folder.join("with-labels"), folder.join("of-folder"));
-    succeed(&adapt(&labelled.display().to_string(), &with_labels));
-    assert_eq!(weights(&with_labels), weights(&adapted));
-    succeed(&adapt(&folder.join("photos/images").display().to_string(), &of_folder));
-    assert_eq!(weights(&of_folder), weights(&adapted));
+    let sources = [images.clone(), labelled.display().to_string(), folder.join("photos/images").display().to_string()];
+    let few = sources.iter().enumerate().map(|(k, from)| {
+        let out = folder.join(format!("few-{k}"));
+        succeed(&adapt(from, &out, 3));
+        weights(&out)
+    });
+    let few: Vec<Vec<u8>> = few.collect();
+    assert!(few.iter().all(|bytes| *bytes == few[0]), "labels or folders were looked at");
 
     // Stopped, the same command goes on and ends the same.
     let stopped = folder.join("stopped");
     let mut stops = 0;
     for pause in [400, 900, 1500] {
-        let mut child = train(&adapt(&images, &stopped)).stderr(Stdio::null()).spawn().unwrap();
+        let mut child = train(&adapt(&images, &stopped, 40)).stderr(Stdio::null()).spawn().unwrap();
         std::thread::sleep(Duration::from_millis(pause));
         let _ = Command::new("sh").arg("-c").arg(format!("kill -TERM {}", child.id())).status();
         stops += usize::from(!child.wait().unwrap().success());
     }
     assert!(stops > 0, "it was always done before it was stopped");
-    succeed(&adapt(&images, &stopped));
+    succeed(&adapt(&images, &stopped, 40));
     assert_eq!(weights(&stopped), weights(&adapted));
 
     // The report and the plan say what it was.
@@ -124,7 +127,7 @@ fn photographs_without_labels_make_a_network_better_on_others_like_them() {
 
     // Another folder of photographs is another training.
     let others = set(&folder.join("others"), LAMP, 300, false);
-    let refused = refuse(&adapt(&others.display().to_string(), &adapted));
+    let refused = refuse(&adapt(&others.display().to_string(), &adapted, 40));
     assert!(refused.contains("another training lies in this folder"), "{refused}");
 }
 
@@ -145,8 +148,8 @@ fn what_cannot_be_adapted_is_told() {
     let adapt = |more: &str| refuse(&format!("adapt {run_name} --out {} {more}", out.display()));
     let images = images.display();
     for (more, words) in [
-        (format!("--images {images} --confidence 1"), "--confidence"),
-        (format!("--images {images} --confidence nan"), "--confidence"),
+        (format!("--images {images} --keep 1.1"), "--keep"),
+        (format!("--images {images} --keep nan"), "--keep"),
         (format!("--images {images} --rate 0"), "rate"),
         (format!("--images {images} --steps 0"), "--steps"),
         (format!("--images {}/none", folder.display()), "none"),

@@ -26,8 +26,8 @@ pub struct Asked<'a> {
     pub steps: u64,
     /// Learning rate; a fifth of the run's unless given.
     pub rate: Option<f64>,
-    /// Probability from which on a prediction is taken for a label, 0 to below 1.
-    pub confidence: f64,
+    /// Share of the predicted pixels of each class that are taken for labels, the surest first; above 0, at most 1.
+    pub keep: f64,
     /// Photographs that are used at most, evenly picked.
     pub most: usize,
     /// Seed.
@@ -96,9 +96,9 @@ impl Asked<'_> {
         folder: &Path,
         callbacks: &Callbacks<'_>,
     ) -> Result<Results> {
-        if !(0.0..1.0).contains(&self.confidence) {
-            return Err(Error::misuse(format!("--confidence: {} is out of range", self.confidence))
-                .help("write a probability from 0 to below 1, such as 0.9"));
+        if !(self.keep > 0.0 && self.keep <= 1.0) {
+            return Err(Error::misuse(format!("--keep: {} is out of range", self.keep))
+                .help("write a share above 0 and at most 1, such as 0.5"));
         }
         let TrainedModel { card, .. } = TrainedModel::open(self.run)?;
         let plan = self.plan(&card)?;
@@ -114,7 +114,7 @@ impl Asked<'_> {
         let adaptation = Adaptation {
             photos: photos.len(),
             photos_sha256: photos.checksum(),
-            confidence: self.confidence,
+            keep: self.keep,
             normalization: card.normalization,
         };
         let plan = Plan { adaptation: Some(adaptation), ..plan };

@@ -32,9 +32,9 @@ pub(crate) struct Args {
     /// Learning rate at the start; a fifth of the run's unless given.
     #[arg(long, value_name = "RATE")]
     rate: Option<f64>,
-    /// Probability from which on a prediction is taken for a label, 0 to below 1.
-    #[arg(long, value_name = "SHARE", default_value_t = 0.9)]
-    confidence: f64,
+    /// Share of the predicted pixels of each class that are taken for labels, the surest first: above 0, at most 1.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.5)]
+    keep: f64,
     /// Photographs that are used at most, evenly picked.
     #[arg(long, value_name = "N", default_value_t = 400, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     most: u32,
@@ -59,7 +59,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         sets: &args.sets,
         steps: args.steps,
         rate: args.rate,
-        confidence: args.confidence,
+        keep: args.keep,
         most: args.most as usize,
         seed: args.seed,
         precision: precision.map_err(Error::input)?.name(),

@@ -197,9 +197,10 @@ fn facts(plan: &Plan, results: &Results) -> Vec<(String, String)> {
         fact("seed", plan.seed.to_string()),
         fact("result", in_words(results)),
     ];
-    if let Some(Adaptation { photos, confidence, .. }) = plan.adaptation {
-        let words =
-            format!("{photos} photographs without labels, predictions of at least {confidence} taken for labels");
+    if let Some(Adaptation { photos, keep, .. }) = plan.adaptation {
+        let words = format!(
+            "{photos} photographs without labels, the surest {keep} of the pixels of each class taken for labels"
+        );
         facts.insert(2, fact("self-training", words));
     }
     facts

@@ -1,8 +1,9 @@
 //! Self-training: a trained network goes on learning from photographs without labels.
 //!
 //! What an average of the network says of a photograph is learnt as its labels by the network itself, which sees the same crop in other
-//! light. The average is that of [`super::ema`] ("mean teacher", Tarvainen & Valpola 2017). Labels less probable than the confidence are
-//! left out ("FixMatch", Sohn et al. 2020). Over each photograph plants of a rendered image are pasted with their exact labels ("DACS",
+//! light ("FixMatch", Sohn et al. 2020). The average is that of [`super::ema`] ("mean teacher", Tarvainen & Valpola 2017). Of each class
+//! the surest share of its pixels is taken ("class-balanced self-training", Zou et al. 2018): with one probability for all, soil, which is
+//! sure, drives out plants, which are not. Over each photograph plants of a rendered image are pasted with their exact labels ("DACS",
 //! Tranheden et al. 2021). The loss of such a batch counts as much as its share of labelled pixels, beside that of a rendered batch, which
 //! keeps the network from believing itself.
 //!
@@ -26,10 +27,43 @@ pub(super) fn batch(
     plan: &Plan,
     number: u64,
 ) -> Result<(Batch, f64)> {
-    let labels = teacher.confident(&views.plain, plan.crop_size(), adaptation.confidence, IGNORE)?;
+    let (mut labels, sure) = teacher.predict_with_probability(&views.plain, plan.crop_size())?;
+    keep_surest(&mut labels, &sure, adaptation.keep);
     let mut photos = Batch { images: rendered.images, pixels: views.changed, labels };
     paste(rendered, &mut photos, &mut Stream::of(plan.seed, number, Purpose::Training, 4));
     let labelled = photos.labels.iter().filter(|label| **label != IGNORE).count();
     let share = labelled as f64 / photos.labels.len().max(1) as f64;
     Ok((photos, share))
+}
+
+/// Takes the label of all but the surest share of the pixels of each class.
+fn keep_surest(labels: &mut [u8], sure: &[f32], keep: f64) {
+    for class in 0..IGNORE {
+        let mut places: Vec<usize> = (0..labels.len()).filter(|at| labels[*at] == class).collect();
+        if places.is_empty() {
+            continue;
+        }
+        let kept = ((keep * places.len() as f64).round() as usize).min(places.len());
+        if kept < places.len() {
+            places.select_nth_unstable_by(kept, |a, b| sure[*b].total_cmp(&sure[*a]).then(a.cmp(b)));
+        }
+        places[kept..].iter().for_each(|at| labels[*at] = IGNORE);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rationale: with one probability for all classes, one that is sure drives out one that is not. Expected: half of the pixels of each,
+    /// the surest; equal ones in their order. Source: the rule.
+    #[test]
+    fn each_class_keeps_the_same_share_of_its_pixels() {
+        let mut labels = vec![0, 0, 0, 0, 1, 1, 2, 2, 2, 2];
+        keep_surest(&mut labels, &[0.9, 0.99, 0.97, 0.98, 0.4, 0.5, 0.6, 0.6, 0.6, 0.6], 0.5);
+        assert_eq!(labels, [IGNORE, 0, IGNORE, 0, IGNORE, 1, 2, 2, IGNORE, IGNORE]);
+        let mut all = vec![0, 1, 1];
+        keep_surest(&mut all, &[0.1, 0.2, 0.3], 1.0);
+        assert_eq!(all, [0, 1, 1]);
+    }
 }

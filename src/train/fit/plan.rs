@@ -45,8 +45,8 @@ pub struct Adaptation {
     pub photos: usize,
     /// Checksum of their pixels.
     pub photos_sha256: String,
-    /// Probability from which on a prediction is taken for a label, 0 to below 1.
-    pub confidence: f64,
+    /// Share of the predicted pixels of each class that are taken for labels, the surest first; above 0, at most 1.
+    pub keep: f64,
     /// Input normalization of the network.
     pub normalization: Normalization,
 }

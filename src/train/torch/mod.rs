@@ -112,13 +112,11 @@ impl Model {
         }))
     }
 
-    /// The class of each pixel as in [`Self::predict`], where its probability is at least `confidence`; `otherwise` elsewhere.
-    pub fn confident(&self, pixels: &[f32], size: (u32, u32), confidence: f64, otherwise: u8) -> Result<Vec<u8>> {
+    /// The class of each pixel as in [`Self::predict`], and its probability.
+    pub fn predict_with_probability(&self, pixels: &[f32], size: (u32, u32)) -> Result<(Vec<u8>, Vec<f32>)> {
         let scores = tch::no_grad(|| self.forward(&self.images(pixels, size), Pass::Inference));
         let (highest, _) = scores.softmax(1, Kind::Float).max_dim(1, false);
-        let sure = values(&highest)?;
-        let known = |(class, sure): (u8, f32)| if f64::from(sure) >= confidence { class } else { otherwise };
-        Ok(classes(&scores)?.into_iter().zip(sure).map(known).collect())
+        Ok((classes(&scores)?, values(&highest)?))
     }
 
     /// Has gradients change nothing any more: only so can its values become constants of a graph.
