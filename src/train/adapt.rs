@@ -74,6 +74,8 @@ impl Asked<'_> {
             },
             ..hyper
         };
+        // Before any photograph is read.
+        hyper.check(&card.input).map_err(|invalid| invalid.of_flag())?;
         Ok(Plan {
             network: card.network,
             classes: card.classes.clone(),

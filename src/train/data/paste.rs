@@ -14,7 +14,11 @@ pub fn paste(from: &Batch, onto: &mut Batch, stream: &mut Stream) {
     for image in 0..from.images {
         let of = image * area..(image + 1) * area;
         let labels = &from.labels[of.clone()];
-        let held: Vec<u8> = (1..IGNORE).filter(|class| labels.contains(class)).collect();
+        let mut there = [false; 256];
+        for label in labels {
+            there[usize::from(*label)] = true;
+        }
+        let held: Vec<u8> = (1..IGNORE).filter(|class| there[usize::from(*class)]).collect();
         let all = stream.chance(0.5);
         let Some(one) = (!held.is_empty()).then(|| held[stream.index(held.len())]) else { continue };
         for at in of.filter(|at| held.contains(&from.labels[*at]) && (all || from.labels[*at] == one)) {

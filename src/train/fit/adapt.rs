@@ -16,6 +16,7 @@ use crate::dataset::sample::IGNORE;
 use crate::sampling::{Purpose, Stream};
 use crate::train::data::{Batch, Views, paste};
 use crate::train::torch::Model;
+use std::collections::BTreeMap;
 
 /// A batch of photographs with the labels that `teacher` gives them and with plants of a rendered batch, and its share of labelled pixels.
 /// `number` is the batch's among all of the training.
@@ -38,11 +39,11 @@ pub(super) fn batch(
 
 /// Takes the label of all but the surest share of the pixels of each class.
 fn keep_surest(labels: &mut [u8], sure: &[f32], keep: f64) {
-    for class in 0..IGNORE {
-        let mut places: Vec<usize> = (0..labels.len()).filter(|at| labels[*at] == class).collect();
-        if places.is_empty() {
-            continue;
-        }
+    let mut classes: BTreeMap<u8, Vec<usize>> = BTreeMap::new();
+    for (at, class) in labels.iter().enumerate() {
+        classes.entry(*class).or_default().push(at);
+    }
+    for mut places in classes.into_values() {
         let kept = ((keep * places.len() as f64).round() as usize).min(places.len());
         if kept < places.len() {
             places.select_nth_unstable_by(kept, |a, b| sure[*b].total_cmp(&sure[*a]).then(a.cmp(b)));
