@@ -108,7 +108,7 @@ pub(super) fn locate(text: &str, error: &SpannedError) -> Fault {
         | Ron::ExpectedMapEnd
         | Ron::ExpectedStructLikeEnd => {
             if behind.starts_with('.') {
-                let from = text[..start].rfind(|c: char| !c.is_ascii_digit()).map_or(0, |i| i + 1);
+                let from = text[..start].trim_end_matches(|c: char| c.is_ascii_digit()).len();
                 let at = from..token(text, start).end;
                 return fault(at, "a whole number belongs here".into(), "write it without a point".into());
             }

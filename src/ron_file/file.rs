@@ -276,7 +276,7 @@ fn unopened(text: &str, error: &SpannedError) -> Option<Fault> {
         return None;
     }
     let before = text[..offset_of(text, error.span.start.line, error.span.start.col)].trim_end();
-    let name = &before[before.rfind(|c: char| !c.is_alphanumeric() && c != '_').map_or(0, |i| i + 1)..];
+    let name = before.rsplit(|c: char| !c.is_alphanumeric() && c != '_').next().unwrap_or(before);
     name.starts_with(char::is_uppercase).then(|| Fault {
         raw_len: text.len(),
         start: before.len() - name.len(),
@@ -296,7 +296,7 @@ fn decimal_comma(text: &str, fault: &Fault) -> Option<String> {
     let digit = |c: char| c.is_ascii_digit();
     let (whole, part) = match (before.strip_suffix(','), after.strip_prefix(',')) {
         (_, Some(rest)) if rest.starts_with(digit) => (at, &rest[..rest.find(|c| !digit(c)).unwrap_or(rest.len())]),
-        (Some(rest), _) if rest.ends_with(digit) => (&rest[rest.rfind(|c| !digit(c)).map_or(0, |i| i + 1)..], at),
+        (Some(rest), _) if rest.ends_with(digit) => (rest.rsplit(|c| !digit(c)).next().unwrap_or(rest), at),
         _ => return None,
     };
     Some(format!("decimals are written with a point: {whole}.{part}"))
@@ -345,6 +345,14 @@ mod tests {
         let m = message("Sun(elevation_deg: Unifrom(1, 2), azimuth_deg: 1)");
         assert!(m.contains("page.ron:1:20") && m.contains("did you mean `Uniform`"), "{m}");
     }
+
+    #[test]
+    fn characters_of_several_bytes_stand_before_what_is_wrong() {
+        for text in ["//\u{fffd}", "é", "Ｆé", "(a: é0,5)", "Sun(elevation_deg: é,5)", "Sun(azimuth_deg: é3.5.5)", "éSun"] {
+            assert!(message(text).contains("page.ron:1:"), "{text}");
+        }
+    }
+
     #[test]
     fn a_quoted_text_is_shown_where_it_counts_not_in_a_comment() {
         let file =
