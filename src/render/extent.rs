@@ -173,8 +173,8 @@ fn image_of(mesh: &Mesh, camera: &Camera) -> Area {
         vec3(end(0), end(1), end(2))
     };
     let halves = FACES.iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
-    let boxes = halves.filter_map(|half| camera.triangle_bounds(half.map(|k| corner(*k))));
-    boxes.map(Area::within).fold(Area::default(), Area::join)
+    let outlines = halves.filter_map(|half| camera.triangle_outline(half.map(|k| corner(*k))));
+    outlines.map(|outline| Area::within(outline.bounds)).fold(Area::default(), Area::join)
 }
 
 /// A leaf with its stalk, or what is no leaf of a plant.
@@ -202,8 +202,12 @@ impl Thing {
         for part in &self.parts {
             let mesh = &scene.parts[*part as usize].mesh;
             for triangle in 0..mesh.triangles.len() as u32 {
-                let Some(bounds) = scene.camera.triangle_bounds(mesh.corners(triangle)) else { continue };
-                mask.fill(Area::within(bounds).meet(self.area), |x, y| {
+                let Some(outline) = scene.camera.triangle_outline(mesh.corners(triangle)) else { continue };
+                mask.fill(Area::within(outline.bounds).meet(self.area), |x, y| {
+                    // Of most pixels in a small triangle's box its edges tell that it is not there, for less than a ray costs.
+                    if !outline.may_hold([f64::from(x) + 0.5, f64::from(y) + 0.5]) {
+                        return false;
+                    }
                     let ray = scene.camera.ray_beyond(x, y);
                     ray.is_some_and(|(o, d)| brute.triangle(&Ray::new(o, d), *part, triangle).is_some())
                 });

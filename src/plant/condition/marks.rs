@@ -33,6 +33,9 @@ const SPECK_MM: f32 = 2.4;
 /// How much an outline strays from its ellipse.
 const RAGGED: f32 = 0.25;
 
+/// Square of the distance from a patch's middle, over its radius, beyond which nothing is told apart.
+const FAR_SQUARED: f32 = 6.0;
+
 /// A leaf as its marks need to know it.
 #[derive(Clone, Copy, Debug)]
 pub struct Bearer<'a> {
@@ -70,10 +73,15 @@ impl Patch {
         Self { centre, radius, turn, stretch, phase: vec2(s.range32(0.0, 99.0), s.range32(0.0, 99.0)) }
     }
 
+    /// Farther than this from its middle, mm, it is not.
+    fn reach(&self) -> f32 {
+        FAR_SQUARED.sqrt() * self.radius * 1.001
+    }
+
     /// Distance from its middle, 1 on its outline; more than 1.6 is not told apart.
     fn at(&self, p: Vec2, noise: &Perlin) -> f32 {
         let q = (p - self.centre) / self.radius;
-        if q.length_squared() > 6.0 {
+        if q.length_squared() > FAR_SQUARED {
             return f32::MAX;
         }
         let q = vec2(q.dot(self.turn) / self.stretch, q.perp_dot(self.turn) * self.stretch);
@@ -93,6 +101,11 @@ struct Tear {
 }
 
 impl Tear {
+    /// Farther than this from where it begins, mm, it is not; strays are less than a millimetre.
+    fn reach(&self) -> f32 {
+        self.length + self.width + 1.0
+    }
+
     fn holds(&self, p: Vec2, noise: &Perlin) -> bool {
         let q = p - self.from;
         let s = q.dot(self.along) / self.length;
@@ -221,20 +234,25 @@ impl Marks {
         vec2(uv.x - 0.5, 1.0 - uv.y) * self.image_mm
     }
 
+    /// The box of uv about a place of the leaf.
+    fn about(&self, centre: Vec2, reach: f32) -> [Vec2; 2] {
+        let (lo, hi) = ((centre - reach) / self.image_mm, (centre + reach) / self.image_mm);
+        [vec2(lo.x + 0.5, 1.0 - hi.y), vec2(hi.x + 0.5, 1.0 - lo.y)]
+    }
+
     /// What is left of a mask; of a leaf without one, a mask of its own.
     pub fn cut(&self, mask: Option<&AlphaMask>) -> AlphaMask {
         let noise = Perlin::new(self.seed);
-        let gone = |uv: Vec2| {
-            let p = self.place(uv);
-            self.holes.iter().any(|h| h.at(p, &noise) < 1.0) || self.tears.iter().any(|t| t.holds(p, &noise))
-        };
-        let left = if let Some(mask) = mask {
-            mask.without(gone)
-        } else {
-            // As fine as a drawn texture: about 6 texels a mm.
-            let texels = |mm: f32| ((mm * 6.0) as u32).clamp(64, 1024);
-            AlphaMask::new(texels(self.image_mm.x), texels(self.image_mm.y), |_, _| true).without(gone)
-        };
+        // As fine as a drawn texture: about 6 texels a mm.
+        let texels = |mm: f32| ((mm * 6.0) as u32).clamp(64, 1024);
+        let whole = || AlphaMask::new(texels(self.image_mm.x), texels(self.image_mm.y), |_, _| true);
+        let mut left = mask.cloned().unwrap_or_else(whole);
+        for hole in &self.holes {
+            left.cut(self.about(hole.centre, hole.reach()), |uv| hole.at(self.place(uv), &noise) < 1.0);
+        }
+        for tear in &self.tears {
+            left.cut(self.about(tear.from, tear.reach()), |uv| tear.holds(self.place(uv), &noise));
+        }
         // Holes seldom cut anything off; bites and tears may.
         if self.bites > 0 || !self.tears.is_empty() { left.hanging() } else { left }
     }

@@ -6,6 +6,58 @@ use crate::math::Vec3;
 /// Continuous pixel coordinates of a box: its least and its greatest corner.
 pub type PixelBox = [[f64; 2]; 2];
 
+/// What the rounding of rays to single precision may move, in pixels, and more.
+const ROUNDING_PX: f64 = 0.01;
+
+/// Beyond so many pixels from the image's corner, edges are not told apart from each other.
+const FAR_PX: f64 = 1e5;
+
+/// Where a triangle appears: a box about it and, where they are straight to a known margin, its edges.
+#[derive(Clone, Copy, Debug)]
+pub struct Outline {
+    /// Holds every pixel coordinate, in the image or beyond it, at which something of the triangle appears, and little more.
+    pub bounds: PixelBox,
+    /// Of each edge a, b and c: nothing of the triangle appears where a x + b y > c.
+    edges: Option<[[f64; 3]; 3]>,
+}
+
+impl Outline {
+    /// Of corners in pixels and the most by which what appears leaves their triangle.
+    fn new(corners: [[f64; 2]; 3], margin: [f64; 2], straight: bool) -> Self {
+        let mut bounds = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
+        for axis in 0..2 {
+            for px in corners {
+                bounds[0][axis] = bounds[0][axis].min(px[axis] - margin[axis]);
+                bounds[1][axis] = bounds[1][axis].max(px[axis] + margin[axis]);
+            }
+        }
+        let [a, b, c] = corners;
+        let twice_area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+        let near = bounds.as_flattened().iter().all(|v| v.abs() < FAR_PX);
+        let slack = ROUNDING_PX + margin[0].max(margin[1]);
+        let edge = |i: usize| {
+            let ([x, y], [to_x, to_y]) = (corners[i], corners[(i + 1) % 3]);
+            let (dx, dy) = (to_x - x, to_y - y);
+            let outward = twice_area.signum() / dx.hypot(dy);
+            let normal = [outward * dy, -outward * dx];
+            [normal[0], normal[1], normal[0] * x + normal[1] * y + slack]
+        };
+        let edges = (straight && near && twice_area.abs() > 1e-6).then(|| [0, 1, 2].map(edge));
+        Self { bounds, edges }
+    }
+
+    /// A box whose insides are not known.
+    fn boxed(bounds: PixelBox) -> Self {
+        Self { bounds, edges: None }
+    }
+
+    /// False only where nothing of the triangle appears at this pixel coordinate.
+    #[inline]
+    pub fn may_hold(&self, [x, y]: [f64; 2]) -> bool {
+        self.edges.as_ref().is_none_or(|edges| edges.iter().all(|[a, b, c]| a * x + b * y <= *c))
+    }
+}
+
 impl Camera {
     /// [`Camera::centre_ray`] of a pixel that may lie outside the image, as if the sensor went on; `None` where the lens is not
     /// known to be one to one: beyond the image's corners by more than a tenth of their distance from the axis, if it distorts.
@@ -23,11 +75,10 @@ impl Camera {
         Some(self.through(at, px[1]))
     }
 
-    /// A box that holds every pixel coordinate, in the image or beyond it, at which something of the triangle appears, and
-    /// little more; `None` for a triangle behind the lens. Unbounded for one that reaches behind it.
-    pub fn triangle_bounds(&self, corners: [Vec3; 3]) -> Option<PixelBox> {
+    /// Where the triangle appears, in the image or beyond it; `None` for one behind the lens. Unbounded for one that reaches behind it.
+    pub fn triangle_outline(&self, corners: [Vec3; 3]) -> Option<Outline> {
         let seen = corners.map(|p| self.pose.point_to_camera(p));
-        if self.rolls() { self.rolling_bounds(seen) } else { self.still_bounds(seen, 0.0) }
+        if self.rolls() { self.rolling_bounds(seen).map(Outline::boxed) } else { self.still_outline(seen, 0.0) }
     }
 
     /// The same of corners in the camera's frame, where rows see from different places. What a row may see lies between what the first
@@ -44,7 +95,7 @@ impl Camera {
                 (a[0] - b[0]).hypot(a[1] - b[1])
             };
             let way = (0..3).map(moved).fold(0.0, f64::max);
-            let [first, last] = seen.map(|seen| self.still_bounds(seen, way));
+            let [first, last] = seen.map(|seen| self.still_outline(seen, way).map(|outline| outline.bounds));
             let (first, last) = match (first, last) {
                 (None, None) => return None,
                 (Some(first), Some(last)) => (first, last),
@@ -62,39 +113,36 @@ impl Camera {
         Some(bounds)
     }
 
-    /// The bounds of corners in the camera's frame of a camera at rest, and of all that lies between them and such a triangle `way` from it
+    /// The outline of corners in the camera's frame of a camera at rest, and of all that lies between them and such a triangle `way` from it
     /// on the plane at unit distance.
-    fn still_bounds(&self, seen: [[f64; 3]; 3], way: f64) -> Option<PixelBox> {
+    fn still_outline(&self, seen: [[f64; 3]; 3], way: f64) -> Option<Outline> {
         if seen.iter().all(|p| p[2] <= 0.0) {
             return None;
         }
         if seen.iter().any(|p| p[2] <= 0.0) {
-            return Some([[f64::NEG_INFINITY; 2], [f64::INFINITY; 2]]);
+            return Some(Outline::boxed([[f64::NEG_INFINITY; 2], [f64::INFINITY; 2]]));
         }
         let plane = seen.map(|[x, y, z]| [x / z, y / z]);
-        let (image, margin) = if self.distortion.is_none() { (plane, 0.0) } else { self.distorted_bounds(plane, way) };
-        let mut bounds = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
-        for axis in 0..2 {
-            for at in image {
-                let px = at[axis] * self.focal[axis] + self.centre[axis];
-                bounds[0][axis] = bounds[0][axis].min(px - margin * self.focal[axis]);
-                bounds[1][axis] = bounds[1][axis].max(px + margin * self.focal[axis]);
-            }
+        let beyond = plane.iter().any(|[x, y]| x * x + y * y > self.horizon);
+        // What lies past the horizon as a whole appears nowhere.
+        if beyond && way == 0.0 && distance_from_axis(plane).powi(2) > self.horizon * 1.0001 {
+            return None;
         }
-        Some(bounds)
+        let (image, margin) = if self.distortion.is_none() { (plane, 0.0) } else { self.distorted_bounds(plane, way, beyond) };
+        let pixels = image.map(|at| [0, 1].map(|axis| at[axis] * self.focal[axis] + self.centre[axis]));
+        Some(Outline::new(pixels, self.focal.map(|focal| margin * focal), way == 0.0 && !beyond))
     }
 
     /// Points of the distorted image plane and a margin about them that together bound a triangle of the pinhole's plane.
     ///
     /// A straight line between points at distance d leaves its chord by at most d²/8 times the lens's curvature. Where the
     /// triangle reaches past the horizon, nothing is farther from a corner's nearest point within than the lens's slope times d.
-    fn distorted_bounds(&self, corners: [[f64; 2]; 3], way: f64) -> ([[f64; 2]; 3], f64) {
+    fn distorted_bounds(&self, corners: [[f64; 2]; 3], way: f64, beyond: bool) -> ([[f64; 2]; 3], f64) {
         let radius = self.horizon.sqrt();
         let size = (0..3)
             .map(|i| (corners[i], corners[(i + 1) % 3]))
             .map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]))
             .fold(0.0, f64::max);
-        let beyond = corners.iter().any(|[x, y]| x * x + y * y > self.horizon);
         let image = corners.map(|[x, y]| {
             let inward = (radius / x.hypot(y).max(f64::MIN_POSITIVE)).min(1.0);
             self.distortion.distort([x * inward, y * inward])
@@ -106,6 +154,21 @@ impl Camera {
         };
         (image, margin)
     }
+}
+
+/// Least distance of a triangle's points from the origin; 0 where that lies within.
+fn distance_from_axis(corners: [[f64; 2]; 3]) -> f64 {
+    let edges = [0, 1, 2].map(|i| (corners[i], corners[(i + 1) % 3]));
+    let sides = edges.map(|([x, y], [to_x, to_y])| x * to_y - y * to_x);
+    if sides.iter().all(|side| *side >= 0.0) || sides.iter().all(|side| *side <= 0.0) {
+        return 0.0;
+    }
+    let distance = |([x, y], [to_x, to_y]): ([f64; 2], [f64; 2])| {
+        let (dx, dy) = (to_x - x, to_y - y);
+        let along = (-(x * dx + y * dy) / (dx * dx + dy * dy).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        (x + along * dx).hypot(y + along * dy)
+    };
+    edges.map(distance).into_iter().fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]
@@ -127,8 +190,8 @@ mod tests {
         Camera::new((160, 120), [150.0, 148.0], [82.3, 58.9], lens, pose).unwrap()
     }
 
-    /// Rationale: a pixel that is not asked is a hole. Expected: whatever point of a triangle is projected lies in its bounds, for
-    /// triangles of any size, in view, past the horizon of the lens and behind it; and the bounds of a small triangle are
+    /// Rationale: a pixel that is not asked is a hole. Expected: whatever point of a triangle is projected lies in its bounds and within
+    /// its edges, for triangles of any size, in view, past the horizon of the lens and behind it; and the bounds of a small triangle are
     /// hardly larger than it.
     #[test]
     fn every_point_of_a_triangle_lies_in_its_bounds() {
@@ -141,7 +204,8 @@ mod tests {
                 let middle = vec3(s.range32(-1.2, 1.2), s.range32(-1.2, 1.2), s.range32(-0.4, 0.4));
                 let corners = [(); 3]
                     .map(|()| middle + vec3(s.range32(-size, size), s.range32(-size, size), s.range32(-size, size)));
-                let bounds = camera.triangle_bounds(corners);
+                let outline = camera.triangle_outline(corners);
+                let bounds = outline.map(|outline| outline.bounds);
                 let mut hull = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
                 for _ in 0..60 {
                     let (mut u, mut v) = (s.range32(0.0, 1.0), s.range32(0.0, 1.0));
@@ -156,6 +220,7 @@ mod tests {
                         hull[0][axis] = hull[0][axis].min(px[axis]);
                         hull[1][axis] = hull[1][axis].max(px[axis]);
                     }
+                    assert!(outline.expect("it is in front of the lens").may_hold(px), "{px:?} of {corners:?}");
                     inside += 1;
                 }
                 beyond += usize::from(hull[0][0] == f64::INFINITY);
@@ -168,6 +233,52 @@ mod tests {
                 }
             }
             assert!(inside > 10_000 && beyond > 20, "{inside} points in view, {beyond} triangles are not");
+        }
+    }
+
+    /// Expected: as the least of many points of the triangle. Source: brute force.
+    #[test]
+    fn distances_from_the_axis_are_those_of_the_nearest_point() {
+        let mut s = Stream::of(12, 0, Purpose::Test, 0);
+        let mut within = 0;
+        for _ in 0..500 {
+            let corners = [(); 3].map(|()| [0, 1].map(|_| f64::from(s.range32(-1.0, 1.0))));
+            let point = |i: u32, j: u32| {
+                let (u, v) = (f64::from(i) / 100.0, f64::from(j) / 100.0);
+                let at = |axis: usize| corners[0][axis] * (1.0 - u - v) + corners[1][axis] * u + corners[2][axis] * v;
+                at(0).hypot(at(1))
+            };
+            let least = (0..=100).flat_map(|i| (0..=100 - i).map(move |j| point(i, j))).fold(f64::INFINITY, f64::min);
+            let distance = distance_from_axis(corners);
+            within += u32::from(distance == 0.0);
+            assert!(distance <= least + 1e-12 && distance > least - 0.03, "{distance} {least}");
+        }
+        assert!((50..300).contains(&within), "{within}");
+    }
+
+    /// Expected: a right triangle fills half of its box, so edges turn half of the box's places away; a needle without an area, one that
+    /// reaches behind the lens and one past its horizon turn none away.
+    #[test]
+    fn edges_turn_half_of_the_box_away() {
+        for lens in LENSES {
+            let camera = camera(lens);
+            let at = |x: f64, y: f64| {
+                let [x, y] = camera.unproject([x, y]);
+                let centre = camera.pose.to_world(vec3(x as f32, y as f32, 1.0));
+                camera.position(0.0, 0.0) + centre * 0.8
+            };
+            let held = |corners: [Vec3; 3]| {
+                let outline = camera.triangle_outline(corners).unwrap();
+                let [lo, hi] = outline.bounds.map(|corner| corner.map(|v| v.clamp(-1e3, 1e3)));
+                let part = |i: i32, axis: usize| lo[axis] + (f64::from(i) + 0.5) / 40.0 * (hi[axis] - lo[axis]);
+                let places = (0..1600).map(|k| [part(k % 40, 0), part(k / 40, 1)]);
+                places.filter(|px| outline.may_hold(*px)).count() as f64 / 1600.0
+            };
+            let half = held([at(60.0, 40.0), at(100.0, 40.0), at(60.0, 80.0)]);
+            assert!((0.49..0.56).contains(&half), "{half}");
+            assert_eq!(held([at(60.0, 40.0), at(60.0, 40.0), at(100.0, 80.0)]), 1.0);
+            let behind = camera.position(0.0, 0.0) * 2.0 - at(60.0, 40.0);
+            assert_eq!(held([at(60.0, 40.0), at(100.0, 40.0), behind]), 1.0);
         }
     }
 

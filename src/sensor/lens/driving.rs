@@ -197,7 +197,7 @@ mod tests {
                 let mut near = |r: f32| vec3(s.range32(-r, r), s.range32(-r, r), s.range32(-0.2, 0.2) * r);
                 let middle = near(0.5);
                 let corners = [(); 3].map(|()| middle + near(size));
-                let Some([lo, hi]) = camera.triangle_bounds(corners) else { continue };
+                let Some([lo, hi]) = camera.triangle_outline(corners).map(|outline| outline.bounds) else { continue };
                 let mut hull = [f64::INFINITY, f64::NEG_INFINITY];
                 let before = inside;
                 for _ in 0..60 {
