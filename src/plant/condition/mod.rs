@@ -85,6 +85,8 @@ pub struct ConditionDesc {
     pub wilt: Vary<Fraction>,
     /// Share of the chlorophyll that the youngest leaf has still to make.
     pub pale_young: Vary<Fraction>,
+    /// Chlorophyll of the plant over the species file's: fields differ by variety, nitrogen and light.
+    pub greenness: Vary<Positive>,
     /// Relative spread of the chlorophyll from leaf to leaf of a plant.
     pub green_sd: Num<Fraction>,
     /// Relative spread of the gloss's roughness from leaf to leaf.
@@ -159,6 +161,7 @@ impl ConditionDesc {
             splash: none(),
             wilt: none(),
             pale_young: none(),
+            greenness: Vary::fixed(1.0),
             green_sd: Num::new(0.0),
             gloss_sd: Num::new(0.0),
             width_sd: Num::new(0.0),
@@ -187,6 +190,7 @@ impl ConditionDesc {
             splash: self.splash.draw32(&mut of(11)),
             wilt: self.wilt.draw32(&mut of(12)),
             pale_young: self.pale_young.draw32(&mut of(13)),
+            greenness: self.greenness.draw32(&mut of(16)),
         }
     }
 
@@ -198,12 +202,13 @@ impl ConditionDesc {
         )
     }
 
-    /// How much more or less chlorophyll than its plant a leaf of age `age` (0 the youngest, 1 the oldest) has, as a factor.
+    /// How much more or less chlorophyll than the species file says a leaf of age `age` (0 the youngest, 1 the oldest) has, as a
+    /// factor.
     pub fn green(&self, condition: &Condition, age: f32, leaf: &Stream) -> f32 {
         let spread = self.green_sd.f32() * leaf.child(Purpose::Condition, 20).normal() as f32;
         // The youngest third is still greening.
         let young = (1.0 - 3.0 * age).max(0.0);
-        ((1.0 + spread) * (1.0 - condition.pale_young * young)).clamp(0.25, 1.6)
+        condition.greenness * ((1.0 + spread) * (1.0 - condition.pale_young * young)).clamp(0.25, 1.6)
     }
 
     /// Factor on the roughness of a leaf's gloss.
@@ -213,12 +218,21 @@ impl ConditionDesc {
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference to the field")]
+fn is_one(factor: &f32) -> bool {
+    *factor == 1.0
+}
+
+fn one() -> f32 {
+    1.0
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference to the field")]
 fn is_none(width: &f32) -> bool {
     *width == 0.0
 }
 
 /// The condition of one plant. Fields as in [`ConditionDesc`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Condition {
     /// Mean number of holes of the oldest leaf.
     pub holes: f32,
@@ -253,6 +267,33 @@ pub struct Condition {
     pub wilt: f32,
     /// Share of chlorophyll that the youngest leaf lacks.
     pub pale_young: f32,
+    /// Chlorophyll of the plant over the species file's.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub greenness: f32,
+}
+
+impl Default for Condition {
+    /// Nothing has happened to the plant.
+    fn default() -> Self {
+        Self {
+            holes: 0.0,
+            shot_holes: 0.0,
+            bites: 0.0,
+            tears: 0.0,
+            chlorosis: 0.0,
+            blotches: 0.0,
+            spots: 0.0,
+            scorched: 0.0,
+            scorch: 0.0,
+            scorch_mm: 0.0,
+            reddening: 0.0,
+            dust: 0.0,
+            splash: 0.0,
+            wilt: 0.0,
+            pale_young: 0.0,
+            greenness: 1.0,
+        }
+    }
 }
 
 /// The stream of a leaf's condition; `plant` is the plant's stream.

@@ -64,7 +64,7 @@ impl<'a> Ailing<'a> {
             _ => 1.0 - f32::from(leaf - 1) / f32::from(bare.last.max(2) - 1),
         };
         let stream = leaf_stream(self.stream, leaf);
-        let green = if leaf == 0 { 1.0 } else { self.desc.green(&self.drawn, age, &stream) };
+        let green = if leaf == 0 { self.drawn.greenness } else { self.desc.green(&self.drawn, age, &stream) };
         let gloss = if leaf == 0 { 1.0 } else { self.desc.gloss(&stream) };
         let base = bare.pigments.chlorophyll.f32();
         let own = bare.choice.material.with_chlorophyll(base, bare.green * green);
