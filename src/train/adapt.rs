@@ -62,6 +62,7 @@ impl Asked<'_> {
             rate: self.rate.unwrap_or(0.2 * hyper.rate),
             class_weights: ClassWeights::None,
             calibrate: 0,
+            logit_adjustment: 0.0,
             pretrained: Pretrained::None,
             freeze: 0,
             encoder_rate: if hyper.encoder_rate > 0.0 { hyper.encoder_rate } else { 1.0 },

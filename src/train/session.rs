@@ -3,6 +3,7 @@
 use super::data::{Photos, Pick, Resize, Selection, Store, resize};
 use super::deploy::enlarge::classes_at;
 use super::fit::calibrate::calibrate;
+use super::fit::logits;
 use super::fit::checkpoint::Checkpoint;
 use super::fit::{self, Callbacks, Data, Plan};
 use super::measure::{Evaluation, Prediction, Report};
@@ -105,6 +106,9 @@ pub(super) fn train(
     if plan.hyper.calibrate > 0 {
         let model = Model::with(plan.network, plan.shape.bands.len(), plan.classes.len(), &outcome.values, place)?;
         outcome.values = calibrate(&model, &data.train, &outcome.normalization, plan.hyper.calibrate)?;
+    }
+    if plan.hyper.logit_adjustment > 0.0 {
+        logits::adjust(&mut outcome.values, &data.train, plan.classes.len(), plan.hyper.logit_adjustment)?;
     }
     let list = parameters(plan.network, plan.shape.bands.len(), plan.classes.len());
     let card = ModelCard {

@@ -11,7 +11,7 @@ use crate::train::weights::Array;
 use crate::{Error, Result};
 
 /// The biases that are set.
-const HEAD: &str = "head.conv.bias";
+pub(super) const HEAD: &str = "head.conv.bias";
 /// One of so many pixels is used: a prime, so that columns take turns.
 const THINNED: usize = 5;
 /// Most that a bias changes, either way: odds of fifty to one.

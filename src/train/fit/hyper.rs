@@ -156,6 +156,9 @@ pub struct Hyperparameters {
     /// Training images on which class biases are calibrated in the end; 0 for none. See `calibrate`.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub calibrate: u64,
+    /// Post-hoc logit adjustment by τ times the logarithm of the first class's frequency over the others', 0 to 2; 0 for none. See `logits`.
+    #[serde(default, skip_serializing_if = "is_nothing")]
+    pub logit_adjustment: f64,
     /// What the encoder begins with.
     #[serde(default, skip_serializing_if = "Pretrained::is_none")]
     pub pretrained: Pretrained,
@@ -228,6 +231,7 @@ impl Default for Hyperparameters {
             loss: LossFunction::Dice,
             class_weights: ClassWeights::None,
             calibrate: 0,
+            logit_adjustment: 0.0,
             pretrained: Pretrained::None,
             freeze: 0,
             encoder_rate: 1.0,
@@ -290,6 +294,15 @@ impl Hyperparameters {
         range("rare_crops", (0.0..=1.0).contains(&self.rare_crops), &self.rare_crops, help)?;
         range("encoder_rate", (0.0..=1.0).contains(&self.encoder_rate), &self.encoder_rate, help)?;
         range("decay", (0.0..1.0).contains(&self.decay), &self.decay, "write a share from 0 to below 1")?;
+        let help = "write a number from 0 to 2, such as 0.5";
+        range("logit_adjustment", (0.0..=2.0).contains(&self.logit_adjustment), &self.logit_adjustment, help)?;
+        if self.logit_adjustment > 0.0 && self.calibrate > 0 {
+            return Err(Invalid {
+                field: "logit_adjustment",
+                message: "calibration sets the same biases".into(),
+                help: "leave one of the two out".into(),
+            });
+        }
         range("validate_every", self.validate_every > 0, &self.validate_every, whole)?;
         range("patience", self.patience > 0, &self.patience, whole)?;
         let Some((width, height)) = self.crop_size else { return Ok(()) };

@@ -16,8 +16,9 @@
 //! | `checkpoint` | a training on disk, between two steps |
 //! | `trainer` | the training loop, with validation passes |
 //! | `calibrate` | class-bias calibration of a trained network |
+//! | `logits` | post-hoc logit adjustment of a trained network |
 //!
-//! Only `adapt`, `loss`, `gradients`, `optimiser`, `ema`, `trainer` and `calibrate` need libtorch. On a CPU the same plan on the same number of threads gives
+//! Only `adapt`, `loss`, `gradients`, `optimiser`, `ema`, `trainer`, `calibrate` and `logits` need libtorch. On a CPU the same plan on the same number of threads gives
 //! the same bits, stopped and gone on with or not.
 
 #[cfg(feature = "train")]
@@ -32,6 +33,8 @@ pub mod ema;
 pub mod gradients;
 pub mod hyper;
 pub mod log;
+#[cfg(feature = "train")]
+pub mod logits;
 #[cfg(feature = "train")]
 mod loss;
 #[cfg(feature = "train")]

@@ -92,6 +92,11 @@ pub struct Settings {
     #[arg(long, value_name = "N", default_value = default_of("calibrate"))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibrate: Option<u64>,
+    /// Post-hoc logit adjustment after the last step: how much of the first class's frequency is taken out of the network's scores, 0 to 2.
+    /// 0 for none; 0.5 for photographs of another kind than the training images, in which networks find too little of the plants.
+    #[arg(long, value_name = "TAU", default_value = default_of("logit_adjustment"))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub logit_adjustment: Option<f64>,
     /// What the encoder begins with: none (random weights), imagenet (EfficientNet-Lite0's, for lite-unet), or a safetensors file with
     /// the names of torchvision's resnet18 (unet) or vgg16_bn (segnet).
     #[arg(long, value_name = "NAME", default_value = default_of("pretrained"))]
@@ -159,6 +164,7 @@ pub fn defaults() -> Vec<(&'static str, String)> {
         ("loss", hyper.loss.name().into()),
         ("class_weights", hyper.class_weights.name().into()),
         ("calibrate", hyper.calibrate.to_string()),
+        ("logit_adjustment", hyper.logit_adjustment.to_string()),
         ("pretrained", hyper.pretrained.name()),
         ("freeze", hyper.freeze.to_string()),
         ("encoder_rate", hyper.encoder_rate.to_string()),
@@ -240,6 +246,7 @@ impl Settings {
         number(self.rate, &mut hyper.rate);
         number(self.decay, &mut hyper.decay);
         number(self.calibrate, &mut hyper.calibrate);
+        number(self.logit_adjustment, &mut hyper.logit_adjustment);
         number(self.validate_every, &mut hyper.validate_every);
         number(self.patience, &mut hyper.patience);
         plan.hyper.check(&plan.shape).map_err(|invalid| Invalid {
