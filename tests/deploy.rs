@@ -161,7 +161,7 @@ fn export_writes_where_it_is_told() {
     let before = names(folder.path());
     assert_eq!(before, ["new", "robot.pt", "robot.pt.json"]);
     for (arguments, words) in [
-        (vec!["--size", "40x40"], "an ONNX graph takes pictures of any size"),
+        (vec!["--size", "40x40"], "only a TorchScript is for pictures of one size"),
         (vec!["--out", path(folder.path())], "this is a folder"),
         (vec!["--format", "torchscript", "--size", "4000x10"], "sides from 32 to 8192"),
         (vec!["--format", "coreml"], "invalid value 'coreml'"),
@@ -172,6 +172,56 @@ fn export_writes_where_it_is_told() {
         assert!(said.contains(words), "{said}");
     }
     assert_eq!(before, names(folder.path()));
+}
+
+/// Expected: half of the bytes, the same classes but for ties, and a folder that is a run's for every command.
+#[test]
+fn half_precision_is_a_run_of_half_the_size() {
+    let folder = tempfile::tempdir().unwrap();
+    let (half, photos) = (folder.path().join("half"), folder.path().join("photos"));
+    succeed(train(&["export", path(&RGB), "--format", "half", "--out", path(&half)]));
+    assert_eq!(names(&half), ["model.json", "weights.safetensors"]);
+    let bytes = |run: &Path| std::fs::metadata(run.join(run::WEIGHTS)).unwrap().len() as f64;
+    assert!((0.49..0.52).contains(&(bytes(&half) / bytes(&RGB))), "{} of {} bytes", bytes(&half), bytes(&RGB));
+    photographs(&photos);
+    let answers = [&*RGB, &half].map(|run| {
+        let out = folder.path().join(run.file_name().unwrap()).join("answers");
+        succeed(train(&["predict", path(run), path(&photos), "--out", path(&out)]));
+        output::read_indexed(&out.join("large.png")).unwrap().2
+    });
+    let differ = answers[0].iter().zip(&answers[1]).filter(|(a, b)| a != b).count();
+    assert!(differ * 200 <= answers[0].len(), "{differ} of {} pixels differ", answers[0].len());
+}
+
+/// Rationale: whoever has photographs and no network gets an answer on the first evening. Expected: the networks that ship are listed; by
+/// its name, from any folder, one finds the plants of a field that it has not seen; nothing is written beside it.
+#[test]
+fn a_network_that_ships_finds_plants() {
+    let listed = succeed(train(&["zoo"]));
+    let listed = String::from_utf8(listed.stdout).unwrap();
+    assert!(listed.lines().any(|line| line.starts_with("any-field  lite-unet  red,green,blue  soil,crop,weed")), "{listed}");
+
+    let folder = tempfile::tempdir().unwrap();
+    let field = folder.path().join("field");
+    let mut render = Command::new(env!("CARGO_BIN_EXE_trace"));
+    render.args(["--scene", "scenes/field.ron", "--index", "3", "--width", "480", "--spp", "8", "--quiet", "--out", path(&field)]);
+    render.current_dir(env!("CARGO_MANIFEST_DIR"));
+    succeed(render);
+    let out = folder.path().join("answers");
+    let photo = field.join("rgb.png");
+    let mut predict = train(&["predict", "any-field", path(&photo), "--out", path(&out)]);
+    succeed({
+        predict.current_dir(folder.path());
+        predict
+    });
+    let (_, _, truth) = output::read_indexed(&field.join("semantics.png")).unwrap();
+    let (_, _, answer) = output::read_indexed(&out.join("rgb.png")).unwrap();
+    let count = |test: fn(u8, u8) -> bool| truth.iter().zip(&answer).filter(|(a, b)| test(**a, **b)).count() as f64;
+    let overlap = count(|a, b| a > 0 && b > 0) / count(|a, b| a > 0 || b > 0);
+    assert!(overlap > 0.6, "{overlap}");
+
+    let said = fail(train(&["export", "any-field"]), 2);
+    assert!(said.contains("`any-field` ships with the program, and nothing is written beside it"), "{said}");
 }
 
 /// Photographs of three kinds and sizes, from the waves of [`pictures`].

@@ -1,4 +1,4 @@
-//! What the command lines share: how a line is told, how a run ends, how an error looks, how a crop is written, what a signal does.
+//! What the command lines share: how a line is told, how a run ends, how a list looks, how an error looks, how a crop is written, what a signal does.
 
 pub mod signal;
 
@@ -40,6 +40,17 @@ pub fn end(done: Result<Vec<PathBuf>>) -> ExitCode {
             fail(&Error::failed(format!("the files are there, but their paths cannot be written to stdout: {e}")))
         }
         _ => ExitCode::SUCCESS,
+    }
+}
+
+/// Prints rows to stdout with their columns below each other. A closed pipe is no failure.
+pub fn print_rows<const N: usize>(rows: &[[String; N]]) {
+    let widths: [usize; N] =
+        std::array::from_fn(|k| rows.iter().map(|row| row[k].chars().count()).max().unwrap_or_default());
+    let mut out = io::stdout().lock();
+    for row in rows {
+        let cells: Vec<String> = row.iter().zip(widths).map(|(cell, width)| format!("{cell:<width$}")).collect();
+        let _ = writeln!(out, "{}", cells.join("  ").trim_end());
     }
 }
 

@@ -1,6 +1,6 @@
-//! What ships with the program: scene files, species files and textures, found from any folder.
+//! What ships with the program: scene files, species files, textures and trained networks, found from any folder.
 //!
-//! They lie in `scenes/` and `textures/` of one folder, as in the repository. That folder is the first of
+//! They lie in `scenes/`, `textures/` and `networks/` of one folder, as in the repository. That folder is the first of
 //!
 //! 1. the one that the environment variable `FURROW_DATA` names;
 //! 2. `../share/furrow`, seen from the program's own folder: `/usr/local/bin/trace` and `/usr/local/share/furrow`;
@@ -79,6 +79,11 @@ pub fn soil_textures() -> Result<Vec<PathBuf>> {
         file.extension().is_some_and(|e| e == "png") && !file.to_string_lossy().ends_with(".height.png")
     });
     Ok(files)
+}
+
+/// The folder of the trained networks that ship.
+pub fn networks() -> Result<PathBuf> {
+    Ok(folder()?.join("networks"))
 }
 
 fn ron_files(folder: &Path) -> Result<Vec<PathBuf>> {

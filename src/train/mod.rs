@@ -33,6 +33,7 @@
 //! | `net`, `torch` | the networks; computed by libtorch |
 //! | `fit` | hyper-parameters, class weights, loss, optimiser, checkpoints, the trainer, class-bias calibration |
 //! | `run` | the folder of a training run |
+//! | [`zoo`] | trained networks that ship |
 //! | `measure`, `figure` | scores; charts and pages |
 //! | `baseline` | ExG threshold and component-size rules that a network must beat |
 //! | `deploy` | a trained model as ONNX or TorchScript; predictions for photographs without labels |
@@ -69,6 +70,7 @@ pub mod table;
 pub mod torch;
 #[doc(hidden)]
 pub mod weights;
+pub mod zoo;
 
 pub use classes::Classes;
 pub use data::{Band, Pick, Selection, Shape};

@@ -14,7 +14,8 @@ use super::fit::Plan;
 use super::fit::checkpoint::History;
 use super::fit::hyper::SIDES;
 use super::net::{Network, Parameter, Pretrained, parameters};
-use super::weights::{self, Array};
+use super::weights::{self, Array, Stored};
+use super::zoo;
 use crate::input::below;
 use crate::output::{Together, write_atomically, write_together};
 use crate::{Error, Result};
@@ -183,14 +184,16 @@ pub struct TrainedModel {
 }
 
 impl TrainedModel {
-    /// Opens a run's folder.
-    pub fn open(folder: &Path) -> Result<Self> {
+    /// Opens a run's folder, or a network that ships, by its name.
+    pub fn open(run: &Path) -> Result<Self> {
+        let folder = &zoo::folder(run);
         let path = folder.join(MODEL);
         if !path.exists() {
             let error = if folder.join(PLAN).exists() {
                 Error::input("this training is not done").help("the command that began it goes on with it")
             } else {
-                Error::input("there is no trained network in this folder").help("`train fit --out DIR` makes one")
+                Error::input("there is no trained network in this folder")
+                    .help("`train fit --out DIR` makes one, `train zoo` lists those that ship")
             };
             return Err(error.in_file(folder));
         }
@@ -214,9 +217,20 @@ impl TrainedModel {
 
     /// Writes weights and card, both or neither.
     pub fn write(&self, folder: &Path) -> Result<()> {
+        self.store(folder, Stored::Single)
+    }
+
+    /// Writes them with weights rounded to half precision, in half of the bytes.
+    pub fn write_half(&self, folder: &Path) -> Result<()> {
+        let values: Vec<Array> = self.values.iter().map(Array::halved).collect();
+        let card = ModelCard { weights_sha256: weights::hash(&values), ..self.card.clone() };
+        Self { card, values }.store(folder, Stored::Half)
+    }
+
+    fn store(&self, folder: &Path, stored: Stored) -> Result<()> {
         let text = serde_json::to_string(&self.card).map_err(|e| failed(&e))?;
         let path = below(folder, &self.card.weights)?;
-        let (values, card) = (weights::encode(&path, &self.values, &text)?, json(&self.card)?);
+        let (values, card) = (weights::encode(&path, &self.values, &text, stored)?, json(&self.card)?);
         let add_both = |files: &mut Together| {
             files.add(&path, &values)?;
             files.add(&folder.join(MODEL), &card)

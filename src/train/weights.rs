@@ -2,6 +2,7 @@
 
 use crate::output::write_atomically;
 use crate::{Error, Result};
+use half::f16;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use sha2::{Digest, Sha256};
 use std::collections::HashMap;
@@ -19,11 +20,47 @@ pub struct Array {
 }
 
 impl Array {
-    /// A tensor of a file; none where it is not of single precision.
+    /// A tensor of a file; none where it is neither of single nor of half precision.
     fn of(name: String, view: &TensorView<'_>) -> Option<Self> {
-        let values =
-            |view: &TensorView<'_>| view.data().as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
-        (view.dtype() == Dtype::F32).then(|| Self { name, shape: view.shape().to_vec(), values: values(view) })
+        let bytes = view.data();
+        let values = match view.dtype() {
+            Dtype::F32 => bytes.as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect(),
+            Dtype::F16 => bytes.as_chunks().0.iter().map(|b| f16::from_le_bytes(*b).to_f32()).collect(),
+            _ => return None,
+        };
+        Some(Self { name, shape: view.shape().to_vec(), values })
+    }
+
+    /// The same with values that half precision holds: 11 significant bits, at most 65504, to which larger ones are held.
+    #[must_use]
+    pub fn halved(&self) -> Self {
+        let halved = |v: &f32| f16::from_f32(v.clamp(f16::MIN.to_f32(), f16::MAX.to_f32())).to_f32();
+        Self { values: self.values.iter().map(halved).collect(), ..self.clone() }
+    }
+}
+
+/// How values lie in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stored {
+    /// Four bytes each.
+    Single,
+    /// Two bytes each; values that [`Array::halved`] returns come back as they were.
+    Half,
+}
+
+impl Stored {
+    fn of(self, values: &[f32]) -> Vec<u8> {
+        match self {
+            Self::Single => values.iter().flat_map(|v| v.to_le_bytes()).collect(),
+            Self::Half => values.iter().flat_map(|v| f16::from_f32(*v).to_le_bytes()).collect(),
+        }
+    }
+
+    fn dtype(self) -> Dtype {
+        match self {
+            Self::Single => Dtype::F32,
+            Self::Half => Dtype::F16,
+        }
     }
 }
 
@@ -32,16 +69,16 @@ const KEY: &str = "furrow";
 
 /// Writes arrays with a text, atomically; equal content gives equal bytes.
 pub fn write(path: &Path, arrays: &[Array], text: &str) -> Result<()> {
-    write_atomically(path, &encode(path, arrays, text)?)
+    write_atomically(path, &encode(path, arrays, text, Stored::Single)?)
 }
 
 /// The bytes of the file at `path` that holds these.
-pub fn encode(path: &Path, arrays: &[Array], text: &str) -> Result<Vec<u8>> {
-    let bytes: Vec<Vec<u8>> = arrays.iter().map(|a| a.values.iter().flat_map(|v| v.to_le_bytes()).collect()).collect();
+pub fn encode(path: &Path, arrays: &[Array], text: &str, stored: Stored) -> Result<Vec<u8>> {
+    let bytes: Vec<Vec<u8>> = arrays.iter().map(|a| stored.of(&a.values)).collect();
     let fault = |e: &dyn std::fmt::Display| unusable(path, &format!("it cannot be written: {e}"));
     let mut views = Vec::new();
     for (array, bytes) in arrays.iter().zip(&bytes) {
-        let view = TensorView::new(Dtype::F32, array.shape.clone(), bytes).map_err(|e| fault(&e))?;
+        let view = TensorView::new(stored.dtype(), array.shape.clone(), bytes).map_err(|e| fault(&e))?;
         views.push((array.name.as_str(), view));
     }
     let header = HashMap::from([(KEY.to_owned(), format!("{}\n{text}", checksum(arrays, text)))]);
@@ -65,7 +102,7 @@ pub fn read(path: &Path) -> Result<(Vec<Array>, String)> {
     Ok((arrays, text.to_owned()))
 }
 
-/// Reads arrays that another program wrote, in the order of their names; those that are not of single precision are left out.
+/// Reads arrays that another program wrote, in the order of their names; those that are neither of single nor of half precision are left out.
 pub fn read_foreign(path: &Path) -> Result<Vec<Array>> {
     let bytes = crate::input::contents(path).map_err(Error::reading(path))?;
     let all = SafeTensors::deserialize(&bytes);
@@ -80,7 +117,7 @@ pub fn read_foreign(path: &Path) -> Result<Vec<Array>> {
 fn arrays(bytes: &[u8]) -> Result<Vec<Array>, String> {
     let all = SafeTensors::deserialize(bytes).map_err(|e| e.to_string())?;
     let array = |(name, view): (String, TensorView<'_>)| {
-        let words = format!("`{name}` is not of single precision");
+        let words = format!("`{name}` is neither of single nor of half precision");
         Array::of(name, &view).ok_or(words)
     };
     let mut arrays = all.tensors().into_iter().map(array).collect::<Result<Vec<_>, _>>()?;
@@ -123,6 +160,30 @@ mod tests {
             values: values.into(),
         };
         vec![array("a", &[2, 3], &[1.0, 2.0, 3.0, -4.0, 5.5, f32::MIN_POSITIVE]), array("b", &[], &[7.0])]
+    }
+
+    /// Expected: half precision keeps 11 bits, takes two bytes a value, and what was rounded once comes back to the bit; what is too large
+    /// stays finite. Source: IEEE 754 binary16.
+    #[test]
+    fn half_precision_takes_half_of_the_bytes_and_keeps_what_was_rounded() {
+        let path = Path::new("w.safetensors");
+        let values: Vec<f32> = (0..4096).map(|i| (i as f32 * 0.731).sin() * 1.001_f32.powi(i - 2048)).collect();
+        let fine = [Array { name: "a".into(), shape: vec![4096], values }];
+        let coarse = fine.each_ref().map(|a| a.halved());
+        for (a, b) in fine[0].values.iter().zip(&coarse[0].values) {
+            assert!((a - b).abs() <= a.abs() / 2048.0 + 3e-8, "{a} {b}");
+        }
+        assert_eq!(coarse.each_ref().map(|a| a.halved()), coarse);
+        let (single, half) = (encode(path, &coarse, "", Stored::Single).unwrap(), encode(path, &coarse, "", Stored::Half).unwrap());
+        assert_eq!(single.len() - half.len(), 2 * 4096);
+        let folder = tempfile::tempdir().unwrap();
+        for bytes in [single, half] {
+            let path = folder.path().join("w.safetensors");
+            std::fs::write(&path, bytes).unwrap();
+            assert_eq!(read(&path).unwrap().0, coarse);
+        }
+        let far = Array { name: "b".into(), shape: vec![2], values: vec![1e9, -1e9] };
+        assert_eq!(far.halved().values, [65504.0, -65504.0]);
     }
 
     #[test]

@@ -1,6 +1,5 @@
 //! `trace species`, `trace cameras`, `trace soils`: what a scene file may name, one a line.
 
-use furrow::Result;
 use furrow::input::shipped;
 use furrow::ron_file::RonFile;
 use furrow::sampling::{Purpose, Stream};
@@ -8,7 +7,7 @@ use furrow::scene::desc::Role;
 use furrow::scene::shipped::all_species;
 use furrow::sensor::{AdcDesc, CameraDesc, MosaicDesc, SensorDesc};
 use furrow::soil::SoilColor;
-use std::io::Write;
+use furrow::{Result, cli};
 use std::path::PathBuf;
 
 /// Species: file, scientific and English name, EPPO code, role, growth stages.
@@ -25,7 +24,7 @@ pub(crate) fn species() -> Result<Vec<PathBuf>> {
         let stages = format!("BBCH {} to {}", codes().min().unwrap_or(0), codes().max().unwrap_or(0));
         rows.push([species.stem(), desc.scientific.clone(), desc.name.clone(), desc.eppo.clone(), role.into(), stages]);
     }
-    print(&rows);
+    cli::print_rows(&rows);
     Ok(Vec::new())
 }
 
@@ -49,7 +48,7 @@ pub(crate) fn cameras() -> Result<Vec<PathBuf>> {
     }
     let any = "the scene file says size, intrinsics, pose and sensor";
     rows.push(["Pinhole", "any size", "any field of view", "any sensor", any].map(str::to_owned));
-    print(&rows);
+    cli::print_rows(&rows);
     Ok(Vec::new())
 }
 
@@ -78,17 +77,6 @@ pub(crate) fn soils() -> Result<Vec<PathBuf>> {
         let layer = format!("layers: [(albedo: \"{name}.png\", height: \"{name}.height.png\", …)]");
         rows.push([name.to_string(), layer, albedo.display().to_string()]);
     }
-    print(&rows);
+    cli::print_rows(&rows);
     Ok(Vec::new())
-}
-
-/// Prints rows with their columns below each other. A closed pipe is no failure.
-fn print<const N: usize>(rows: &[[String; N]]) {
-    let widths: [usize; N] =
-        std::array::from_fn(|k| rows.iter().map(|row| row[k].chars().count()).max().unwrap_or_default());
-    let mut out = std::io::stdout().lock();
-    for row in rows {
-        let cells: Vec<String> = row.iter().zip(widths).map(|(cell, width)| format!("{cell:<width$}")).collect();
-        let _ = writeln!(out, "{}", cells.join("  ").trim_end());
-    }
 }

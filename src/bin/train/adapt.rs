@@ -14,7 +14,7 @@ use std::path::PathBuf;
 /// Which network, on which photographs.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folder of the run that it begins with.
+    /// Folder of the run that it begins with, or the name of a network that ships (`train zoo`).
     run: PathBuf,
     /// PNG or JPEG files of any size, folders of them, or images of a set, whose labels are not read: DIR, DIR@PICK. May be given several
     /// times.

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 /// Which network, on which images.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folder of the run.
+    /// Folder of the run, or the name of a network that ships (`train zoo`).
     run: PathBuf,
     /// Images with labels: the training set of a dataset unless it says DIR@PICK. May be given several times.
     #[arg(long = "set", value_name = "DIR[@PICK]", required = true, value_parser = Selection::parse)]

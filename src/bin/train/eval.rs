@@ -13,7 +13,7 @@ use std::path::PathBuf;
 /// Which network, on which images.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folder of the run.
+    /// Folder of the run, or the name of a network that ships (`train zoo`).
     run: PathBuf,
     /// Test set: images with labels; all of the dataset unless it says DIR@PICK.
     #[arg(long = "set", value_name = "DIR[@PICK]", value_parser = Selection::parse)]

@@ -17,6 +17,7 @@ mod renamed;
 mod report;
 mod sizes;
 mod table;
+mod zoo;
 
 use clap::{Parser, Subcommand};
 use furrow::cli::{self, signal};
@@ -41,6 +42,7 @@ Examples:
   train fit --set data/d --set data/real@0..10*4 --network unet --size 240x180 --out runs/augmented
   train eval runs/d --set data/real@12..20                scores on a test set of real images
   train predict runs/d photos/ --out predictions          masks of photographs, and masks over them
+  train predict any-field photos/ --out predictions       the same by a network that ships
   train adapt runs/d --images photos/ --out runs/d3       goes on learning from photographs without labels
   train calibrate runs/d --set data/d --out runs/d2       class biases calibrated
   train export runs/d --format onnx                       the network for a robot
@@ -65,6 +67,8 @@ enum Verb {
     Adapt(adapt::Args),
     /// Calibrate the class biases of a trained network against over- and under-prediction, on images with labels.
     Calibrate(calibrate::Args),
+    /// List the trained networks that ship with the program.
+    Zoo,
     /// Write a trained network for other programs.
     Export(export::Args),
     /// Fit and evaluate an ExG threshold, with component sizes or without: what a network must beat.
@@ -92,6 +96,7 @@ fn main() -> ExitCode {
         Verb::Predict(args) => predict::run(&args, &signals),
         Verb::Adapt(args) => adapt::run(&args, &signals),
         Verb::Calibrate(args) => calibrate::run(&args),
+        Verb::Zoo => zoo::run(),
         Verb::Export(args) => export::run(&args),
         Verb::Baseline(args) => baseline::run(&args, &signals),
         Verb::Table(args) => table::run(&args, &signals),

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 /// Which network, on which images.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folder of the run.
+    /// Folder of the run, or the name of a network that ships (`train zoo`).
     run: PathBuf,
     /// PNG or JPEG files of any size, folders of them, or images of a set: DIR, DIR@PICK.
     #[arg(required = true, value_name = "IMAGES")]

@@ -1,0 +1,19 @@
+//! `train zoo`.
+
+use furrow::train::data::Band;
+use furrow::train::zoo;
+use furrow::{Result, cli};
+use std::path::PathBuf;
+
+/// Networks that ship: name, network, bands, classes, pixel size, what for.
+pub(crate) fn run() -> Result<Vec<PathBuf>> {
+    let row = |network: &zoo::Shipped| {
+        let card = &network.model.card;
+        let bands: Vec<&str> = card.input.bands.iter().map(Band::name).collect();
+        let pixel = card.pixel_mm.map_or_else(|| "pixels of any size".to_owned(), |mm| format!("pixels of {mm:.1} mm"));
+        [network.name.clone(), card.network.name().to_owned(), bands.join(","), card.classes.names().join(","), pixel, network.about.clone()]
+    };
+    let rows: Vec<[String; 6]> = zoo::all()?.iter().map(row).collect();
+    cli::print_rows(&rows);
+    Ok(Vec::new())
+}
