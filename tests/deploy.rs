@@ -181,6 +181,8 @@ fn half_precision_is_a_run_of_half_the_size() {
     let (half, photos) = (folder.path().join("half"), folder.path().join("photos"));
     succeed(train(&["export", path(&RGB), "--format", "half", "--out", path(&half)]));
     assert_eq!(names(&half), ["model.json", "weights.safetensors"]);
+    let said = fail(train(&["export", path(&RGB), "--format", "half", "--out", path(&half)]), 2);
+    assert!(said.contains("there is a trained model in this folder already"), "{said}");
     let bytes = |run: &Path| std::fs::metadata(run.join(run::WEIGHTS)).unwrap().len() as f64;
     assert!((0.49..0.52).contains(&(bytes(&half) / bytes(&RGB))), "{} of {} bytes", bytes(&half), bytes(&RGB));
     photographs(&photos);
@@ -199,12 +201,27 @@ fn half_precision_is_a_run_of_half_the_size() {
 fn a_network_that_ships_finds_plants() {
     let listed = succeed(train(&["zoo"]));
     let listed = String::from_utf8(listed.stdout).unwrap();
-    assert!(listed.lines().any(|line| line.starts_with("any-field  lite-unet  red,green,blue  soil,crop,weed")), "{listed}");
+    assert!(
+        listed.lines().any(|line| line.starts_with("any-field  lite-unet  red,green,blue  soil,crop,weed")),
+        "{listed}"
+    );
 
     let folder = tempfile::tempdir().unwrap();
     let field = folder.path().join("field");
     let mut render = Command::new(env!("CARGO_BIN_EXE_trace"));
-    render.args(["--scene", "scenes/field.ron", "--index", "3", "--width", "480", "--spp", "8", "--quiet", "--out", path(&field)]);
+    render.args([
+        "--scene",
+        "scenes/field.ron",
+        "--index",
+        "3",
+        "--width",
+        "480",
+        "--spp",
+        "8",
+        "--quiet",
+        "--out",
+        path(&field),
+    ]);
     render.current_dir(env!("CARGO_MANIFEST_DIR"));
     succeed(render);
     let out = folder.path().join("answers");
@@ -220,6 +237,11 @@ fn a_network_that_ships_finds_plants() {
     let overlap = count(|a, b| a > 0 && b > 0) / count(|a, b| a > 0 || b > 0);
     assert!(overlap > 0.6, "{overlap}");
 
+    // A folder of that name without a network in it, such as one for reports, does not hide the one that ships.
+    std::fs::create_dir(folder.path().join("any-field")).unwrap();
+    let mut export = train(&["export", "any-field", "--out", path(&folder.path().join("network.onnx"))]);
+    export.current_dir(folder.path());
+    succeed(export);
     let said = fail(train(&["export", "any-field"]), 2);
     assert!(said.contains("`any-field` ships with the program, and nothing is written beside it"), "{said}");
 }

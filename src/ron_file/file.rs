@@ -348,7 +348,9 @@ mod tests {
 
     #[test]
     fn characters_of_several_bytes_stand_before_what_is_wrong() {
-        for text in ["//\u{fffd}", "é", "Ｆé", "(a: é0,5)", "Sun(elevation_deg: é,5)", "Sun(azimuth_deg: é3.5.5)", "éSun"] {
+        for text in
+            ["//\u{fffd}", "é", "Ｆé", "(a: é0,5)", "Sun(elevation_deg: é,5)", "Sun(azimuth_deg: é3.5.5)", "éSun"]
+        {
             assert!(message(text).contains("page.ron:1:"), "{text}");
         }
     }

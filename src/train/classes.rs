@@ -50,6 +50,11 @@ impl fmt::Display for Classes {
 }
 
 impl Classes {
+    /// Whether the first class is soil and nothing else, as it is unless a user says otherwise.
+    pub fn begins_with_soil(&self) -> bool {
+        self.0.first().is_some_and(|class| class.labels == SEMANTICS[..1])
+    }
+
     /// Reads `soil; beet=crop; other=weed,Galium aparine`.
     pub fn parse(text: &str) -> Result<Self, String> {
         let mut classes: Vec<Class> = Vec::new();

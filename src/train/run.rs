@@ -15,13 +15,13 @@ use super::fit::checkpoint::History;
 use super::fit::hyper::SIDES;
 use super::net::{Network, Parameter, Pretrained, parameters};
 use super::weights::{self, Array, Stored};
-use super::zoo;
-use crate::input::below;
+use crate::input::{below, shipped};
 use crate::output::{Together, write_atomically, write_together};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use std::path::Path;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 
 /// File of the plan.
 pub const PLAN: &str = "plan.json";
@@ -73,9 +73,12 @@ impl Identity {
             return Ok(());
         }
         let (a, b) = (fields(&there)?, fields(self)?);
-        let differ = b.iter().filter(|(k, v)| *k != "seconds" && *k != "folder" && a.get(*k) != Some(v));
-        let differ: Vec<String> = differ
-            .map(|(k, v)| format!("{k} is {} there and {v} here", a.get(k).map_or("none", String::as_str)))
+        let names: BTreeSet<&String> = a.keys().chain(b.keys()).filter(|k| *k != "seconds" && *k != "folder").collect();
+        let of = |fields: &'_ Fields, k: &String| fields.get(k).map_or("none".to_owned(), String::clone);
+        let differ: Vec<String> = names
+            .into_iter()
+            .filter(|k| a.get(*k) != b.get(*k))
+            .map(|k| format!("{k} is {} there and {} here", of(&a, k), of(&b, k)))
             .collect();
         let what = if differ.is_empty() { "its images are others".into() } else { differ.join("; ") };
         Err(Error::misuse(format!("another training lies in this folder: {what}"))
@@ -84,8 +87,11 @@ impl Identity {
     }
 }
 
+/// A plan's values by name, as text.
+type Fields = BTreeMap<String, String>;
+
 /// The plan's values by name, as text.
-fn fields(identity: &Identity) -> Result<std::collections::BTreeMap<String, String>> {
+fn fields(identity: &Identity) -> Result<Fields> {
     let value = serde_json::to_value(&identity.plan).map_err(|e| failed(&e))?;
     Ok(value.as_object().into_iter().flatten().map(|(k, v)| (k.clone(), v.to_string())).collect())
 }
@@ -174,6 +180,25 @@ pub struct Results {
     pub images_per_second: f64,
 }
 
+/// The folder of a run that a user means: the folder itself where a run of that name lies; else that of a network that ships, where it
+/// is a bare name such as `any-field`; else what was written.
+pub fn folder(written: &Path) -> PathBuf {
+    let is_run = [MODEL, PLAN].iter().any(|file| written.join(file).exists());
+    let bare = written.to_str().is_some_and(shipped::is_bare) && !is_run;
+    let named = bare.then(|| shipped::networks().ok()).flatten().map(|networks| networks.join(written));
+    named.filter(|folder| folder.join(MODEL).is_file()).unwrap_or_else(|| written.to_owned())
+}
+
+/// An error where a run, begun or done, lies in a folder that another model is to be written to.
+pub fn check_untaken(folder: &Path) -> Result<()> {
+    if [MODEL, PLAN].iter().any(|file| folder.join(file).exists()) {
+        return Err(Error::misuse("there is a trained model in this folder already")
+            .in_file(folder)
+            .help("give another --out"));
+    }
+    Ok(())
+}
+
 /// A trained model, from its folder.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainedModel {
@@ -186,14 +211,18 @@ pub struct TrainedModel {
 impl TrainedModel {
     /// Opens a run's folder, or a network that ships, by its name.
     pub fn open(run: &Path) -> Result<Self> {
-        let folder = &zoo::folder(run);
+        let folder = &folder(run);
         let path = folder.join(MODEL);
         if !path.exists() {
             let error = if folder.join(PLAN).exists() {
                 Error::input("this training is not done").help("the command that began it goes on with it")
             } else {
+                // Whoever writes a bare name means what ships, and is told where that is missing.
+                if run.to_str().is_some_and(shipped::is_bare) && !run.exists() {
+                    shipped::networks()?;
+                }
                 Error::input("there is no trained network in this folder")
-                    .help("`train fit --out DIR` makes one, `train zoo` lists those that ship")
+                    .help("`train fit --out DIR` makes one; `train zoo` lists those that ship, by their names")
             };
             return Err(error.in_file(folder));
         }
@@ -220,9 +249,16 @@ impl TrainedModel {
         self.store(folder, Stored::Single)
     }
 
-    /// Writes them with weights rounded to half precision, in half of the bytes.
+    /// Writes them with weights rounded to half precision, in half of the bytes. An error where one is too large for that.
     pub fn write_half(&self, folder: &Path) -> Result<()> {
         let values: Vec<Array> = self.values.iter().map(Array::halved).collect();
+        if let Some(large) = values.iter().find(|array| !array.values.iter().all(|v| v.is_finite())) {
+            return Err(Error::input(format!(
+                "`{}` holds values that half precision does not, above 65504",
+                large.name
+            ))
+            .help("keep this network in single precision"));
+        }
         let card = ModelCard { weights_sha256: weights::hash(&values), ..self.card.clone() };
         Self { card, values }.store(folder, Stored::Half)
     }
@@ -294,5 +330,23 @@ mod tests {
         assert_eq!(serde_json::to_string(&identity).unwrap(), text);
         assert_eq!(identity.hash().unwrap(), "f1d0a304d9f74cce6867a24237cebc60846ba30fe7dc6f9d7920b7dd5f560dc6");
         assert_eq!(identity.plan.hyper.crop_size, Some((40, 32)));
+    }
+
+    /// Rationale: a field that is its default is not written, and was once not compared. Expected: what differs is told whichever of the two
+    /// plans has it.
+    #[test]
+    fn what_differs_from_the_plan_of_a_folder_is_told_both_ways() {
+        let plain = Identity { plan: Plan::default(), train: Vec::new(), val: Vec::new() };
+        let mut averaged = plain.clone();
+        averaged.plan.hyper.ema = 0.9;
+        for (there, here, words) in [
+            (&plain, &averaged, "ema is none there and 0.9 here"),
+            (&averaged, &plain, "ema is 0.9 there and none here"),
+        ] {
+            let folder = tempfile::tempdir().unwrap();
+            there.claim(folder.path()).unwrap();
+            let said = here.claim(folder.path()).unwrap_err().to_string();
+            assert!(said.contains(words), "{said}");
+        }
     }
 }

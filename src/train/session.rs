@@ -3,8 +3,8 @@
 use super::data::{Photos, Pick, Resize, Selection, Store, resize};
 use super::deploy::enlarge::classes_at;
 use super::fit::calibrate::calibrate;
-use super::fit::logits;
 use super::fit::checkpoint::Checkpoint;
+use super::fit::logits;
 use super::fit::{self, Callbacks, Data, Plan};
 use super::measure::{Evaluation, Prediction, Report};
 use super::net::{Parameter, parameters};
@@ -78,6 +78,10 @@ pub(super) fn train(
     if train.is_empty() {
         return Err(Error::misuse("there is no training image")
             .help("name sets with --set DIR, or other images of them with DIR@all"));
+    }
+    if plan.hyper.logit_adjustment > 0.0 && !plan.classes.begins_with_soil() {
+        return Err(Error::misuse("logit adjustment takes out how frequent soil is, and the first class is not soil")
+            .help("name soil first in --classes, or leave --logit-adjustment out"));
     }
     let begin = match begin {
         Some(_) if !plan.hyper.pretrained.is_none() => {

@@ -3,9 +3,9 @@
 //! Each lies in a folder of `networks/`: a trained model as [`run`](super::run) has it, with weights in half precision, and a `README.md`
 //! whose first paragraph says what it is for.
 
-use super::run::{MODEL, TrainedModel};
-use crate::Result;
+use super::run::{MODEL, TrainedModel, folder};
 use crate::input::shipped;
+use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
 /// A network that ships.
@@ -20,12 +20,14 @@ pub struct Shipped {
     pub about: String,
 }
 
-/// The folder of a run that a user means: the folder itself where there is one of that name; else that of a network that ships, where it
-/// is a bare name such as `any-field`; else what was written.
-pub fn folder(written: &Path) -> PathBuf {
-    let bare = written.to_str().is_some_and(shipped::is_bare) && !written.exists();
-    let named = bare.then(|| shipped::networks().ok()).flatten().map(|networks| networks.join(written));
-    named.filter(|folder| folder.join(MODEL).is_file()).unwrap_or_else(|| written.to_owned())
+/// An error where a run is a network that ships, and no folder was named for what is written: `usual` beside its weights would be lost or
+/// forbidden.
+pub fn needs_out(run: &Path, usual: &str) -> Result<()> {
+    if folder(run) == run {
+        return Ok(());
+    }
+    Err(Error::misuse(format!("`{}` ships with the program, and nothing is written beside it", run.display()))
+        .help(format!("give --out, such as --out {usual}")))
 }
 
 /// All networks that ship, in order of their names.
@@ -52,7 +54,7 @@ fn about(folder: &Path) -> String {
 mod tests {
     use super::*;
 
-    /// Expected: each network that ships opens, is found by its name, says what it is for and is at most 10 MB; a folder that is there
+    /// Expected: each network that ships opens, is found by its name, says what it is for and is at most 10 MB; a run that is there
     /// comes before it, and other names stay as they are written.
     #[test]
     fn networks_that_ship_are_found_by_their_names() {

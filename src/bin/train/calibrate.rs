@@ -4,7 +4,7 @@ use crate::machine::MachineArgs;
 use furrow::train::data::Selection;
 use furrow::train::run::{self, TrainedModel};
 use furrow::train::session;
-use furrow::{Error, Result, cli};
+use furrow::{Result, cli};
 use std::path::PathBuf;
 
 /// Which network, on which images.
@@ -29,11 +29,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     let trained = TrainedModel::open(&args.run)?;
     cli::check_folder(&args.out)?;
-    if [run::MODEL, run::PLAN].iter().any(|file| args.out.join(file).exists()) {
-        return Err(Error::misuse("there is a trained model in this folder already")
-            .in_file(&args.out)
-            .help("give another --out"));
-    }
+    run::check_untaken(&args.out)?;
     let MachineArgs { precision, .. } = &args.machine;
     let machine = args.machine.machine();
     let calibrated =

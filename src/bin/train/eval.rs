@@ -6,7 +6,7 @@ use crate::sizes::SizeArgs;
 use furrow::cli::signal::Signals;
 use furrow::train::data::{Pick, Resize, Selection};
 use furrow::train::run::TrainedModel;
-use furrow::train::session;
+use furrow::train::{session, zoo};
 use furrow::{Result, cli};
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ pub(crate) struct Args {
     /// Test set: images with labels; all of the dataset unless it says DIR@PICK.
     #[arg(long = "set", value_name = "DIR[@PICK]", value_parser = Selection::parse)]
     set: Selection,
-    /// Folder for the report; `eval/NAME` in the run's, after the set, unless given.
+    /// Folder for the report; `eval/NAME` in the run's, after the set, unless given. Needed for a network that ships.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -32,6 +32,9 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let mut trained = TrainedModel::open(&args.run)?;
     args.sizes.apply(&mut trained.card)?;
     let set = args.set.folder.file_name().unwrap_or_default();
+    if args.out.is_none() {
+        zoo::needs_out(&args.run, "report")?;
+    }
     let out = args.out.clone().unwrap_or_else(|| args.run.join("eval").join(set));
     cli::check_folder(&out)?;
     let (machine, threads) = (args.machine.machine(), args.machine.threads());

@@ -3,7 +3,8 @@
 use clap::ValueEnum;
 use furrow::train::deploy::{onnx, torchscript};
 use furrow::train::fit::settings::parse_size;
-use furrow::train::run::TrainedModel;
+use furrow::train::run::{self, TrainedModel};
+use furrow::train::zoo;
 use furrow::{Error, Result, cli};
 use std::path::PathBuf;
 
@@ -42,9 +43,8 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
         Format::Torchscript => "network.pt",
         Format::Half => "half",
     };
-    if args.out.is_none() && !args.run.is_dir() {
-        return Err(Error::misuse(format!("`{}` ships with the program, and nothing is written beside it", args.run.display()))
-            .help(format!("give --out, such as --out {usual}")));
+    if args.out.is_none() {
+        zoo::needs_out(&args.run, usual)?;
     }
     let out = args.out.clone().unwrap_or_else(|| args.run.join(usual));
     if out.is_dir() && !matches!(args.format, Format::Half) {
@@ -68,6 +68,7 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
         }
         Format::Half => {
             cli::check_folder(&out)?;
+            run::check_untaken(&out)?;
             trained.write_half(&out)?;
             Ok(vec![out])
         }

@@ -11,7 +11,14 @@ pub(crate) fn run() -> Result<Vec<PathBuf>> {
         let card = &network.model.card;
         let bands: Vec<&str> = card.input.bands.iter().map(Band::name).collect();
         let pixel = card.pixel_mm.map_or_else(|| "pixels of any size".to_owned(), |mm| format!("pixels of {mm:.1} mm"));
-        [network.name.clone(), card.network.name().to_owned(), bands.join(","), card.classes.names().join(","), pixel, network.about.clone()]
+        [
+            network.name.clone(),
+            card.network.name().to_owned(),
+            bands.join(","),
+            card.classes.names().join(","),
+            pixel,
+            network.about.clone(),
+        ]
     };
     let rows: Vec<[String; 6]> = zoo::all()?.iter().map(row).collect();
     cli::print_rows(&rows);

@@ -25,6 +25,16 @@ impl Bound for MarkCount {
     const WORDS: &'static str = "between 0 and 60 marks a leaf";
 }
 
+/// A factor on chlorophyll.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Greenness;
+
+impl Bound for Greenness {
+    const MIN: f64 = 0.05;
+    const MAX: f64 = 4.0;
+    const WORDS: &'static str = "between 0.05 and 4";
+}
+
 /// How far plants are from flawless. Every number that may vary is drawn once a plant; `condition: ()` is an ordinary field,
 /// a species file without `condition` has flawless plants, as [`ConditionDesc::flawless`] has.
 ///
@@ -85,8 +95,9 @@ pub struct ConditionDesc {
     pub wilt: Vary<Fraction>,
     /// Share of the chlorophyll that the youngest leaf has still to make.
     pub pale_young: Vary<Fraction>,
-    /// Chlorophyll of the plant over the species file's: fields differ by variety, nitrogen and light.
-    pub greenness: Vary<Positive>,
+    /// Chlorophyll of each plant over the species file's: below 1 yellower, above 1 darker. A leaf has 100 µg/cm² at most, so
+    /// more than 3 changes nothing.
+    pub greenness: Vary<Greenness>,
     /// Relative spread of the chlorophyll from leaf to leaf of a plant.
     pub green_sd: Num<Fraction>,
     /// Relative spread of the gloss's roughness from leaf to leaf.

@@ -93,7 +93,8 @@ pub struct Settings {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibrate: Option<u64>,
     /// Post-hoc logit adjustment after the last step: how much of the first class's frequency is taken out of the network's scores, 0 to 2.
-    /// 0 for none; 0.5 for photographs of another kind than the training images, in which networks find too little of the plants.
+    /// 0 for none; 0.5 for photographs of another kind than the training images, in which networks find too little of the plants. The
+    /// first class must be soil; not together with `calibrate`, which sets the same biases.
     #[arg(long, value_name = "TAU", default_value = default_of("logit_adjustment"))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub logit_adjustment: Option<f64>,
