@@ -493,6 +493,44 @@ fn calibrated_a_network_overlaps_better() {
     assert!(error.contains("there is a trained model in this folder already"), "{error}");
 }
 
+/// Rationale: a network that misses plants is made to find more by its biases alone. Expected: all weights as without the adjustment, but
+/// for the biases of plants, which are higher by τ ln(soil / plants); where soil is not first, or biases are calibrated too, one error.
+/// Source: the rule.
+#[test]
+fn adjusted_logits_are_other_biases_and_nothing_else() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path();
+    let set = set(folder, 4);
+    let (plain, adjusted) = (folder.join("plain"), folder.join("adjusted"));
+    let more = "--network unet --steps 3";
+    succeed(&mut fit(&set, &plain, more));
+    succeed(&mut fit(&set, &adjusted, &format!("{more} --logit-adjustment 0.5")));
+    let shape = Shape { bands: Band::RGB.to_vec(), width: W, height: H };
+    let selection = Selection::parse(&format!("{}@all", set.display())).unwrap();
+    let store = Store::open(&[selection], Pick::All, 1, &Classes::default(), &shape, false, 1 << 30).unwrap();
+    let labels: Vec<u8> = (0..4).flat_map(|place| store.get(place).unwrap().labels.clone()).collect();
+    let soil = labels.iter().filter(|label| **label == 0).count() as f64;
+    let plants = labels.iter().filter(|label| (1..3).contains(*label)).count() as f64;
+    let offset = (0.5 * (soil / plants).ln()) as f32;
+    let both = [&plain, &adjusted].map(|run| TrainedModel::open(run).unwrap().values);
+    for (before, after) in both[0].iter().zip(&both[1]) {
+        if before.name == "head.conv.bias" {
+            let moved: Vec<f32> = before.values.iter().zip(&after.values).map(|(a, b)| b - a).collect();
+            assert!(moved[0] == 0.0 && moved[1..].iter().all(|m| (m - offset).abs() < 1e-5), "{moved:?} for {offset}");
+        } else {
+            assert_eq!(before, after);
+        }
+    }
+    for (more, words) in [
+        ("--logit-adjustment 0.5 --classes plant=crop,weed;soil", "the first class is not soil"),
+        ("--logit-adjustment 0.5 --calibrate 2", "calibration sets the same biases"),
+        ("--logit-adjustment 3", "3 is out of range"),
+    ] {
+        let said = refuse(&mut fit(&set, &folder.join("refused"), more), 2);
+        assert!(said.contains(words) && !folder.join("refused").exists(), "{said}");
+    }
+}
+
 /// Rationale: outlines that people drew keep a distance from the leaf; a network that is judged by them learns it from rendered
 /// labels that are moved as far. Expected: with a margin of 2 pixels, soil whose outline is no farther is plant, all else and the
 /// photographs stay. A set with a margin is another one to learn from. Source: distances to all plants' pixels.
