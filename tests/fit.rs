@@ -509,8 +509,8 @@ fn adjusted_logits_are_other_biases_and_nothing_else() {
     let selection = Selection::parse(&format!("{}@all", set.display())).unwrap();
     let store = Store::open(&[selection], Pick::All, 1, &Classes::default(), &shape, false, 1 << 30).unwrap();
     let labels: Vec<u8> = (0..4).flat_map(|place| store.get(place).unwrap().labels.clone()).collect();
-    let soil = labels.iter().filter(|label| **label == 0).count() as f64;
-    let plants = labels.iter().filter(|label| (1..3).contains(*label)).count() as f64;
+    let pixels = |classes: std::ops::Range<u8>| labels.iter().filter(|label| classes.contains(label)).count() as f64;
+    let (soil, plants) = (pixels(0..1), pixels(1..3));
     let offset = (0.5 * (soil / plants).ln()) as f32;
     let both = [&plain, &adjusted].map(|run| TrainedModel::open(run).unwrap().values);
     for (before, after) in both[0].iter().zip(&both[1]) {

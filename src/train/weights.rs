@@ -168,11 +168,11 @@ mod tests {
         let path = Path::new("w.safetensors");
         let values: Vec<f32> = (0..4096).map(|i| (i as f32 * 0.731).sin() * 1.001_f32.powi(i - 2048)).collect();
         let fine = [Array { name: "a".into(), shape: vec![4096], values }];
-        let coarse = fine.each_ref().map(|a| a.halved());
+        let coarse = fine.each_ref().map(Array::halved);
         for (a, b) in fine[0].values.iter().zip(&coarse[0].values) {
             assert!((a - b).abs() <= a.abs() / 2048.0 + 3e-8, "{a} {b}");
         }
-        assert_eq!(coarse.each_ref().map(|a| a.halved()), coarse);
+        assert_eq!(coarse.each_ref().map(Array::halved), coarse);
         let (single, half) =
             (encode(path, &coarse, "", Stored::Single).unwrap(), encode(path, &coarse, "", Stored::Half).unwrap());
         assert_eq!(single.len() - half.len(), 2 * 4096);
