@@ -1,4 +1,5 @@
-//! What the command lines share: how a line is told, how a run ends, how a list looks, how an error looks, how a crop is written, what a signal does.
+//! What the command lines share: how a line is told, how a run ends, how a list and an error look, how a crop is written, what a
+//! signal does.
 
 pub mod signal;
 

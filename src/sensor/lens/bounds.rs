@@ -257,8 +257,8 @@ mod tests {
         assert!((50..300).contains(&within), "{within}");
     }
 
-    /// Expected: a right triangle fills half of its box, so edges turn half of the box's places away, and fewer where the lens bends them; a needle without an area and one
-    /// that reaches behind the lens turn none away.
+    /// Expected: a right triangle fills half of its box, so edges turn half of the box's places away, and fewer where the lens bends them;
+    /// a needle without an area and one that reaches behind the lens turn none away.
     #[test]
     fn edges_turn_half_of_the_box_away() {
         for lens in LENSES {
