@@ -444,6 +444,30 @@ fn every_broken_invariant_is_told() {
     }
 }
 
+/// Rationale: an image of feathery leaves alone, each finer than a pixel, ended a dataset. Expected: of labels in stripes of one pixel, where
+/// samples miss every thirtieth, none is told; maps that lie one pixel apart are, in stripes of two.
+#[test]
+fn feathery_leaves_are_no_fault_and_shifted_maps_are() {
+    let (_keep, data) = scratch();
+    let (set, whole) = sample(&data);
+    let told = |sample: &Sample| invariants::faults(&set.recipe, sample).join("; ").contains("by their samples");
+    let share = |class: u8| [0, 1, 2].map(|k| if k == class { 255 } else { 0 });
+    let width = whole.size().0 as usize;
+    let mut feathery = whole.clone();
+    for at in 0..whole.pixels() {
+        let label = (at % width % 2) as u8;
+        feathery.semantics[at] = label;
+        feathery.coverage[at] = share(if at % 30 == 0 { 1 - label } else { label });
+    }
+    assert!(!told(&feathery));
+    let mut shifted = whole.clone();
+    for at in 0..whole.pixels() {
+        shifted.semantics[at] = (at % width / 2 % 2) as u8;
+        shifted.coverage[at] = share(((at % width + 1) / 2 % 2) as u8);
+    }
+    assert!(told(&shifted));
+}
+
 /// Expected: a stem and leaf ends lie where the label maps say that their plant is, within a pixel, wherever they are told to be visible.
 #[test]
 fn keypoints_lie_on_what_they_belong_to() {

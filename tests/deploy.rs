@@ -16,6 +16,7 @@ use furrow::train::deploy::pictures::Prediction;
 use furrow::train::deploy::{onnx, torchscript};
 use furrow::train::fit::hyper::NormalizationMode;
 use furrow::train::net::Network;
+use furrow::train::refine::Refine;
 use furrow::train::run::{self, TrainedModel};
 use furrow::train::torch::{Model, Precision, Where, device};
 use furrow::train::weights::{self, Array};
@@ -332,6 +333,25 @@ fn images_of_a_set_are_asked_about_by_name_and_bands_are_found() {
     let mask = |out: &Path, name: &str| output::read_indexed(&out.join(name)).unwrap().2;
     let differ = mask(&out, "000002.png").iter().zip(&answer).filter(|(a, b)| a != b).count();
     assert!(differ * 1000 <= answer.len(), "{differ}");
+
+    // Refined: by the program what the library makes of the network's probabilities, refused beside other answers, and without red no colours.
+    let refined = folder.path().join("refined");
+    let ask =
+        |refine: &str, out: &Path| train(&["predict", path(&RGBN), &some, "--out", path(out), "--refine", refine]);
+    succeed(ask("colour,plants", &refined));
+    let network = model(&learnt);
+    let pixels = normalised(&learnt, &four, (w, h));
+    let mut probabilities = network.probabilities(&pixels, (w, h), (w, h)).unwrap();
+    Refine { colour: true, plants: true }.apply(&pixels, (w, h), &learnt.card.input.bands, &mut probabilities, None);
+    let n = (w * h) as usize;
+    let class = |at: usize| {
+        (1..3).fold(0, |best, c| if probabilities[c * n + at] > probabilities[best * n + at] { c } else { best })
+    };
+    let expected: Vec<u8> = (0..n).map(|at| class(at) as u8).collect();
+    let differ = mask(&refined, "000002.png").iter().zip(&expected).filter(|(a, b)| a != b).count();
+    assert!(differ * 1000 <= n && expected != answer, "{differ}");
+    assert!(fail(ask("none", &refined), 2).contains("refined otherwise"));
+    assert!(fail(ask("color", &refined), 2).contains("there is no refinement `color`"));
 
     // Beside the photograph, in its own folder, by another name: the same band, the same answer.
     for (k, photo, band, more) in

@@ -18,6 +18,7 @@ use furrow::train::fit::checkpoint::History;
 use furrow::train::fit::{Hyperparameters, Plan};
 use furrow::train::measure::{Evaluation, Prediction, Report};
 use furrow::train::net;
+use furrow::train::refine::Refine;
 use furrow::train::run::{self, Identity, ModelCard, Results, TrainedModel};
 use furrow::train::table::{self, Bound, Callbacks, Experiment, Only, Order, Predictor, Real};
 use furrow::train::weights::{self, Array};
@@ -104,6 +105,7 @@ impl Players {
             input: plan.shape.clone(),
             normalization: Normalization::Image,
             resize: Resize::default(),
+            refine: Refine::default(),
             pixel_mm: None,
             classes: plan.classes.clone(),
             weights: run::WEIGHTS.into(),

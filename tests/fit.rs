@@ -302,6 +302,7 @@ fn weights_of_other_classes_and_damaged_ones_are_refused() {
         ("pixel", "\"weights\":", "\"pixel_mm\": 0.0, \"weights\":", "its pixels have no size"),
         ("resize", "\"weights\":", "\"resize\": {\"scale\": 0.0}, \"weights\":", "not by 0"),
         ("sides", "\"weights\":", "\"resize\": {\"long_sides\": [1000000000]}, \"weights\":", "long sides are 1 to 8"),
+        ("refine", "\"weights\":", "\"refine\": \"all\", \"weights\":", "there is no refinement `all`"),
         (
             "weights",
             "\"weights.safetensors\"",
@@ -525,6 +526,8 @@ fn adjusted_logits_are_other_biases_and_nothing_else() {
         ("--logit-adjustment 0.5 --classes plant=crop,weed;soil", "the first class is not soil"),
         ("--logit-adjustment 0.5 --calibrate 2", "calibration sets the same biases"),
         ("--logit-adjustment 3", "3 is out of range"),
+        ("--refine plants --classes plant=crop,weed;soil", "the first class is not soil"),
+        ("--refine colour --bands nir", "needs the bands red, green and blue"),
     ] {
         let said = refuse(&mut fit(&set, &folder.join("refused"), more), 2);
         assert!(said.contains(words) && !folder.join("refused").exists(), "{said}");

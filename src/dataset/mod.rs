@@ -81,7 +81,7 @@ pub mod verify;
 pub use generate::{Callbacks, Shard, Work};
 pub use make::{begin, make, make_watched};
 pub use plan::Order;
-pub use recipe::Recipe;
+pub use recipe::{MOST_IMAGES, Recipe};
 pub use record::Record;
 pub use sample::Sample;
 pub use set::Set;

@@ -119,6 +119,9 @@ pub(super) fn scope(folder: &Path) -> Scope {
     Scope::Below { folder: folder.into(), help }
 }
 
+/// Most images of a dataset: their names have eight digits at most.
+pub const MOST_IMAGES: u64 = 99_999_999;
+
 /// The recipe's file, below the dataset's folder.
 pub const FILE: &str = "dataset.json";
 
@@ -134,11 +137,17 @@ impl Recipe {
             }
             other => other.map_err(Error::reading(&path))?,
         };
-        serde_json::from_slice(&bytes).map_err(|e| {
-            Error::damaged(format!("this is not a dataset's recipe: {e}"))
-                .in_file(path)
+        let wrong = |what: String| {
+            Error::damaged(what)
+                .in_file(&path)
                 .help("run the command that began the dataset again with another --out, or restore the file")
-        })
+        };
+        let recipe: Self =
+            serde_json::from_slice(&bytes).map_err(|e| wrong(format!("this is not a dataset's recipe: {e}")))?;
+        if recipe.count > MOST_IMAGES {
+            return Err(wrong(format!("it tells of {} images; datasets have at most {MOST_IMAGES}", recipe.count)));
+        }
+        Ok(recipe)
     }
 
     /// Its text.

@@ -68,6 +68,7 @@ impl Asked<'_> {
             encoder_rate: if hyper.encoder_rate > 0.0 { hyper.encoder_rate } else { 1.0 },
             ema: if hyper.ema > 0.0 { hyper.ema } else { EMA },
             resize: card.resize.clone(),
+            refine: card.refine,
             normalization: match card.normalization {
                 Normalization::Band => NormalizationMode::Band,
                 Normalization::Image => NormalizationMode::Image,

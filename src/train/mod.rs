@@ -32,6 +32,7 @@
 //! | `data` | datasets to batches: crops, data augmentation, input normalization, oversampling |
 //! | `net`, `torch` | the networks; computed by libtorch |
 //! | `fit` | hyper-parameters, class weights, loss, optimiser, checkpoints, the trainer, class-bias calibration |
+//! | `refine` | predictions refined by what a picture says as a whole |
 //! | `run` | the folder of a training run |
 //! | [`zoo`] | trained networks that ship |
 //! | `measure`, `figure` | scores; charts and pages |
@@ -59,6 +60,8 @@ pub mod measure;
 pub mod memory;
 #[doc(hidden)]
 pub mod net;
+#[doc(hidden)]
+pub mod refine;
 #[doc(hidden)]
 pub mod run;
 #[cfg(feature = "train")]

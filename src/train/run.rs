@@ -14,6 +14,7 @@ use super::fit::Plan;
 use super::fit::checkpoint::History;
 use super::fit::hyper::SIDES;
 use super::net::{Network, Parameter, Pretrained, parameters};
+use super::refine::Refine;
 use super::weights::{self, Array, Stored};
 use crate::input::{below, shipped};
 use crate::output::{Together, write_atomically, write_together};
@@ -113,6 +114,9 @@ pub struct ModelCard {
     /// The sizes that pictures are brought to.
     #[serde(default, skip_serializing_if = "Resize::is_stretch")]
     pub resize: Resize,
+    /// How predictions are refined.
+    #[serde(default, skip_serializing_if = "Refine::is_none")]
+    pub refine: Refine,
     /// Side of a pixel on the ground, millimetres: the median of the training set, where it tells its cameras.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pixel_mm: Option<f64>,
@@ -139,6 +143,7 @@ impl ModelCard {
         }
         self.resize.check()?;
         self.classes.check()?;
+        self.refine.check(&self.classes, bands)?;
         if [width, height].iter().any(|side| **side < self.network.least_side()) {
             return Err(format!("{} does not see {width} × {height} pixels", self.network.name()));
         }
@@ -240,6 +245,11 @@ impl TrainedModel {
         if let Some(array) = values.iter().find(|a| !a.values.iter().all(|v| v.is_finite())) {
             let what = format!("`{}` holds values that are not finite numbers", array.name);
             return Err(Error::input(what).help("train again, with a lower --rate").in_file(path));
+        }
+        let is_below = |a: &&Array| a.name.ends_with(".running_var") && a.values.iter().any(|v| *v < 0.0);
+        if let Some(array) = values.iter().find(is_below) {
+            let what = format!("`{}` holds variances below 0", array.name);
+            return Err(Error::input(what).help("no training writes them: take weights that you trust").in_file(path));
         }
         Ok(Self { card, values })
     }

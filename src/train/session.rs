@@ -83,6 +83,11 @@ pub(super) fn train(
         return Err(Error::misuse("logit adjustment takes out how frequent soil is, and the first class is not soil")
             .help("name soil first in --classes, or leave --logit-adjustment out"));
     }
+    let refine = plan.hyper.refine;
+    refine.check(&plan.classes, &plan.shape.bands).map_err(|what| {
+        Error::misuse(format!("--refine {}: {what}", refine.name()))
+            .help("name soil first in --classes and red, green and blue in --bands, or leave --refine out")
+    })?;
     let begin = match begin {
         Some(_) if !plan.hyper.pretrained.is_none() => {
             return Err(Error::misuse("a run to begin with and pretrained weights exclude each other")
@@ -122,6 +127,7 @@ pub(super) fn train(
         input: plan.shape.clone(),
         normalization: outcome.normalization,
         resize: plan.hyper.resize.clone(),
+        refine: plan.hyper.refine,
         pixel_mm,
         classes: plan.classes.clone(),
         weights: run::WEIGHTS.into(),
@@ -205,7 +211,8 @@ pub fn evaluate(
         let sizes = card.resize.sizes(trained_at, size)?;
         let inputs = resize::inputs(&example.planes, size, &sizes, &card.normalization);
         let begun = Instant::now();
-        let scores = multiscale::scores(&model, &inputs)?;
+        let mut scores = multiscale::scores(&model, &inputs)?;
+        scores.refine(card.refine, &inputs, &card.input.bands);
         let seconds = Some(begun.elapsed().as_secs_f64());
         let predicted = classes_at(&scores.values, scores.size, size);
         let (width, height) = size;

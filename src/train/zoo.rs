@@ -30,8 +30,8 @@ pub fn needs_out(run: &Path, usual: &str) -> Result<()> {
         .help(format!("give --out, such as --out {usual}")))
 }
 
-/// All networks that ship, in order of their names.
-pub fn all() -> Result<Vec<Shipped>> {
+/// All networks that ship, in order of their names; an error in place of each that is damaged.
+pub fn all() -> Result<Vec<Result<Shipped>>> {
     let mut folders: Vec<PathBuf> =
         std::fs::read_dir(shipped::networks()?).into_iter().flatten().filter_map(|e| Some(e.ok()?.path())).collect();
     folders.retain(|folder| folder.join(MODEL).is_file());
@@ -40,7 +40,7 @@ pub fn all() -> Result<Vec<Shipped>> {
         let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
         Ok(Shipped { model: TrainedModel::open(&folder)?, about: about(&folder), name, folder })
     };
-    folders.into_iter().map(open).collect()
+    Ok(folders.into_iter().map(open).collect())
 }
 
 /// The first paragraph of its README below the title, in one line.
@@ -58,7 +58,7 @@ mod tests {
     /// comes before it, and other names stay as they are written.
     #[test]
     fn networks_that_ship_are_found_by_their_names() {
-        let all = all().unwrap();
+        let all: Vec<Shipped> = all().unwrap().into_iter().map(Result::unwrap).collect();
         assert!(all.iter().any(|network| network.name == "any-field"));
         for network in &all {
             assert_eq!(folder(Path::new(&network.name)), network.folder);

@@ -1,8 +1,8 @@
 //! `train eval`.
 
+use crate::inference::InferenceArgs;
 use crate::machine::MachineArgs;
 use crate::report;
-use crate::sizes::SizeArgs;
 use furrow::cli::signal::Signals;
 use furrow::train::data::{Pick, Resize, Selection};
 use furrow::train::run::TrainedModel;
@@ -22,7 +22,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
-    sizes: SizeArgs,
+    inference: InferenceArgs,
     #[command(flatten)]
     machine: MachineArgs,
 }
@@ -30,7 +30,7 @@ pub(crate) struct Args {
 /// Evaluates, and writes the report.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let mut trained = TrainedModel::open(&args.run)?;
-    args.sizes.apply(&mut trained.card)?;
+    args.inference.apply(&mut trained.card)?;
     let set = args.set.folder.file_name().unwrap_or_default();
     if args.out.is_none() {
         zoo::needs_out(&args.run, "report")?;
@@ -49,14 +49,15 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         session::evaluate(&trained, &args.set, &args.machine.precision, threads, &machine, signals.heed(), &mut see)?;
     let title = format!("{} on {}", args.run.display(), args.set.folder.display());
     let lead = format!(
-        "{}, {} parameters, {}.",
+        "{}, {} parameters, {}{}.",
         card.network.about().trim_end_matches('.'),
         card.parameters,
         match card.resize {
             Resize::Stretch => format!("at {} × {} pixels", card.input.width, card.input.height),
             Resize::LongSides(_) => format!("at long sides of {} pixels", card.resize.name()),
             Resize::Scale(_) => format!("at the images' size {}", card.resize.name()),
-        }
+        },
+        if card.refine.is_none() { String::new() } else { format!(", refined by {}", card.refine.name()) }
     );
     let paths = report::write(&out, &title, &lead, &report, &shots.kept, &card.classes.colors())?;
     furrow::tell!("{}", report.summary().markdown().trim_end());

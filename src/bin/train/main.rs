@@ -10,12 +10,12 @@ mod eval;
 mod explain;
 mod export;
 mod fit;
+mod inference;
 mod machine;
 mod pages;
 mod predict;
 mod renamed;
 mod report;
-mod sizes;
 mod table;
 mod zoo;
 

@@ -1,7 +1,7 @@
 //! `train predict`.
 
+use crate::inference::InferenceArgs;
 use crate::machine::MachineArgs;
-use crate::sizes::SizeArgs;
 use furrow::cli::signal::Signals;
 use furrow::train::data::Band;
 use furrow::train::deploy::pictures;
@@ -30,7 +30,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=1024))]
     batch: u16,
     #[command(flatten)]
-    sizes: SizeArgs,
+    inference: InferenceArgs,
     #[command(flatten)]
     machine: MachineArgs,
     /// Print nothing but errors and the paths of the files.
@@ -49,7 +49,7 @@ fn band(text: &str) -> Result<(Band, PathBuf), String> {
 /// Predicts.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let mut trained = TrainedModel::open(&args.run)?;
-    args.sizes.apply(&mut trained.card)?;
+    args.inference.apply(&mut trained.card)?;
     cli::check_folder(&args.out)?;
     let pictures = pictures::find(&args.images, &trained.card.input, &args.bands)?;
     let bar = if args.quiet { ProgressBar::hidden() } else { ProgressBar::new(pictures.len() as u64) };

@@ -5,7 +5,7 @@ use furrow::train::zoo;
 use furrow::{Result, cli};
 use std::path::PathBuf;
 
-/// Networks that ship: name, network, bands, classes, pixel size, what for.
+/// Networks that ship: name, network, bands, classes, pixel size, what for. One that is damaged is told after the others.
 pub(crate) fn run() -> Result<Vec<PathBuf>> {
     let row = |network: &zoo::Shipped| {
         let card = &network.model.card;
@@ -20,7 +20,8 @@ pub(crate) fn run() -> Result<Vec<PathBuf>> {
             network.about.clone(),
         ]
     };
-    let rows: Vec<[String; 6]> = zoo::all()?.iter().map(row).collect();
+    let (whole, damaged): (Vec<_>, Vec<_>) = zoo::all()?.into_iter().partition(Result::is_ok);
+    let rows: Vec<[String; 6]> = whole.iter().flatten().map(row).collect();
     cli::print_rows(&rows);
-    Ok(Vec::new())
+    damaged.into_iter().next().map_or_else(|| Ok(Vec::new()), |network| network.map(|_| Vec::new()))
 }

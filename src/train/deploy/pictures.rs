@@ -9,6 +9,7 @@ use crate::dataset::{Set, native};
 use crate::output;
 use crate::train::classes::Classes;
 use crate::train::data::{Band, Pick, Resize, Selection, Shape};
+use crate::train::refine::Refine;
 use crate::train::run::{self, ModelCard};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -259,6 +260,9 @@ pub struct Prediction {
     /// The sizes that pictures were brought to, as `--resize` writes them.
     #[serde(default = "stretch")]
     pub resize: String,
+    /// How they were refined, as `--refine` writes it.
+    #[serde(default, skip_serializing_if = "Refine::is_none")]
+    pub refine: Refine,
     /// Classes in the order of their numbers, with their sRGB colours.
     pub classes: Vec<(String, [u8; 3])>,
     /// The photograph of each prediction, by name.
@@ -285,6 +289,9 @@ impl Prediction {
         }
         if there.as_ref().is_some_and(|t| t.resize != card.resize.name()) {
             return refuse(&path, "predictions at other sizes lie in this folder".into());
+        }
+        if there.as_ref().is_some_and(|t| t.refine != card.refine) {
+            return refuse(&path, "predictions that were refined otherwise lie in this folder".into());
         }
         let mut all = there.map(|t| t.pictures).unwrap_or_default();
         for picture in pictures {
@@ -318,6 +325,7 @@ impl Prediction {
             network: card.network.name().into(),
             weights_sha256: card.weights_sha256.clone(),
             resize: card.resize.name(),
+            refine: card.refine,
             classes,
             pictures: all,
         };

@@ -159,8 +159,8 @@ fn write<'s, 'a: 's>(
     let (sender, receiver) = sync_channel::<Scored<'a>>(AHEAD);
     let handle = scope.spawn(move || {
         let mut written = Vec::new();
-        for (number, ready, scores) in receiver {
-            match draw(card, out, &ready, &scores) {
+        for (number, ready, mut scores) in receiver {
+            match draw(card, out, &ready, &mut scores) {
                 Ok(paths) => written.push((number, paths)),
                 Err(e) => {
                     failed.store(true, Ordering::Relaxed);
@@ -190,7 +190,7 @@ fn infer<'a>(model: &Model, batch: Vec<(usize, Ready<'a>)>, writers: &[SyncSende
                 let pixels: Vec<f32> = several.iter().flat_map(|(_, ready)| &ready.inputs[0].pixels).copied().collect();
                 let values = model.scores(&pixels, size)?;
                 let each = values.chunks_exact(values.len() / several.len());
-                all.extend(each.map(|values| Scores { values: values.to_vec(), size }));
+                all.extend(each.map(|values| Scores { values: values.to_vec(), size, finest: None }));
             }
         }
     }
@@ -203,8 +203,9 @@ fn infer<'a>(model: &Model, batch: Vec<(usize, Ready<'a>)>, writers: &[SyncSende
 }
 
 /// Writes the prediction of one picture.
-fn draw(card: &ModelCard, out: &Path, ready: &Ready<'_>, scores: &Scores) -> Result<[PathBuf; 2]> {
+fn draw(card: &ModelCard, out: &Path, ready: &Ready<'_>, scores: &mut Scores) -> Result<[PathBuf; 2]> {
     let (width, height) = (ready.width, ready.height);
+    scores.refine(card.refine, &ready.inputs, &card.input.bands);
     let colors = card.classes.colors();
     let classes = enlarge::classes_at(&scores.values, scores.size, (width, height));
     let over = overlay::draw(&ready.rgb, &classes, width, &colors);

@@ -28,13 +28,36 @@ pub(super) fn batch(
     plan: &Plan,
     number: u64,
 ) -> Result<(Batch, f64)> {
-    let (mut labels, sure) = teacher.predict_with_probability(&views.plain, plan.crop_size())?;
+    let (mut labels, sure) = answers(teacher, &views.plain, plan)?;
     keep_surest(&mut labels, &sure, adaptation.keep);
     let mut photos = Batch { images: rendered.images, pixels: views.changed, labels };
     paste(rendered, &mut photos, &mut Stream::of(plan.seed, number, Purpose::Training, 4));
     let labelled = photos.labels.iter().filter(|label| **label != IGNORE).count();
     let share = labelled as f64 / photos.labels.len().max(1) as f64;
     Ok((photos, share))
+}
+
+/// The class of each pixel and its probability, refined as the network's predictions will be.
+fn answers(teacher: &Model, pixels: &[f32], plan: &Plan) -> Result<(Vec<u8>, Vec<f32>)> {
+    let (refine, size, bands) = (plan.hyper.refine, plan.crop_size(), &plan.shape.bands);
+    if refine.is_none() {
+        return teacher.predict_with_probability(pixels, size);
+    }
+    let area = size.0 as usize * size.1 as usize;
+    let mut probabilities = teacher.probabilities(pixels, size, size)?;
+    let images = pixels.chunks_exact(area * bands.len()).zip(probabilities.chunks_exact_mut(area * teacher.classes));
+    let (mut labels, mut sure) = (Vec::new(), Vec::new());
+    for (pixels, probabilities) in images {
+        refine.apply(pixels, size, bands, probabilities, None);
+        for at in 0..area {
+            let each = probabilities.iter().skip(at).step_by(area).enumerate();
+            let (class, p) =
+                each.fold((0, f32::NEG_INFINITY), |best, (class, p)| if *p > best.1 { (class, *p) } else { best });
+            labels.push(class as u8);
+            sure.push(p);
+        }
+    }
+    Ok((labels, sure))
 }
 
 /// Takes the label of all but the surest share of the pixels of each class.

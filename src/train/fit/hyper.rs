@@ -11,6 +11,7 @@ use super::schedule::Schedule;
 use crate::Error;
 use crate::train::data::{Augment, Resize, Shape};
 use crate::train::net::Pretrained;
+use crate::train::refine::Refine;
 use serde::{Deserialize, Serialize};
 
 /// The optimiser.
@@ -175,6 +176,9 @@ pub struct Hyperparameters {
     /// The sizes that pictures are brought to once the network is trained; of no effect on training and validation.
     #[serde(default, skip_serializing_if = "Resize::is_stretch")]
     pub resize: Resize,
+    /// How predictions are refined once the network is trained; of no effect on training and validation.
+    #[serde(default, skip_serializing_if = "Refine::is_none")]
+    pub refine: Refine,
     /// Data augmentation.
     pub augment: Augment,
     /// Input normalization.
@@ -237,6 +241,7 @@ impl Default for Hyperparameters {
             encoder_rate: 1.0,
             ema: 0.0,
             resize: Resize::Stretch,
+            refine: Refine::default(),
             augment: Augment::default(),
             normalization: NormalizationMode::Band,
             validate_every: 100,

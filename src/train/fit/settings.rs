@@ -10,6 +10,7 @@ use super::schedule::Schedule;
 use crate::train::classes::Classes;
 use crate::train::data::{Augment, Band, Resize};
 use crate::train::net::Pretrained;
+use crate::train::refine::Refine;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -120,6 +121,11 @@ pub struct Settings {
     #[arg(long, value_name = "SIDES", default_value = default_of("resize"))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resize: Option<String>,
+    /// Refinement of predictions once the network is trained: colour (pixels of equal colour in a picture are rather of equal kind, plant
+    /// or soil), plants (plant pixels that hang together are of one class), colour,plants or none. The first class must be soil.
+    #[arg(long, value_name = "NAMES", default_value = default_of("refine"))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub refine: Option<String>,
     /// Data augmentation: all, none, or some of flip, rotate, scale, crop, colour, blur, noise with commas between, and erase (random
     /// erasing: patches of one colour labelled as soil), which is not part of all.
     #[arg(long, value_name = "NAMES", default_value = default_of("augment"))]
@@ -171,6 +177,7 @@ pub fn defaults() -> Vec<(&'static str, String)> {
         ("encoder_rate", hyper.encoder_rate.to_string()),
         ("ema", hyper.ema.to_string()),
         ("resize", hyper.resize.name()),
+        ("refine", hyper.refine.name().into()),
         ("augment", hyper.augment.to_string()),
         ("normalization", hyper.normalization.name().into()),
         ("validate_every", hyper.validate_every.to_string()),
@@ -237,6 +244,7 @@ impl Settings {
         word("normalization", self.normalization.as_ref(), &mut hyper.normalization, NormalizationMode::parse)?;
         word("pretrained", self.pretrained.as_ref(), &mut hyper.pretrained, Pretrained::parse)?;
         word("resize", self.resize.as_ref(), &mut hyper.resize, Resize::parse)?;
+        word("refine", self.refine.as_ref(), &mut hyper.refine, Refine::parse)?;
         number(self.freeze, &mut hyper.freeze);
         number(self.encoder_rate, &mut hyper.encoder_rate);
         number(self.ema, &mut hyper.ema);

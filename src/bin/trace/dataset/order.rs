@@ -28,7 +28,7 @@ pub(crate) struct ImageArgs {
     #[command(flatten)]
     pub(crate) memory: MemoryArgs,
     /// How many images. A dataset may get longer later.
-    #[arg(long, value_name = "N", required = true, value_parser = clap::value_parser!(u64).range(1..=99_999_999))]
+    #[arg(long, value_name = "N", required = true, value_parser = clap::value_parser!(u64).range(1..=dataset::MOST_IMAGES))]
     count: Option<u64>,
     /// Folder of the dataset.
     #[arg(long, value_name = "DIR", required = true)]
