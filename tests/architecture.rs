@@ -66,7 +66,7 @@ const ALLOWED: &[(&str, &str)] = &[
     // Tables: measured spectra in; boxes of plants and numbers of reports out.
     ("csv", "optics/measured.rs optics/munsell.rs optics/prospect.rs dataset/format/cropandweed.rs report/csv.rs"),
     // Layers out, pictures of light in.
-    ("exr", "output/exr/mod.rs texture/panorama.rs"),
+    ("exr", "output/exr/mod.rs texture/exr_size.rs texture/panorama.rs"),
     // Vectors are re-exported by `math`; two files sum in double precision.
     ("glam", "math/ film/ accel/brute.rs"),
     // Weights of networks that ship.

@@ -33,7 +33,8 @@ fn failed_well(ended: &Ended, folder: &Path, at: u64) {
     }
 }
 
-/// Expected: until the first file gets its name the old image stays as it is; from then on each file is the old one or the new one, whole.
+/// Expected: whatever fails, the old image stays as it is, renamed files put back; where the disk fails for good after the first of them has its
+/// name, each file is the old one or the new one, whole. Where old files cannot be kept under a second name, they are replaced all the same.
 #[test]
 fn an_image_is_replaced_whole_or_told() {
     let (_keep, out) = scratch();
@@ -43,28 +44,41 @@ fn an_image_is_replaced_whole_or_told() {
     let whole = faults::run(image(&other, "2"), &other, 0, false);
     assert!(whole.output.status.success());
     let new = tree(&other);
+    let over = faults::run(image(&out, "2"), &out, 0, false);
+    same(&tree(&out), &new);
+    restore(&out, &old);
     assert!(old.keys().eq(new.keys()) && names(&out) == FILES);
     let mut seen = std::collections::BTreeSet::new();
-    for at in 1..=whole.changes {
-        // The folder is there already: what the program makes for itself alone is one change less.
-        let ended = faults::run(image(&out, "2"), &out, at, at % 2 == 0);
+    for at in 1..=over.changes {
+        // Names are kept and given in turn: by twos, so that both kinds fail once and for good.
+        let lasts = at / 2 % 2 == 0;
+        let ended = faults::run(image(&out, "2"), &out, at, lasts);
         if ended.failed == "none" {
             continue;
         }
-        failed_well(&ended, &out, at);
         let found = tree(&out);
-        if ended.failed == "rename" {
-            for (name, bytes) in &found {
-                assert!(*bytes == old[name] || *bytes == new[name], "change {at}: {name} is neither");
-            }
+        let replacing = ended.failed == "rename" || ended.failed == "link";
+        if ended.failed == "link" && !lasts {
+            assert!(ended.output.status.success(), "change {at}: {}", ended.said());
+            same(&found, &new);
         } else {
-            same(&found, &old);
+            failed_well(&ended, &out, at);
+            if lasts && replacing {
+                for (name, bytes) in &found {
+                    assert!(*bytes == old[name] || *bytes == new[name], "change {at}: {name} is neither");
+                }
+            } else {
+                same(&found, &old);
+            }
         }
-        seen.insert(ended.failed);
+        seen.insert((ended.failed, lasts));
         std::fs::remove_dir_all(&out).expect("it goes");
         restore(&out, &old);
     }
-    assert!(["make", "write", "flush", "rename"].iter().all(|kind| seen.contains(*kind)), "{seen:?}");
+    for kind in ["make", "write", "flush", "rename", "link"] {
+        assert!(seen.iter().any(|(failed, _)| failed == kind), "{kind} is not among {seen:?}");
+    }
+    assert!(seen.contains(&("rename".to_owned(), false)), "{seen:?}");
     succeed(image(&out, "2"));
     same(&tree(&out), &new);
 }

@@ -18,9 +18,38 @@ use std::sync::Arc;
 const OPTIONS: tobj::LoadOptions =
     tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
 
+/// An error where a corner names what is not there before it, counted from the last one (a number below 0), or what no file has: `tobj`
+/// multiplies such a number before it looks whether it is in range.
+fn check_corners(text: &[u8]) -> Result<(), String> {
+    let kinds = ["v", "vt", "vn"];
+    let mut counts = [0i64; 3];
+    for (number, line) in text.split(|byte| *byte == b'\n').enumerate() {
+        let line = String::from_utf8_lossy(line);
+        let mut words = line.split_whitespace();
+        let first = words.next().unwrap_or_default();
+        if let Some(kind) = kinds.iter().position(|kind| *kind == first) {
+            counts[kind] += 1;
+        }
+        if !["f", "l", "p"].contains(&first) {
+            continue;
+        }
+        for corner in words {
+            for (part, count) in corner.split('/').zip(counts) {
+                // What is no number is told by `tobj`.
+                let Ok(index) = part.parse::<i64>() else { continue };
+                if index == 0 || index < -count || index > i64::from(u32::MAX) {
+                    return Err(format!("line {}: the corner `{corner}` names what is not there", number + 1));
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
 /// Reads a file; in words what is wrong with it.
 pub(super) fn read(mut files: Files<'_>, up: Up) -> Result<Model, Wrong> {
     let text = files.own()?;
+    check_corners(&text)?;
     // The loader of materials is asked in the middle of reading: it leaves its fault here.
     let asked: RefCell<(&mut Files<'_>, Option<Wrong>)> = RefCell::new((&mut files, None));
     let materials = |name: &Path| {

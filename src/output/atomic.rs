@@ -65,7 +65,7 @@ pub fn create_atomically(path: &Path, bytes: &[u8]) -> Result<bool> {
 }
 
 /// Files that belong together: all are whole under temporary names before the first is renamed. So where the disk gets full, those
-/// that were there before stay, and never stand beside some of the new ones.
+/// that were there before stay, and never stand beside some of the new ones. Where a renaming fails, those before it are undone.
 #[derive(Default)]
 pub struct Together {
     waiting: Vec<(TempPath, PathBuf)>,
@@ -101,19 +101,57 @@ impl Together {
     /// Gives all files their names; returns their paths in the order in which they were added. `None` where somebody has cleared a
     /// temporary file away: then all are to be added once more.
     pub fn finish(self) -> Result<Option<Vec<PathBuf>>> {
-        let mut paths = Vec::new();
+        let mut done: Vec<Replaced> = Vec::new();
         for (temporary, path) in self.waiting {
             let name = temporary.to_path_buf();
-            match temporary.persist(&path) {
-                Ok(()) => {}
-                Err(e) if e.error.kind() == ErrorKind::NotFound => return Ok(None),
-                Err(e) => return Err(Error::io(&path)(e.error)),
+            let replaced = Replaced::keep(path);
+            if let Err(e) = temporary.persist(&replaced.path) {
+                let failed = match e.error.kind() {
+                    ErrorKind::NotFound => Ok(None),
+                    _ => Err(Error::io(&replaced.path)(e.error)),
+                };
+                done.into_iter().rev().for_each(Replaced::undo);
+                return failed;
             }
             // Two names of one file: POSIX leaves both.
             let _ = fs::remove_file(name);
-            paths.push(path);
+            done.push(replaced);
         }
-        Ok(Some(paths))
+        Ok(Some(done.into_iter().map(|replaced| replaced.path).collect()))
+    }
+}
+
+/// A file that gets a new content, and a second name of the old one until all that belong together have theirs.
+struct Replaced {
+    path: PathBuf,
+    was_there: bool,
+    old: Option<TempPath>,
+}
+
+impl Replaced {
+    /// What is at this path now stays under a temporary name; not where the file system has no links.
+    fn keep(path: PathBuf) -> Self {
+        let was_there = fs::symlink_metadata(&path).is_ok();
+        let mut builder = tempfile::Builder::new();
+        let link = |name: &Path| fs::hard_link(&path, name);
+        let old = was_there.then(|| builder.prefix(UNFINISHED).make_in(parent(&path), link).ok()).flatten();
+        Self { old: old.map(tempfile::NamedTempFile::into_temp_path), was_there, path }
+    }
+
+    /// Puts the old content back, as far as the disk still allows it.
+    fn undo(self) {
+        match self.old {
+            Some(old) => {
+                // Two names of one file: POSIX leaves both. Where it cannot be put back it stays under its temporary name.
+                let name = old.to_path_buf();
+                match old.persist(&self.path) {
+                    Ok(()) => drop(fs::remove_file(name)),
+                    Err(e) => drop(e.path.keep()),
+                }
+            }
+            None if !self.was_there => drop(fs::remove_file(&self.path)),
+            None => {}
+        }
     }
 }
 
@@ -267,6 +305,22 @@ mod tests {
             assert_eq!((fs::read(&a).unwrap(), fs::read(&b).unwrap()), (b"old".to_vec(), b"old".to_vec()));
             assert_eq!(names(folder.path()), ["a", "b", "c"]);
         }
+    }
+
+    /// Expected: where a name is taken by a folder after all files were written, those renamed before it are as they were, new ones gone.
+    #[test]
+    fn files_renamed_before_one_that_cannot_be_are_put_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let [a, b, c] = ["a", "b", "c"].map(|name| folder.path().join(name));
+        fs::write(&a, "old").unwrap();
+        let mut files = Together::default();
+        for path in [&a, &b, &c] {
+            files.add(path, b"new").unwrap();
+        }
+        fs::create_dir(&c).unwrap();
+        assert_eq!(files.finish().unwrap_err().exit_code(), 1);
+        assert_eq!(fs::read(&a).unwrap(), b"old");
+        assert_eq!(names(folder.path()), ["a", "c"]);
     }
 
     #[test]

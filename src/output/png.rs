@@ -76,6 +76,7 @@ pub fn encode(width: u32, height: u32, picture: &Picture<'_>, text: &str) -> Res
 fn read(path: &Path, depth: BitDepth, color: ColorType, what: &str) -> Result<(u32, u32, Vec<u8>)> {
     let wrong = |e: &dyn std::fmt::Display| Error::input(e.to_string()).in_file(path);
     let file = input::open(path).map_err(|refusal| refusal.into_error(path))?;
+    let bytes = file.metadata().map_err(Error::reading(path))?.len();
     let mut decoder = png::Decoder::new(std::io::BufReader::new(file));
     decoder.set_transformations(png::Transformations::IDENTITY);
     let mut reader = decoder.read_info().map_err(|e| wrong(&e))?;
@@ -83,10 +84,19 @@ fn read(path: &Path, depth: BitDepth, color: ColorType, what: &str) -> Result<(u
     if reader.info().bit_depth != depth || reader.info().color_type != color {
         return Err(wrong(&format!("it is not {what}")));
     }
-    let size = reader.output_buffer_size().ok_or_else(|| wrong(&"it is too large"))?;
+    let size = plausible(reader.output_buffer_size(), (w, h), bytes).map_err(|what| wrong(&what))?;
     let mut data = vec![0; size];
     reader.next_frame(&mut data).map_err(|e| wrong(&e))?;
     Ok((w, h, data))
+}
+
+/// Bytes that a byte of a PNG may stand for: deflate has at most 1032.
+const DEFLATED: u64 = 1100;
+
+/// The size of a picture's data; an error where it is more than the file's bytes can hold, before that much memory is taken.
+fn plausible(size: Option<usize>, (w, h): (u32, u32), bytes: u64) -> Result<usize, String> {
+    let holds = |size: &usize| *size as u64 <= DEFLATED.saturating_mul(bytes);
+    size.filter(holds).ok_or_else(|| format!("it tells of {w} × {h} pixels, more than its {bytes} bytes can hold"))
 }
 
 /// Reads an 8-bit indexed PNG: width, height, indices.
@@ -140,6 +150,7 @@ impl Map {
 pub fn read_map(path: &Path) -> Result<(u32, u32, Map)> {
     let wrong = |what: String| Error::input(what).in_file(path);
     let file = input::open(path).map_err(|refusal| refusal.into_error(path))?;
+    let bytes = file.metadata().map_err(Error::reading(path))?.len();
     let mut decoder = png::Decoder::new(std::io::BufReader::new(file));
     decoder.set_transformations(png::Transformations::IDENTITY);
     let unreadable = |e: png::DecodingError| wrong(format!("this mask cannot be read: {e}; masks are PNG files"));
@@ -147,7 +158,7 @@ pub fn read_map(path: &Path) -> Result<(u32, u32, Map)> {
     let (w, h) = (reader.info().width, reader.info().height);
     let (color, depth) = (reader.info().color_type, reader.info().bit_depth as u8);
     let palette = reader.info().palette.as_ref().map(|p| p.as_chunks::<3>().0.to_vec()).unwrap_or_default();
-    let size = reader.output_buffer_size().ok_or_else(|| wrong("it is too large".into()))?;
+    let size = plausible(reader.output_buffer_size(), (w, h), bytes).map_err(wrong)?;
     let mut data = vec![0; size];
     reader.next_frame(&mut data).map_err(unreadable)?;
     let values = unpack(&data, w as usize * color.samples(), depth);

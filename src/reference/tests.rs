@@ -43,6 +43,20 @@ fn examples_of_experiment_files_are_read() {
     every_example_is_read::<crate::train::table::ExperimentDesc>(&super::experiment());
 }
 
+/// Rationale: an example that the program refuses is worse than none. Expected: each example of a hyper-parameter is one that a plan takes.
+#[cfg(feature = "train")]
+#[test]
+fn examples_of_hyper_parameters_are_taken() {
+    use crate::train::{Plan, Settings};
+    let reference = super::experiment();
+    let section = reference.sections.iter().find(|section| section.path == "hyperparameters").unwrap();
+    assert!(section.entries.len() > 20);
+    for entry in &section.entries {
+        let settings: Settings = ron::from_str(&format!("#![enable(implicit_some)]\n({})", entry.example)).unwrap();
+        settings.apply(&mut Plan::default()).unwrap_or_else(|e| panic!("{}: {e:?}", entry.example));
+    }
+}
+
 #[test]
 fn every_entry_has_words_and_names_no_type_of_the_code() {
     let mut wrong = Vec::new();

@@ -7,6 +7,7 @@
 
 mod cutout;
 pub mod draw;
+pub(crate) mod exr_size;
 mod height;
 pub mod maps;
 pub mod noise;

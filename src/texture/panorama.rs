@@ -3,6 +3,7 @@
 //! Rows run from the zenith to the nadir, columns once around, to the right clockwise as seen from above. Values are linear; colours are
 //! read as Rec.709. Of OpenEXR the channels R, G, B (of the first layer that has them) and, where it is there, NIR; opacity is left out.
 
+use super::exr_size;
 use super::rgbe;
 use super::texels::{Texels, check};
 use crate::input;
@@ -80,6 +81,7 @@ impl Panorama {
 }
 
 fn open_exr(bytes: &[u8]) -> Result<Texels, String> {
+    exr_size::check(bytes)?;
     let reader = read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
     let image = reader.from_buffered(Cursor::new(bytes)).map_err(|e| format!("it cannot be read: {e}"))?;
     for layer in &image.layer_data {

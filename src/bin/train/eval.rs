@@ -57,7 +57,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
             Resize::LongSides(_) => format!("at long sides of {} pixels", card.resize.name()),
             Resize::Scale(_) => format!("at the images' size {}", card.resize.name()),
         },
-        if card.refine.is_none() { String::new() } else { format!(", refined by {}", card.refine.name()) }
+        if card.refine.is_none() { ", not refined".into() } else { format!(", refined by {}", card.refine.name()) }
     );
     let paths = report::write(&out, &title, &lead, &report, &shots.kept, &card.classes.colors())?;
     furrow::tell!("{}", report.summary().markdown().trim_end());

@@ -31,6 +31,7 @@ pub(crate) fn write(
     palette: &[[u8; 3]],
 ) -> Result<Vec<PathBuf>> {
     let tables: String = report.tables().iter().map(|t| t.markdown() + "\n").collect();
+    let tables = format!("{title}: {lead}\n\n{tables}");
     let page = Page {
         kind: "Evaluation",
         title,

@@ -23,5 +23,8 @@ pub(crate) fn run() -> Result<Vec<PathBuf>> {
     let (whole, damaged): (Vec<_>, Vec<_>) = zoo::all()?.into_iter().partition(Result::is_ok);
     let rows: Vec<[String; 6]> = whole.iter().flatten().map(row).collect();
     cli::print_rows(&rows);
-    damaged.into_iter().next().map_or_else(|| Ok(Vec::new()), |network| network.map(|_| Vec::new()))
+    let mut damaged: Vec<_> = damaged.into_iter().filter_map(Result::err).collect();
+    let Some(last) = damaged.pop() else { return Ok(Vec::new()) };
+    damaged.iter().for_each(|error| furrow::tell!("error: {error}"));
+    Err(last)
 }

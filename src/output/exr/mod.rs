@@ -13,6 +13,7 @@ use crate::geometry::Window;
 use crate::math::Spectrum;
 use crate::render::{self, LabelMap, label::NONE};
 use crate::scene::tag::{Class, Tag};
+use crate::texture::exr_size;
 use crate::{Error, Result};
 use exr::prelude::*;
 use std::path::Path;
@@ -139,6 +140,7 @@ pub type Geometry = (u32, u32, Vec<f32>, Vec<[f32; 3]>);
 pub fn read_geometry(path: &Path) -> Result<Geometry> {
     let wrong = |what: String| Error::input(what).in_file(path);
     let bytes = crate::input::contents(path).map_err(Error::reading(path))?;
+    exr_size::check(&bytes).map_err(wrong)?;
     let reader = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
     let image = reader.from_buffered(std::io::Cursor::new(bytes)).map_err(|e| wrong(e.to_string()))?;
     let layer = image.layer_data;

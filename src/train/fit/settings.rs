@@ -31,118 +31,144 @@ pub struct Settings {
     /// Classes to tell apart, with a semicolon between, each with its labels: "soil; beet=crop; other=weed".
     #[arg(long, value_name = "CLASSES", default_value = default_of("classes"))]
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "\"soil; beet=crop; other=weed\""))]
     pub classes: Option<String>,
     /// Input bands: rgb, rgbn, or names with commas between.
     #[arg(long, value_name = "BANDS", default_value = default_of("bands"))]
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "\"rgbn\""))]
     pub bands: Option<String>,
     /// Size that images are resized to, pixels: width and height, each from 32 to 8192.
     #[arg(long, value_name = "WxH", default_value = default_of("size"), value_parser = parse_size)]
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "(480, 360)"))]
     pub size: Option<(u32, u32)>,
     /// Size of the random crop of each image that a step is trained on, at most that of the images; whole images unless given.
     /// Small crops make steps cheap and keep small plants as large as they are.
     #[arg(long, alias = "window", value_name = "WxH", value_parser = parse_size)]
     #[serde(alias = "window", skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "(320, 256)"))]
     pub crop_size: Option<(u32, u32)>,
     /// Share of the crops that are centred on rare-class pixels, the rarer the class the more often (oversampling): small plants
     /// are in hardly any other crop. Of no effect without a crop size.
     #[arg(long, alias = "rare", value_name = "SHARE", default_value = default_of("rare_crops"))]
     #[serde(alias = "rare", skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "0.25"))]
     pub rare_crops: Option<f64>,
     /// Most training steps.
     #[arg(long, value_name = "N", default_value = default_of("steps"))]
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "1500"))]
     pub steps: Option<u64>,
     /// Batch size: images that a network sees at once, 1 to 1024.
     #[arg(long, value_name = "N", default_value = default_of("batch"))]
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "4"))]
     pub batch: Option<usize>,
     /// Gradient accumulation: batches a step, 1 to 1024. A step goes along their mean gradient, as that of a batch so many times as
     /// large but for batch norms and soft Dice loss, which see one at a time.
     #[arg(long, value_name = "N", default_value = default_of("accumulate"))]
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "4"))]
     pub accumulate: Option<u64>,
     /// Optimiser: sgd or adam.
     #[arg(long, alias = "optimizer", value_name = "NAME", default_value = default_of("optimiser"))]
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "\"adam\""))]
     pub optimiser: Option<String>,
     /// Learning rate at the start; one that suits the optimiser unless given.
     #[arg(long, value_name = "RATE", help = rate_help())]
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "0.002"))]
     pub rate: Option<f64>,
     /// Weight decay, from 0 to below 1.
     #[arg(long, value_name = "SHARE", default_value = default_of("decay"))]
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "0.0005"))]
     pub decay: Option<f64>,
     /// Learning-rate schedule: poly, cosine or constant.
     #[arg(long, value_name = "NAME", default_value = default_of("schedule"))]
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "\"cosine\""))]
     pub schedule: Option<String>,
     /// Loss: entropy (cross-entropy), or dice (cross-entropy plus soft Dice loss, which serves rare classes).
     #[arg(long, value_name = "NAME", default_value = default_of("loss"))]
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "\"entropy\""))]
     pub loss: Option<String>,
     /// Class weights of the loss: median (median-frequency weights), sqrt (their square root), annealed (the square root, annealed
     /// to 1 until half of the steps are done), or none.
     #[arg(long, alias = "balance", value_name = "NAME", default_value = default_of("class_weights"))]
     #[serde(alias = "balance", skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "\"annealed\""))]
     pub class_weights: Option<String>,
     /// Training images on which class biases are calibrated after the last step, for the best overlap: losses that serve small plants
     /// make a network over-predict them. 0 for none.
     #[arg(long, value_name = "N", default_value = default_of("calibrate"))]
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "40"))]
     pub calibrate: Option<u64>,
     /// Post-hoc logit adjustment after the last step: how much of the first class's frequency is taken out of the network's scores, 0 to 2.
     /// 0 for none; 0.5 for photographs of another kind than the training images, in which networks find too little of the plants. The
     /// first class must be soil; not together with `calibrate`, which sets the same biases.
     #[arg(long, value_name = "TAU", default_value = default_of("logit_adjustment"))]
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "0.5"))]
     pub logit_adjustment: Option<f64>,
     /// What the encoder begins with: none (random weights), imagenet (EfficientNet-Lite0's, for lite-unet), or a safetensors file with
     /// the names of torchvision's resnet18 (unet) or vgg16_bn (segnet).
     #[arg(long, value_name = "NAME", default_value = default_of("pretrained"))]
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "\"none\""))]
     pub pretrained: Option<String>,
     /// Steps in which the encoder stays as it is and the decoder alone learns.
     #[arg(long, value_name = "N", default_value = default_of("freeze"))]
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "100"))]
     pub freeze: Option<u64>,
     /// Learning rate of the encoder as a share of the decoder's, 0 to 1.
     #[arg(long, value_name = "SHARE", default_value = default_of("encoder_rate"))]
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "0.1"))]
     pub encoder_rate: Option<f64>,
     /// Decay of an exponential moving average (EMA) of the weights, such as 0.998: it is validated and kept in their place. 0 for none.
     #[arg(long, value_name = "DECAY", default_value = default_of("ema"))]
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "0.99"))]
     pub ema: Option<f64>,
     /// Sizes that pictures are brought to once the network is trained: stretch (to the size that it was trained at), or lengths of the
     /// longer side with commas between: the shape is kept, probabilities are averaged over them.
     #[arg(long, value_name = "SIDES", default_value = default_of("resize"))]
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "\"480,640,960\""))]
     pub resize: Option<String>,
     /// Refinement of predictions once the network is trained: colour (pixels of equal colour in a picture are rather of equal kind, plant
     /// or soil), plants (plant pixels that hang together are of one class), colour,plants or none. The first class must be soil.
     #[arg(long, value_name = "NAMES", default_value = default_of("refine"))]
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "\"colour,plants\""))]
     pub refine: Option<String>,
     /// Data augmentation: all, none, or some of flip, rotate, scale, crop, colour, blur, noise with commas between, and erase (random
     /// erasing: patches of one colour labelled as soil), which is not part of all.
     #[arg(long, value_name = "NAMES", default_value = default_of("augment"))]
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "\"all,erase\""))]
     pub augment: Option<String>,
     /// Input normalization: band (each band of an image by its mean and standard deviation, which removes exposure and white balance),
     /// image (all bands of an image alike, which removes exposure), or fixed (by those of the training set).
     #[arg(long, alias = "normalise", value_name = "NAME", default_value = default_of("normalization"))]
     #[serde(alias = "normalise", skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "\"image\""))]
     pub normalization: Option<String>,
     /// Steps between two validation passes, each with a checkpoint.
     #[arg(long, alias = "watch-every", value_name = "N", default_value = default_of("validate_every"))]
     #[serde(alias = "watch_every", skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "50"))]
     pub validate_every: Option<u64>,
     /// Validation passes without a better result after which a training ends early.
     #[arg(long, value_name = "N", default_value = default_of("patience"))]
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "20"))]
     pub patience: Option<u64>,
 }
 

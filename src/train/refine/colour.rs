@@ -26,14 +26,16 @@ pub(super) fn refine(pixels: &[f32], bands: usize, rgb: [usize; 3], probabilitie
     let bins = bins(pixels, bands, rgb);
     let (soil, plants) = probabilities.split_at_mut(n);
     let alike = alike(&bins, soil);
+    let classes = plants.len() / n.max(1);
     for (at, soil) in soil.iter_mut().enumerate() {
-        let own = 1.0 - f64::from(*soil);
+        // Not 1 − soil, which rounds away what is small.
+        let own: f64 = plants.iter().skip(at).step_by(n).map(|p| f64::from(*p)).sum();
         let odds = (1.0 - WEIGHT) * log_odds(own) + WEIGHT * log_odds(alike[usize::from(bins[at])]);
         let plant = 1.0 / (1.0 + (-odds).exp());
         *soil = (1.0 - plant) as f32;
-        // Where the network saw no plant at all, its classes' ratios are what rounding left of them.
-        let factor = (plant / own.max(1e-6)) as f32;
-        plants.iter_mut().skip(at).step_by(n).for_each(|p| *p *= factor);
+        for p in plants.iter_mut().skip(at).step_by(n) {
+            *p = if own > 0.0 { f64::from(*p) * plant / own } else { plant / classes as f64 } as f32;
+        }
     }
 }
 
@@ -158,7 +160,7 @@ mod tests {
         for sure in [0.0f32, 1.0] {
             let mut probabilities: Vec<f32> = [vec![1.0 - sure; 100], vec![sure; 100]].concat();
             refine(&gray, 3, [0, 1, 2], &mut probabilities);
-            assert!(probabilities.iter().all(|p| p.is_finite()));
+            assert!((0..100).all(|at| (probabilities[at] + probabilities[100 + at] - 1.0).abs() < 1e-5));
             assert!(probabilities[..100].iter().all(|soil| (*soil < 0.5) == (sure > 0.5)));
         }
         refine(&[], 3, [0, 1, 2], &mut []);

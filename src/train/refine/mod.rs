@@ -122,7 +122,7 @@ mod tests {
             assert_eq!(Refine::parse(text).unwrap().name(), text);
         }
         assert_eq!(Refine::parse("plants, colour").unwrap().name(), "colour,plants");
-        for bad in ["", "color", "colour;plants", "all"] {
+        for bad in ["", "color", "colour;plants", "all", "colour,none", "colour,colour", "colour,plants,plants"] {
             assert!(Refine::parse(bad).is_err(), "{bad}");
         }
     }
