@@ -463,7 +463,7 @@ fn feathery_leaves_are_no_fault_and_shifted_maps_are() {
     let mut shifted = whole.clone();
     for at in 0..whole.pixels() {
         shifted.semantics[at] = (at % width / 2 % 2) as u8;
-        shifted.coverage[at] = share(((at % width + 1) / 2 % 2) as u8);
+        shifted.coverage[at] = share(((at % width).div_ceil(2) % 2) as u8);
     }
     assert!(told(&shifted));
 }

@@ -25,6 +25,8 @@ pub(crate) fn run() -> Result<Vec<PathBuf>> {
     cli::print_rows(&rows);
     let mut damaged: Vec<_> = damaged.into_iter().filter_map(Result::err).collect();
     let Some(last) = damaged.pop() else { return Ok(Vec::new()) };
-    damaged.iter().for_each(|error| furrow::tell!("error: {error}"));
+    for error in &damaged {
+        furrow::tell!("error: {error}");
+    }
     Err(last)
 }

@@ -30,20 +30,16 @@ pub struct Refine {
 impl Refine {
     /// Reads `none`, or `colour` and `plants` with commas between.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let mut refine = Self::default();
-        for name in text.split(',').map(str::trim) {
-            match name {
-                "none" => {}
-                "colour" => refine.colour = true,
-                "plants" => refine.plants = true,
-                _ => {
-                    return Err(format!(
-                        "there is no refinement `{name}`: write none, colour, plants or colour,plants"
-                    ));
-                }
-            }
+        let names: Vec<&str> = text.split(',').map(str::trim).collect();
+        let help = "write none, colour, plants or colour,plants";
+        match names.as_slice() {
+            ["none"] => Ok(Self::default()),
+            ["colour"] => Ok(Self { colour: true, plants: false }),
+            ["plants"] => Ok(Self { colour: false, plants: true }),
+            ["colour", "plants"] | ["plants", "colour"] => Ok(Self { colour: true, plants: true }),
+            [name] => Err(format!("there is no refinement `{name}`: {help}")),
+            _ => Err(format!("`{text}` is no refinement: {help}")),
         }
-        Ok(refine)
     }
 
     /// As it is written.
@@ -57,7 +53,6 @@ impl Refine {
     }
 
     /// Whether nothing is done.
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }
