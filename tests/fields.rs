@@ -12,6 +12,8 @@ use furrow::scene::assemble::{self, Options};
 use furrow::scene::tag::Class;
 use furrow::scene::{Field, PlantRecord};
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// A row of beets among cleavers on a bare plane, by what their growths are.
 fn meadow(beet: &str, cleavers: &str, index: u64) -> Field {
@@ -510,4 +512,51 @@ fn soil_has_the_spectrum_of_its_file() {
     }
     // The spectrum rises from blue to near infrared.
     assert!(dim[2] < dim[1] && dim[1] < dim[0] && dim[0] < dim[3], "{dim:?}");
+}
+
+/// A row of beets on ploughed ground with clods, as a camera of 320 pixels sees it.
+fn ploughed(preview: Option<Arc<AtomicBool>>) -> furrow::Result<Field> {
+    let text = r#"Field(
+        seed: 4,
+        camera: Pinhole(size: (320, 240), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.8)),
+        lights: [Constant(radiance: (1, 1, 1, 1))],
+        soil: (layers: [(albedo: "textures/dirt.png", height: "textures/dirt.height.png")], stones: [(cover: 0.02)], litter: (straw_cover: 0.02)),
+        crops: [(species: "scenes/species/sugar_beet.ron", growth: Bbch(16), rows: (in_row_m: 0.15))],
+    )"#;
+    assemble::field_of(text, &Options { preview, ..Options::default() })
+}
+
+/// Rationale: whoever turns a slider must see the field that will be rendered. Expected: the same plants at the same places and the same
+/// ground from fewer triangles, and labels that differ at outlines alone. Source: what `Options::preview` says.
+#[test]
+fn a_preview_is_the_same_field_with_coarser_meshes() {
+    use furrow::accel::EmbreeAccel;
+    use furrow::geometry::Window;
+    use furrow::render::label;
+    let (whole, preview) = (ploughed(None).unwrap(), ploughed(Some(Arc::default())).unwrap());
+    let feet = |field: &Field| field.plants.iter().map(|p| (p.id, p.position, p.bbch, p.leaves)).collect::<Vec<_>>();
+    assert!(whole.plants.len() > 3);
+    assert_eq!(feet(&whole), feet(&preview));
+    let triangles = |field: &Field, plants: bool| -> usize {
+        let parts = field.scene.parts.iter().filter(|part| (part.tag.plant > 0) == plants);
+        parts.map(|part| part.mesh.triangles.len()).sum()
+    };
+    let (fine, coarse) = (triangles(&whole, true), triangles(&preview, true));
+    assert!(coarse < fine / 2, "{coarse} of {fine}");
+    let labels = |field: &Field| {
+        let geometry = EmbreeAccel::build(&field.scene.surfaces(), 2).expect("an accelerator");
+        label(&geometry, &field.scene.parts, &field.scene.camera, Window::full(320, 240)).tags
+    };
+    let (fine, coarse) = (labels(&whole), labels(&preview));
+    let plants = fine.iter().filter(|tag| tag.plant > 0).count();
+    let differ = fine.iter().zip(&coarse).filter(|(a, b)| a.plant != b.plant).count();
+    assert!(plants > 2000, "{plants}");
+    assert!(differ > 0 && differ < plants / 12, "{differ} of {plants}");
+}
+
+/// Expected: where it is not wanted any more, nothing is grown.
+#[test]
+fn a_preview_that_is_not_wanted_is_given_up() {
+    let refusal = ploughed(Some(Arc::new(AtomicBool::new(true)))).err().expect("an interruption");
+    assert_eq!(refusal.kind(), furrow::error::Kind::Interrupted);
 }

@@ -7,9 +7,10 @@
 
 use super::{Surface, rtc};
 use crate::Result;
-use crate::geometry::alpha::sort;
+use crate::geometry::alpha::{Sorted, sort};
 use crate::geometry::{AlphaMask, Hit, Intersect, PACKET, Ray};
 use crate::math::Vec2;
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Instruction set of the traversal kernels.
@@ -52,18 +53,19 @@ pub fn version() -> Result<String> {
 }
 
 impl EmbreeAccel {
-    /// Builds the hierarchy over all surfaces with `threads` threads (0: all there are).
+    /// Builds the hierarchy over all surfaces with `threads` threads (0: all there are); masks are looked at in the pool that it is called in.
     pub fn build(surfaces: &[Surface<'_>], threads: u32) -> Result<Self> {
         let mut scene = rtc::Builder::new(rtc::Device::new(ISA, threads)?)?;
         let mut slots = Vec::with_capacity(surfaces.len());
-        for (part, Surface { mesh, mask }) in surfaces.iter().enumerate() {
+        let cut = |surface: &Surface<'_>| surface.mask.map(|mask| sort(surface.mesh, Some(mask)));
+        let sorted: Vec<Option<Sorted>> = surfaces.par_iter().map(cut).collect();
+        for (part, (Surface { mesh, mask }, sorted)) in surfaces.iter().zip(sorted).enumerate() {
             let part = part as u32;
-            let Some(mask) = mask else {
+            let (Some(mask), Some(sorted)) = (mask, sorted) else {
                 scene.attach(&mesh.positions, mesh.triangles.iter().copied(), None)?;
                 slots.push(Slot { part, triangles: None });
                 continue;
             };
-            let sorted = sort(mesh, Some(mask));
             let only = |i: &u32| mesh.triangles[*i as usize];
             if !sorted.opaque.is_empty() {
                 scene.attach(&mesh.positions, sorted.opaque.iter().map(only), None)?;

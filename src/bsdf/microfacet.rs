@@ -90,8 +90,14 @@ impl Ggx {
     pub fn albedo(&self, cos_o: f32) -> f32 {
         const N: u32 = 64;
         let wo = Vec3::new((1.0 - cos_o * cos_o).max(0.0).sqrt(), 0.0, cos_o);
+        // Seen from straight above all quadrants are alike, and without a direction of its own all azimuths.
+        let azimuths = match self.alpha {
+            _ if cos_o != 1.0 => N,
+            [across, along] if across == along => 1,
+            _ => N / 4,
+        };
         let mut sum = 0.0_f64;
-        for i in 0..N {
+        for i in 0..azimuths {
             for j in 0..N {
                 let wi = self.sample(wo, (i as f32 + 0.5) / N as f32, (j as f32 + 0.5) / N as f32);
                 let pdf = self.pdf(wo, wi);
@@ -100,7 +106,7 @@ impl Ggx {
                 }
             }
         }
-        (sum / f64::from(N * N)) as f32
+        (sum / f64::from(azimuths * N)) as f32
     }
 }
 

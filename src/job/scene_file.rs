@@ -9,6 +9,7 @@ use crate::scene::assemble::{Options, Source};
 use crate::scene::estimate::Estimate;
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// A scene file: a distribution over fields. What its fields have read (species, textures, tables) is kept for the next.
@@ -80,10 +81,19 @@ impl SceneFile {
         self
     }
 
+    /// For a look at its fields: meshes of plants are as coarse as the pixels, and growing ends with an interruption where the
+    /// flag is raised. Every random number stays, so plants and labels are those of the field but for their outlines.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn preview(mut self, outdated: &Arc<AtomicBool>) -> Self {
+        self.options.preview = Some(Arc::clone(outdated));
+        self
+    }
+
     /// About what field `index` will take, before it grows.
     #[doc(hidden)]
     pub fn estimate(&self, index: u64) -> Result<Estimate> {
-        let options = Options { index, ..self.options };
+        let options = Options { index, ..self.options.clone() };
         self.threads.install(|| self.source.estimate(&options))
     }
 
@@ -101,13 +111,13 @@ impl SceneFile {
 
     /// About how many plants stand in view of field `index`.
     pub(super) fn expected_plants(&self, index: u64) -> Result<f64> {
-        self.source.expected_plants(&Options { index, ..self.options })
+        self.source.expected_plants(&Options { index, ..self.options.clone() })
     }
 
     /// Grows field `index`: always the same for the same file, seed and index, and without growing those before it.
     pub fn field(&self, index: u64) -> Result<Field> {
         let begin = Instant::now();
-        let options = Options { index, ..self.options };
+        let options = Options { index, ..self.options.clone() };
         let grown = self.threads.install(|| self.edit.field(&self.source, &options))?;
         Ok(Field::new(grown, self.edit, self.threads.clone(), begin.elapsed()))
     }

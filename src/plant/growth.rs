@@ -5,6 +5,7 @@
 
 use super::desc::{PlantDesc, Stage};
 use super::kind::LeafKind;
+use super::leaf::CELL;
 use super::stage::{BUD, StageDesc};
 use crate::math::lerp;
 use crate::ron_file::{Bound, Vary};
@@ -33,6 +34,8 @@ pub(super) struct LeafNow<'a> {
     pub(super) twist: f32,
     /// Arch of the stalk beyond the kind's.
     pub(super) arch: f32,
+    /// Shortest cell of its mesh, metres.
+    pub(super) cell: f32,
     /// This leaf's own numbers.
     pub(super) stream: Stream,
 }
@@ -166,6 +169,7 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
                 fold: lerp(fold.max(0.9), fold, grown),
                 twist: 0.0,
                 arch: 0.0,
+                cell: CELL,
                 stream,
             });
         }

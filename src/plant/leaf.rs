@@ -17,8 +17,10 @@ use std::f32::consts::FRAC_PI_2;
 
 /// Corners round a stalk.
 const SIDES: u32 = 9;
-/// Shortest cell of a blade's mesh, metres: about what four pixels of a field camera see.
-const CELL: f32 = 0.9e-3;
+/// Corners round the stalk of a mesh that is coarser than usual.
+const FEW_SIDES: u32 = 5;
+/// Shortest cell of a blade's mesh unless coarser ones are asked for, metres: about what four pixels of a field camera see.
+pub(super) const CELL: f32 = 0.9e-3;
 /// A midrib never comes nearer to the soil than this, metres, plus [`LYING_WIDTH`] of the blade's width for its hanging
 /// sides: a leaf that would, lies on the soil's crumbs. Near the crown the bound falls to half the crown's height.
 const LYING: f32 = 0.004;
@@ -96,15 +98,20 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
         return;
     }
     let mut mesh = skin::skin(rest, &motions);
-    tube::close_seams(&mut mesh, SIDES, 0);
+    tube::close_seams(&mut mesh, sides(leaf), 0);
     let kind = if lower == Lower::Petiole { OrganKind::Petiole } else { OrganKind::Sheath };
     organs.push(Organ { kind, leaf: leaf.number, material: leaf.kind.stalk_material.clone(), mesh, midrib: None });
 }
 
-/// Cells along and across the blade: those of the kind, but none shorter than [`CELL`], so that a bud costs little.
+/// Corners round the stalk.
+fn sides(leaf: &LeafNow<'_>) -> u32 {
+    if leaf.cell > CELL { FEW_SIDES } else { SIDES }
+}
+
+/// Cells along and across the blade: those of the kind, but none shorter than the leaf's shortest, so that a bud costs little.
 fn cells(leaf: &LeafNow<'_>) -> (usize, usize) {
     let (rows, columns) = (leaf.kind.rows.get(), leaf.kind.columns.get());
-    let fit = f64::from(leaf.blade / CELL).max(8.0).min(rows);
+    let fit = f64::from(leaf.blade / leaf.cell).max(8.0).min(rows);
     (fit.round() as usize, (columns * (fit / rows).sqrt()).round().max(4.0).min(columns) as usize)
 }
 
@@ -284,6 +291,6 @@ fn stalk(leaf: &LeafNow<'_>, skeleton: &Skeleton, relief: &BladeRelief, lower: L
             rings.push(ring(s * reach, (r, r), -0.2, 0.1 * r));
         }
     }
-    tube::sweep(&mut rest, &rings, SIDES, |p| skeleton.weights_on_chain(p.y));
+    tube::sweep(&mut rest, &rings, sides(leaf), |p| skeleton.weights_on_chain(p.y));
     rest
 }

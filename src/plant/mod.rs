@@ -80,23 +80,39 @@ pub fn turn(stream: &Stream) -> f32 {
     growth::turn(stream)
 }
 
-/// Grows one plant.
-pub fn grow(desc: &PlantDesc, stage: Stage, stream: &Stream) -> Plant {
-    grow_in(desc, stage, stream, (1.0, None))
+/// What a plant is grown with beyond its species, stage and stream.
+#[derive(Clone, Copy, Debug)]
+pub struct GrowOptions<'a> {
+    /// Factor on its sizes.
+    pub vigour: f32,
+    /// The condition as which it holds its leaves.
+    pub condition: Option<(&'a ConditionDesc, &'a Condition)>,
+    /// Shortest cell of a blade's mesh, metres. Coarser meshes change no random number and move a leaf by less than a cell.
+    pub cell: f32,
 }
 
-/// Grows one plant of a vigour, the factor on its sizes, that holds its leaves as its condition has them.
-pub fn grow_in(
-    desc: &PlantDesc,
-    stage: Stage,
-    stream: &Stream,
-    (vigour, condition): (f32, Option<(&ConditionDesc, &Condition)>),
-) -> Plant {
-    let Some(mut growth) = growth::growth(desc, stage, stream, vigour) else {
+impl Default for GrowOptions<'_> {
+    /// Of usual size, without a condition, as fine as field cameras see.
+    fn default() -> Self {
+        Self { vigour: 1.0, condition: None, cell: leaf::CELL }
+    }
+}
+
+/// Grows one plant.
+pub fn grow(desc: &PlantDesc, stage: Stage, stream: &Stream) -> Plant {
+    grow_with(desc, stage, stream, &GrowOptions::default())
+}
+
+/// Grows one plant with options.
+pub fn grow_with(desc: &PlantDesc, stage: Stage, stream: &Stream, options: &GrowOptions<'_>) -> Plant {
+    let Some(mut growth) = growth::growth(desc, stage, stream, options.vigour) else {
         return Plant { organs: Vec::new(), bbch: 0, age_days: 0.0, height: 0.0, radius: 0.0 };
     };
-    if let Some((desc, condition)) = condition {
+    if let Some((desc, condition)) = options.condition {
         condition::Posture::new(desc, condition, stream).apply(&mut growth.leaves);
+    }
+    for leaf in &mut growth.leaves {
+        leaf.cell = options.cell.max(leaf.cell);
     }
     let organs = organs_of(desc.form, &growth);
     let corners = || organs.iter().flat_map(|o| &o.mesh.positions);

@@ -85,6 +85,9 @@ pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy) -> Vec<Clods> {
     let mut shapes: Vec<Vec<Option<Shape>>> = vec![vec![None; SHAPES]; LEVELS];
     let mut groups: Vec<Mesh> = vec![Mesh::default(); 2 * HUES * TONES];
     for clod in candidates(ground, &stream) {
+        if pile.given_up() {
+            break;
+        }
         let mut s = own.child(Purpose::Debris, u64::from(clod.key));
         let level = level(clod.mm, scale);
         let k = s.index(SHAPES);

@@ -15,7 +15,11 @@ use crate::math::{Spectrum, Vec2, Vec3, vec2};
 use crate::optics::soil::at;
 use crate::sampling::{Purpose, Stream};
 use crate::texture::noise::Perlin;
+use rayon::prelude::*;
 use std::path::Path;
+
+/// Rows of vertices that are raised at once: what is kept of them beside the ground stays small.
+const BLOCK_ROWS: usize = 64;
 
 /// Standard deviation of [`Perlin::fbm2`] with four octaves and gain 0.6.
 const FBM4_SD: f32 = 0.245;
@@ -58,7 +62,7 @@ impl Ground {
     /// The ground that `desc` and `stream` say, with the layers' textures in `maps`, in the order of the scene file.
     ///
     /// About 0.3 s of one core for 600 × 500 mm at 1 mm.
-    pub fn new<L: LayerMaps>(
+    pub fn new<L: LayerMaps + Sync>(
         desc: &SoilDesc,
         colors: &[Spectrum],
         maps: &[L],
@@ -94,29 +98,36 @@ impl Ground {
     }
 
     /// Relief and layers.
-    fn raise<L: LayerMaps>(&mut self, maps: &[L], relief: &Relief) {
+    fn raise<L: LayerMaps + Sync>(&mut self, maps: &[L], relief: &Relief) {
         let raster = self.raster();
         let inside: Vec<Vec<f32>> =
             (0..self.blend.layers()).map(|k| slowly(raster, self.every(), |p| self.blend.noise(k, p))).collect();
-        for j in 0..self.grid.rows() {
-            for i in 0..self.grid.columns() {
-                let p = vec2(self.grid.x.at[i], self.grid.y.at[j]);
-                let cell = self.grid.x.spacing(i).max(self.grid.y.spacing(j));
-                let fine = self.fine_index(i, j);
-                let mut noise = [0.0; MAX_LAYERS];
-                for (k, n) in noise.iter_mut().enumerate().take(self.blend.layers()) {
-                    *n = fine.map_or_else(|| self.blend.noise(k, p), |v| inside[k][v]);
-                }
-                let heights = self.blend.heights(maps, p);
-                let weights = self.blend.weights(noise, heights);
-                let detail = self.blend.displacement(weights, heights);
-                // Cells that are long one way would turn fine heights into furrows.
-                let fade = (2.0 * self.step / cell).min(1.0);
-                self.heights.push(relief.height(p, cell) + detail * fade * fade);
-                if fine.is_some() {
+        let vertex = |ground: &Self, i: usize, j: usize| {
+            let p = vec2(ground.grid.x.at[i], ground.grid.y.at[j]);
+            let cell = ground.grid.x.spacing(i).max(ground.grid.y.spacing(j));
+            let fine = ground.fine_index(i, j);
+            let mut noise = [0.0; MAX_LAYERS];
+            for (k, n) in noise.iter_mut().enumerate().take(ground.blend.layers()) {
+                *n = fine.map_or_else(|| ground.blend.noise(k, p), |v| inside[k][v]);
+            }
+            let heights = ground.blend.heights(maps, p);
+            let weights = ground.blend.weights(noise, heights);
+            let detail = ground.blend.displacement(weights, heights);
+            // Cells that are long one way would turn fine heights into furrows.
+            let fade = (2.0 * ground.step / cell).min(1.0);
+            let height = relief.height(p, cell) + detail * fade * fade;
+            (height, fine.map(|_| (noise, detail, ground.blend.clods(weights) * relief.left(p))))
+        };
+        let (columns, rows) = (self.grid.columns(), self.grid.rows());
+        for first in (0..rows).step_by(BLOCK_ROWS) {
+            let block = (first * columns..(first + BLOCK_ROWS).min(rows) * columns).into_par_iter();
+            let block: Vec<_> = block.map(|k| vertex(self, k % columns, k / columns)).collect();
+            for (height, fine) in block {
+                self.heights.push(height);
+                if let Some((noise, detail, share)) = fine {
                     self.fine.noise.push(noise);
                     self.fine.detail.push(detail);
-                    self.fine.share.push(self.blend.clods(weights) * relief.left(p));
+                    self.fine.share.push(share);
                 }
             }
         }
@@ -422,12 +433,12 @@ fn check(desc: &SoilDesc, maps: usize, site: &Site) -> Result<()> {
 }
 
 /// `f` at every sample of a raster, taken at every `every`-th and mixed between.
-fn slowly(raster: Raster, every: usize, f: impl Fn(Vec2) -> f32) -> Vec<f32> {
+fn slowly(raster: Raster, every: usize, f: impl Fn(Vec2) -> f32 + Sync) -> Vec<f32> {
     let lines = |n: usize| (n - 1).div_ceil(every) + 1;
     let (w, h) = (lines(raster.width), lines(raster.height));
     // The last line may lie beyond the raster, so that all are evenly spaced.
     let place = |i: usize, j: usize| raster.origin + vec2((i * every) as f32, (j * every) as f32) * raster.step;
-    let coarse: Vec<f32> = (0..w * h).map(|k| f(place(k % w, k / w))).collect();
+    let coarse: Vec<f32> = (0..w * h).into_par_iter().map(|k| f(place(k % w, k / w))).collect();
     let mut out = Vec::with_capacity(raster.width * raster.height);
     for j in 0..raster.height {
         for i in 0..raster.width {

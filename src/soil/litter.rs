@@ -58,6 +58,9 @@ pub fn litter(desc: &LitterDesc, ground: &Ground, pile: &mut Pile, stream: &Stre
         (DebrisKind::Bit, drawn.bits_per_m2, 6),
     ] {
         for (at, mut s) in places(ground.area(), per_m2, &child(k)) {
+            if pile.given_up() {
+                break;
+            }
             let thing = match kind {
                 DebrisKind::Stick => stick(desc, pile, at, &mut s),
                 DebrisKind::Straw => straw(desc, drawn.weathering, pile, at, &mut s),

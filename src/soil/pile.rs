@@ -3,12 +3,15 @@
 use super::crumb::Raster;
 use super::{Ground, Rect};
 use crate::math::{Vec2, vec2};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Height of the ground and of everything laid on it so far, at the vertices of the ground's fine grid.
 #[derive(Clone, Debug)]
 pub struct Pile {
     raster: Raster,
     height: Vec<f32>,
+    outdated: Option<Arc<AtomicBool>>,
 }
 
 impl Pile {
@@ -18,7 +21,19 @@ impl Pile {
         let height = (0..raster.width * raster.height)
             .map(|k| ground.heights[ground.index(k % raster.width, k / raster.width)])
             .collect();
-        Self { raster, height }
+        Self { raster, height, outdated: None }
+    }
+
+    /// One on which nothing more is laid once the flag is raised.
+    #[must_use]
+    pub fn until(mut self, outdated: Option<&Arc<AtomicBool>>) -> Self {
+        self.outdated = outdated.map(Arc::clone);
+        self
+    }
+
+    /// Whether nothing more is laid on it.
+    pub(super) fn given_up(&self) -> bool {
+        self.outdated.as_ref().is_some_and(|outdated| outdated.load(Ordering::Relaxed))
     }
 
     /// The area it covers.

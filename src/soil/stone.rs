@@ -28,6 +28,9 @@ pub fn stones(desc: &[StonesDesc], ground: &Ground, pile: &mut Pile, stream: &St
     for (i, population) in desc.iter().enumerate() {
         let stream = own(stream, i);
         for (at, mm, mut s) in sizes(population, ground.area(), &stream) {
+            if pile.given_up() {
+                break;
+            }
             all.push(stone(population, ground, pile, at, mm, &mut s));
         }
     }

@@ -5,6 +5,8 @@ use crate::geometry::Mesh;
 use crate::math::Vec3;
 use crate::ron_file::{Num, Vary};
 use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Waves and steps, so that layers differ in height and colour.
 struct Waves(f32, [f32; 3]);
@@ -237,6 +239,24 @@ fn nothing_floats_and_nothing_is_wholly_buried() {
     }
     // A few lie across another one.
     assert!(things.len() > 40 && touching * 100 > things.len() * 93, "{touching} of {}", things.len());
+}
+
+/// Rationale: ten million clods for a preview that nobody waits for any more block the one that is waited for. Expected: from when the flag is
+/// raised nothing is laid.
+#[test]
+fn nothing_is_laid_on_a_pile_that_is_given_up() {
+    let page = page();
+    let ground = ground(&page, 0.15);
+    let outdated = Arc::new(AtomicBool::new(false));
+    let mut pile = Pile::new(&ground).until(Some(&outdated));
+    let lay = |pile: &mut Pile| {
+        let clods = clods(&ground, pile, &Canopy::none(&ground)).len();
+        let stones = stones(&page.stones, &ground, pile, &stream()).len();
+        [clods, stones, litter(&page.litter, &ground, pile, &stream()).len()]
+    };
+    assert!(lay(&mut pile).iter().all(|count| *count > 0));
+    outdated.store(true, Ordering::Relaxed);
+    assert_eq!(lay(&mut pile), [0; 3]);
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! What a field is built with, and of.
 
+use super::Options;
 use super::lighting::Lighting;
 use super::season::Season;
 use crate::geometry::Mesh;
@@ -22,6 +23,7 @@ pub(super) const MOST_PLANTS: usize = u16::MAX as usize;
 pub(super) struct Builder<'a> {
     pub(super) page: &'a RonFile,
     pub(super) desc: &'a FieldDesc,
+    pub(super) options: &'a Options,
     pub(super) library: Library,
     pub(super) seed: u64,
     pub(super) index: u64,

@@ -53,7 +53,7 @@ impl Builder<'_> {
         let (seedlings, populations) = self.seedlings(view.grown(PLANT_MARGIN), &[])?;
         for (population, range) in populations {
             let (at, advice) = population.place();
-            add(&at, plants(&seedlings, population, range), &format!("{advice}, or lower the camera"));
+            add(&at, plants(&seedlings, population, range, self.cell()), &format!("{advice}, or lower the camera"));
         }
         for (k, model) in self.desc.models.iter().enumerate() {
             let model = self.library.model(self.page, model)?;
@@ -65,8 +65,8 @@ impl Builder<'_> {
     }
 }
 
-/// What the plants of a population take: as much as some of them, which are grown for it. Not grown is what might itself be too large.
-fn plants(seedlings: &[Seedling], population: Population, range: Range<usize>) -> Cost {
+/// What the plants of a population take, meshed with such cells: as much as some of them, which are grown for it. Not grown is what might itself be too large.
+fn plants(seedlings: &[Seedling], population: Population, range: Range<usize>, cell: f32) -> Cost {
     let number = range.len();
     let most = if population == Population::Placed { LOOKED_AT_PLACED } else { LOOKED_AT };
     let tried = number.min(most);
@@ -76,7 +76,7 @@ fn plants(seedlings: &[Seedling], population: Population, range: Range<usize>) -
         if bound > TRIED {
             return (bound, 1.0);
         }
-        let (_, organs) = grow(seedling, 1, None, LOESS);
+        let (_, organs) = grow(seedling, 1, None, (LOESS, cell));
         (organs.iter().map(|organ| organ.part.mesh.triangles.len()).sum::<usize>() as f64, organs.len() as f64)
     });
     let samples: Vec<(f64, f64)> = samples.collect();

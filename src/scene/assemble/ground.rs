@@ -67,7 +67,8 @@ impl Builder<'_> {
         let site = self.site(view, open);
         let ground = Ground::new(desc, &colors, &maps, &site, &self.stream(Purpose::Soil, 0))
             .map_err(|e| self.page.blame(&[Step::Field("soil")], e))?;
-        let mut pile = Pile::new(&ground);
+        self.options.wanted()?;
+        let mut pile = Pile::new(&ground).until(self.options.preview.as_ref());
         let stones = soil::stones(&desc.stones, &ground, &mut pile, &self.stream(Purpose::Debris, STONES));
         Ok(Earth { ground, maps, pile, stones })
     }

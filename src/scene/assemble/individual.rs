@@ -2,7 +2,7 @@
 
 use super::builder::Builder;
 use crate::math::{Mat3, Vec3};
-use crate::plant::{self, Condition, ConditionDesc, Plant};
+use crate::plant::{self, GrowOptions, Plant};
 use crate::sampling::rng::mix;
 use crate::sampling::{Purpose, Stream};
 use crate::scene::desc::{Growth, SpeciesDesc};
@@ -31,16 +31,16 @@ impl Individual {
         &self.shape
     }
 
-    /// Grows it to the age that the field draws, of this vigour and in this condition, turned as the plant of `own` would be.
+    /// Grows it to the age that the field draws, with these options, turned as the plant of `own` would be.
     pub(super) fn plant(
         &self,
         desc: &SpeciesDesc,
         (growth, season): (&Growth, usize),
         own: &Stream,
-        raised: (f32, Option<(&ConditionDesc, &Condition)>),
+        options: &GrowOptions<'_>,
     ) -> Plant {
         let stage = growth.draw(season, &mut self.age.clone());
-        let mut plant = plant::grow_in(&desc.plant, stage, &self.shape, raised);
+        let mut plant = plant::grow_with(&desc.plant, stage, &self.shape, options);
         // Azimuths run clockwise seen from above.
         let turn = Mat3::from_rotation_z(plant::turn(&self.shape) - plant::turn(own));
         for organ in &mut plant.organs {

@@ -30,7 +30,7 @@ use crate::light::LightDesc;
 use crate::material::{BakedGround, Material};
 use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3, vec2};
 use crate::optics::soil::LOESS;
-use crate::plant::{self, ConditionDesc, LeafAxis, OrganKind};
+use crate::plant::{self, ConditionDesc, GrowOptions, LeafAxis, OrganKind};
 use crate::ron_file::{Positive, RENAMED, RonFile, Step, Vary};
 use crate::sampling::{Purpose, Stream};
 use crate::scatter::{self, Disc, Spot};
@@ -48,11 +48,12 @@ use lighting::Listed;
 use rayon::prelude::*;
 pub use season::Season;
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use view::View;
 
 /// What the command line adds to a scene file.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Options {
     /// Instead of the scene file's seed.
     pub seed: Option<u64>,
@@ -65,6 +66,16 @@ pub struct Options {
     /// Most bytes that a field may take; [`usual_memory`](super::estimate::usual_memory) unless given. Nothing of a field depends on it, but whether it is
     /// made.
     pub memory: Option<u64>,
+    /// Given for a preview: meshes are as coarse as its pixels, and where the flag is raised the field is given up.
+    pub preview: Option<Arc<AtomicBool>>,
+}
+
+impl Options {
+    /// An interruption, where a preview is not wanted any more.
+    fn wanted(&self) -> Result<()> {
+        let outdated = self.preview.as_ref().is_some_and(|outdated| outdated.load(Ordering::Relaxed));
+        if outdated { Err(Error::interrupted()) } else { Ok(()) }
+    }
 }
 
 /// Room around the view in which plants are grown: they lean in and throw shadows.
@@ -153,7 +164,7 @@ impl Source {
         let held = || self.library.lock().unwrap_or_else(PoisonError::into_inner);
         // A copy of names and references: fields that are built at once do not wait for each other.
         let library = held().clone();
-        let (field, library) = Builder::new(&self.page, &self.desc, options, library)?.build(options)?;
+        let (field, library) = Builder::new(&self.page, &self.desc, options, library)?.build()?;
         *held() = library;
         Ok(field)
     }
@@ -195,7 +206,7 @@ impl Seedling {
 }
 
 impl<'a> Builder<'a> {
-    fn new(page: &'a RonFile, desc: &'a FieldDesc, options: &Options, mut library: Library) -> Result<Self> {
+    fn new(page: &'a RonFile, desc: &'a FieldDesc, options: &'a Options, mut library: Library) -> Result<Self> {
         let (seed, index) = (options.seed.unwrap_or(desc.seed), options.index);
         let mut stream = Stream::of(seed, index, Purpose::Page, 0);
         let camera = rig::first(page, desc, (options.width, options.height), &mut stream)?;
@@ -232,6 +243,7 @@ impl<'a> Builder<'a> {
         Ok(Self {
             page,
             desc,
+            options,
             library,
             seed,
             index,
@@ -261,6 +273,12 @@ impl<'a> Builder<'a> {
         first.filter_map(|capture| side(&capture.camera)).reduce(f32::min).unwrap_or(1e-3)
     }
 
+    /// Shortest cell of the plants' meshes, metres: in a preview as many of its pixels as the usual one has of a field camera's.
+    fn cell(&self) -> f32 {
+        let usual = GrowOptions::default().cell;
+        if self.options.preview.is_some() { usual.max(4.0 * self.ground_pixel()) } else { usual }
+    }
+
     fn material(&mut self, material: Material) -> u32 {
         self.scene.materials.push(material);
         self.scene.materials.len() as u32 - 1
@@ -271,9 +289,9 @@ impl<'a> Builder<'a> {
     }
 
     /// The field, and the library with whatever was read for it.
-    fn build(mut self, options: &Options) -> Result<(Field, Library)> {
+    fn build(mut self) -> Result<(Field, Library)> {
         let View { area: view, open } = self.looked_at()?;
-        let memory = options.memory.unwrap_or_else(usual_memory);
+        let memory = self.options.memory.unwrap_or_else(usual_memory);
         self.estimate(view, open)?.check(memory).map_err(|(at, error)| self.page.blame(&at, error))?;
         let (sown, shown) = (view.grown(PLANT_MARGIN), self.has_ground().then_some(view));
         self.warn_of_camera();
@@ -289,6 +307,7 @@ impl<'a> Builder<'a> {
             }
             Some(soil) => {
                 let Earth { ground, maps, mut pile, mut stones } = self.break_ground(soil, view, open)?;
+                self.options.wanted()?;
                 let floor = Floor { ground: &ground, flat: soil.flat };
                 known = Some(self.soil_record(soil, &ground));
                 let texel = self.texel(view);
@@ -309,6 +328,7 @@ impl<'a> Builder<'a> {
                     },
                 );
                 let (clods, plants) = rest?;
+                self.options.wanted()?;
                 planted = self.scene.parts.len();
                 self.lay(floor, clods, stones, &baked);
                 plants
@@ -459,8 +479,10 @@ impl<'a> Builder<'a> {
         view: Option<Rect>,
     ) -> Result<Vec<PlantRecord>> {
         let dust = self.dust()?;
-        let grown: Vec<(PlantRecord, Vec<Grown>)> =
-            seedlings.par_iter().enumerate().map(|(i, s)| grow(s, i as u16 + 1, floor, dust)).collect();
+        let (cell, options) = (self.cell(), self.options);
+        let grown: Vec<(PlantRecord, Vec<Grown>)> = (seedlings.par_iter().enumerate())
+            .map(|(i, s)| options.wanted().map(|()| grow(s, i as u16 + 1, floor, (dust, cell))))
+            .collect::<Result<_>>()?;
         let mut records = Vec::with_capacity(grown.len());
         for (record, organs) in grown {
             // Grown to know its size, dropped where neither it nor its shadow reaches the view.
@@ -497,8 +519,13 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// Grows one plant, in its own stream, and stands it on the ground.
-fn grow(s: &Seedling, number: u16, floor: Option<Floor<'_>>, dust: Spectrum) -> (PlantRecord, Vec<Grown>) {
+/// Grows one plant, in its own stream, its mesh of cells no shorter than `cell`, and stands it on the ground.
+fn grow(
+    s: &Seedling,
+    number: u16,
+    floor: Option<Floor<'_>>,
+    (dust, cell): (Spectrum, f32),
+) -> (PlantRecord, Vec<Grown>) {
     let desc: &SpeciesDesc = &s.species.desc;
     let mut stream = s.stream.clone();
     let stage = s.growth.draw(s.season, &mut stream);
@@ -508,11 +535,11 @@ fn grow(s: &Seedling, number: u16, floor: Option<Floor<'_>>, dust: Spectrum) -> 
     let axis = scatter::axis(normal, AXIS_NOISE_DEG, &mut stream);
     let shape = s.individual.as_ref().map_or(&stream, Individual::shape);
     let ailing = s.condition.as_ref().map(|condition| Ailing::new(condition, shape, dust));
-    let posture = ailing.as_ref().map(Ailing::posture);
     let vigour = s.vigour.draw32(&mut shape.child(Purpose::Plant, VIGOUR));
+    let options = GrowOptions { vigour, condition: ailing.as_ref().map(Ailing::posture), cell };
     let plant = match &s.individual {
-        Some(individual) => individual.plant(desc, (&s.growth, s.season), &stream, (vigour, posture)),
-        None => plant::grow_in(&desc.plant, stage, &stream, (vigour, posture)),
+        Some(individual) => individual.plant(desc, (&s.growth, s.season), &stream, &options),
+        None => plant::grow_with(&desc.plant, stage, &stream, &options),
     };
     let foot = Vec3::new(x, y, z);
     // Plant coordinates: y to the north before the turn, z along the axis. Growing has given it a turn of its own.

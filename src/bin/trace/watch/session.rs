@@ -63,14 +63,14 @@ pub(super) struct Session {
     inner: Mutex<Inner>,
     changed: Condvar,
     /// Raised where what is rendered is not wanted any more.
-    outdated: AtomicBool,
+    outdated: Arc<AtomicBool>,
 }
 
 impl Session {
     /// A session that has shown nothing yet.
     pub(super) fn new(path: PathBuf, wish: Wish, spp: u32) -> Self {
         let inner = Inner { wish, asked: 1, version: 1, shown: Shown::default(), ended: false };
-        Self { path, spp, inner: Mutex::new(inner), changed: Condvar::new(), outdated: AtomicBool::new(false) }
+        Self { path, spp, inner: Mutex::new(inner), changed: Condvar::new(), outdated: Arc::default() }
     }
 
     /// The scene file.
@@ -84,7 +84,7 @@ impl Session {
     }
 
     /// The flag that stops what is rendered.
-    pub(super) fn outdated(&self) -> &AtomicBool {
+    pub(super) fn outdated(&self) -> &Arc<AtomicBool> {
         &self.outdated
     }
 

@@ -90,7 +90,7 @@ impl Worker {
             Some(known) => known.reread(Some(&text))?,
             None => SceneFile::open(session.path())?.threads(&self.threads).reread(Some(&text))?,
         };
-        let scene = scene.seed(wish.seed).memory(self.memory);
+        let scene = scene.seed(wish.seed).memory(self.memory).preview(session.outdated());
         let field = Arc::new(self.grow(&scene, wish)?);
         self.files.follow(session.path(), &field.grown().files);
         self.known = Some(scene.clone());
