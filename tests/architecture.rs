@@ -64,7 +64,10 @@ const ALLOWED: &[(&str, &str)] = &[
     // Checksums of TensorBoard's records.
     ("crc32c", "train/fit/log/events.rs"),
     // Tables: measured spectra in; boxes of plants and numbers of reports out.
-    ("csv", "optics/measured.rs optics/munsell.rs optics/prospect.rs dataset/format/cropandweed.rs report/csv.rs"),
+    (
+        "csv",
+        "optics/measured.rs optics/munsell.rs optics/prospect.rs dataset/format/cropandweed.rs dataset/format/traits.rs report/csv.rs",
+    ),
     // Layers out, pictures of light in.
     ("exr", "output/exr/mod.rs texture/exr_size.rs texture/panorama.rs"),
     // Vectors are re-exported by `math`; two files sum in double precision.
@@ -99,7 +102,7 @@ const ALLOWED: &[(&str, &str)] = &[
     // Images, plants, the soil's maps and the sensor's pixels: loops over what is many.
     (
         "rayon",
-        "render/ sensor/ job/threads.rs dataset/ compare/ scene/assemble/estimate.rs scene/assemble/mod.rs soil/bake.rs material/ground.rs raster/sheets.rs",
+        "accel/embree.rs render/ sensor/ job/threads.rs dataset/ compare/ scene/assemble/estimate.rs scene/assemble/mod.rs scene/traits.rs soil/bake.rs soil/ground.rs material/ground.rs raster/sheets.rs",
     ),
     // One reader for all RON files; faults inside a value are found where they lie.
     ("ron", "ron_file/"),

@@ -520,7 +520,7 @@ fn ploughed(preview: Option<Arc<AtomicBool>>) -> furrow::Result<Field> {
         seed: 4,
         camera: Pinhole(size: (320, 240), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.8)),
         lights: [Constant(radiance: (1, 1, 1, 1))],
-        soil: (layers: [(albedo: "textures/dirt.png", height: "textures/dirt.height.png")], stones: [(cover: 0.02)], litter: (straw_cover: 0.02)),
+        soil: (stones: [(cover: 0.02)], litter: (straw_cover: 0.02)),
         crops: [(species: "scenes/species/sugar_beet.ron", growth: Bbch(16), rows: (in_row_m: 0.15))],
     )"#;
     assemble::field_of(text, &Options { preview, ..Options::default() })

@@ -101,6 +101,11 @@ fn cropandweed_is_read_as_its_own_scripts_read_it() {
     ask("check_cropandweed.py", "import numpy, PIL");
 }
 
+#[test]
+fn pandas_reads_traits_that_agree_with_records_and_pixels() {
+    ask("check_traits.py", "import numpy, pandas, PIL");
+}
+
 /// The images of a dataset as they lie on the disk.
 fn samples(folder: &Path) -> (Recipe, Vec<Sample>) {
     let set = Set::open(folder).unwrap();
@@ -168,6 +173,7 @@ fn every_format_takes_an_image_that_little_is_known_of() {
             ignored: 0,
             plants: Vec::new(),
             conditions: None,
+            canopy: None,
             exposure: None,
             sampling: None,
             warnings: Vec::new(),

@@ -73,7 +73,14 @@ pub fn plants(sample: &Sample) -> Vec<Plant> {
             });
         } else if let Some(plant) = all.last_mut() {
             // Keys are sorted: a leaf follows its plant.
-            plant.leaves.push(Leaf { number: key.1, id: None, seen: seen(key, found), base: None, tip: None });
+            plant.leaves.push(Leaf {
+                number: key.1,
+                id: None,
+                seen: seen(key, found),
+                base: None,
+                tip: None,
+                traits: None,
+            });
         }
     }
     all

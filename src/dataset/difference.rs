@@ -85,6 +85,7 @@ mod tests {
                 ignored: 0,
                 plants: Vec::new(),
                 conditions: None,
+                canopy: None,
                 exposure: None,
                 warnings: Vec::new(),
             },

@@ -6,6 +6,7 @@ use crate::film::Sampling;
 use crate::plant::Condition;
 use crate::scene::record::Conditions;
 use crate::scene::tag::{Class, lowercase};
+use crate::scene::traits::{Canopy, LeafTraits, PlantTraits};
 use serde::{Deserialize, Serialize, Serializer, ser};
 
 /// One image.
@@ -39,6 +40,9 @@ pub struct Record {
     /// What was drawn for it: camera, lights, soil, rows, stage; null for an imported image.
     #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "sorted")]
     pub conditions: Option<Conditions>,
+    /// Leaf area over the ground that it shows; null in older records, for an imported image, and where the camera sees the horizon.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub canopy: Option<Canopy>,
     /// How the sensor was set; null for an imported image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure: Option<Exposure>,
@@ -144,6 +148,9 @@ pub struct Grown {
     pub radius_m: f32,
     /// Number of its leaves, seed leaves included, seen or not.
     pub leaves: u16,
+    /// Its leaf area and cover; null in older records and for a model.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub traits: Option<PlantTraits>,
     /// Its condition (holes, dead tissue, dust, wilting), where its scene file gave one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub condition: Option<Condition>,
@@ -165,6 +172,9 @@ pub struct Leaf {
     /// Where its blade ends.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tip: Option<Keypoint>,
+    /// Its area, size and angles; null in older records and for a leaf of a model or of an imported plant.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub traits: Option<LeafTraits>,
 }
 
 /// How much of a plant or a leaf an image shows.

@@ -10,6 +10,7 @@ use crate::job::{Field, Image, Renderer, Request, SceneFile};
 use crate::output::half;
 use crate::render::{self, LabelMap, Watch};
 use crate::scene::drive::Capture;
+use crate::scene::traits::{Canopy, PlantTraits, Traits};
 use crate::scene::{self, PlantRecord};
 use crate::settings::Engine;
 use crate::{Error, Result};
@@ -150,6 +151,7 @@ fn describe(recipe: &Recipe, index: u64, image: Image<'_>) -> Result<Sample> {
             ignored: 0,
             plants: Vec::new(),
             conditions: Some(field.conditions.clone()),
+            canopy: Canopy::of(field),
             exposure: Some(Exposure {
                 gain: photograph.gain,
                 nir_gain: photograph.nir_gain,
@@ -179,6 +181,7 @@ fn describe(recipe: &Recipe, index: u64, image: Image<'_>) -> Result<Sample> {
 /// The plants of a field that its image shows or hides, in the order of their numbers.
 fn plants(field: &scene::Field, labels: &LabelMap, sample: &Sample) -> Vec<Plant> {
     let extents = render::extents(&field.scene, labels);
+    let traits = Traits::of(field);
     let camera = &field.scene.camera;
     let mut shown: BTreeMap<u16, Plant> = annotate::plants(sample).into_iter().map(|p| (p.number, p)).collect();
     let mut all = Vec::new();
@@ -199,7 +202,8 @@ fn plants(field: &scene::Field, labels: &LabelMap, sample: &Sample) -> Vec<Plant
             if extent.unoccluded > 0
                 && let Err(place) = plant.leaves.binary_search_by_key(number, |l| l.number)
             {
-                let mut leaf = Leaf { number: *number, id: None, seen: Seen::default(), base: None, tip: None };
+                let mut leaf =
+                    Leaf { number: *number, id: None, seen: Seen::default(), base: None, tip: None, traits: None };
                 known(&mut leaf.seen, extent);
                 plant.leaves.insert(place, leaf);
             }
@@ -217,8 +221,9 @@ fn plants(field: &scene::Field, labels: &LabelMap, sample: &Sample) -> Vec<Plant
         plant.id = Some(grown.id);
         for leaf in &mut plant.leaves {
             leaf.id = usize::from(leaf.number).checked_sub(1).and_then(|place| grown.leaf_ids.get(place)).copied();
+            leaf.traits = traits.leaves.get(&(grown.number, leaf.number)).copied();
         }
-        plant.grown = Some(described(grown));
+        plant.grown = Some(described(grown, traits.plants.get(&grown.number).copied()));
         plant.kind = grown.kind;
         all.push(plant);
     }
@@ -240,7 +245,7 @@ fn hidden(grown: &PlantRecord) -> Plant {
     }
 }
 
-fn described(grown: &PlantRecord) -> Grown {
+fn described(grown: &PlantRecord, traits: Option<PlantTraits>) -> Grown {
     Grown {
         species: grown.species.clone(),
         eppo: grown.eppo.clone(),
@@ -251,6 +256,7 @@ fn described(grown: &PlantRecord) -> Grown {
         height_m: grown.height,
         radius_m: grown.radius,
         leaves: grown.leaves,
+        traits,
         condition: grown.condition,
     }
 }

@@ -17,6 +17,8 @@ pub struct AlphaMask {
     tiles: Vec<u64>,
 }
 
+/// Most parts that the sides of a triangle are cut into by [`AlphaMask::share`].
+const MOST_STEPS: f32 = 64.0;
 /// Bits of a tile's texels of least x.
 const FIRST_COLUMN: u64 = 0x0101_0101_0101_0101;
 /// Bits of a tile's texels of greatest x.
@@ -142,6 +144,27 @@ impl AlphaMask {
             return 0;
         }
         self.tiles[(y as u32 * self.tiles_x + x as u32) as usize]
+    }
+
+    /// Share of a uv triangle that is opaque, 0 to 1: exact where it is all or nothing, else by about two places a texel.
+    pub fn share(&self, uv: [Vec2; 3]) -> f64 {
+        match self.coverage(uv) {
+            Coverage::Opaque => return 1.0,
+            Coverage::Transparent => return 0.0,
+            Coverage::Mixed => {}
+        }
+        let scale = vec2(self.width as f32, self.height as f32);
+        let [a, b, c] = uv.map(|p| p * scale);
+        let texels = 0.5 * (b - a).perp_dot(c - a).abs();
+        let n = (2.0 * texels).sqrt().ceil().clamp(2.0, MOST_STEPS) as u32;
+        // The middles of the n² equal triangles that lines along its sides cut it into: those that stand as it does, then the others.
+        let upright = (0..n).flat_map(|i| (0..n - i).map(move |j| (i, j, 1.0 / 3.0)));
+        let reversed = (1..n).flat_map(|i| (0..n - i).map(move |j| (i - 1, j, 2.0 / 3.0)));
+        let opaque = upright.chain(reversed).filter(|(i, j, middle)| {
+            let (u, v) = ((*i as f32 + middle) / n as f32, (*j as f32 + middle) / n as f32);
+            self.opaque_at(uv[0] * (1.0 - u - v) + uv[1] * u + uv[2] * v)
+        });
+        opaque.count() as f64 / f64::from(n * n)
     }
 
     /// What the mask says about the uv triangle. Conservative: `Mixed` where in doubt.

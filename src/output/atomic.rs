@@ -142,11 +142,10 @@ impl Replaced {
     fn undo(self) {
         match self.old {
             Some(old) => {
-                // Two names of one file: POSIX leaves both. Where it cannot be put back it stays under its temporary name.
+                // Two names of one file: POSIX leaves both. Where it cannot be put back the new file stays, whole.
                 let name = old.to_path_buf();
-                match old.persist(&self.path) {
-                    Ok(()) => drop(fs::remove_file(name)),
-                    Err(e) => drop(e.path.keep()),
+                if old.persist(&self.path).is_ok() {
+                    let _ = fs::remove_file(name);
                 }
             }
             None if !self.was_there => drop(fs::remove_file(&self.path)),

@@ -2,7 +2,7 @@
 
 use super::growth::{Growth, LeafNow};
 use super::leaf::Seat;
-use super::organ::{Organ, OrganKind};
+use super::organ::{LeafSize, Organ, OrganKind};
 use super::tube::{self, Profile, Ring};
 use crate::math::{Frame, Vec3, direction, lerp, vec3};
 use crate::sampling::Purpose;
@@ -95,6 +95,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
         material: material(&growth.desc.hypocotyl_material),
         mesh,
         midrib: None,
+        size: LeafSize::default(),
     });
     let mut rings: Vec<Ring> = Vec::with_capacity(2 * nodes.len() + 4);
     if stemless {
@@ -124,6 +125,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
         material: material(&growth.desc.stem_material),
         mesh,
         midrib: None,
+        size: LeafSize::default(),
     });
     Axis { nodes, radii, section, crown }
 }

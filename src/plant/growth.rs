@@ -5,12 +5,14 @@
 
 use super::desc::{PlantDesc, Stage};
 use super::kind::LeafKind;
-use super::leaf::CELL;
 use super::stage::{BUD, StageDesc};
 use crate::math::lerp;
 use crate::ron_file::{Bound, Vary};
 use crate::sampling::{Purpose, Stream};
 use std::f32::consts::PI;
+
+/// Shortest cell of a blade's mesh unless coarser ones are asked for, metres: about what four pixels of a field camera see.
+pub(super) const CELL: f32 = 0.9e-3;
 
 /// One leaf as it is today. Metres and radians.
 #[derive(Clone, Debug)]

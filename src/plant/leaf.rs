@@ -2,10 +2,10 @@
 
 use super::blade::{self, Rest};
 use super::fern;
-use super::growth::LeafNow;
+use super::growth::{CELL, LeafNow};
 use super::kind::Shape;
 use super::leaflets;
-use super::organ::{Organ, OrganKind};
+use super::organ::{LeafSize, Organ, OrganKind};
 use super::ribbons;
 use super::skeleton::{Measures, Pose, Skeleton};
 use super::skin::{self, BladeRelief};
@@ -19,8 +19,6 @@ use std::f32::consts::FRAC_PI_2;
 const SIDES: u32 = 9;
 /// Corners round the stalk of a mesh that is coarser than usual.
 const FEW_SIDES: u32 = 5;
-/// Shortest cell of a blade's mesh unless coarser ones are asked for, metres: about what four pixels of a field camera see.
-pub(super) const CELL: f32 = 0.9e-3;
 /// A midrib never comes nearer to the soil than this, metres, plus [`LYING_WIDTH`] of the blade's width for its hanging
 /// sides: a leaf that would, lies on the soil's crumbs. Near the crown the bound falls to half the crown's height.
 const LYING: f32 = 0.004;
@@ -92,7 +90,8 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
         _ => end(skeleton.along().len() - 1),
     };
     let midrib = Some([end(skeleton.base()), tip]);
-    organs.push(Organ { kind, leaf: leaf.number, material: material.to_owned(), mesh, midrib });
+    let size = LeafSize { length: leaf.blade, width: leaf.width, petiole: leaf.stalk };
+    organs.push(Organ { kind, leaf: leaf.number, material: material.to_owned(), mesh, midrib, size });
     let rest = stalk(leaf, &skeleton, &relief, lower, &mut stream);
     if rest.triangles.is_empty() {
         return;
@@ -100,7 +99,14 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
     let mut mesh = skin::skin(rest, &motions);
     tube::close_seams(&mut mesh, sides(leaf), 0);
     let kind = if lower == Lower::Petiole { OrganKind::Petiole } else { OrganKind::Sheath };
-    organs.push(Organ { kind, leaf: leaf.number, material: leaf.kind.stalk_material.clone(), mesh, midrib: None });
+    organs.push(Organ {
+        kind,
+        leaf: leaf.number,
+        material: leaf.kind.stalk_material.clone(),
+        mesh,
+        midrib: None,
+        size: LeafSize::default(),
+    });
 }
 
 /// Corners round the stalk.

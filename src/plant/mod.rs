@@ -46,7 +46,7 @@ pub use bound::most_triangles;
 pub use condition::{Condition, ConditionDesc};
 pub use desc::{Form, PlantDesc, Stage};
 pub use kind::{LeafKind, Shape};
-pub use organ::{LeafAxis, Organ, OrganKind};
+pub use organ::{LeafAxis, LeafSize, Organ, OrganKind};
 pub use stage::{BUD, LayerDesc, StageDesc};
 
 use crate::sampling::Stream;
@@ -70,7 +70,7 @@ pub struct Plant {
 impl Plant {
     /// The keypoints of its leaves, in plant coordinates, in the order of its organs.
     pub fn leaf_axes(&self) -> impl Iterator<Item = LeafAxis> + '_ {
-        let axis = |o: &Organ| o.midrib.map(|[base, tip]| LeafAxis { leaf: o.leaf, base, tip });
+        let axis = |o: &Organ| o.midrib.map(|[base, tip]| LeafAxis { leaf: o.leaf, base, tip, size: o.size });
         self.organs.iter().filter_map(axis)
     }
 }
@@ -94,7 +94,7 @@ pub struct GrowOptions<'a> {
 impl Default for GrowOptions<'_> {
     /// Of usual size, without a condition, as fine as field cameras see.
     fn default() -> Self {
-        Self { vigour: 1.0, condition: None, cell: leaf::CELL }
+        Self { vigour: 1.0, condition: None, cell: growth::CELL }
     }
 }
 

@@ -34,7 +34,18 @@ impl OrganKind {
     }
 }
 
-/// Where a leaf's blade begins and ends: the keypoints of a leaf.
+/// How large a leaf is, flat and whole, metres.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LeafSize {
+    /// Length of its blade along the midrib, of a compound leaf along the rachis.
+    pub length: f32,
+    /// Largest width of the blade.
+    pub width: f32,
+    /// Length of its petiole, of a grass leaf of its sheath.
+    pub petiole: f32,
+}
+
+/// Where a leaf's blade begins and ends, the keypoints of a leaf, and how large it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LeafAxis {
     /// The leaf, counted as in [`Organ::leaf`].
@@ -43,6 +54,8 @@ pub struct LeafAxis {
     pub base: Vec3,
     /// The midrib's tip, metres.
     pub tip: Vec3,
+    /// Its size.
+    pub size: LeafSize,
 }
 
 /// One organ of one plant.
@@ -58,4 +71,6 @@ pub struct Organ {
     pub mesh: Mesh,
     /// Of a blade, and of nothing else: the ends of its midrib in the same coordinates, base (joint B) and tip (joint PK).
     pub midrib: Option<[Vec3; 2]>,
+    /// Of a blade: the size of its leaf.
+    pub size: LeafSize,
 }

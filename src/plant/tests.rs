@@ -554,7 +554,7 @@ fn the_keypoints_of_a_leaf_lie_on_its_blade_and_point_outward() {
         let axes: Vec<LeafAxis> = plant.leaf_axes().collect();
         assert_eq!(axes.iter().map(|a| a.leaf).collect::<std::collections::BTreeSet<_>>(), leaves);
         assert_eq!(axes.len(), leaves.len(), "one axis a leaf");
-        for LeafAxis { leaf, base, tip } in axes {
+        for LeafAxis { leaf, base, tip, .. } in axes {
             let at = format!("{} {} leaf {leaf}", page.eppo, stage.bbch);
             let of = |flat: bool| {
                 let is =

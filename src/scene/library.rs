@@ -22,6 +22,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
+/// Most bytes of a file of poses: about a million lines.
+const MOST_POSES: u64 = 64 << 20;
+
 /// A picture with the mask that it cuts.
 #[derive(Clone)]
 pub(super) struct Cut {
@@ -321,7 +324,7 @@ impl Library {
     /// The file of poses that `page` names.
     pub(super) fn poses(&mut self, page: &RonFile, path: &str) -> Result<Vec<(f64, Pose)>> {
         let full = self.need(page, path)?;
-        let bytes = input::read(&full, input::LARGEST).map_err(|refusal| refusal.into_error(&full))?;
+        let bytes = input::read(&full, MOST_POSES).map_err(|refusal| refusal.into_error(&full))?;
         self.files.insert(full.clone(), Sha256::digest(&bytes).into());
         let poses = drive::read_poses(&String::from_utf8_lossy(&bytes));
         poses.map_err(|e| at_its_place(page, path, "", e.in_file(&full)))

@@ -9,6 +9,7 @@ mod library;
 pub mod record;
 pub mod shipped;
 pub mod tag;
+pub mod traits;
 
 use crate::accel::Surface;
 use crate::film::Footprint;

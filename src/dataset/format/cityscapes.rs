@@ -145,6 +145,7 @@ mod tests {
             ignored: 0,
             plants: (1..=count).map(weed).collect(),
             conditions: None,
+            canopy: None,
             exposure: None,
             sampling: None,
             warnings: Vec::new(),

@@ -94,6 +94,8 @@ formats! {
         r#"datumaro.Dataset.import_from("panoptic", "coco_panoptic")"#;
     "phenobench" => phenobench: "PhenoBench: semantics, plants, leaves and visibility, for `phenobench`",
         r#"PhenoBench("phenobench", "train", target_types=["semantics", "plant_instances", "leaf_instances"])[0]"#;
+    "traits" => traits: "CSV for phenotyping: leaf areas, angles, sizes and cover of plants, leaves and images",
+        r#"pandas.read_csv("traits/leaves.csv")"#;
     "tum" => tum: "TUM RGB-D trajectories: time, position and quaternion of each camera's images",
         r#"numpy.loadtxt("tum/000000-camera.txt")"#;
     "yolo" => yolo: "YOLO segmentation: a polygon a plant, with what is lost by it, for Ultralytics and `supervision`",

@@ -178,6 +178,7 @@ fn sample(recipe: &Recipe, listed: &Listed, index: u64, read: Labelled) -> Sampl
             ignored: 0,
             plants: Vec::new(),
             conditions: None,
+            canopy: None,
             exposure: None,
             sampling: None,
             warnings: read.warnings,

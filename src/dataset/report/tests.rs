@@ -42,6 +42,7 @@ fn record(conditions: Option<Conditions>) -> Record {
         ignored: 0,
         plants: Vec::new(),
         conditions,
+        canopy: None,
         exposure: None,
         sampling: None,
         warnings: Vec::new(),

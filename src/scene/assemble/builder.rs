@@ -1,7 +1,7 @@
 //! What a field is built with, and of.
 
-use super::Options;
 use super::lighting::Lighting;
+use super::options::Options;
 use super::season::Season;
 use crate::geometry::Mesh;
 use crate::light::LightRecord;

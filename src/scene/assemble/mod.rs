@@ -12,6 +12,7 @@ mod individual;
 mod known;
 mod lighting;
 mod models;
+mod options;
 mod rig;
 mod season;
 mod unlikely;
@@ -45,38 +46,12 @@ use ground::{BakedGrounds, Earth};
 use individual::Individual;
 pub use lighting::Lighting;
 use lighting::Listed;
+pub use options::Options;
 use rayon::prelude::*;
 pub use season::Season;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use view::View;
-
-/// What the command line adds to a scene file.
-#[derive(Clone, Debug, Default)]
-pub struct Options {
-    /// Instead of the scene file's seed.
-    pub seed: Option<u64>,
-    /// Which field.
-    pub index: u64,
-    /// Image width; the field of view stays.
-    pub width: Option<u32>,
-    /// Image height.
-    pub height: Option<u32>,
-    /// Most bytes that a field may take; [`usual_memory`](super::estimate::usual_memory) unless given. Nothing of a field depends on it, but whether it is
-    /// made.
-    pub memory: Option<u64>,
-    /// Given for a preview: meshes are as coarse as its pixels, and where the flag is raised the field is given up.
-    pub preview: Option<Arc<AtomicBool>>,
-}
-
-impl Options {
-    /// An interruption, where a preview is not wanted any more.
-    fn wanted(&self) -> Result<()> {
-        let outdated = self.preview.as_ref().is_some_and(|outdated| outdated.load(Ordering::Relaxed));
-        if outdated { Err(Error::interrupted()) } else { Ok(()) }
-    }
-}
 
 /// Room around the view in which plants are grown: they lean in and throw shadows.
 const PLANT_MARGIN: f32 = 0.35;

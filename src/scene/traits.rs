@@ -1,0 +1,336 @@
+//! What phenotyping measures, as a field has it: areas, lengths and angles of leaves, cover and leaf area of plants, leaf area index.
+//!
+//! Areas are one-sided and of what is there: an opacity mask cuts them, so what is eaten is gone. Lengths are those of the flat leaf,
+//! whole; bending keeps them. Angles are of the leaf as it is held.
+
+use super::{Field, Part};
+use crate::geometry::AlphaMask;
+use crate::math::{Vec2, Vec3, vec2};
+use crate::plant::{LeafAxis, OrganKind};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// What is measured of a leaf.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LeafTraits {
+    /// Area of its blade, one side, m².
+    pub area_m2: f32,
+    /// Length of the blade along its midrib, of a compound leaf along its rachis, metres.
+    pub length_m: f32,
+    /// Largest width of the flat blade, metres.
+    pub width_m: f32,
+    /// Length of its petiole, of a grass leaf of its sheath, metres; 0 for a sessile leaf.
+    pub petiole_m: f32,
+    /// Angle between blade and horizontal, its mean over the blade's area, degrees: 0 lies flat, 90 stands.
+    pub inclination_deg: f32,
+    /// Direction from the blade's base to its tip, degrees clockwise from north (+y), 0 to 360.
+    pub azimuth_deg: f32,
+    /// Height of its highest point over the foot of its plant, metres.
+    pub top_m: f32,
+}
+
+/// What is measured of a plant.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PlantTraits {
+    /// Area of its leaves' blades, one side, m².
+    pub leaf_area_m2: f32,
+    /// Ground that it covers seen from straight above, m²; what lies over itself counts once.
+    pub cover_m2: f32,
+}
+
+/// The leaves over the ground that an image shows.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Canopy {
+    /// The ground at height 0 between the image's corners, m².
+    pub ground_m2: f32,
+    /// Area of the blades above it, one side, m².
+    pub leaf_area_m2: f32,
+    /// Leaf area index: the second over the first.
+    pub lai: f32,
+}
+
+/// All of a field's plants and leaves; models from disk, of whose organs nothing is known, are left out.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Traits {
+    /// By the plant's number.
+    pub plants: BTreeMap<u16, PlantTraits>,
+    /// By the numbers of plant and leaf.
+    pub leaves: BTreeMap<(u16, u16), LeafTraits>,
+}
+
+/// An organ: its part of the scene, and what it is.
+type Organ<'a> = (&'a Part, OrganKind);
+
+impl Traits {
+    /// Measures a field. Call it inside a pool.
+    pub fn of(field: &Field) -> Self {
+        let mut organs: BTreeMap<u16, Vec<Organ<'_>>> = BTreeMap::new();
+        for (part, kind) in organs_of(field) {
+            organs.entry(part.tag.plant).or_default().push((part, kind));
+        }
+        let grown: Vec<_> = field.plants.iter().filter_map(|p| Some((p, organs.get(&p.number)?))).collect();
+        let measured: Vec<_> = (grown.par_iter())
+            .map(|(plant, organs)| (plant.number, measure(organs, &plant.leaf_axes, plant.position)))
+            .collect();
+        let mut all = Self::default();
+        for (number, (plant, leaves)) in measured {
+            all.plants.insert(number, plant);
+            all.leaves.extend(leaves.into_iter().map(|(leaf, traits)| ((number, leaf), traits)));
+        }
+        all
+    }
+}
+
+impl Canopy {
+    /// The canopy over what the field's camera sees; `None` where it sees beyond the horizon. Call it inside a pool.
+    pub fn of(field: &Field) -> Option<Self> {
+        let corners = field.scene.camera.footprint(0.0)?;
+        let ground = polygon_area(&corners);
+        let organs: Vec<Organ<'_>> = organs_of(field).filter(|(_, kind)| is_blade(*kind)).collect();
+        let areas: Vec<f64> = organs
+            .par_iter()
+            .map(|(part, _)| {
+                let over = pieces(part).filter(|(piece, _)| within(&corners, (piece[0] + piece[1] + piece[2]) / 3.0));
+                over.map(|(_, area)| area).sum()
+            })
+            .collect();
+        let leaves: f64 = areas.iter().sum();
+        let canopy = Self { ground_m2: ground as f32, leaf_area_m2: leaves as f32, lai: (leaves / ground) as f32 };
+        (ground > 0.0).then_some(canopy)
+    }
+}
+
+fn organs_of(field: &Field) -> impl Iterator<Item = Organ<'_>> {
+    field.scene.parts.iter().zip(&field.organs).filter_map(|(part, kind)| Some((part, (*kind)?)))
+}
+
+fn is_blade(kind: OrganKind) -> bool {
+    matches!(kind, OrganKind::Blade | OrganKind::Cotyledon)
+}
+
+/// The triangles of a part and how much of each is there, m².
+fn pieces(part: &Part) -> impl Iterator<Item = ([Vec3; 3], f64)> + '_ {
+    let Part { mesh, mask, .. } = part;
+    (0..).zip(&mesh.triangles).map(move |(i, corners)| {
+        let triangle = mesh.corners(i);
+        let share = mask.as_ref().map_or(1.0, |mask| mask.share(corners.map(|k| mesh.uvs[k as usize])));
+        (triangle, 0.5 * f64::from(normal(triangle).length()) * share)
+    })
+}
+
+/// Normal of a triangle, as long as twice its area.
+fn normal([a, b, c]: [Vec3; 3]) -> Vec3 {
+    (b - a).cross(c - a)
+}
+
+/// A plant of these organs that stands at `foot`, and its leaves.
+fn measure(organs: &[Organ<'_>], axes: &[LeafAxis], foot: Vec3) -> (PlantTraits, BTreeMap<u16, LeafTraits>) {
+    let mut leaves = BTreeMap::new();
+    let mut total = 0.0;
+    for axis in axes {
+        let (mut area, mut tilted, mut top) = (0.0, 0.0, f32::MIN);
+        for (part, kind) in organs.iter().filter(|(part, _)| part.tag.leaf == axis.leaf) {
+            top = part.mesh.positions.iter().fold(top, |top, p| top.max(p.z));
+            for (triangle, piece) in pieces(part).filter(|_| is_blade(*kind)) {
+                let normal = normal(triangle).normalize_or_zero();
+                area += piece;
+                tilted += piece * f64::from(normal.z.abs().clamp(0.0, 1.0).acos());
+            }
+        }
+        let ahead = axis.tip - axis.base;
+        let leaf = LeafTraits {
+            area_m2: area as f32,
+            length_m: axis.size.length,
+            width_m: axis.size.width,
+            petiole_m: axis.size.petiole,
+            inclination_deg: if area > 0.0 { (tilted / area).to_degrees() as f32 } else { 0.0 },
+            azimuth_deg: ahead.x.atan2(ahead.y).to_degrees().rem_euclid(360.0),
+            top_m: top - foot.z,
+        };
+        total += area;
+        leaves.insert(axis.leaf, leaf);
+    }
+    (PlantTraits { leaf_area_m2: total as f32, cover_m2: cover(organs) as f32 }, leaves)
+}
+
+/// Cells along the longer side of what a plant's cover is counted on.
+const CELLS: f32 = 512.0;
+
+/// Ground below organs, m²: cells whose middle lies under one of them.
+fn cover(organs: &[Organ<'_>]) -> f64 {
+    let corners = || organs.iter().flat_map(|(part, _)| &part.mesh.positions).map(|p| p.truncate());
+    let Some(first) = corners().next() else { return 0.0 };
+    let (lo, hi) = corners().fold((first, first), |(lo, hi), p| (lo.min(p), hi.max(p)));
+    let side = ((hi - lo).max_element() / CELLS).max(1e-5);
+    let columns = ((hi.x - lo.x) / side) as usize + 1;
+    let rows = ((hi.y - lo.y) / side) as usize + 1;
+    let mut covered = vec![false; columns * rows];
+    for (part, _) in organs {
+        for (i, corners) in (0..).zip(&part.mesh.triangles) {
+            let triangle = part.mesh.corners(i).map(|p| (p.truncate() - lo) / side);
+            let mask = part.mask.as_deref().map(|mask| (mask, corners.map(|k| part.mesh.uvs[k as usize])));
+            shade(&mut covered, (columns, rows), triangle, mask);
+        }
+    }
+    covered.iter().filter(|cell| **cell).count() as f64 * f64::from(side) * f64::from(side)
+}
+
+/// Covers the cells of side 1 whose middles lie in a triangle, where its mask is opaque.
+fn shade(
+    covered: &mut [bool],
+    (columns, rows): (usize, usize),
+    [a, b, c]: [Vec2; 3],
+    mask: Option<(&AlphaMask, [Vec2; 3])>,
+) {
+    let double = (b - a).perp_dot(c - a);
+    if double == 0.0 {
+        return;
+    }
+    let (lo, hi) = (a.min(b).min(c), a.max(b).max(c));
+    let cells =
+        |lo: f32, hi: f32, most: usize| ((lo - 0.5).ceil().max(0.0) as usize)..((hi + 0.5).floor() as usize).min(most);
+    for row in cells(lo.y, hi.y, rows) {
+        for column in cells(lo.x, hi.x, columns) {
+            let p = vec2(column as f32 + 0.5, row as f32 + 0.5);
+            let (u, v) = ((p - a).perp_dot(c - a) / double, (b - a).perp_dot(p - a) / double);
+            let inside = u >= 0.0 && v >= 0.0 && u + v <= 1.0;
+            let there =
+                |(mask, uv): (&AlphaMask, [Vec2; 3])| mask.opaque_at(uv[0] * (1.0 - u - v) + uv[1] * u + uv[2] * v);
+            if inside && mask.is_none_or(there) {
+                covered[row * columns + column] = true;
+            }
+        }
+    }
+}
+
+/// Area of a polygon without crossings.
+fn polygon_area(corners: &[Vec2]) -> f64 {
+    let next = corners.iter().cycle().skip(1);
+    0.5 * corners.iter().zip(next).map(|(a, b)| f64::from(a.perp_dot(*b))).sum::<f64>().abs()
+}
+
+/// Whether a point lies below or above a convex polygon.
+fn within(corners: &[Vec2], point: Vec3) -> bool {
+    let p = point.truncate();
+    let next = corners.iter().cycle().skip(1);
+    let sides = corners.iter().zip(next).map(|(a, b)| (*b - *a).perp_dot(p - *a));
+    let (mut left, mut right) = (true, true);
+    for side in sides {
+        left &= side >= 0.0;
+        right &= side <= 0.0;
+    }
+    left || right
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Mesh;
+    use crate::math::{Mat3, vec3};
+    use crate::plant::LeafSize;
+    use crate::scene::tag::{Class, Tag};
+    use std::f32::consts::PI;
+    use std::sync::Arc;
+
+    /// A leaf of 0.1 m by 0.04 m whose midrib is bent to an arc of this angle, radians; it leads north, its base at the origin.
+    fn leaf(arc: f32, mask: Option<AlphaMask>) -> Part {
+        let (rows, columns) = (64, 8);
+        let place = |s: f32| match arc {
+            0.0 => vec3(0.0, s, 0.0),
+            _ => vec3(0.0, (arc * s / 0.1).sin(), 1.0 - (arc * s / 0.1).cos()) * (0.1 / arc),
+        };
+        let (mut positions, mut uvs, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
+        for i in 0..=rows {
+            for j in 0..=columns {
+                let (t, x) = (i as f32 / rows as f32, j as f32 / columns as f32);
+                positions.push(place(0.1 * t) + vec3(0.04 * (x - 0.5), 0.0, 0.0));
+                uvs.push(vec2(x, 1.0 - t));
+                if i < rows && j < columns {
+                    let a = i * (columns + 1) + j;
+                    triangles.push([a, a + 1, a + columns + 2]);
+                    triangles.push([a, a + columns + 2, a + columns + 1]);
+                }
+            }
+        }
+        let mesh = Mesh::smooth(positions, uvs, triangles);
+        let tag = Tag { class: Class::Crop, plant: 1, leaf: 1 };
+        Part { mesh, mask: mask.map(Arc::new), material: 0, tag }
+    }
+
+    fn axis(part: &Part) -> LeafAxis {
+        let size = LeafSize { length: 0.1, width: 0.04, petiole: 0.02 };
+        LeafAxis { leaf: 1, base: part.mesh.positions[4], tip: part.mesh.positions[64 * 9 + 4], size }
+    }
+
+    fn measured(part: &Part) -> (PlantTraits, LeafTraits) {
+        let (plant, leaves) = measure(&[(part, OrganKind::Blade)], &[axis(part)], vec3(0.0, 0.0, -0.05));
+        (plant, leaves[&1])
+    }
+
+    #[test]
+    fn a_flat_rectangle_has_its_area_its_cover_and_no_inclination() {
+        let part = leaf(0.0, None);
+        let (plant, leaf) = measured(&part);
+        assert!((leaf.area_m2 / 0.004 - 1.0).abs() < 1e-4, "{leaf:?}");
+        assert!((plant.cover_m2 / 0.004 - 1.0).abs() < 0.01, "{plant:?}");
+        assert_eq!(plant.leaf_area_m2, leaf.area_m2);
+        assert!(leaf.inclination_deg < 0.01 && leaf.azimuth_deg < 0.01);
+        assert!((leaf.top_m - 0.05).abs() < 1e-6);
+        assert_eq!((leaf.length_m, leaf.width_m, leaf.petiole_m), (0.1, 0.04, 0.02));
+    }
+
+    /// Expected: an arc of angle φ and length L stands at angles 0 to φ, φ/2 in the mean, and covers L sin φ / φ.
+    #[test]
+    fn a_bent_leaf_keeps_its_area_and_covers_less() {
+        for arc in [0.5_f32, 1.0, PI / 2.0] {
+            let (plant, leaf) = measured(&leaf(arc, None));
+            assert!((leaf.area_m2 / 0.004 - 1.0).abs() < 0.005, "{arc}: {leaf:?}");
+            assert!((leaf.inclination_deg - 0.5 * arc.to_degrees()).abs() < 0.2, "{arc}: {leaf:?}");
+            let expected = 0.004 * arc.sin() / arc;
+            assert!((plant.cover_m2 / expected - 1.0).abs() < 0.01, "{arc}: {plant:?}");
+        }
+    }
+
+    #[test]
+    fn a_turned_leaf_leads_where_it_was_turned() {
+        for degrees in [30.0_f32, 135.0, 260.0] {
+            let mut part = leaf(0.3, None);
+            part.mesh.transform(Mat3::from_rotation_z(-degrees.to_radians()), Vec3::ZERO);
+            let (plant, leaf) = measured(&part);
+            assert!((leaf.azimuth_deg - degrees).abs() < 0.1, "{degrees}: {leaf:?}");
+            let expected = 0.004 * 0.3_f32.sin() / 0.3;
+            assert!((plant.cover_m2 / expected - 1.0).abs() < 0.02, "{degrees}: {plant:?}");
+        }
+    }
+
+    /// Rationale: half of a leaf eaten is half of its area. Expected: a disc of a mask has a disc's area, in the triangles that its outline
+    /// crosses too.
+    #[test]
+    fn what_a_mask_leaves_is_what_counts() {
+        let disc = AlphaMask::new(200, 500, |x, y| vec2(x as f32 - 99.5, (y as f32 - 249.5) * 0.4).length() < 80.0);
+        let (plant, leaf) = measured(&leaf(0.0, Some(disc)));
+        // An ellipse of 0.8 of the width and 0.8 of the length.
+        let expected = PI / 4.0 * 0.032 * 0.08;
+        assert!((leaf.area_m2 / expected - 1.0).abs() < 0.005, "{leaf:?} for {expected}");
+        assert!((plant.cover_m2 / expected - 1.0).abs() < 0.01, "{plant:?} for {expected}");
+    }
+
+    #[test]
+    fn leaves_over_each_other_cover_once() {
+        let (below, mut above) = (leaf(0.0, None), leaf(0.0, None));
+        above.mesh.transform(Mat3::IDENTITY, vec3(0.02, 0.0, 0.01));
+        let organs = [(&below, OrganKind::Blade), (&above, OrganKind::Blade)];
+        assert!((cover(&organs) / 0.006 - 1.0).abs() < 0.01, "{}", cover(&organs));
+    }
+
+    #[test]
+    fn polygons_have_their_areas_and_insides() {
+        let corners = [vec2(0.0, 0.0), vec2(2.0, 0.0), vec2(3.0, 1.0), vec2(0.0, 1.0)];
+        assert!((polygon_area(&corners) - 2.5).abs() < 1e-9);
+        assert!(within(&corners, vec3(2.4, 0.9, 7.0)) && !within(&corners, vec3(2.4, 0.1, 0.0)));
+        let mut reversed = corners;
+        reversed.reverse();
+        assert!(within(&reversed, vec3(1.0, 0.5, 0.0)) && !within(&reversed, vec3(-0.1, 0.5, 0.0)));
+    }
+}

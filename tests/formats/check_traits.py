@@ -1,0 +1,52 @@
+"""Reads DATASET/traits with pandas and holds its rows against the records, and its areas against the label maps."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+import native
+
+dataset = Path(sys.argv[1])
+images = native.read(dataset)
+read = lambda name: pd.read_csv(dataset / "traits" / name, dtype={"image": str})
+plants, leaves, views = read("plants.csv"), read("leaves.csv"), read("images.csv")
+
+assert list(views["image"]) == list(images)
+assert len(plants) == sum(len(i.record["plants"]) for i in images.values())
+assert len(leaves) == sum(len(p["leaves"]) for i in images.values() for p in i.record["plants"])
+assert list(plants.columns[:6]) == ["image", "split", "plant", "id", "class", "species"]
+assert list(leaves.columns[:5]) == ["image", "split", "plant", "leaf", "id"]
+
+for row in plants.itertuples():
+    shown = images[row.image].plants == row.plant
+    assert row.pixels == shown.sum()
+    # Leaves that neither stand in view nor hide in it have no rows, but count for the plant.
+    own = leaves[(leaves["image"] == row.image) & (leaves["plant"] == row.plant)]
+    assert own["area_m2"].sum() <= row.leaf_area_m2 * 1.001
+    if len(own) == row.leaves:
+        assert abs(own["area_m2"].sum() - row.leaf_area_m2) <= 1e-3 * row.leaf_area_m2
+    assert 0 < row.cover_m2 <= np.pi * row.radius_m**2
+    assert row.leaf_area_m2 > 0
+
+if len(leaves):
+    # A blade is no larger than the rectangle that it is cut from, and no smaller than a thread.
+    assert (leaves["area_m2"] <= 1.05 * leaves["length_m"] * leaves["width_m"]).all()
+    assert (leaves["area_m2"] > 0).all()
+    assert leaves["inclination_deg"].between(0, 90).all() and leaves["azimuth_deg"].between(0, 360).all()
+    assert (leaves["visible_area_m2"] <= leaves["area_m2"]).all()
+
+# Seen from above, a pixel is worth a fixed piece of ground: a plant wholly in sight covers about what its pixels do.
+compared = 0
+for name, image in images.items():
+    view = views[views["image"] == name].iloc[0]
+    assert view["crop_pixels"] + view["weed_pixels"] + view["soil_pixels"] == image.plants.size
+    assert abs(view["lai"] - view["leaf_area_m2"] / view["ground_m2"]) < 1e-4
+    each = view["ground_m2"] / image.plants.size
+    for row in plants[plants["image"] == name].itertuples():
+        if row.pixels > 150 and row.pixels == row.whole_pixels:
+            assert 0.75 < row.cover_m2 / (row.pixels * each) < 1.1, (name, row.plant)
+            compared += 1
+assert compared > 0 or not len(plants)
+print(f"traits: {len(plants)} plants, {len(leaves)} leaves, {compared} covers held against pixels")
