@@ -103,7 +103,7 @@ fn cropandweed_is_read_as_its_own_scripts_read_it() {
 
 #[test]
 fn pandas_reads_traits_that_agree_with_records_and_pixels() {
-    ask("check_traits.py", "import numpy, pandas, PIL");
+    ask("check_traits.py", "import numpy, pandas, OpenEXR, PIL");
 }
 
 /// The images of a dataset as they lie on the disk.

@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import OpenEXR
 import pandas as pd
 
 import native
@@ -37,16 +38,19 @@ if len(leaves):
     assert leaves["inclination_deg"].between(0, 90).all() and leaves["azimuth_deg"].between(0, 360).all()
     assert (leaves["visible_area_m2"] <= leaves["area_m2"]).all()
 
-# Seen from above, a pixel is worth a fixed piece of ground: a plant wholly in sight covers about what its pixels do.
+# Seen from above, the pixels of a plant wholly in sight cover about what it covers: each a square as wide as its depth makes it.
 compared = 0
 for name, image in images.items():
     view = views[views["image"] == name].iloc[0]
     assert view["crop_pixels"] + view["weed_pixels"] + view["soil_pixels"] == image.plants.size
     assert abs(view["lai"] - view["leaf_area_m2"] / view["ground_m2"]) < 1e-4
-    each = view["ground_m2"] / image.plants.size
+    camera = image.record["conditions"]["camera"]
+    depth = OpenEXR.File(str(dataset / "images" / name / "geometry.exr")).channels()["depth.Z"].pixels
+    each = depth.astype(float) ** 2 / (camera["fx_px"] * camera["fy_px"])
     for row in plants[plants["image"] == name].itertuples():
         if row.pixels > 150 and row.pixels == row.whole_pixels:
-            assert 0.75 < row.cover_m2 / (row.pixels * each) < 1.1, (name, row.plant)
+            covered = each[image.plants == row.plant].sum()
+            assert 0.8 < row.cover_m2 / covered < 1.25, (name, row.plant, row.cover_m2 / covered)
             compared += 1
 assert compared > 0 or not len(plants)
 print(f"traits: {len(plants)} plants, {len(leaves)} leaves, {compared} covers held against pixels")
