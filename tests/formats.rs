@@ -102,6 +102,21 @@ fn cropandweed_is_read_as_its_own_scripts_read_it() {
 }
 
 #[test]
+fn organs_and_ground_lie_where_the_other_labels_say() {
+    ask("check_parts.py", "import numpy, PIL");
+}
+
+#[test]
+fn joints_of_leaves_lie_between_base_and_tip() {
+    ask("check_skeletons.py", "import numpy");
+}
+
+#[test]
+fn plyfile_reads_points_that_the_camera_sees_where_they_came_from() {
+    ask("check_ply.py", "import numpy, plyfile");
+}
+
+#[test]
 fn pandas_reads_traits_that_agree_with_records_and_pixels() {
     ask("check_traits.py", "import numpy, pandas, OpenEXR, PIL");
 }

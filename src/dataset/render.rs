@@ -174,7 +174,15 @@ fn describe(recipe: &Recipe, index: u64, image: Image<'_>) -> Result<Sample> {
     };
     (sample.record.classes, sample.record.ignored) = annotate::classes(&sample);
     sample.record.plants = plants(field, &labels, &sample);
-    sample.film = Some(Rendered { film, labels, tags, flows });
+    sample.film = Some(Rendered {
+        film,
+        labels,
+        tags,
+        kinds: field.kinds.clone(),
+        plants: field.plants.clone(),
+        camera: field.scene.camera,
+        flows,
+    });
     Ok(sample)
 }
 

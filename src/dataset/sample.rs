@@ -41,6 +41,12 @@ pub struct Rendered {
     pub labels: LabelMap,
     /// Class, plant and leaf of each part.
     pub tags: Vec<crate::scene::tag::Tag>,
+    /// What each part is.
+    pub kinds: Vec<crate::scene::PartKind>,
+    /// What grows.
+    pub plants: Vec<crate::scene::PlantRecord>,
+    /// Who looked.
+    pub camera: crate::sensor::Camera,
     /// Where what this image shows lies in others of its field; none unless a format asks for it.
     pub flows: Vec<Flow>,
 }

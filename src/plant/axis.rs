@@ -96,6 +96,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
         mesh,
         midrib: None,
         size: LeafSize::default(),
+        joints: Vec::new(),
     });
     let mut rings: Vec<Ring> = Vec::with_capacity(2 * nodes.len() + 4);
     if stemless {
@@ -126,6 +127,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
         mesh,
         midrib: None,
         size: LeafSize::default(),
+        joints: Vec::new(),
     });
     Axis { nodes, radii, section, crown }
 }

@@ -91,7 +91,15 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
     };
     let midrib = Some([end(skeleton.base()), tip]);
     let size = LeafSize { length: leaf.blade, width: leaf.width, petiole: leaf.stalk };
-    organs.push(Organ { kind, leaf: leaf.number, material: material.to_owned(), mesh, midrib, size });
+    organs.push(Organ {
+        kind,
+        leaf: leaf.number,
+        material: material.to_owned(),
+        mesh,
+        midrib,
+        size,
+        joints: skeleton.placed(root),
+    });
     let rest = stalk(leaf, &skeleton, &relief, lower, &mut stream);
     if rest.triangles.is_empty() {
         return;
@@ -106,6 +114,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
         mesh,
         midrib: None,
         size: LeafSize::default(),
+        joints: Vec::new(),
     });
 }
 

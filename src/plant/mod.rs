@@ -47,6 +47,7 @@ pub use condition::{Condition, ConditionDesc};
 pub use desc::{Form, PlantDesc, Stage};
 pub use kind::{LeafKind, Shape};
 pub use organ::{LeafAxis, LeafSize, Organ, OrganKind};
+pub use skeleton::PlacedJoint;
 pub use stage::{BUD, LayerDesc, StageDesc};
 
 use crate::sampling::Stream;
@@ -70,7 +71,9 @@ pub struct Plant {
 impl Plant {
     /// The keypoints of its leaves, in plant coordinates, in the order of its organs.
     pub fn leaf_axes(&self) -> impl Iterator<Item = LeafAxis> + '_ {
-        let axis = |o: &Organ| o.midrib.map(|[base, tip]| LeafAxis { leaf: o.leaf, base, tip, size: o.size });
+        let axis = |o: &Organ| {
+            o.midrib.map(|[base, tip]| LeafAxis { leaf: o.leaf, base, tip, size: o.size, joints: o.joints.clone() })
+        };
         self.organs.iter().filter_map(axis)
     }
 }

@@ -1,5 +1,6 @@
 //! The words of botany: what a plant is made of. One organ is one geometry of the scene, so it is also the finest label.
 
+use super::skeleton::PlacedJoint;
 use crate::geometry::Mesh;
 use crate::math::Vec3;
 
@@ -45,8 +46,8 @@ pub struct LeafSize {
     pub petiole: f32,
 }
 
-/// Where a leaf's blade begins and ends, the keypoints of a leaf, and how large it is.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Where a leaf's blade begins and ends, the keypoints of a leaf, how large it is, and how it bends.
+#[derive(Clone, Debug, PartialEq)]
 pub struct LeafAxis {
     /// The leaf, counted as in [`Organ::leaf`].
     pub leaf: u16,
@@ -56,6 +57,20 @@ pub struct LeafAxis {
     pub tip: Vec3,
     /// Its size.
     pub size: LeafSize,
+    /// The joints of its kinematic tree, metres; those of a compound leaf along its rachis.
+    pub joints: Vec<PlacedJoint>,
+}
+
+impl LeafAxis {
+    /// The same with all its points moved by a rigid motion.
+    #[must_use]
+    pub fn moved(mut self, motion: impl Fn(Vec3) -> Vec3) -> Self {
+        (self.base, self.tip) = (motion(self.base), motion(self.tip));
+        for joint in &mut self.joints {
+            joint.at = motion(joint.at);
+        }
+        self
+    }
 }
 
 /// One organ of one plant.
@@ -73,4 +88,6 @@ pub struct Organ {
     pub midrib: Option<[Vec3; 2]>,
     /// Of a blade: the size of its leaf.
     pub size: LeafSize,
+    /// Of a blade: the joints of its leaf, in the same coordinates.
+    pub joints: Vec<PlacedJoint>,
 }

@@ -73,7 +73,15 @@ fn hypocotyl(organs: &mut Vec<Organ>, growth: &Growth<'_>, foot: &Foot) {
     let mut rings: Vec<Ring> = heights.into_iter().map(ring).collect();
     axis::dome(&mut rings, foot.along, foot.radius, 0.5);
     let (mesh, material) = (tube::rigid(&rings, 10), material(&growth.desc.hypocotyl_material));
-    organs.push(Organ { kind: OrganKind::Hypocotyl, leaf: 0, material, mesh, midrib: None, size: LeafSize::default() });
+    organs.push(Organ {
+        kind: OrganKind::Hypocotyl,
+        leaf: 0,
+        material,
+        mesh,
+        midrib: None,
+        size: LeafSize::default(),
+        joints: Vec::new(),
+    });
 }
 
 /// Grows a stem through nodes at these lengths along it; returns them.
@@ -110,7 +118,15 @@ fn stem(organs: &mut Vec<Organ>, growth: &Growth<'_>, foot: &Foot, rise: &[f32],
     let (_, _, radius) = nodes.last().copied().unwrap_or((point, along, foot.radius));
     axis::dome(&mut rings, along, radius, 1.0);
     let (mesh, material) = (tube::rigid(&rings, 10), material(&growth.desc.stem_material));
-    organs.push(Organ { kind: OrganKind::Stem, leaf: 0, material, mesh, midrib: None, size: LeafSize::default() });
+    organs.push(Organ {
+        kind: OrganKind::Stem,
+        leaf: 0,
+        material,
+        mesh,
+        midrib: None,
+        size: LeafSize::default(),
+        joints: Vec::new(),
+    });
     nodes
 }
 

@@ -19,6 +19,7 @@
 
 use crate::math::{Mat3, Vec3, vec3};
 use std::f32::consts::FRAC_PI_2;
+use std::fmt;
 
 /// A rigid motion: rotation, then offset.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,6 +72,31 @@ pub enum Name {
     StL(u8, u8),
     /// Branch to the right.
     StR(u8, u8),
+}
+
+impl fmt::Display for Name {
+    /// As the paper writes them; of a branch the side and the vein joint.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::St(n) => write!(f, "ST{n}"),
+            Self::B => write!(f, "B"),
+            Self::Vn(n) => write!(f, "VN{n}"),
+            Self::Pk => write!(f, "PK"),
+            Self::StL(n, _) => write!(f, "STL{n}"),
+            Self::StR(n, _) => write!(f, "STR{n}"),
+        }
+    }
+}
+
+/// A joint as the posture has put it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlacedJoint {
+    /// What it is called; of a branch, the hinge half-way out.
+    pub name: Name,
+    /// Place of its parent in the same list; `None` for the first.
+    pub parent: Option<u16>,
+    /// Where it is, metres.
+    pub at: Vec3,
 }
 
 /// One joint: one rotation about its own z axis.
@@ -247,6 +273,25 @@ impl Skeleton {
     /// Forward kinematics: the pose of every joint when ST1's parent stands at `root`.
     pub fn forward(&self, root: Pose) -> Vec<Pose> {
         self.solve(root, true)
+    }
+
+    /// Where the joints stand when ST1's parent stands at `root`: the chain, then the outer hinge of each branch, whose other joints stand
+    /// at the midrib.
+    pub fn placed(&self, root: Pose) -> Vec<PlacedJoint> {
+        let poses = self.forward(root);
+        let chain = self.along.len();
+        let place = |(k, joint): (usize, &Joint)| match joint.name {
+            Name::StL(vein, 3) | Name::StR(vein, 3) => {
+                let parent = Some((self.base + usize::from(vein)) as u16);
+                Some(PlacedJoint { name: joint.name, parent, at: poses[k].origin })
+            }
+            _ if k < chain => {
+                let parent = joint.parent.map(|parent| parent as u16);
+                Some(PlacedJoint { name: joint.name, parent, at: poses[k].origin })
+            }
+            _ => None,
+        };
+        self.joints.iter().enumerate().filter_map(place).collect()
     }
 
     /// The poses of the flat leaf in its own coordinates: blade's base at the origin, midrib along y.

@@ -6,6 +6,7 @@ pub mod drive;
 pub mod estimate;
 mod growing;
 mod library;
+mod part_kind;
 pub mod record;
 pub mod shipped;
 pub mod tag;
@@ -23,6 +24,7 @@ use std::sync::Arc;
 use tag::{Class, Tag};
 
 pub use assemble::Field;
+pub use part_kind::PartKind;
 
 /// One organ of one plant, one stone, the ground: a mesh with a material and a name.
 #[derive(Clone, Debug)]

@@ -102,7 +102,7 @@ impl Canopy {
 }
 
 fn organs_of(field: &Field) -> impl Iterator<Item = Organ<'_>> {
-    field.scene.parts.iter().zip(&field.organs).filter_map(|(part, kind)| Some((part, (*kind)?)))
+    field.scene.parts.iter().zip(&field.kinds).filter_map(|(part, kind)| Some((part, kind.organ()?)))
 }
 
 fn is_blade(kind: OrganKind) -> bool {
@@ -260,7 +260,13 @@ mod tests {
 
     fn axis(part: &Part) -> LeafAxis {
         let size = LeafSize { length: 0.1, width: 0.04, petiole: 0.02 };
-        LeafAxis { leaf: 1, base: part.mesh.positions[4], tip: part.mesh.positions[64 * 9 + 4], size }
+        LeafAxis {
+            leaf: 1,
+            base: part.mesh.positions[4],
+            tip: part.mesh.positions[64 * 9 + 4],
+            size,
+            joints: Vec::new(),
+        }
     }
 
     fn measured(part: &Part) -> (PlantTraits, LeafTraits) {

@@ -92,8 +92,14 @@ formats! {
         r#"json.load(open("nerf/000000/transforms.json"))["frames"]"#;
     "panoptic" => panoptic: "COCO panoptic: plants as things, soil as stuff, for `panopticapi` and `datumaro`",
         r#"datumaro.Dataset.import_from("panoptic", "coco_panoptic")"#;
+    "parts" => parts: "Label maps of organs and ground: blade, petiole, stem, soil, stone, straw and so on",
+        r#"numpy.array(PIL.Image.open("parts/train/000000.png"))"#;
     "phenobench" => phenobench: "PhenoBench: semantics, plants, leaves and visibility, for `phenobench`",
         r#"PhenoBench("phenobench", "train", target_types=["semantics", "plant_instances", "leaf_instances"])[0]"#;
+    "ply" => ply: "Point clouds: place, normal, colour, NIR, class, part, plant and leaf of each pixel's surface",
+        r#"plyfile.PlyData.read("ply/train/000000.ply")["vertex"]"#;
+    "skeletons" => skeletons: "Joints of each leaf's kinematic tree, in the world and in the image, as JSON",
+        r#"json.load(open("skeletons/train/000000.json"))["plants"]"#;
     "traits" => traits: "CSV for phenotyping: leaf areas, angles, sizes and cover of plants, leaves and images",
         r#"pandas.read_csv("traits/leaves.csv")"#;
     "tum" => tum: "TUM RGB-D trajectories: time, position and quaternion of each camera's images",

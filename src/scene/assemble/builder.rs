@@ -11,7 +11,7 @@ use crate::ron_file::RonFile;
 use crate::scene::desc::FieldDesc;
 use crate::scene::drive::Capture;
 use crate::scene::library::Library;
-use crate::scene::{Part, Scene};
+use crate::scene::{Part, PartKind, Scene};
 use crate::soil::Ground;
 
 /// Farthest that a model or a camera may be from the world's origin along an axis, metres: single precision tells 0.06 mm apart there.
@@ -36,7 +36,9 @@ pub(super) struct Builder<'a> {
     pub(super) scene: Scene,
     /// The images that are taken of it.
     pub(super) captures: Vec<Capture>,
-    /// What the plants' parts are, in the order of the parts; those of models and of the ground have none.
+    /// What the parts of the ground are, in the order of the parts.
+    pub(super) ground: Vec<PartKind>,
+    /// What the plants' parts are, in the order of the parts.
     pub(super) organs: Vec<OrganKind>,
     pub(super) warnings: Vec<String>,
 }

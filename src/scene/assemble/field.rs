@@ -2,12 +2,11 @@
 
 use crate::film::Film;
 use crate::math::Spectrum;
-use crate::plant::OrganKind;
 use crate::sampling::rng::mix;
 use crate::sampling::{Purpose, Stream};
 use crate::scene::drive::Capture;
 use crate::scene::record::{Conditions, SpeciesRecord};
-use crate::scene::{PlantRecord, Scene};
+use crate::scene::{PartKind, PlantRecord, Scene};
 use crate::sensor::{Linear, Photograph, SensorDesc};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -20,8 +19,8 @@ pub struct Field {
     pub captures: Vec<Capture>,
     /// Place of the one whose camera the scene has.
     pub capture: usize,
-    /// What the scene's parts are, in their order; none for what is not grown here.
-    pub organs: Vec<Option<OrganKind>>,
+    /// What the scene's parts are, in their order.
+    pub kinds: Vec<PartKind>,
     /// Its plants, in the order of their numbers.
     pub plants: Vec<PlantRecord>,
     /// How its film becomes a picture.

@@ -9,6 +9,7 @@ use crate::ron_file::Step;
 use crate::sampling::Purpose;
 use crate::sampling::rng::mix;
 use crate::scatter::Rows;
+use crate::scene::PartKind;
 use crate::scene::library::Layer;
 use crate::soil::{
     self, Canopy, Clods, Debris, DebrisKind, Expected, Ground, Pile, Rect, SeedRows, Site, SoilDesc, SoilRecord,
@@ -133,11 +134,11 @@ impl Builder<'_> {
         let plants = std::mem::take(&mut self.scene.parts);
         let material = self.material(Material::Ground(GroundMaterial::new(baked.ground.clone())));
         let mesh = if floor.flat { floor.ground.levelled().mesh() } else { floor.ground.mesh() };
-        self.part(mesh, material);
+        self.part(mesh, material, PartKind::Soil);
         for group in clods {
             let maps = baked.clods[usize::from(group.damp)].clone();
             let material = self.material(Material::Ground(GroundMaterial::clods(maps, group.tint)));
-            self.part(group.mesh, material);
+            self.part(group.mesh, material, PartKind::Soil);
         }
         for (i, thing) in debris.into_iter().enumerate() {
             let solid = Solid::new(thing.albedo * thing.tint, DEBRIS_SIGMA);
@@ -150,7 +151,7 @@ impl Builder<'_> {
             let moisture = floor.ground.moisture(thing.centre.x, thing.centre.y);
             let solid = solid.moist((moisture * MOISTURE_STEPS).round() / MOISTURE_STEPS);
             let material = self.material(Material::Solid(solid));
-            self.part(thing.mesh, material);
+            self.part(thing.mesh, material, PartKind::Debris(thing.kind));
         }
         self.scene.parts.extend(plants);
     }

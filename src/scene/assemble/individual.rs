@@ -46,6 +46,7 @@ impl Individual {
         for organ in &mut plant.organs {
             organ.mesh.transform(turn, Vec3::ZERO);
             organ.midrib = organ.midrib.map(|ends| ends.map(|p| turn * p));
+            organ.joints.iter_mut().for_each(|joint| joint.at = turn * joint.at);
         }
         plant
     }

@@ -24,7 +24,7 @@ pub use super::growing::Growing;
 use super::library::{Library, Species};
 use super::record::Conditions;
 use super::tag::Tag;
-use super::{Part, PlantRecord, Scene};
+use super::{Part, PartKind, PlantRecord, Scene};
 use crate::geometry::Mesh;
 use crate::input::Scope;
 use crate::light::LightDesc;
@@ -228,6 +228,7 @@ impl<'a> Builder<'a> {
             lighting,
             scene,
             captures,
+            ground: Vec::new(),
             organs: Vec::new(),
             warnings,
         })
@@ -259,7 +260,9 @@ impl<'a> Builder<'a> {
         self.scene.materials.len() as u32 - 1
     }
 
-    fn part(&mut self, mesh: Mesh, material: u32) {
+    /// A part of the ground; they come before those of the plants.
+    fn part(&mut self, mesh: Mesh, material: u32, kind: PartKind) {
+        self.ground.push(kind);
         self.scene.parts.push(Part { mesh, mask: None, material, tag: Tag::default() });
     }
 
@@ -272,13 +275,10 @@ impl<'a> Builder<'a> {
         self.warn_of_camera();
         self.warn_of_plants()?;
         let mut known = None;
-        let planted;
         let mut plants = match &self.desc.soil {
             None => {
                 let (seedlings, _) = self.seedlings(sown, &[])?;
-                let plants = self.populate(&seedlings, None, shown)?;
-                planted = self.scene.parts.len();
-                plants
+                self.populate(&seedlings, None, shown)?
             }
             Some(soil) => {
                 let Earth { ground, maps, mut pile, mut stones } = self.break_ground(soil, view, open)?;
@@ -304,7 +304,6 @@ impl<'a> Builder<'a> {
                 );
                 let (clods, plants) = rest?;
                 self.options.wanted()?;
-                planted = self.scene.parts.len();
                 self.lay(floor, clods, stones, &baked);
                 plants
             }
@@ -323,15 +322,15 @@ impl<'a> Builder<'a> {
             season: self.season,
         };
         // Plants come behind the ground, and models behind them.
-        let mut organs = vec![None; self.scene.parts.len() - planted];
-        organs.extend(self.organs.into_iter().map(Some));
-        organs.resize(self.scene.parts.len(), None);
+        let mut kinds = self.ground;
+        kinds.extend(self.organs.into_iter().map(PartKind::Organ));
+        kinds.resize(self.scene.parts.len(), PartKind::Model);
         self.warnings.extend(self.library.warnings());
         let field = Field {
             scene: self.scene,
             captures: self.captures,
             capture: 0,
-            organs,
+            kinds,
             plants,
             species,
             conditions,
@@ -525,8 +524,7 @@ fn grow(
     let kept = |leaf: u16| s.only_leaf.is_none_or(|l| leaf == l);
     let to_world = |p: Vec3| rotation * p + foot;
     let axes = plant.leaf_axes().filter(|a| kept(a.leaf));
-    let mut leaf_axes: Vec<LeafAxis> =
-        axes.map(|a| LeafAxis { base: to_world(a.base), tip: to_world(a.tip), ..a }).collect();
+    let mut leaf_axes: Vec<LeafAxis> = axes.map(|a| a.moved(to_world)).collect();
     leaf_axes.sort_by_key(|a| a.leaf);
     let last = plant.organs.iter().map(|o| o.leaf).max().unwrap_or(0);
     let organs = plant.organs.into_iter().filter(|o| kept(o.leaf)).flat_map(|organ| {

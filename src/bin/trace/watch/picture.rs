@@ -103,7 +103,7 @@ impl Picture {
         let i = (y * self.photograph.width + x) as usize;
         let grown = self.field.grown();
         let (tag, part, depth) = (self.labels.tags[i], self.labels.parts[i], self.labels.depth[i]);
-        let organ = grown.organs.get(part as usize).copied().flatten();
+        let organ = grown.kinds.get(part as usize).and_then(|kind| kind.organ());
         let plant = grown.plants.iter().find(|plant| plant.number == tag.plant);
         Ok(json!({
             "x": x,

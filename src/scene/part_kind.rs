@@ -1,0 +1,77 @@
+//! What the parts of a scene are: the finest label.
+
+use crate::plant::OrganKind;
+use crate::soil::DebrisKind;
+
+/// What a part is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PartKind {
+    /// The ground and its clods.
+    Soil,
+    /// What lies on the ground.
+    Debris(DebrisKind),
+    /// A model from disk, of whose organs nothing is known.
+    Model,
+    /// An organ of a plant.
+    Organ(OrganKind),
+}
+
+impl PartKind {
+    /// All of them with their numbers in label maps and their names; 0 is nothing at all, such as the sky.
+    pub const NUMBERED: [(u8, &'static str, Self); 12] = [
+        (1, "soil", Self::Soil),
+        (2, "stone", Self::Debris(DebrisKind::Stone)),
+        (3, "straw", Self::Debris(DebrisKind::Straw)),
+        (4, "stick", Self::Debris(DebrisKind::Stick)),
+        (5, "bit", Self::Debris(DebrisKind::Bit)),
+        (6, "model", Self::Model),
+        (11, "blade", Self::Organ(OrganKind::Blade)),
+        (12, "petiole", Self::Organ(OrganKind::Petiole)),
+        (13, "cotyledon", Self::Organ(OrganKind::Cotyledon)),
+        (14, "hypocotyl", Self::Organ(OrganKind::Hypocotyl)),
+        (15, "stem", Self::Organ(OrganKind::Stem)),
+        (16, "sheath", Self::Organ(OrganKind::Sheath)),
+    ];
+
+    /// Its number in label maps.
+    pub fn number(self) -> u8 {
+        Self::NUMBERED.iter().find(|(_, _, kind)| *kind == self).map_or(0, |(number, ..)| *number)
+    }
+
+    /// The organ, if it is one.
+    pub fn organ(self) -> Option<OrganKind> {
+        match self {
+            Self::Organ(kind) => Some(kind),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Expected: every kind has a number of its own, and organs have the names that they have elsewhere.
+    #[test]
+    fn every_kind_has_its_number_and_name() {
+        let organs = [
+            OrganKind::Blade,
+            OrganKind::Petiole,
+            OrganKind::Cotyledon,
+            OrganKind::Hypocotyl,
+            OrganKind::Stem,
+            OrganKind::Sheath,
+        ];
+        let debris = [DebrisKind::Stone, DebrisKind::Stick, DebrisKind::Straw, DebrisKind::Bit];
+        let all = organs.map(PartKind::Organ).into_iter().chain(debris.map(PartKind::Debris));
+        let all: Vec<PartKind> = all.chain([PartKind::Soil, PartKind::Model]).collect();
+        let mut numbers: Vec<u8> = all.iter().map(|kind| kind.number()).collect();
+        numbers.sort_unstable();
+        numbers.dedup();
+        assert_eq!(numbers.len(), all.len());
+        assert!(!numbers.contains(&0));
+        for (_, name, kind) in PartKind::NUMBERED {
+            assert!(kind.organ().is_none_or(|organ| organ.name() == name), "{name}");
+        }
+    }
+}
