@@ -14,6 +14,7 @@ use furrow::geometry::{AlphaMask, Hit, Interaction, Intersect, Mesh, PACKET, Ray
 use furrow::math::{Mat3, Vec3, vec2, vec3};
 use furrow::sampling::{Purpose, Stream};
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 fn stream(index: u64) -> Stream {
     Stream::of(17, 0, Purpose::Test, index)
@@ -359,4 +360,24 @@ fn packets_meet_what_single_rays_meet() {
         }
     }
     assert!(met > 10_000 && dark > 10_000, "{met} met, {dark} dark");
+}
+
+/// Rationale: ten million triangles for a preview that nobody waits for any more block the one that is waited for. Expected: a build whose
+/// flag is raised ends as an interruption, and one whose flag stays down is built. Source: Embree's progress monitor.
+#[test]
+fn a_build_that_is_not_wanted_is_given_up() {
+    const SIDE: u32 = 500;
+    let place = |k: u32| vec3((k % (SIDE + 1)) as f32, (k / (SIDE + 1)) as f32, (k as f32).sin());
+    let positions: Vec<_> = (0..(SIDE + 1) * (SIDE + 1)).map(place).collect();
+    let cell = |k: u32| {
+        let a = k / SIDE * (SIDE + 1) + k % SIDE;
+        [[a, a + 1, a + SIDE + 2], [a, a + SIDE + 2, a + SIDE + 1]]
+    };
+    let uvs = vec![vec2(0.0, 0.0); positions.len()];
+    let mesh = Mesh::smooth(positions, uvs, (0..SIDE * SIDE).flat_map(cell).collect());
+    let surfaces = [Surface { mesh: &mesh, mask: None }];
+    let build = |raised: bool| EmbreeAccel::build_until(&surfaces, 2, Some(&AtomicBool::new(raised)));
+    assert_eq!(build(true).err().map(|e| e.kind()), Some(furrow::error::Kind::Interrupted));
+    let down = Ray::new(vec3(3.3, 4.4, 10.0), vec3(0.0, 0.0, -1.0));
+    assert!(build(false).unwrap().closest(&down).is_some());
 }

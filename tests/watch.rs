@@ -324,6 +324,12 @@ fn a_slider_is_a_look_until_it_is_written() {
         events.until(|s| s["values"].as_object().is_some_and(|v| v.len() == 1) && s["picture"]["asked"] == s["asked"]);
     assert_eq!(written["picture"]["hash"], moved["picture"]["hash"], "it looks as the slider had shown it");
     assert_eq!(watched.post("write", &json!({ "path": "nothing", "value": 1 })).0, 400);
+    // A value that the file may not have stays out of it.
+    let before = watched.text();
+    let (status, said) = watched.post("write", &json!({ "path": "plants[0].growth.Bbch", "value": -1 }));
+    assert_eq!(status, 400, "{said}");
+    assert!(said.contains("nothing was written"), "{said}");
+    assert_eq!(watched.text(), before);
     assert_eq!(watched.post("wish", &json!({ "values": {}, "index": 0, "seed": 9, "sheet": true })).0, 200);
     let sheet = events.until(|s| s["sheet"]["done"] == 12);
     assert_eq!(sheet["seed"], 9);

@@ -12,6 +12,7 @@ use crate::geometry::{AlphaMask, Hit, Intersect, PACKET, Ray};
 use crate::math::Vec2;
 use rayon::prelude::*;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// Instruction set of the traversal kernels.
 const ISA: &str = "avx2";
@@ -55,6 +56,11 @@ pub fn version() -> Result<String> {
 impl EmbreeAccel {
     /// Builds the hierarchy over all surfaces with `threads` threads (0: all there are); masks are looked at in the pool that it is called in.
     pub fn build(surfaces: &[Surface<'_>], threads: u32) -> Result<Self> {
+        Self::build_until(surfaces, threads, None)
+    }
+
+    /// The same; an interruption where the flag is raised before it is built.
+    pub fn build_until(surfaces: &[Surface<'_>], threads: u32, outdated: Option<&AtomicBool>) -> Result<Self> {
         let mut scene = rtc::Builder::new(rtc::Device::new(ISA, threads)?)?;
         let mut slots = Vec::with_capacity(surfaces.len());
         let cut = |surface: &Surface<'_>| surface.mask.map(|mask| sort(surface.mesh, Some(mask)));
@@ -78,7 +84,7 @@ impl EmbreeAccel {
                 slots.push(Slot { part, triangles: Some(sorted.mixed.into()) });
             }
         }
-        Ok(Self { scene: scene.commit()?, slots })
+        Ok(Self { scene: scene.commit(outdated)?, slots })
     }
 
     /// Embree's hit as a hit on a part.

@@ -6,7 +6,8 @@ use crate::accel::EmbreeAccel;
 use crate::integrator::World;
 use crate::scene;
 use crate::{Error, Result};
-use std::sync::OnceLock;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 /// A grown field: everything that a camera can see, and what is known of every plant.
@@ -14,13 +15,21 @@ pub struct Field {
     grown: scene::Field,
     edit: &'static Edit,
     threads: Threads,
+    /// Of a preview: raised where it is not wanted any more.
+    outdated: Option<Arc<AtomicBool>>,
     grow: Duration,
     geometry: OnceLock<(EmbreeAccel, Duration)>,
 }
 
 impl Field {
-    pub(super) fn new(grown: scene::Field, edit: &'static Edit, threads: Threads, grow: Duration) -> Self {
-        Self { grown, edit, threads, grow, geometry: OnceLock::new() }
+    pub(super) fn new(
+        grown: scene::Field,
+        edit: &'static Edit,
+        threads: Threads,
+        outdated: Option<Arc<AtomicBool>>,
+        grow: Duration,
+    ) -> Self {
+        Self { grown, edit, threads, outdated, grow, geometry: OnceLock::new() }
     }
 
     /// Scene, plants and sensor; seed, index and hash of what was read; conditions and warnings.
@@ -65,7 +74,8 @@ impl Field {
         if self.geometry.get().is_none() {
             let begin = Instant::now();
             let surfaces = self.grown.scene.surfaces();
-            let built = self.threads.install(|| EmbreeAccel::build(&surfaces, self.threads.count() as u32))?;
+            let (count, outdated) = (self.threads.count() as u32, self.outdated.as_deref());
+            let built = self.threads.install(|| EmbreeAccel::build_until(&surfaces, count, outdated))?;
             let _ = self.geometry.set((built, begin.elapsed()));
         }
         self.geometry.get().map(|(built, _)| built).ok_or_else(|| Error::failed("the scene was not built"))

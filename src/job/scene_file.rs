@@ -119,6 +119,6 @@ impl SceneFile {
         let begin = Instant::now();
         let options = Options { index, ..self.options.clone() };
         let grown = self.threads.install(|| self.edit.field(&self.source, &options))?;
-        Ok(Field::new(grown, self.edit, self.threads.clone(), begin.elapsed()))
+        Ok(Field::new(grown, self.edit, self.threads.clone(), options.preview, begin.elapsed()))
     }
 }

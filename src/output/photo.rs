@@ -29,9 +29,13 @@ pub fn read_color_photo(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
             .help("give photographs in red, green and blue")
             .in_file(path));
     }
-    let photo = photo.into_rgb8();
+    let photo = photo.into_rgba8();
     let (w, h) = photo.dimensions();
-    Ok((w, h, photo.into_raw().as_chunks::<3>().0.to_vec()))
+    // What a transparent pixel hides is no part of the picture: it lies on white paper.
+    let over_white = |[r, g, b, a]: &[u8; 4]| {
+        [r, g, b].map(|c| ((u32::from(*c) * u32::from(*a) + 255 * (255 - u32::from(*a)) + 127) / 255) as u8)
+    };
+    Ok((w, h, photo.as_raw().as_chunks::<4>().0.iter().map(over_white).collect()))
 }
 
 /// Whether these are the bytes of a JPEG of which the end is missing: no end marker stands behind the header of its first scan. What is in

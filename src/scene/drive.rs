@@ -342,7 +342,9 @@ pub(super) fn read_poses(text: &str) -> Result<Vec<(f64, Pose)>> {
     let mut first = true;
     for (k, line) in text.lines().enumerate() {
         let line = line.split('#').next().unwrap_or_default();
-        let words: Vec<&str> = line.split(|c: char| c.is_whitespace() || c == ',').filter(|w| !w.is_empty()).collect();
+        let words = line.split(|c: char| c.is_whitespace() || c == ',').filter(|w| !w.is_empty());
+        // One more than there may be: a line may be as long as the file.
+        let words: Vec<&str> = words.take(9).collect();
         if words.is_empty() {
             continue;
         }
@@ -359,7 +361,9 @@ pub(super) fn read_poses(text: &str) -> Result<Vec<(f64, Pose)>> {
             return Err(wrong("holds something that is no number"));
         };
         let [time, x, y, z, qx, qy, qz, qw] = numbers[..] else {
-            return Err(wrong(&format!("holds {} numbers, not 8", numbers.len())));
+            let held =
+                if numbers.len() > 8 { "more than 8".to_owned() } else { format!("{} numbers, not 8", numbers.len()) };
+            return Err(wrong(&format!("holds {held}")));
         };
         let norm = (qx * qx + qy * qy + qz * qz + qw * qw).sqrt();
         if !(0.9..1.1).contains(&norm) {

@@ -35,19 +35,23 @@ pub struct LeafTraits {
 pub struct PlantTraits {
     /// Area of its leaves' blades, one side, m².
     pub leaf_area_m2: f32,
-    /// Ground that it covers seen from straight above, m²; what lies over itself counts once.
+    /// Ground that it covers seen from straight above, petioles and stems too, m²; what lies over itself counts once.
     pub cover_m2: f32,
+    /// Height of its highest point over its foot, as it stands, metres.
+    pub top_m: f32,
 }
 
 /// The leaves over the ground that an image shows.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Canopy {
-    /// The ground at height 0 between the image's corners, m².
+    /// The ground at height 0 within the image's border, m².
     pub ground_m2: f32,
-    /// Area of the blades above it, one side, m².
-    pub leaf_area_m2: f32,
+    /// Area of the blades above it, one side, m²; left out where a model from disk stands among the plants, whose blades are not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub leaf_area_m2: Option<f32>,
     /// Leaf area index: the second over the first.
-    pub lai: f32,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lai: Option<f32>,
 }
 
 /// All of a field's plants and leaves; models from disk, of whose organs nothing is known, are left out.
@@ -85,18 +89,26 @@ impl Traits {
 impl Canopy {
     /// The canopy over what the field's camera sees; `None` where it sees beyond the horizon. Call it inside a pool.
     pub fn of(field: &Field) -> Option<Self> {
-        let corners = field.scene.camera.footprint(0.0)?;
-        let ground = polygon_area(&corners);
+        let border = field.scene.camera.outline(0.0, BORDER)?;
+        let ground = polygon_area(&border);
+        let unknown =
+            field.scene.parts.iter().zip(&field.kinds).any(|(part, kind)| part.tag.plant > 0 && kind.organ().is_none());
         let organs: Vec<Organ<'_>> = organs_of(field).filter(|(_, kind)| is_blade(*kind)).collect();
         let areas: Vec<f64> = organs
             .par_iter()
             .map(|(part, _)| {
-                let over = pieces(part).filter(|(piece, _)| within(&corners, (piece[0] + piece[1] + piece[2]) / 3.0));
+                let over = pieces(part).filter(|(piece, _)| within(&border, (piece[0] + piece[1] + piece[2]) / 3.0));
                 over.map(|(_, area)| area).sum()
             })
             .collect();
-        let leaves: f64 = areas.iter().sum();
-        let canopy = Self { ground_m2: ground as f32, leaf_area_m2: leaves as f32, lai: (leaves / ground) as f32 };
+        // From a zero of its own: an empty sum is a negative one.
+        let leaves = areas.iter().fold(0.0, |sum, area| sum + area);
+        let known = (!unknown).then_some(leaves);
+        let canopy = Self {
+            ground_m2: ground as f32,
+            leaf_area_m2: known.map(|leaves| leaves as f32),
+            lai: known.map(|leaves| (leaves / ground) as f32),
+        };
         (ground > 0.0).then_some(canopy)
     }
 }
@@ -151,9 +163,14 @@ fn measure(organs: &[Organ<'_>], axes: &[LeafAxis], foot: Vec3) -> (PlantTraits,
         total += area;
         leaves.insert(axis.leaf, leaf);
     }
-    (PlantTraits { leaf_area_m2: total as f32, cover_m2: cover(organs) as f32 }, leaves)
+    let corners = organs.iter().flat_map(|(part, _)| &part.mesh.positions);
+    let top = corners.fold(foot.z, |top, p| top.max(p.z));
+    let plant = PlantTraits { leaf_area_m2: total as f32, cover_m2: cover(organs) as f32, top_m: top - foot.z };
+    (plant, leaves)
 }
 
+/// Points on each side of the image's border by which the ground within it is told.
+const BORDER: u32 = 32;
 /// Cells along the longer side of what a plant's cover is counted on.
 const CELLS: f32 = 512.0;
 
@@ -210,17 +227,13 @@ fn polygon_area(corners: &[Vec2]) -> f64 {
     0.5 * corners.iter().zip(next).map(|(a, b)| f64::from(a.perp_dot(*b))).sum::<f64>().abs()
 }
 
-/// Whether a point lies below or above a convex polygon.
+/// Whether a point lies below or above a polygon: a line to its east crosses the border an odd number of times.
 fn within(corners: &[Vec2], point: Vec3) -> bool {
-    let p = point.truncate();
     let next = corners.iter().cycle().skip(1);
-    let sides = corners.iter().zip(next).map(|(a, b)| (*b - *a).perp_dot(p - *a));
-    let (mut left, mut right) = (true, true);
-    for side in sides {
-        left &= side >= 0.0;
-        right &= side <= 0.0;
-    }
-    left || right
+    let crosses = |(a, b): (&Vec2, &Vec2)| {
+        (a.y > point.y) != (b.y > point.y) && point.x < a.x + (point.y - a.y) / (b.y - a.y) * (b.x - a.x)
+    };
+    corners.iter().zip(next).filter(|side| crosses(*side)).count() % 2 == 1
 }
 
 #[cfg(test)]
@@ -280,7 +293,7 @@ mod tests {
         let (plant, leaf) = measured(&part);
         assert!((leaf.area_m2 / 0.004 - 1.0).abs() < 1e-4, "{leaf:?}");
         assert!((plant.cover_m2 / 0.004 - 1.0).abs() < 0.01, "{plant:?}");
-        assert_eq!(plant.leaf_area_m2, leaf.area_m2);
+        assert_eq!((plant.leaf_area_m2, plant.top_m), (leaf.area_m2, leaf.top_m));
         assert!(leaf.inclination_deg < 0.01 && leaf.azimuth_deg < 0.01);
         assert!((leaf.top_m - 0.05).abs() < 1e-6);
         assert_eq!((leaf.length_m, leaf.width_m, leaf.petiole_m), (0.1, 0.04, 0.02));
@@ -337,6 +350,8 @@ mod tests {
         assert!(within(&corners, vec3(2.4, 0.9, 7.0)) && !within(&corners, vec3(2.4, 0.1, 0.0)));
         let mut reversed = corners;
         reversed.reverse();
+        let notched = [vec2(0.0, 0.0), vec2(1.0, 0.5), vec2(2.0, 0.0), vec2(2.0, 2.0), vec2(0.0, 2.0)];
+        assert!(!within(&notched, vec3(1.0, 0.2, 0.0)) && within(&notched, vec3(1.0, 0.8, 0.0)));
         assert!(within(&reversed, vec3(1.0, 0.5, 0.0)) && !within(&reversed, vec3(-0.1, 0.5, 0.0)));
     }
 }

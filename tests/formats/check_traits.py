@@ -30,6 +30,8 @@ for row in plants.itertuples():
         assert abs(own["area_m2"].sum() - row.leaf_area_m2) <= 1e-3 * row.leaf_area_m2
     assert 0 < row.cover_m2 <= np.pi * row.radius_m**2
     assert row.leaf_area_m2 > 0
+    if len(own):
+        assert own["top_m"].max() <= row.top_m + 1e-6
 
 if len(leaves):
     # A blade is no larger than the rectangle that it is cut from, and no smaller than a thread.

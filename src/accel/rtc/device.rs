@@ -84,7 +84,7 @@ fn failed(code: u32) -> Error {
         3 => "invalid operation",
         4 => "out of memory",
         5 => "this processor is not supported",
-        6 => "cancelled",
+        6 => return Error::interrupted(),
         _ => "unknown error",
     };
     Error::failed(format!("Embree: {words}"))

@@ -8,7 +8,9 @@ use crate::geometry::{PACKET, Ray};
 use crate::math::Vec3;
 use std::ffi::c_void;
 use std::mem::MaybeUninit;
+use std::ptr;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Says which hits count. A panic in it ends the process, since it must not unwind through Embree.
 pub(in crate::accel) trait Filter: Send + Sync {
@@ -103,13 +105,28 @@ impl<F: Filter> Builder<F> {
         scene.device.check()
     }
 
-    /// Builds the hierarchy.
-    pub(in crate::accel) fn commit(self) -> Result<Scene<F>> {
+    /// Builds the hierarchy; an interruption where the flag is raised meanwhile.
+    pub(in crate::accel) fn commit(self, outdated: Option<&AtomicBool>) -> Result<Scene<F>> {
+        let handle = self.0.handle;
+        if let Some(outdated) = outdated {
+            let flag = ptr::from_ref(outdated).cast_mut().cast::<c_void>();
+            // SAFETY: the scene lives; `wanted` reads an `AtomicBool` behind the pointer, which outlives the commit, and Embree forgets it below.
+            unsafe { sys::rtcSetSceneProgressMonitorFunction(handle, Some(wanted), flag) };
+        }
         // SAFETY: the scene lives, and nothing else knows it yet.
-        unsafe { sys::rtcCommitScene(self.0.handle) };
+        unsafe {
+            sys::rtcCommitScene(handle);
+            sys::rtcSetSceneProgressMonitorFunction(handle, None, ptr::null_mut());
+        }
         self.0.device.check()?;
         Ok(self.0)
     }
+}
+
+/// Whether a build goes on: Embree's progress monitor.
+unsafe extern "C" fn wanted(flag: *mut c_void, _: f64) -> bool {
+    // SAFETY: `commit` has given a reference to an `AtomicBool` that lives as long as the build.
+    !unsafe { &*flag.cast::<AtomicBool>() }.load(Ordering::Relaxed)
 }
 
 /// A geometry that this side holds.

@@ -107,6 +107,9 @@ pub(super) struct RTCFilterFunctionNArguments {
     pub(super) N: c_uint,
 }
 
+/// Told how far a build is; it ends where this returns false.
+pub(super) type RTCProgressMonitorFunction = unsafe extern "C" fn(*mut c_void, f64) -> bool;
+
 pub(super) type RTCFilterFunctionN = unsafe extern "C" fn(*const RTCFilterFunctionNArguments);
 
 unsafe extern "C" {
@@ -135,6 +138,11 @@ unsafe extern "C" {
     pub(super) fn rtcReleaseScene(scene: *mut RTCScene);
     pub(super) fn rtcSetSceneFlags(scene: *mut RTCScene, flags: c_uint);
     pub(super) fn rtcSetSceneBuildQuality(scene: *mut RTCScene, quality: c_uint);
+    pub(super) fn rtcSetSceneProgressMonitorFunction(
+        scene: *mut RTCScene,
+        progress: Option<RTCProgressMonitorFunction>,
+        data: *mut c_void,
+    );
     pub(super) fn rtcAttachGeometry(scene: *mut RTCScene, geometry: *mut RTCGeometry) -> c_uint;
     pub(super) fn rtcCommitScene(scene: *mut RTCScene);
 }

@@ -194,23 +194,30 @@ impl Camera {
         (1.0 / (self.focal[0] * self.focal[1]).sqrt()) as f32
     }
 
-    /// The points of the plane z = `ground` (metres) seen by the image's corners, clockwise from the top left; `None` where a
-    /// corner sees no ground.
-    pub fn footprint(&self, ground: f32) -> Option<[Vec2; 4]> {
+    /// The points of the plane z = `ground` (metres) seen along the image's border, clockwise from the top left corner, so many to a side;
+    /// `None` where one sees no ground. Lens distortion and rolling shutters bend sides.
+    pub fn outline(&self, ground: f32, points: u32) -> Option<Vec<Vec2>> {
+        let corners = self.corners();
+        let side = |k: usize| {
+            let (from, to) = (corners[k], corners[(k + 1) % 4]);
+            (0..points).map(move |i| from + (to - from) * (i as f32 / points as f32))
+        };
+        (0..4).flat_map(side).map(|px| self.on_ground(px, ground)).collect()
+    }
+
+    /// The image's corners, clockwise from the top left.
+    fn corners(&self) -> [Vec2; 4] {
         let (w, h) = (self.width as f32, self.height as f32);
-        let mut seen = [Vec2::ZERO; 4];
-        for (seen, corner) in seen.iter_mut().zip([vec2(0.0, 0.0), vec2(w, 0.0), vec2(w, h), vec2(0.0, h)]) {
-            let [x, y] = self.unproject([f64::from(corner.x), f64::from(corner.y)]);
-            let dir = self.pose.to_world(vec3(x as f32, y as f32, 1.0));
-            let position = self.position(f64::from(corner.y), 0.0);
-            let t = (ground - position.z) / dir.z;
-            if !(t.is_finite() && t > 0.0) {
-                return None;
-            }
-            let at = position + dir * t;
-            *seen = vec2(at.x, at.y);
-        }
-        Some(seen)
+        [vec2(0.0, 0.0), vec2(w, 0.0), vec2(w, h), vec2(0.0, h)]
+    }
+
+    /// The point of the plane z = `ground` (metres) that is seen at a place of the image; `None` where no ground is.
+    fn on_ground(&self, px: Vec2, ground: f32) -> Option<Vec2> {
+        let [x, y] = self.unproject([f64::from(px.x), f64::from(px.y)]);
+        let dir = self.pose.to_world(vec3(x as f32, y as f32, 1.0));
+        let position = self.position(f64::from(px.y), 0.0);
+        let t = (ground - position.z) / dir.z;
+        (t.is_finite() && t > 0.0).then(|| (position + dir * t).truncate())
     }
 
     /// Cosine of the angle between the optical axis and what a pixel sees.

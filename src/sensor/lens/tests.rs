@@ -92,10 +92,29 @@ fn distortion_has_opencvs_signs() {
 #[test]
 fn the_preset_sees_what_its_data_sheet_says() {
     let camera = build("JaiAd130(focal_mm: 15, height_m: 0.85)").unwrap();
-    let [a, b, c, _] = camera.footprint(0.0).unwrap();
+    let outline = camera.outline(0.0, 1).unwrap();
+    let [a, b, c, _] = outline[..] else { panic!("{outline:?}") };
     assert!((b.x - a.x - 0.2754).abs() < 1e-4 && (b.y - c.y - 0.2053).abs() < 1e-4, "275 × 205 mm");
     assert!((camera.pixel_angle() * 0.85 - 0.2125e-3).abs() < 1e-6, "0.2125 mm per pixel");
     assert!(camera.contains(vec2(0.0, 0.0)) && !camera.contains(vec2(1296.0, 1.0)));
+}
+
+/// Rationale: between corners a barrel's sides bend, and ground beyond them is in no image. Expected: what the outline meets on the ground is
+/// seen on the image's border, in its order.
+#[test]
+fn the_outline_on_the_ground_is_the_images_border() {
+    let text = "Pinhole(size: (200, 150), intrinsics: FieldOfView(horizontal_deg: 60), distortion: (k1: -0.2), pose: Nadir(height_m: 0.8))";
+    let camera = build(text).unwrap();
+    let outline = camera.outline(0.0, 8).unwrap();
+    assert_eq!(outline.len(), 32);
+    for (k, at) in outline.iter().enumerate() {
+        let px = camera.project(at.extend(0.0)).unwrap();
+        let (x, y) = [(0, 0), (200, 0), (200, 150), (0, 150)][k / 8];
+        let (to_x, to_y) = [(200, 0), (200, 150), (0, 150), (0, 0)][k / 8];
+        let part = (k % 8) as f32 / 8.0;
+        let border = vec2(x as f32 + part * (to_x - x) as f32, y as f32 + part * (to_y - y) as f32);
+        assert!(px.distance(border) < 0.01, "{k}: {px} for {border}");
+    }
 }
 
 #[test]

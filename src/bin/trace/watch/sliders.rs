@@ -1,5 +1,6 @@
 //! The numbers of a scene file as sliders: how the field looks where a number is this one, and that number written into the file.
 
+use furrow::job::SceneFile;
 use furrow::output;
 use furrow::ron_file::{Distribution, Quantity, Value, quantities};
 use furrow::{Error, Result};
@@ -102,6 +103,7 @@ pub(super) fn write(file: &Path, path: &str, value: f64, seen: &str) -> Result<S
     if !quantities(seen).iter().any(|q| q.path == path) {
         return Err(Error::input(format!("the file has no number `{path}`; nothing was written")).in_file(file));
     }
+    check(file, &new)?;
     let permissions = fs::metadata(file).map_err(Error::reading(file))?.permissions();
     let mut whole = output::Together::default();
     whole.add(file, &[mark.as_slice(), new.as_bytes()].concat())?;
@@ -112,6 +114,13 @@ pub(super) fn write(file: &Path, path: &str, value: f64, seen: &str) -> Result<S
     }
     fs::set_permissions(file, permissions).map_err(Error::io(file))?;
     Ok(new)
+}
+
+/// Refuses a text that can be read no more, such as one with a number beyond its bounds, in the place of one that can.
+fn check(file: &Path, new: &str) -> Result<()> {
+    let Ok(scene) = SceneFile::open(file) else { return Ok(()) };
+    let refused = scene.reread(Some(new)).err();
+    refused.map_or(Ok(()), |e| Err(Error::input(format!("{}; nothing was written", e.message())).in_file(file)))
 }
 
 /// The byte order mark of a file that still holds what was seen; an error where it holds something else.

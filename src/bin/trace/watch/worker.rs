@@ -122,6 +122,8 @@ impl Worker {
         if watch.stop.load(Ordering::Relaxed) {
             return Err(Error::interrupted());
         }
+        session.show(|shown| shown.doing = "building");
+        field.geometry()?;
         session.show(|shown| shown.doing = "rendering");
         let passes: Vec<u32> =
             (0..u32::BITS).map(|k| 1 << k).take_while(|spp| *spp < session.spp()).chain([session.spp()]).collect();
