@@ -182,9 +182,12 @@ fn a_training_whose_disk_fails_ends_with_the_same_bytes() {
         let out = folder.join(format!("at-{at}"));
         let ended = common::faults::run(begin(&out), &out, at, at % 2 == 0);
         let said = ended.said();
-        assert_eq!(ended.output.status.code(), Some(1), "change {at}, {}: {said}", ended.failed);
-        assert!(said.contains("error: ") && said.contains(" help: "), "change {at}, {}: {said}", ended.failed);
-        succeed(&mut fit(&set, &out, &more));
+        // Where an old file cannot be kept under a second name until its successor is there, it is replaced all the same.
+        if ended.failed != "link" || !ended.output.status.success() {
+            assert_eq!(ended.output.status.code(), Some(1), "change {at}, {}: {said}", ended.failed);
+            assert!(said.contains("error: ") && said.contains(" help: "), "change {at}, {}: {said}", ended.failed);
+            succeed(&mut fit(&set, &out, &more));
+        }
         assert_eq!(weights(&out), weights(&whole), "change {at}");
         assert_eq!(results(&out).history, results(&whole).history);
         let hidden =
