@@ -5,8 +5,8 @@
 //!
 //! | step | rule |
 //! |---|---|
-//! | [`colour`] | pixels of equal colour are rather of equal kind, plant or soil |
-//! | [`plants`] | plant pixels that hang together are of one class |
+//! | `colour` | pixels of equal colour are rather of equal kind, plant or soil |
+//! | `plants` | plant pixels that hang together are of one class |
 //!
 //! The rules' constants were chosen on the even images of five sets of photographs; `docs/results.md` reports the odd ones.
 
@@ -21,9 +21,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Refine {
-    /// [`colour`].
+    /// Whether pixels of equal colour become rather of equal kind.
     pub colour: bool,
-    /// [`plants`].
+    /// Whether plant pixels that hang together become of one class.
     pub plants: bool,
 }
 
