@@ -10,7 +10,7 @@ use crate::job::{Field, Image, Renderer, Request, SceneFile};
 use crate::output::half;
 use crate::render::{self, LabelMap, Watch};
 use crate::scene::drive::Capture;
-use crate::scene::traits::{Canopy, PlantTraits, Traits};
+use crate::scene::traits::{PlantTraits, Traits};
 use crate::scene::{self, PlantRecord};
 use crate::settings::Engine;
 use crate::{Error, Result};
@@ -151,7 +151,7 @@ fn describe(recipe: &Recipe, index: u64, image: Image<'_>) -> Result<Sample> {
             ignored: 0,
             plants: Vec::new(),
             conditions: Some(field.conditions.clone()),
-            canopy: Canopy::of(field),
+            canopy: None,
             exposure: Some(Exposure {
                 gain: photograph.gain,
                 nir_gain: photograph.nir_gain,
@@ -173,7 +173,9 @@ fn describe(recipe: &Recipe, index: u64, image: Image<'_>) -> Result<Sample> {
         film: None,
     };
     (sample.record.classes, sample.record.ignored) = annotate::classes(&sample);
-    sample.record.plants = plants(field, &labels, &sample);
+    let traits = Traits::of(field);
+    sample.record.canopy = traits.canopy;
+    sample.record.plants = plants(field, &traits, &labels, &sample);
     sample.film = Some(Rendered {
         film,
         labels,
@@ -187,9 +189,8 @@ fn describe(recipe: &Recipe, index: u64, image: Image<'_>) -> Result<Sample> {
 }
 
 /// The plants of a field that its image shows or hides, in the order of their numbers.
-fn plants(field: &scene::Field, labels: &LabelMap, sample: &Sample) -> Vec<Plant> {
+fn plants(field: &scene::Field, traits: &Traits, labels: &LabelMap, sample: &Sample) -> Vec<Plant> {
     let extents = render::extents(&field.scene, labels);
-    let traits = Traits::of(field);
     let camera = &field.scene.camera;
     let mut shown: BTreeMap<u16, Plant> = annotate::plants(sample).into_iter().map(|p| (p.number, p)).collect();
     let mut all = Vec::new();

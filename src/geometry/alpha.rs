@@ -18,7 +18,7 @@ pub struct AlphaMask {
 }
 
 /// Most parts that the sides of a triangle are cut into by [`AlphaMask::share`].
-const MOST_STEPS: f32 = 64.0;
+const MOST_STEPS: f32 = 8.0;
 /// Bits of a tile's texels of least x.
 const FIRST_COLUMN: u64 = 0x0101_0101_0101_0101;
 /// Bits of a tile's texels of greatest x.
@@ -146,7 +146,7 @@ impl AlphaMask {
         self.tiles[(y as u32 * self.tiles_x + x as u32) as usize]
     }
 
-    /// Share of a uv triangle that is opaque, 0 to 1: exact where it is all or nothing, else by about two places a texel.
+    /// Share of a uv triangle that is opaque, 0 to 1: exact where it is all or nothing, else by about two places a texel, 64 at most.
     pub fn share(&self, uv: [Vec2; 3]) -> f64 {
         match self.coverage(uv) {
             Coverage::Opaque => return 1.0,

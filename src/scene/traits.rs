@@ -3,7 +3,7 @@
 //! Areas are one-sided and of what is there: an opacity mask cuts them, so what is eaten is gone. Lengths are those of the flat leaf,
 //! whole; bending keeps them. Angles are of the leaf as it is held.
 
-use super::{Field, Part};
+use super::{Field, Part, PartKind};
 use crate::geometry::AlphaMask;
 use crate::math::{Vec2, Vec3, vec2};
 use crate::plant::{LeafAxis, OrganKind};
@@ -61,23 +61,31 @@ pub struct Traits {
     pub plants: BTreeMap<u16, PlantTraits>,
     /// By the numbers of plant and leaf.
     pub leaves: BTreeMap<(u16, u16), LeafTraits>,
+    /// The canopy over what the camera sees; none where it sees beyond the horizon.
+    pub canopy: Option<Canopy>,
 }
 
-/// An organ: its part of the scene, and what it is.
-type Organ<'a> = (&'a Part, OrganKind);
+/// An organ: its part of the scene, and of a blade how much of each triangle is there, m².
+struct Organ<'a> {
+    part: &'a Part,
+    areas: Vec<f64>,
+}
 
 impl Traits {
     /// Measures a field. Call it inside a pool.
     pub fn of(field: &Field) -> Self {
-        let mut organs: BTreeMap<u16, Vec<Organ<'_>>> = BTreeMap::new();
-        for (part, kind) in organs_of(field) {
-            organs.entry(part.tag.plant).or_default().push((part, kind));
+        // Looked at once: a mask is asked about each triangle that it may cut.
+        let organs: Vec<Organ<'_>> = field.scene.parts.par_iter().zip(&field.kinds).filter_map(organ).collect();
+        let canopy = Canopy::of(field, &organs);
+        let mut by_plant: BTreeMap<u16, Vec<&Organ<'_>>> = BTreeMap::new();
+        for organ in &organs {
+            by_plant.entry(organ.part.tag.plant).or_default().push(organ);
         }
-        let grown: Vec<_> = field.plants.iter().filter_map(|p| Some((p, organs.get(&p.number)?))).collect();
+        let grown: Vec<_> = field.plants.iter().filter_map(|p| Some((p, by_plant.get(&p.number)?))).collect();
         let measured: Vec<_> = (grown.par_iter())
             .map(|(plant, organs)| (plant.number, measure(organs, &plant.leaf_axes, plant.position)))
             .collect();
-        let mut all = Self::default();
+        let mut all = Self { canopy, ..Self::default() };
         for (number, (plant, leaves)) in measured {
             all.plants.insert(number, plant);
             all.leaves.extend(leaves.into_iter().map(|(leaf, traits)| ((number, leaf), traits)));
@@ -87,20 +95,17 @@ impl Traits {
 }
 
 impl Canopy {
-    /// The canopy over what the field's camera sees; `None` where it sees beyond the horizon. Call it inside a pool.
-    pub fn of(field: &Field) -> Option<Self> {
+    /// The canopy over what the field's camera sees.
+    fn of(field: &Field, organs: &[Organ<'_>]) -> Option<Self> {
         let border = field.scene.camera.outline(0.0, BORDER)?;
         let ground = polygon_area(&border);
         let unknown =
             field.scene.parts.iter().zip(&field.kinds).any(|(part, kind)| part.tag.plant > 0 && kind.organ().is_none());
-        let organs: Vec<Organ<'_>> = organs_of(field).filter(|(_, kind)| is_blade(*kind)).collect();
-        let areas: Vec<f64> = organs
-            .par_iter()
-            .map(|(part, _)| {
-                let over = pieces(part).filter(|(piece, _)| within(&border, (piece[0] + piece[1] + piece[2]) / 3.0));
-                over.map(|(_, area)| area).sum()
-            })
-            .collect();
+        let over = |organ: &Organ<'_>| {
+            let middle = |i: u32| organ.part.mesh.corners(i).into_iter().sum::<Vec3>() / 3.0;
+            (0..).zip(&organ.areas).filter(|(i, _)| within(&border, middle(*i))).map(|(_, area)| area).sum()
+        };
+        let areas: Vec<f64> = organs.par_iter().map(over).collect();
         // From a zero of its own: an empty sum is a negative one.
         let leaves = areas.iter().fold(0.0, |sum, area| sum + area);
         let known = (!unknown).then_some(leaves);
@@ -113,22 +118,17 @@ impl Canopy {
     }
 }
 
-fn organs_of(field: &Field) -> impl Iterator<Item = Organ<'_>> {
-    field.scene.parts.iter().zip(&field.kinds).filter_map(|(part, kind)| Some((part, kind.organ()?)))
-}
-
-fn is_blade(kind: OrganKind) -> bool {
-    matches!(kind, OrganKind::Blade | OrganKind::Cotyledon)
-}
-
-/// The triangles of a part and how much of each is there, m².
-fn pieces(part: &Part) -> impl Iterator<Item = ([Vec3; 3], f64)> + '_ {
+/// The organ that a part of the scene is, if it is one.
+fn organ<'a>((part, kind): (&'a Part, &PartKind)) -> Option<Organ<'a>> {
+    let kind = kind.organ()?;
     let Part { mesh, mask, .. } = part;
-    (0..).zip(&mesh.triangles).map(move |(i, corners)| {
-        let triangle = mesh.corners(i);
+    let area = |(i, corners): (u32, &[u32; 3])| {
         let share = mask.as_ref().map_or(1.0, |mask| mask.share(corners.map(|k| mesh.uvs[k as usize])));
-        (triangle, 0.5 * f64::from(normal(triangle).length()) * share)
-    })
+        0.5 * f64::from(normal(mesh.corners(i)).length()) * share
+    };
+    let blade = matches!(kind, OrganKind::Blade | OrganKind::Cotyledon);
+    let areas = if blade { (0..).zip(&mesh.triangles).map(area).collect() } else { Vec::new() };
+    Some(Organ { part, areas })
 }
 
 /// Normal of a triangle, as long as twice its area.
@@ -137,15 +137,15 @@ fn normal([a, b, c]: [Vec3; 3]) -> Vec3 {
 }
 
 /// A plant of these organs that stands at `foot`, and its leaves.
-fn measure(organs: &[Organ<'_>], axes: &[LeafAxis], foot: Vec3) -> (PlantTraits, BTreeMap<u16, LeafTraits>) {
+fn measure(organs: &[&Organ<'_>], axes: &[LeafAxis], foot: Vec3) -> (PlantTraits, BTreeMap<u16, LeafTraits>) {
     let mut leaves = BTreeMap::new();
     let mut total = 0.0;
     for axis in axes {
         let (mut area, mut tilted, mut top) = (0.0, 0.0, f32::MIN);
-        for (part, kind) in organs.iter().filter(|(part, _)| part.tag.leaf == axis.leaf) {
+        for Organ { part, areas } in organs.iter().filter(|organ| organ.part.tag.leaf == axis.leaf) {
             top = part.mesh.positions.iter().fold(top, |top, p| top.max(p.z));
-            for (triangle, piece) in pieces(part).filter(|_| is_blade(*kind)) {
-                let normal = normal(triangle).normalize_or_zero();
+            for (i, piece) in (0..).zip(areas) {
+                let normal = normal(part.mesh.corners(i)).normalize_or_zero();
                 area += piece;
                 tilted += piece * f64::from(normal.z.abs().clamp(0.0, 1.0).acos());
             }
@@ -163,7 +163,7 @@ fn measure(organs: &[Organ<'_>], axes: &[LeafAxis], foot: Vec3) -> (PlantTraits,
         total += area;
         leaves.insert(axis.leaf, leaf);
     }
-    let corners = organs.iter().flat_map(|(part, _)| &part.mesh.positions);
+    let corners = organs.iter().flat_map(|organ| &organ.part.mesh.positions);
     let top = corners.fold(foot.z, |top, p| top.max(p.z));
     let plant = PlantTraits { leaf_area_m2: total as f32, cover_m2: cover(organs) as f32, top_m: top - foot.z };
     (plant, leaves)
@@ -175,15 +175,15 @@ const BORDER: u32 = 32;
 const CELLS: f32 = 512.0;
 
 /// Ground below organs, m²: cells whose middle lies under one of them.
-fn cover(organs: &[Organ<'_>]) -> f64 {
-    let corners = || organs.iter().flat_map(|(part, _)| &part.mesh.positions).map(|p| p.truncate());
+fn cover(organs: &[&Organ<'_>]) -> f64 {
+    let corners = || organs.iter().flat_map(|organ| &organ.part.mesh.positions).map(|p| p.truncate());
     let Some(first) = corners().next() else { return 0.0 };
     let (lo, hi) = corners().fold((first, first), |(lo, hi), p| (lo.min(p), hi.max(p)));
     let side = ((hi - lo).max_element() / CELLS).max(1e-5);
     let columns = ((hi.x - lo.x) / side) as usize + 1;
     let rows = ((hi.y - lo.y) / side) as usize + 1;
     let mut covered = vec![false; columns * rows];
-    for (part, _) in organs {
+    for Organ { part, .. } in organs {
         for (i, corners) in (0..).zip(&part.mesh.triangles) {
             let triangle = part.mesh.corners(i).map(|p| (p.truncate() - lo) / side);
             let mask = part.mask.as_deref().map(|mask| (mask, corners.map(|k| part.mesh.uvs[k as usize])));
@@ -282,8 +282,12 @@ mod tests {
         }
     }
 
+    fn blade(part: &Part) -> Organ<'_> {
+        organ((part, &PartKind::Organ(OrganKind::Blade))).unwrap()
+    }
+
     fn measured(part: &Part) -> (PlantTraits, LeafTraits) {
-        let (plant, leaves) = measure(&[(part, OrganKind::Blade)], &[axis(part)], vec3(0.0, 0.0, -0.05));
+        let (plant, leaves) = measure(&[&blade(part)], &[axis(part)], vec3(0.0, 0.0, -0.05));
         (plant, leaves[&1])
     }
 
@@ -339,8 +343,9 @@ mod tests {
     fn leaves_over_each_other_cover_once() {
         let (below, mut above) = (leaf(0.0, None), leaf(0.0, None));
         above.mesh.transform(Mat3::IDENTITY, vec3(0.02, 0.0, 0.01));
-        let organs = [(&below, OrganKind::Blade), (&above, OrganKind::Blade)];
-        assert!((cover(&organs) / 0.006 - 1.0).abs() < 0.01, "{}", cover(&organs));
+        let (below, above) = (blade(&below), blade(&above));
+        let covered = cover(&[&below, &above]);
+        assert!((covered / 0.006 - 1.0).abs() < 0.01, "{covered}");
     }
 
     #[test]
