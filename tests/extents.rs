@@ -22,6 +22,7 @@ use furrow::scene::{Part, Scene};
 use furrow::sensor::{Camera, Distortion};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::sync::Arc;
 
 type Extents = BTreeMap<(u16, u16), Extent>;
 
@@ -162,7 +163,7 @@ fn squares(parts: &[(Vec3, f32, u16, u16)]) -> Scene {
     let eye = camera((100, 80), vec3(0.0, 0.0, 0.5), Vec3::ZERO, fov);
     let part = |&(centre, side, plant, leaf): &(Vec3, f32, u16, u16)| {
         let class = if plant > 0 { Class::Crop } else { Class::Soil };
-        Part { mesh: square(centre, side), mask: None, material: 0, tag: Tag { class, plant, leaf } }
+        Part { mesh: Arc::new(square(centre, side)), mask: None, material: 0, tag: Tag { class, plant, leaf } }
     };
     let parts = parts.iter().map(part).collect();
     Scene { parts, materials: Vec::new(), lights: Vec::new(), camera: eye, filter: Filter::Box.footprint() }
@@ -196,7 +197,7 @@ fn a_leaf_half_hidden_by_another_is_half_visible() {
     assert_eq!(found[&(1, 1)].visible_fraction(), 0.5);
     // Soil hides as leaves do.
     let mut buried = scene;
-    buried.parts[0].mesh = square(at(0.0, 0.0, 0.1), 1.0);
+    buried.parts[0].mesh = Arc::new(square(at(0.0, 0.0, 0.1), 1.0));
     let labels = labels_of(&buried, full(&buried));
     let found = extents(&buried, &labels);
     assert_eq!(found[&(1, 1)], Extent { visible: 0, unoccluded: 400, whole: 400 });
@@ -233,11 +234,11 @@ fn a_plant_cut_by_the_frame_counts_beyond_it() {
 fn a_leaf_that_reaches_behind_the_camera_is_counted_where_it_is_seen() {
     let mut scene = squares(&[(Vec3::ZERO, 0.04, 1, 1)]);
     // A long triangle from below the camera up past it.
-    scene.parts[0].mesh = Mesh::smooth(
+    scene.parts[0].mesh = Arc::new(Mesh::smooth(
         vec![vec3(-0.02, 0.01, 0.0), vec3(0.02, 0.01, 0.0), vec3(0.0, 0.05, 0.9)],
         vec![furrow::math::Vec2::ZERO; 3],
         vec![[0, 1, 2]],
-    );
+    ));
     let found = check(&scene, full(&scene));
     assert!(found[&(1, 1)].whole > found[&(1, 1)].unoccluded && found[&(1, 1)].visible > 100, "{found:?}");
 }

@@ -6,11 +6,13 @@
 mod common;
 
 use common::program::{SMALL, field, shoot, small_text};
+use furrow::job::{Field as Shown, SceneFile};
 use furrow::light::LightRecord;
 use furrow::math::{Spectrum, vec3};
-use furrow::scene::assemble::{self, Options};
+use furrow::scene::assemble::{self, Options, Preview};
 use furrow::scene::tag::Class;
 use furrow::scene::{Field, PlantRecord};
+use furrow::settings::Quality;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -515,15 +517,17 @@ fn soil_has_the_spectrum_of_its_file() {
 }
 
 /// A row of beets on ploughed ground with clods, as a camera of 320 pixels sees it.
-fn ploughed(preview: Option<Arc<AtomicBool>>) -> furrow::Result<Field> {
-    let text = r#"Field(
-        seed: 4,
-        camera: Pinhole(size: (320, 240), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.8)),
-        lights: [Constant(radiance: (1, 1, 1, 1))],
-        soil: (stones: [(cover: 0.02)], litter: (straw_cover: 0.02)),
-        crops: [(species: "scenes/species/sugar_beet.ron", growth: Bbch(16), rows: (in_row_m: 0.15))],
-    )"#;
-    assemble::field_of(text, &Options { preview, ..Options::default() })
+const PLOUGHED: &str = r#"Field(
+    seed: 4,
+    camera: Pinhole(size: (320, 240), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.8)),
+    lights: [Constant(radiance: (1, 1, 1, 1))],
+    soil: (moisture: (mean: 0.2), stones: [(cover: 0.02)], litter: (straw_cover: 0.02)),
+    crops: [(species: "scenes/species/sugar_beet.ron", growth: Bbch(16), rows: (in_row_m: 0.15))],
+    weeds: [(species: "scenes/species/galium.ron", growth: Bbch(12), spread: (per_m2: 20))],
+)"#;
+
+fn ploughed(preview: Option<Preview>) -> furrow::Result<Field> {
+    assemble::field_of(PLOUGHED, &Options { preview, ..Options::default() })
 }
 
 /// Rationale: whoever turns a slider must see the field that will be rendered. Expected: the same plants at the same places and the same
@@ -533,7 +537,7 @@ fn a_preview_is_the_same_field_with_coarser_meshes() {
     use furrow::accel::EmbreeAccel;
     use furrow::geometry::Window;
     use furrow::render::label;
-    let (whole, preview) = (ploughed(None).unwrap(), ploughed(Some(Arc::default())).unwrap());
+    let (whole, preview) = (ploughed(None).unwrap(), ploughed(Some(Preview::default())).unwrap());
     let feet = |field: &Field| field.plants.iter().map(|p| (p.id, p.position, p.bbch, p.leaves)).collect::<Vec<_>>();
     assert!(whole.plants.len() > 3);
     assert_eq!(feet(&whole), feet(&preview));
@@ -557,6 +561,72 @@ fn a_preview_is_the_same_field_with_coarser_meshes() {
 /// Expected: where it is not wanted any more, nothing is grown.
 #[test]
 fn a_preview_that_is_not_wanted_is_given_up() {
-    let refusal = ploughed(Some(Arc::new(AtomicBool::new(true)))).err().expect("an interruption");
+    let refusal = ploughed(Some(Preview::new(&Arc::new(AtomicBool::new(true))))).err().expect("an interruption");
     assert_eq!(refusal.kind(), furrow::error::Kind::Interrupted);
+}
+
+/// Rationale: what is kept of the field before must never show where it is not what the scene file says now. Expected: after each change
+/// of the text the very parts that a preview without a past grows; the meshes of before where nothing that shapes them changed, and those
+/// of the plants alone where the soil did.
+#[test]
+fn a_preview_keeps_what_did_not_change_and_nothing_else() {
+    let root = concat!("\"", env!("CARGO_MANIFEST_DIR"), "/scenes/species/");
+    let text = PLOUGHED.replace("\"scenes/species/", root);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("field.ron");
+    std::fs::write(&path, &text).unwrap();
+    let mut scene = SceneFile::open(&path).unwrap();
+    let preview = Preview::default();
+    let grow = |scene: &SceneFile, preview: &Preview| scene.clone().preview(preview).field(0).unwrap();
+    let image = |field: &Shown| field.render(&Quality::spp(1)).unwrap().film.pixels;
+    // What is written, instead of what; whether the plants' meshes stay, and whether the ground's do.
+    let steps = [
+        ("seed: 4", "seed: 4", true, true),
+        ("radiance: (1, 1, 1, 1)", "radiance: (2, 1, 1, 1)", true, true),
+        ("moisture: (mean: 0.2)", "moisture: (mean: 0.6)", true, false),
+        ("per_m2: 20", "per_m2: 40", false, false),
+        ("Bbch(16)", "Bbch(18)", false, false),
+        ("height_m: 0.8", "height_m: 0.7", false, false),
+    ];
+    for (from, to, same_plants, same_ground) in steps {
+        assert!(text.contains(from), "{from}");
+        let first = scene.reread(Some(&text)).unwrap();
+        let before = grow(&first, &preview);
+        before.geometry().unwrap();
+        scene = first.reread(Some(&text.replace(from, to))).unwrap();
+        let (kept, fresh) = (grow(&scene, &preview), grow(&scene, &Preview::default()));
+        let parts = |field: &Shown| -> Vec<_> {
+            let parts = field.grown().scene.parts.iter();
+            parts.map(|part| (part.mesh.clone(), part.mask.clone(), part.material, part.tag)).collect()
+        };
+        assert!(parts(&kept) == parts(&fresh), "{to}: a field that was kept is not the field");
+        assert_eq!(kept.grown().plants, fresh.grown().plants, "{to}");
+        assert!(image(&kept) == image(&fresh), "{to}: a picture of what was kept is not the field's");
+        let shared = |plants: bool| {
+            let meshes = |field: &Shown| -> Vec<_> {
+                let parts = field.grown().scene.parts.iter().filter(|part| (part.tag.plant > 0) == plants);
+                parts.map(|part| Arc::as_ptr(&part.mesh)).collect()
+            };
+            meshes(&kept) == meshes(&before)
+        };
+        assert_eq!((shared(true), shared(false)), (same_plants, same_ground), "{to}");
+        let built = |field: &Shown| std::ptr::from_ref(field.geometry().unwrap());
+        assert_eq!(built(&kept) == built(&before), same_plants && same_ground, "{to}");
+    }
+}
+
+/// Expected: a scene file that is saved as it was gives the very meshes and BVH of before, however many kinds of things its fields have.
+#[test]
+fn a_preview_of_a_file_that_did_not_change_is_not_grown_again() {
+    let preview = Preview::default();
+    for (name, index) in [("any-field", 0), ("any-field", 3), ("field", 0), ("09-drive", 0)] {
+        let scene = SceneFile::open(format!("scenes/{name}.ron")).unwrap().width(160).preview(&preview);
+        let before = scene.field(index).unwrap();
+        let built = std::ptr::from_ref(before.geometry().unwrap());
+        let again = scene.reread(None).unwrap().field(index).unwrap();
+        let meshes =
+            |field: &Shown| field.grown().scene.parts.iter().map(|part| Arc::as_ptr(&part.mesh)).collect::<Vec<_>>();
+        assert!(meshes(&before) == meshes(&again), "{name} {index}");
+        assert_eq!(built, std::ptr::from_ref(again.geometry().unwrap()), "{name} {index}");
+    }
 }

@@ -3,6 +3,7 @@
 use super::record::Record;
 use crate::film::Film;
 use crate::render::LabelMap;
+use crate::{Error, Result};
 use std::collections::BTreeMap;
 
 /// One image of a dataset. Maps hold one value a pixel, row by row from the top; a map that is not known is empty.
@@ -30,6 +31,15 @@ pub struct Sample {
     pub normals: Vec<[f32; 3]>,
     /// What was rendered; only in the process that rendered it.
     pub film: Option<Rendered>,
+}
+
+impl Sample {
+    /// What only the renderer knows of it; an error that names the `format` which asks, for an image that was not rendered now.
+    pub fn rendered(&self, format: &str) -> Result<&Rendered> {
+        self.film.as_ref().ok_or_else(|| {
+            Error::misuse(format!("image {}: only the renderer knows what --format {format} holds", self.record.name))
+        })
+    }
 }
 
 /// What formats for compositing (layers, Cryptomattes) hold beyond a photograph.

@@ -5,8 +5,8 @@ use crate::ablation::Edit;
 use crate::accel::EmbreeAccel;
 use crate::integrator::World;
 use crate::scene;
+use crate::scene::assemble::Preview;
 use crate::{Error, Result};
-use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
@@ -15,10 +15,9 @@ pub struct Field {
     grown: scene::Field,
     edit: &'static Edit,
     threads: Threads,
-    /// Of a preview: raised where it is not wanted any more.
-    outdated: Option<Arc<AtomicBool>>,
+    preview: Option<Preview>,
     grow: Duration,
-    geometry: OnceLock<(EmbreeAccel, Duration)>,
+    geometry: OnceLock<(Arc<EmbreeAccel>, Duration)>,
 }
 
 impl Field {
@@ -26,10 +25,10 @@ impl Field {
         grown: scene::Field,
         edit: &'static Edit,
         threads: Threads,
-        outdated: Option<Arc<AtomicBool>>,
+        preview: Option<Preview>,
         grow: Duration,
     ) -> Self {
-        Self { grown, edit, threads, outdated, grow, geometry: OnceLock::new() }
+        Self { grown, edit, threads, preview, grow, geometry: OnceLock::new() }
     }
 
     /// Scene, plants and sensor; seed, index and hash of what was read; conditions and warnings.
@@ -73,12 +72,16 @@ impl Field {
     pub fn geometry(&self) -> Result<&EmbreeAccel> {
         if self.geometry.get().is_none() {
             let begin = Instant::now();
-            let surfaces = self.grown.scene.surfaces();
-            let (count, outdated) = (self.threads.count() as u32, self.outdated.as_deref());
-            let built = self.threads.install(|| EmbreeAccel::build_until(&surfaces, count, outdated))?;
+            let (scene, count) = (&self.grown.scene, self.threads.count() as u32);
+            let built = self.threads.install(|| match &self.preview {
+                None => EmbreeAccel::build(&scene.surfaces(), count).map(Arc::new),
+                Some(preview) => preview.geometry(&scene.parts, || {
+                    EmbreeAccel::build_until(&scene.surfaces(), count, Some(preview.outdated()))
+                }),
+            })?;
             let _ = self.geometry.set((built, begin.elapsed()));
         }
-        self.geometry.get().map(|(built, _)| built).ok_or_else(|| Error::failed("the scene was not built"))
+        self.geometry.get().map(|(built, _)| built.as_ref()).ok_or_else(|| Error::failed("the scene was not built"))
     }
 
     /// Scene and geometry, as integrators take them.

@@ -5,11 +5,10 @@ use super::threads::Threads;
 use crate::Result;
 use crate::ablation::{Edit, FULL};
 use crate::input::Scope;
-use crate::scene::assemble::{Options, Source};
+use crate::scene::assemble::{Options, Preview, Source};
 use crate::scene::estimate::Estimate;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// A scene file: a distribution over fields. What its fields have read (species, textures, tables) is kept for the next.
@@ -81,12 +80,13 @@ impl SceneFile {
         self
     }
 
-    /// For a look at its fields: meshes of plants are as coarse as the pixels, and growing ends with an interruption where the
-    /// flag is raised. Every random number stays, so plants and labels are those of the field but for their outlines.
+    /// For a look at its fields: meshes of plants are as coarse as the pixels, growing ends with an interruption where the preview's flag is
+    /// raised, and what did not change since the field before is kept. Every random number stays, so plants and labels are those of the field
+    /// but for their outlines.
     #[doc(hidden)]
     #[must_use]
-    pub fn preview(mut self, outdated: &Arc<AtomicBool>) -> Self {
-        self.options.preview = Some(Arc::clone(outdated));
+    pub fn preview(mut self, preview: &Preview) -> Self {
+        self.options.preview = Some(preview.clone());
         self
     }
 

@@ -2,7 +2,7 @@
 
 use super::growth::{Growth, LeafNow};
 use super::leaf::Seat;
-use super::organ::{LeafSize, Organ, OrganKind};
+use super::organ::{Organ, OrganKind};
 use super::tube::{self, Profile, Ring};
 use crate::math::{Frame, Vec3, direction, lerp, vec3};
 use crate::sampling::Purpose;
@@ -94,9 +94,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
         leaf: 0,
         material: material(&growth.desc.hypocotyl_material),
         mesh,
-        midrib: None,
-        size: LeafSize::default(),
-        joints: Vec::new(),
+        axis: None,
     });
     let mut rings: Vec<Ring> = Vec::with_capacity(2 * nodes.len() + 4);
     if stemless {
@@ -125,9 +123,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
         leaf: 0,
         material: material(&growth.desc.stem_material),
         mesh,
-        midrib: None,
-        size: LeafSize::default(),
-        joints: Vec::new(),
+        axis: None,
     });
     Axis { nodes, radii, section, crown }
 }

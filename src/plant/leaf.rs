@@ -5,7 +5,7 @@ use super::fern;
 use super::growth::{CELL, LeafNow};
 use super::kind::Shape;
 use super::leaflets;
-use super::organ::{LeafSize, Organ, OrganKind};
+use super::organ::{LeafAxis, LeafSize, Organ, OrganKind};
 use super::ribbons;
 use super::skeleton::{Measures, Pose, Skeleton};
 use super::skin::{self, BladeRelief};
@@ -89,17 +89,14 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
         (Shape::Leaflets { .. }, _) => skin::carried(&skeleton, &motions, leaf.kind.rib.f32() * leaf.blade),
         _ => end(skeleton.along().len() - 1),
     };
-    let midrib = Some([end(skeleton.base()), tip]);
-    let size = LeafSize { length: leaf.blade, width: leaf.width, petiole: leaf.stalk };
-    organs.push(Organ {
-        kind,
+    let axis = LeafAxis {
         leaf: leaf.number,
-        material: material.to_owned(),
-        mesh,
-        midrib,
-        size,
+        base: end(skeleton.base()),
+        tip,
+        size: LeafSize { length: leaf.blade, width: leaf.width, petiole: leaf.stalk },
         joints: skeleton.placed(root),
-    });
+    };
+    organs.push(Organ { kind, leaf: leaf.number, material: material.to_owned(), mesh, axis: Some(axis) });
     let rest = stalk(leaf, &skeleton, &relief, lower, &mut stream);
     if rest.triangles.is_empty() {
         return;
@@ -107,15 +104,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
     let mut mesh = skin::skin(rest, &motions);
     tube::close_seams(&mut mesh, sides(leaf), 0);
     let kind = if lower == Lower::Petiole { OrganKind::Petiole } else { OrganKind::Sheath };
-    organs.push(Organ {
-        kind,
-        leaf: leaf.number,
-        material: leaf.kind.stalk_material.clone(),
-        mesh,
-        midrib: None,
-        size: LeafSize::default(),
-        joints: Vec::new(),
-    });
+    organs.push(Organ { kind, leaf: leaf.number, material: leaf.kind.stalk_material.clone(), mesh, axis: None });
 }
 
 /// Corners round the stalk.

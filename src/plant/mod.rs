@@ -71,10 +71,7 @@ pub struct Plant {
 impl Plant {
     /// The keypoints of its leaves, in plant coordinates, in the order of its organs.
     pub fn leaf_axes(&self) -> impl Iterator<Item = LeafAxis> + '_ {
-        let axis = |o: &Organ| {
-            o.midrib.map(|[base, tip]| LeafAxis { leaf: o.leaf, base, tip, size: o.size, joints: o.joints.clone() })
-        };
-        self.organs.iter().filter_map(axis)
+        self.organs.iter().filter_map(|organ| organ.axis.clone())
     }
 }
 

@@ -84,10 +84,6 @@ pub struct Organ {
     pub material: String,
     /// Its shape in plant coordinates: metres, growth axis +z, origin where the stem meets the soil.
     pub mesh: Mesh,
-    /// Of a blade, and of nothing else: the ends of its midrib in the same coordinates, base (joint B) and tip (joint PK).
-    pub midrib: Option<[Vec3; 2]>,
-    /// Of a blade: the size of its leaf.
-    pub size: LeafSize,
-    /// Of a blade: the joints of its leaf, in the same coordinates.
-    pub joints: Vec<PlacedJoint>,
+    /// Of a blade, and of nothing else: its leaf's keypoints, size and joints, in the same coordinates.
+    pub axis: Option<LeafAxis>,
 }

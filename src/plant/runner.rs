@@ -7,7 +7,7 @@
 use super::axis::{self, ROOT};
 use super::growth::{Growth, LeafNow};
 use super::leaf::{self, Lower, Seat};
-use super::organ::{LeafSize, Organ, OrganKind};
+use super::organ::{Organ, OrganKind};
 use super::tube::{self, Profile, Ring};
 use crate::math::{Vec3, direction, lerp, smoothstep};
 use crate::sampling::{Purpose, Stream};
@@ -73,15 +73,7 @@ fn hypocotyl(organs: &mut Vec<Organ>, growth: &Growth<'_>, foot: &Foot) {
     let mut rings: Vec<Ring> = heights.into_iter().map(ring).collect();
     axis::dome(&mut rings, foot.along, foot.radius, 0.5);
     let (mesh, material) = (tube::rigid(&rings, 10), material(&growth.desc.hypocotyl_material));
-    organs.push(Organ {
-        kind: OrganKind::Hypocotyl,
-        leaf: 0,
-        material,
-        mesh,
-        midrib: None,
-        size: LeafSize::default(),
-        joints: Vec::new(),
-    });
+    organs.push(Organ { kind: OrganKind::Hypocotyl, leaf: 0, material, mesh, axis: None });
 }
 
 /// Grows a stem through nodes at these lengths along it; returns them.
@@ -118,15 +110,7 @@ fn stem(organs: &mut Vec<Organ>, growth: &Growth<'_>, foot: &Foot, rise: &[f32],
     let (_, _, radius) = nodes.last().copied().unwrap_or((point, along, foot.radius));
     axis::dome(&mut rings, along, radius, 1.0);
     let (mesh, material) = (tube::rigid(&rings, 10), material(&growth.desc.stem_material));
-    organs.push(Organ {
-        kind: OrganKind::Stem,
-        leaf: 0,
-        material,
-        mesh,
-        midrib: None,
-        size: LeafSize::default(),
-        joints: Vec::new(),
-    });
+    organs.push(Organ { kind: OrganKind::Stem, leaf: 0, material, mesh, axis: None });
     nodes
 }
 

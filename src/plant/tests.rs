@@ -302,7 +302,7 @@ fn blades_fill_as_much_of_their_length_and_width_as_the_table_says() {
         let plant = grow(&page.plant, stage, &stream);
         for leaf in growth::growth(&page.plant, stage, &stream, 1.0).unwrap().leaves {
             let Shape::Sheet { outline: of @ outline::Outline::Power { .. } } = leaf.kind.shape else { continue };
-            let blade = plant.organs.iter().find(|o| o.leaf == leaf.number && o.midrib.is_some()).unwrap();
+            let blade = plant.organs.iter().find(|o| o.leaf == leaf.number && o.axis.is_some()).unwrap();
             let share = blade.mesh.area() / (leaf.blade * leaf.width) / ratio(of);
             assert!((0.85..1.25).contains(&share), "{} leaf {}: {share}", page.eppo, leaf.number);
         }
@@ -322,7 +322,7 @@ fn compound_blades_have_as_many_leaflets_as_their_species() {
                 if leaf.kind_name != "leaf" {
                     continue;
                 }
-                let organ = plant.organs.iter().find(|o| o.leaf == leaf.number && o.midrib.is_some()).unwrap();
+                let organ = plant.organs.iter().find(|o| o.leaf == leaf.number && o.axis.is_some()).unwrap();
                 // Corners that share a triangle belong to one sheet.
                 let mut sheet: Vec<u32> = (0..organ.mesh.positions.len() as u32).collect();
                 let mut joined = true;
@@ -339,8 +339,8 @@ fn compound_blades_have_as_many_leaflets_as_their_species() {
                 let held: std::collections::BTreeSet<u32> =
                     organ.mesh.triangles.iter().map(|t| sheet[t[0] as usize]).collect();
                 assert_eq!(held.len(), leaflets, "{eppo} leaf {}", leaf.number);
-                let [base, tip] = organ.midrib.unwrap();
-                let share = base.distance(tip) / leaf.blade;
+                let axis = organ.axis.as_ref().unwrap();
+                let share = axis.base.distance(axis.tip) / leaf.blade;
                 assert!(reach.contains(&share), "{eppo} leaf {}: {share}", leaf.number);
             }
         }

@@ -45,7 +45,7 @@ pub enum Purpose {
 }
 
 /// A stream of random numbers with an address.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Stream {
     key: u64,
     rng: Pcg64Mcg,

@@ -59,6 +59,13 @@ pub(super) struct Species {
     pub(super) materials: BTreeMap<String, Vec<Choice>>,
 }
 
+/// One is equal to itself alone: its files may have changed.
+impl PartialEq for Species {
+    fn eq(&self, other: &Self) -> bool {
+        std::ptr::eq(self, other)
+    }
+}
+
 /// What was read so far. Every file's bytes go into the hash in the order of their paths.
 #[derive(Clone, Default)]
 pub(super) struct Library {
@@ -439,6 +446,13 @@ fn at_its_place(page: &RonFile, literal: &str, help: &str, error: Error) -> Erro
 pub(super) struct Layer {
     albedo: Texture,
     height: Height,
+}
+
+/// One is equal to itself alone: its files may have changed.
+impl PartialEq for Layer {
+    fn eq(&self, other: &Self) -> bool {
+        std::ptr::eq(self, other)
+    }
 }
 
 impl Layer {

@@ -30,7 +30,7 @@ pub use part_kind::PartKind;
 #[derive(Clone, Debug)]
 pub struct Part {
     /// Its triangles, in the world.
-    pub mesh: Mesh,
+    pub mesh: Arc<Mesh>,
     /// Where they are there at all; `None` for everywhere.
     pub mask: Option<Arc<AlphaMask>>,
     /// Index into [`Scene::materials`].

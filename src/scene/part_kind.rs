@@ -17,25 +17,26 @@ pub enum PartKind {
 }
 
 impl PartKind {
-    /// All of them with their numbers in label maps and their names; 0 is nothing at all, such as the sky.
-    pub const NUMBERED: [(u8, &'static str, Self); 12] = [
-        (1, "soil", Self::Soil),
-        (2, "stone", Self::Debris(DebrisKind::Stone)),
-        (3, "straw", Self::Debris(DebrisKind::Straw)),
-        (4, "stick", Self::Debris(DebrisKind::Stick)),
-        (5, "bit", Self::Debris(DebrisKind::Bit)),
-        (6, "model", Self::Model),
-        (11, "blade", Self::Organ(OrganKind::Blade)),
-        (12, "petiole", Self::Organ(OrganKind::Petiole)),
-        (13, "cotyledon", Self::Organ(OrganKind::Cotyledon)),
-        (14, "hypocotyl", Self::Organ(OrganKind::Hypocotyl)),
-        (15, "stem", Self::Organ(OrganKind::Stem)),
-        (16, "sheath", Self::Organ(OrganKind::Sheath)),
+    /// All of them with their numbers in label maps, their names, and their colours there: soils brown, organs green, others apart. 0 is nothing at
+    /// all, such as the sky.
+    pub const NUMBERED: [(u8, &'static str, [u8; 3], Self); 12] = [
+        (1, "soil", [94, 72, 52], Self::Soil),
+        (2, "stone", [150, 150, 160], Self::Debris(DebrisKind::Stone)),
+        (3, "straw", [214, 190, 110], Self::Debris(DebrisKind::Straw)),
+        (4, "stick", [120, 80, 30], Self::Debris(DebrisKind::Stick)),
+        (5, "bit", [160, 110, 70], Self::Debris(DebrisKind::Bit)),
+        (6, "model", [60, 110, 220], Self::Model),
+        (11, "blade", [40, 170, 60], Self::Organ(OrganKind::Blade)),
+        (12, "petiole", [200, 220, 60], Self::Organ(OrganKind::Petiole)),
+        (13, "cotyledon", [120, 220, 150], Self::Organ(OrganKind::Cotyledon)),
+        (14, "hypocotyl", [200, 90, 120], Self::Organ(OrganKind::Hypocotyl)),
+        (15, "stem", [170, 60, 200], Self::Organ(OrganKind::Stem)),
+        (16, "sheath", [0, 150, 150], Self::Organ(OrganKind::Sheath)),
     ];
 
     /// Its number in label maps.
     pub fn number(self) -> u8 {
-        Self::NUMBERED.iter().find(|(_, _, kind)| *kind == self).map_or(0, |(number, ..)| *number)
+        Self::NUMBERED.iter().find(|(.., kind)| *kind == self).map_or(0, |(number, ..)| *number)
     }
 
     /// The organ, if it is one.
@@ -70,7 +71,7 @@ mod tests {
         numbers.dedup();
         assert_eq!(numbers.len(), all.len());
         assert!(!numbers.contains(&0));
-        for (_, name, kind) in PartKind::NUMBERED {
+        for (_, name, _, kind) in PartKind::NUMBERED {
             assert!(kind.organ().is_none_or(|organ| organ.name() == name), "{name}");
         }
     }

@@ -268,7 +268,7 @@ mod tests {
         }
         let mesh = Mesh::smooth(positions, uvs, triangles);
         let tag = Tag { class: Class::Crop, plant: 1, leaf: 1 };
-        Part { mesh, mask: mask.map(Arc::new), material: 0, tag }
+        Part { mesh: Arc::new(mesh), mask: mask.map(Arc::new), material: 0, tag }
     }
 
     fn axis(part: &Part) -> LeafAxis {
@@ -319,7 +319,7 @@ mod tests {
     fn a_turned_leaf_leads_where_it_was_turned() {
         for degrees in [30.0_f32, 135.0, 260.0] {
             let mut part = leaf(0.3, None);
-            part.mesh.transform(Mat3::from_rotation_z(-degrees.to_radians()), Vec3::ZERO);
+            Arc::make_mut(&mut part.mesh).transform(Mat3::from_rotation_z(-degrees.to_radians()), Vec3::ZERO);
             let (plant, leaf) = measured(&part);
             assert!((leaf.azimuth_deg - degrees).abs() < 0.1, "{degrees}: {leaf:?}");
             let expected = 0.004 * 0.3_f32.sin() / 0.3;
@@ -342,7 +342,7 @@ mod tests {
     #[test]
     fn leaves_over_each_other_cover_once() {
         let (below, mut above) = (leaf(0.0, None), leaf(0.0, None));
-        above.mesh.transform(Mat3::IDENTITY, vec3(0.02, 0.0, 0.01));
+        Arc::make_mut(&mut above.mesh).transform(Mat3::IDENTITY, vec3(0.02, 0.0, 0.01));
         let (below, above) = (blade(&below), blade(&above));
         let covered = cover(&[&below, &above]);
         assert!((covered / 0.006 - 1.0).abs() < 0.01, "{covered}");

@@ -13,6 +13,7 @@ use furrow::sampling::Points;
 use furrow::scene::tag::Tag;
 use furrow::scene::{Part, Scene};
 use furrow::sensor::{Camera, Distortion, Pose};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// A square of side `side` about `centre`, facing up.
@@ -56,8 +57,12 @@ pub fn camera(size: (u32, u32), position: Vec3, target: Vec3, fov_deg: f64) -> C
 /// A scene of unmasked meshes, each with one scattering.
 pub fn scene(parts: Vec<(Mesh, Bsdf)>, lights: Vec<Light>, camera: Camera) -> Scene {
     let materials = parts.iter().map(|(_, b)| Material::Plain(*b)).collect();
-    let part =
-        |(i, (mesh, _)): (usize, (Mesh, Bsdf))| Part { mesh, mask: None, material: i as u32, tag: Tag::default() };
+    let part = |(i, (mesh, _)): (usize, (Mesh, Bsdf))| Part {
+        mesh: Arc::new(mesh),
+        mask: None,
+        material: i as u32,
+        tag: Tag::default(),
+    };
     let parts = parts.into_iter().enumerate().map(part).collect();
     Scene { parts, materials, lights, camera, filter: Filter::Box.footprint() }
 }

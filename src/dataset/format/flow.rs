@@ -16,7 +16,7 @@ use crate::dataset::recipe::Recipe;
 use crate::dataset::sample::{Flow, Sample};
 use crate::dataset::File;
 use crate::output;
-use crate::{Error, Result};
+use crate::Result;
 
 pub(super) struct Writer;
 
@@ -25,9 +25,7 @@ const FOLDER: &str = "flow";
 impl Format for Writer {
     fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
         let record = &sample.record;
-        let rendered = sample.film.as_ref().ok_or_else(|| {
-            Error::misuse(format!("image {}: only the renderer knows what --format {FOLDER} holds", record.name))
-        })?;
+        let rendered = sample.rendered(FOLDER)?;
         let mut planes: Vec<(String, Vec<f32>)> = rendered.flows.iter().flat_map(planes).collect();
         if planes.is_empty() {
             planes.push(("none".into(), vec![0.0; sample.pixels()]));

@@ -18,7 +18,7 @@ use crate::dataset::recipe::{Made, Recipe};
 use crate::dataset::sample::Sample;
 use crate::dataset::File;
 use crate::output;
-use crate::{Error, Result};
+use crate::Result;
 
 pub(super) struct Writer;
 
@@ -27,9 +27,7 @@ const FOLDER: &str = "layers";
 impl Format for Writer {
     fn image(&self, recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
         let record = &sample.record;
-        let rendered = sample.film.as_ref().ok_or_else(|| {
-            Error::misuse(format!("image {}: only the renderer knows what --format {FOLDER} holds", record.name))
-        })?;
+        let rendered = sample.rendered(FOLDER)?;
         let text = provenance(recipe, record.index);
         let bytes = output::encode_layers(&rendered.film, &rendered.labels, &rendered.tags, &text)?;
         Ok(vec![File { path: format!("{FOLDER}/{}/{}.exr", record.split.name(), record.name), bytes }])

@@ -9,43 +9,32 @@ use crate::dataset::set::Set;
 use crate::dataset::File;
 use crate::output::Picture;
 use crate::scene::PartKind;
-use crate::{Error, Result};
+use crate::Result;
 use std::collections::BTreeMap;
 
 pub(super) struct Writer;
 
 const FOLDER: &str = "parts";
 
-/// Colours of the numbers from 0: soils brown, organs green, others apart.
-const COLORS: [[u8; 3]; 17] = [
-    [0, 0, 0],
-    [94, 72, 52],
-    [150, 150, 160],
-    [214, 190, 110],
-    [120, 80, 30],
-    [160, 110, 70],
-    [60, 110, 220],
-    [0, 0, 0],
-    [0, 0, 0],
-    [0, 0, 0],
-    [0, 0, 0],
-    [40, 170, 60],
-    [200, 220, 60],
-    [120, 220, 150],
-    [200, 90, 120],
-    [170, 60, 200],
-    [0, 150, 150],
-];
+/// Colours of the numbers from 0; black where there is none.
+fn colors() -> Vec<[u8; 3]> {
+    let last = PartKind::NUMBERED.iter().map(|(number, ..)| usize::from(*number)).max().unwrap_or(0);
+    let mut all = vec![[0; 3]; last + 1];
+    for (number, _, color, _) in PartKind::NUMBERED {
+        all[usize::from(number)] = color;
+    }
+    all
+}
 
 impl Format for Writer {
     fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
         let record = &sample.record;
         let path = format!("{FOLDER}/{}/{}.png", record.split.name(), record.name);
-        Ok(vec![picture::file(sample, path, &Picture::Indexed(&numbers(FOLDER, sample)?, &COLORS))?])
+        Ok(vec![picture::file(sample, path, &Picture::Indexed(&numbers(FOLDER, sample)?, &colors()))?])
     }
 
     fn whole(&self, _set: &Set, out: &mut Whole<'_>) -> Result<()> {
-        let names: BTreeMap<u8, &str> = PartKind::NUMBERED.iter().map(|(number, name, _)| (*number, *name)).collect();
+        let names: BTreeMap<u8, &str> = PartKind::NUMBERED.iter().map(|(number, name, ..)| (*number, *name)).collect();
         out.file(&format!("{FOLDER}/names.json"), |w| {
             w.json(&names)?;
             w.put("\n")
@@ -59,9 +48,7 @@ impl Format for Writer {
 
 /// The number of what each pixel shows; an error that names `format` for an image that was not rendered.
 pub(super) fn numbers(format: &str, sample: &Sample) -> Result<Vec<u8>> {
-    let rendered = sample.film.as_ref().ok_or_else(|| {
-        Error::misuse(format!("image {}: only the renderer knows what --format {format} holds", sample.record.name))
-    })?;
+    let rendered = sample.rendered(format)?;
     let number = |part: &u32| rendered.kinds.get(*part as usize).map_or(0, |kind| kind.number());
     Ok(rendered.labels.parts.iter().map(number).collect())
 }

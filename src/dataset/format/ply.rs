@@ -17,7 +17,7 @@ use super::{Format, parts};
 use crate::dataset::recipe::Recipe;
 use crate::dataset::sample::Sample;
 use crate::dataset::File;
-use crate::{Error, Result};
+use crate::Result;
 
 pub(super) struct Writer;
 
@@ -48,7 +48,7 @@ impl Format for Writer {
     fn image(&self, recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
         let record = &sample.record;
         let parts = parts::numbers(FOLDER, sample)?;
-        let rendered = sample.film.as_ref().ok_or_else(|| Error::failed("parts without what was rendered"))?;
+        let rendered = sample.rendered(FOLDER)?;
         let (width, _) = sample.size();
         let camera = &rendered.camera;
         let axis = camera.pose().axes.z_axis;

@@ -14,7 +14,7 @@ use crate::dataset::recipe::{Recipe, json};
 use crate::dataset::sample::{Rendered, Sample};
 use crate::dataset::File;
 use crate::plant::PlacedJoint;
-use crate::{Error, Result};
+use crate::Result;
 use serde::Serialize;
 
 pub(super) struct Writer;
@@ -51,9 +51,7 @@ struct JointRow {
 impl Format for Writer {
     fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
         let record = &sample.record;
-        let rendered = sample.film.as_ref().ok_or_else(|| {
-            Error::misuse(format!("image {}: only the renderer knows what --format {FOLDER} holds", record.name))
-        })?;
+        let rendered = sample.rendered(FOLDER)?;
         let plants = record.plants.iter().map(|plant| PlantSkeleton {
             plant: plant.number,
             id: plant.id,

@@ -148,7 +148,7 @@ fn groups(scene: &Scene, leveled: &Leveled) -> Result<Vec<Group>> {
                     name: format!("{}-{}-{number}", key.class, key.plant),
                     material: index,
                     mask: part.mask.clone(),
-                    mesh: part.mesh.clone(),
+                    mesh: Mesh::clone(&part.mesh),
                     colors,
                 });
             }
@@ -305,7 +305,7 @@ mod tests {
         let part = |k: usize| {
             let class = if k.is_multiple_of(2) { Class::Crop } else { Class::Weed };
             let tag = Tag { class, plant: (k / 2 + 1) as u16, leaf: 0 };
-            Part { mesh: mesh.clone(), mask: None, material: 0, tag }
+            Part { mesh: Arc::new(mesh.clone()), mask: None, material: 0, tag }
         };
         let parts = (0..plants).chain(0..plants).map(part).collect();
         let pose = Pose::look_at(vec3(0.0, -1.0, 1.0), Vec3::ZERO).unwrap();

@@ -3,15 +3,13 @@
 use super::lighting::Lighting;
 use super::options::Options;
 use super::season::Season;
-use crate::geometry::Mesh;
 use crate::light::LightRecord;
-use crate::material::LeafMaterial;
 use crate::plant::OrganKind;
 use crate::ron_file::RonFile;
 use crate::scene::desc::FieldDesc;
 use crate::scene::drive::Capture;
 use crate::scene::library::Library;
-use crate::scene::{Part, PartKind, Scene};
+use crate::scene::{PartKind, Scene};
 use crate::soil::Ground;
 
 /// Farthest that a model or a camera may be from the world's origin along an axis, metres: single precision tells 0.06 mm apart there.
@@ -55,26 +53,5 @@ impl Floor<'_> {
     /// Height at a place, metres.
     pub(super) fn height(&self, x: f32, y: f32) -> f32 {
         if self.flat { 0.0 } else { self.ground.height(x, y) }
-    }
-}
-
-/// An organ that stands in the field.
-pub(super) struct Grown {
-    pub(super) part: Part,
-    pub(super) kind: OrganKind,
-    /// Its key among the species' materials.
-    pub(super) key: String,
-    pub(super) choice: usize,
-    pub(super) material: LeafMaterial,
-    /// Whether no other organ of the plant has this material.
-    pub(super) own: bool,
-}
-
-impl Grown {
-    /// The same of another shape.
-    pub(super) fn with(&self, mesh: Mesh) -> Self {
-        let Part { mask, material, tag, .. } = &self.part;
-        let part = Part { mesh, mask: mask.clone(), material: *material, tag: *tag };
-        Self { part, key: self.key.clone(), material: self.material.clone(), ..*self }
     }
 }

@@ -1,6 +1,6 @@
 //! Plants in a condition: leaf by leaf, what is cut out of it and what its tissue has become.
 
-use super::builder::Grown;
+use super::grown::Grown;
 use crate::geometry::Mesh;
 use crate::material::ConditionOptics;
 use crate::math::{Spectrum, Vec2};
@@ -72,7 +72,7 @@ impl<'a> Ailing<'a> {
         // What stands apart is eaten apart: leaflets share a picture, not their holes.
         let pieces = match grown.part.mesh.image_size() {
             Some(_) if blade && bare.choice.pictured => grown.part.mesh.pieces(),
-            _ => vec![grown.part.mesh.clone()],
+            _ => vec![Mesh::clone(&grown.part.mesh)],
         };
         let share = 1.0 / pieces.len().max(1) as f32;
         let mut dressed = Vec::with_capacity(pieces.len());

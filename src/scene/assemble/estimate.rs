@@ -1,11 +1,14 @@
 //! What a field under way will take: film, ground, what lies on it, plants, models.
 
+use super::PLANT_MARGIN;
 use super::builder::Builder;
 use super::census::Population;
-use super::{PLANT_MARGIN, Seedling, grow};
+use super::preview::Counted;
+use super::seedling::{Place, Seedling, grow};
 use crate::Result;
 use crate::film::Pixel;
 use crate::geometry::Cost;
+use crate::math::Vec3;
 use crate::optics::soil::LOESS;
 use crate::plant::most_triangles;
 use crate::ron_file::Step;
@@ -51,9 +54,16 @@ impl Builder<'_> {
             }
         }
         let (seedlings, populations) = self.seedlings(view.grown(PLANT_MARGIN), &[])?;
+        let (cell, mut counted) = (self.cell(), Vec::new());
         for (population, range) in populations {
             let (at, advice) = population.place();
-            add(&at, plants(&seedlings, population, range, self.cell()), &format!("{advice}, or lower the camera"));
+            let number = range.len();
+            let some = self.count(&seedlings, population, range, cell);
+            add(&at, expected(&some, number), &format!("{advice}, or lower the camera"));
+            counted.extend(some);
+        }
+        if let Some(preview) = &self.options.preview {
+            preview.keep_counted(counted);
         }
         for (k, model) in self.desc.models.iter().enumerate() {
             let model = self.library.model(self.page, model)?;
@@ -63,24 +73,33 @@ impl Builder<'_> {
         }
         Ok(Estimate { shares })
     }
+    /// The sizes of some plants of a population, meshed with such cells, which are grown for it. Not grown is what might itself be too large.
+    fn count(&self, seedlings: &[Seedling], population: Population, range: Range<usize>, cell: f32) -> Vec<Counted> {
+        let number = range.len();
+        let most = if population == Population::Placed { LOOKED_AT_PLACED } else { LOOKED_AT };
+        let tried = number.min(most);
+        let samples = (0..tried).into_par_iter().map(|k| {
+            let seedling = &seedlings[range.start + (2 * k + 1) * number / (2 * tried)];
+            let known = self.options.preview.as_ref().and_then(|preview| preview.counted(seedling, cell));
+            Counted { seedling: seedling.clone(), cell, size: known.unwrap_or_else(|| size(seedling, cell)) }
+        });
+        samples.collect()
+    }
 }
 
-/// What the plants of a population take, meshed with such cells: as much as some of them, which are grown for it. Not grown is what might itself be too large.
-fn plants(seedlings: &[Seedling], population: Population, range: Range<usize>, cell: f32) -> Cost {
-    let number = range.len();
-    let most = if population == Population::Placed { LOOKED_AT_PLACED } else { LOOKED_AT };
-    let tried = number.min(most);
-    let samples = (0..tried).into_par_iter().map(|k| {
-        let seedling = &seedlings[range.start + (2 * k + 1) * number / (2 * tried)];
-        let bound = most_triangles(&seedling.species.desc.plant);
-        if bound > TRIED {
-            return (bound, 1.0);
-        }
-        let (_, organs) = grow(seedling, 1, None, (LOESS, cell));
-        (organs.iter().map(|organ| organ.part.mesh.triangles.len()).sum::<usize>() as f64, organs.len() as f64)
-    });
-    let samples: Vec<(f64, f64)> = samples.collect();
-    let (triangles, organs) = samples.iter().fold((0.0, 0.0), |(a, b), (t, o)| (a + t, b + o));
+/// Triangles and organs of a plant.
+fn size(seedling: &Seedling, cell: f32) -> (f64, f64) {
+    let bound = most_triangles(&seedling.species.desc.plant);
+    if bound > TRIED {
+        return (bound, 1.0);
+    }
+    let (_, organs) = grow(seedling, &Place { height: 0.0, normal: Vec3::Z, dust: LOESS, cell });
+    (organs.iter().map(|organ| organ.part.mesh.triangles.len()).sum::<usize>() as f64, organs.len() as f64)
+}
+
+/// What so many plants take of which these are some.
+fn expected(some: &[Counted], number: usize) -> Cost {
+    let (triangles, organs) = some.iter().fold((0.0, 0.0), |(a, b), Counted { size: (t, o), .. }| (a + t, b + o));
     let each = Cost::of(triangles, organs) + Cost::work(0.0, triangles * SECONDS_PER_TRIANGLE);
-    each * (number as f64 / tried.max(1) as f64)
+    each * (number as f64 / some.len().max(1) as f64)
 }

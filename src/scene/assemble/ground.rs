@@ -1,19 +1,24 @@
 //! The ground of a field: broken, covered with what lies on it, and laid as parts.
 
+use super::PLANT_MARGIN;
 use super::builder::{Builder, Floor};
-use crate::Result;
-use crate::geometry::Cost;
+use super::earth::{BakedGrounds, Bed, Earth, Laid, Soil};
+use super::preview::{Preview, Under};
+use super::view::View;
+use crate::geometry::{Cost, Mesh};
 use crate::material::{BakedGround, Ground as GroundMaterial, Material, Solid};
 use crate::math::Spectrum;
 use crate::ron_file::Step;
 use crate::sampling::Purpose;
 use crate::sampling::rng::mix;
-use crate::scatter::Rows;
-use crate::scene::PartKind;
+use crate::scatter::{Disc, Rows};
 use crate::scene::library::Layer;
+use crate::scene::tag::Tag;
+use crate::scene::{Part, PartKind, PlantRecord};
 use crate::soil::{
     self, Canopy, Clods, Debris, DebrisKind, Expected, Ground, Pile, Rect, SeedRows, Site, SoilDesc, SoilRecord,
 };
+use crate::{Error, Result};
 use std::sync::Arc;
 
 /// Room around the view with fine ground.
@@ -40,38 +45,73 @@ const DUST_PATCH: f32 = 3e-3;
 /// Steps of moisture from air-dry to saturated that pieces are told apart by.
 const MOISTURE_STEPS: f32 = 12.0;
 
-/// The ground while it is being covered.
-pub(super) struct Earth {
-    pub(super) ground: Ground,
-    pub(super) maps: Vec<Arc<Layer>>,
-    pub(super) pile: Pile,
-    pub(super) stones: Vec<Debris>,
-}
-
-/// What the ground shows, and what its clods show: dry ones and damp ones.
-pub(super) struct BakedGrounds {
-    pub(super) ground: Arc<BakedGround>,
-    pub(super) clods: [Arc<BakedGround>; 2],
-    /// Reflectance of the dry soil that lies on stones and straw.
-    pub(super) dust: Spectrum,
-}
-
 impl Builder<'_> {
-    /// The ground and the stones in it: what must be known before plants can be placed.
-    pub(super) fn break_ground(&mut self, desc: &SoilDesc, view: Rect, open: bool) -> Result<Earth> {
+    /// The ground, the plants that grow in it, and what lies under them.
+    pub(super) fn cultivate(
+        &mut self,
+        desc: &SoilDesc,
+        View { area: view, open }: View,
+        shown: Option<Rect>,
+    ) -> Result<(Vec<PlantRecord>, SoilRecord)> {
+        let soil = self.soil(desc, view, open)?;
+        let options = self.options;
+        let preview = options.preview.as_ref();
+        let known = preview.and_then(|preview| preview.bed(&soil));
+        let mut earth = match &known {
+            Some(bed) => bed.earth.clone(),
+            None => self.break_ground(&soil)?,
+        };
+        self.options.wanted()?;
+        let bare = preview.map(|_| earth.clone());
+        let ground = earth.ground.clone();
+        let floor = Floor { ground: &ground, flat: desc.flat };
+        let record = self.soil_record(desc, &ground);
+        // The bake takes as long as everything else, and neither needs the other.
+        let (baked, rest) = rayon::join(
+            || known.as_ref().map_or_else(|| Arc::new(bake(&ground, &soil)), |bed| bed.baked.clone()),
+            || {
+                let taken: Vec<Disc> = earth.stones.iter().map(|s| (s.centre.truncate(), s.radius)).collect();
+                let (seedlings, _) = self.seedlings(view.grown(PLANT_MARGIN), &taken)?;
+                // Plants first: what grows moves the clods, not the other way round.
+                let plants = self.populate(&seedlings, Some(floor), shown)?;
+                let meshes = || self.scene.parts.iter().map(|part| part.mesh.clone()).collect();
+                let same = known.clone().and_then(|bed| preview?.laid(&Under { bed, plants: meshes() }));
+                let cover = if same.is_some() { Vec::new() } else { self.cover(desc, &mut earth) };
+                Ok::<_, Error>((plants, same, cover))
+            },
+        );
+        let (plants, same, clods) = rest?;
+        self.options.wanted()?;
+        let laid = same.unwrap_or_else(|| Arc::new(lay(floor, clods, earth.stones, &baked)));
+        if let (Some(preview), Some(earth)) = (preview, bare) {
+            let bed = known.unwrap_or_else(|| Arc::new(Bed { soil, earth, baked }));
+            let plants = self.scene.parts.iter().map(|part| part.mesh.clone()).collect();
+            preview.keep_ground(Under { bed, plants }, &laid);
+        }
+        self.put(&laid);
+        Ok((plants, record))
+    }
+
+    /// What the ground follows from.
+    fn soil(&mut self, desc: &SoilDesc, view: Rect, open: bool) -> Result<Soil> {
         let mut maps: Vec<Arc<Layer>> = Vec::new();
         for layer in &desc.layers {
             maps.push(self.library.layer(self.page, layer)?);
         }
         let mut read = |file: &str| self.library.soil_spectrum(self.page, file);
         let colors = desc.colors.iter().map(|color| color.reflectance(&mut read)).collect::<Result<Vec<Spectrum>>>()?;
-        let site = self.site(view, open);
-        let ground = Ground::new(desc, &colors, &maps, &site, &self.stream(Purpose::Soil, 0))
+        let (site, texel, of) = (self.site(view, open), self.texel(view), (self.seed, self.index));
+        Ok(Soil { desc: desc.clone(), colors, maps, site, texel, of })
+    }
+
+    /// The ground and the stones in it: what must be known before plants can be placed.
+    fn break_ground(&self, Soil { desc, colors, maps, site, .. }: &Soil) -> Result<Earth> {
+        let ground = Ground::new(desc, colors, maps, site, &self.stream(Purpose::Soil, 0))
             .map_err(|e| self.page.blame(&[Step::Field("soil")], e))?;
         self.options.wanted()?;
-        let mut pile = Pile::new(&ground).until(self.options.preview.as_ref());
+        let mut pile = Pile::new(&ground).until(self.options.preview.as_ref().map(Preview::outdated));
         let stones = soil::stones(&desc.stones, &ground, &mut pile, &self.stream(Purpose::Debris, STONES));
-        Ok(Earth { ground, maps, pile, stones })
+        Ok(Earth { ground: Arc::new(ground), pile, stones })
     }
 
     /// Which piece of ground is made, and how finely.
@@ -106,14 +146,8 @@ impl Builder<'_> {
         ground.record(desc, &self.stream(Purpose::Debris, STONES), &self.stream(Purpose::Debris, LITTER))
     }
 
-    /// Clods under the plants, and litter, which joins the `debris`.
-    pub(super) fn cover(
-        &self,
-        desc: &SoilDesc,
-        ground: &Ground,
-        pile: &mut Pile,
-        debris: &mut Vec<Debris>,
-    ) -> Vec<Clods> {
+    /// Clods under the plants, and litter, which joins the stones.
+    fn cover(&self, desc: &SoilDesc, Earth { ground, pile, stones: debris }: &mut Earth) -> Vec<Clods> {
         let mut canopy = Canopy::none(ground);
         for part in self.scene.parts.iter().filter(|_| !desc.flat) {
             canopy.add(&part.mesh);
@@ -129,30 +163,52 @@ impl Builder<'_> {
         Vec::new()
     }
 
-    /// Makes parts of everything of the ground; they come before those of the plants.
-    pub(super) fn lay(&mut self, floor: Floor<'_>, clods: Vec<Clods>, debris: Vec<Debris>, baked: &BakedGrounds) {
-        let plants = std::mem::take(&mut self.scene.parts);
-        let material = self.material(Material::Ground(GroundMaterial::new(baked.ground.clone())));
-        let mesh = if floor.flat { floor.ground.levelled().mesh() } else { floor.ground.mesh() };
-        self.part(mesh, material, PartKind::Soil);
-        for group in clods {
-            let maps = baked.clods[usize::from(group.damp)].clone();
-            let material = self.material(Material::Ground(GroundMaterial::clods(maps, group.tint)));
-            self.part(group.mesh, material, PartKind::Soil);
-        }
-        for (i, thing) in debris.into_iter().enumerate() {
-            let solid = Solid::new(thing.albedo * thing.tint, DEBRIS_SIGMA);
-            // A stone is of a piece; dead matter is mottled by what eats it.
-            let patch = 0.5 * thing.radius.max(1e-3);
-            let patch = if thing.kind == DebrisKind::Stone { patch } else { patch.min(MOTTLE) };
-            let solid = solid.with_grain(mix(i as u64) as u32, patch, 0.35);
-            let solid = solid.with_dust(baked.dust, thing.dust, DUST_PATCH);
-            // In steps, so that pieces of the same film can be exported as one.
-            let moisture = floor.ground.moisture(thing.centre.x, thing.centre.y);
-            let solid = solid.moist((moisture * MOISTURE_STEPS).round() / MOISTURE_STEPS);
-            let material = self.material(Material::Solid(solid));
-            self.part(thing.mesh, material, PartKind::Debris(thing.kind));
-        }
-        self.scene.parts.extend(plants);
+    /// Puts the ground before the plants.
+    fn put(&mut self, laid: &Laid) {
+        let first = self.scene.materials.len() as u32;
+        let parts = laid.parts.iter().map(|part| Part { material: first + part.material, ..part.clone() });
+        self.scene.parts.splice(0..0, parts);
+        self.scene.materials.extend(laid.materials.iter().cloned());
+        self.ground.extend(&laid.kinds);
     }
+}
+
+/// What the ground shows.
+fn bake(ground: &Ground, Soil { maps, texel, .. }: &Soil) -> BakedGrounds {
+    let fabric = |wet| Arc::new(BakedGround::bake(&ground.fabric(maps, *texel, wet)));
+    BakedGrounds {
+        ground: Arc::new(BakedGround::bake(&ground.bake(maps, *texel))),
+        clods: ground.clods_moisture().map(fabric),
+        dust: ground.mean_dry(maps),
+    }
+}
+
+/// Makes parts of everything of the ground.
+fn lay(floor: Floor<'_>, clods: Vec<Clods>, debris: Vec<Debris>, baked: &BakedGrounds) -> Laid {
+    let mut laid = Laid::default();
+    let mut add = |mesh: Mesh, material: Material, kind| {
+        let material_of = laid.materials.len() as u32;
+        laid.materials.push(material);
+        laid.kinds.push(kind);
+        laid.parts.push(Part { mesh: Arc::new(mesh), mask: None, material: material_of, tag: Tag::default() });
+    };
+    let mesh = if floor.flat { floor.ground.levelled().mesh() } else { floor.ground.mesh() };
+    add(mesh, Material::Ground(GroundMaterial::new(baked.ground.clone())), PartKind::Soil);
+    for group in clods {
+        let maps = baked.clods[usize::from(group.damp)].clone();
+        add(group.mesh, Material::Ground(GroundMaterial::clods(maps, group.tint)), PartKind::Soil);
+    }
+    for (i, thing) in debris.into_iter().enumerate() {
+        let solid = Solid::new(thing.albedo * thing.tint, DEBRIS_SIGMA);
+        // A stone is of a piece; dead matter is mottled by what eats it.
+        let patch = 0.5 * thing.radius.max(1e-3);
+        let patch = if thing.kind == DebrisKind::Stone { patch } else { patch.min(MOTTLE) };
+        let solid = solid.with_grain(mix(i as u64) as u32, patch, 0.35);
+        let solid = solid.with_dust(baked.dust, thing.dust, DUST_PATCH);
+        // In steps, so that pieces of the same film can be exported as one.
+        let moisture = floor.ground.moisture(thing.centre.x, thing.centre.y);
+        let solid = solid.moist((moisture * MOISTURE_STEPS).round() / MOISTURE_STEPS);
+        add(thing.mesh, Material::Solid(solid), PartKind::Debris(thing.kind));
+    }
+    laid
 }

@@ -1,6 +1,5 @@
 //! Plants that are all alike: one shape and age for a whole species.
 
-use super::builder::Builder;
 use crate::math::{Mat3, Vec3};
 use crate::plant::{self, GrowOptions, Plant};
 use crate::sampling::rng::mix;
@@ -8,6 +7,7 @@ use crate::sampling::{Purpose, Stream};
 use crate::scene::desc::{Growth, SpeciesDesc};
 
 /// The one plant that all of a species are.
+#[derive(Clone, PartialEq)]
 pub(super) struct Individual {
     /// The field's: how old it is.
     age: Stream,
@@ -15,17 +15,15 @@ pub(super) struct Individual {
     shape: Stream,
 }
 
-impl Builder<'_> {
-    /// The individual of a species whose plants are alike.
-    pub(super) fn individual(&self, desc: &SpeciesDesc) -> Option<Individual> {
+impl Individual {
+    /// That of a species whose plants are alike, in field `index` of `seed`.
+    pub(super) fn of(desc: &SpeciesDesc, (seed, index): (u64, u64)) -> Option<Self> {
         // By name, so that a species that stands in two places of a scene file is one all the same.
         let key = desc.name.bytes().fold(0, |key, byte| mix(key ^ u64::from(byte)));
-        let stream = |index| Stream::of(self.seed, index, Purpose::Plant, key);
-        desc.alike.then(|| Individual { age: stream(self.index).child(Purpose::Page, 0), shape: stream(0) })
+        let stream = |index| Stream::of(seed, index, Purpose::Plant, key);
+        desc.alike.then(|| Self { age: stream(index).child(Purpose::Page, 0), shape: stream(0) })
     }
-}
 
-impl Individual {
     /// Its shape.
     pub(super) fn shape(&self) -> &Stream {
         &self.shape
@@ -45,8 +43,7 @@ impl Individual {
         let turn = Mat3::from_rotation_z(plant::turn(&self.shape) - plant::turn(own));
         for organ in &mut plant.organs {
             organ.mesh.transform(turn, Vec3::ZERO);
-            organ.midrib = organ.midrib.map(|ends| ends.map(|p| turn * p));
-            organ.joints.iter_mut().for_each(|joint| joint.at = turn * joint.at);
+            organ.axis = organ.axis.take().map(|axis| axis.moved(|p| turn * p));
         }
         plant
     }

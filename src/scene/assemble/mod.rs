@@ -3,52 +3,56 @@
 mod builder;
 mod census;
 mod condition;
+mod earth;
 mod estimate;
 mod expected;
 mod field;
 mod ground;
+mod grown;
 mod identity;
 mod individual;
 mod known;
 mod lighting;
 mod models;
 mod options;
+mod preview;
 mod rig;
 mod season;
+mod seedling;
 mod unlikely;
 mod view;
 
-use super::desc::{FieldDesc, Growth, SpeciesDesc};
+use super::desc::{FieldDesc, Growth};
 use super::estimate::{Estimate, usual_memory};
 pub use super::growing::Growing;
 use super::library::{Library, Species};
 use super::record::Conditions;
 use super::tag::Tag;
 use super::{Part, PartKind, PlantRecord, Scene};
-use crate::geometry::Mesh;
 use crate::input::Scope;
 use crate::light::LightDesc;
-use crate::material::{BakedGround, Material};
-use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3, vec2};
+use crate::material::Material;
+use crate::math::{Spectrum, Vec2, Vec3, vec2};
 use crate::optics::soil::LOESS;
-use crate::plant::{self, ConditionDesc, GrowOptions, LeafAxis, OrganKind};
-use crate::ron_file::{Positive, RENAMED, RonFile, Step, Vary};
+use crate::plant::{ConditionDesc, GrowOptions};
+use crate::ron_file::{RENAMED, RonFile, Step, Vary};
 use crate::sampling::{Purpose, Stream};
 use crate::scatter::{self, Disc, Spot};
 use crate::sensor::Camera;
 use crate::soil::Rect;
 use crate::{Error, Result};
-use builder::{Builder, Floor, Grown};
+use builder::{Builder, Floor};
 use census::{Census, Members, Population};
-use condition::{Ailing, Bare};
 pub use field::Field;
-use ground::{BakedGrounds, Earth};
 use individual::Individual;
 pub use lighting::Lighting;
 use lighting::Listed;
 pub use options::Options;
+pub use preview::Preview;
+use preview::Standing;
 use rayon::prelude::*;
 pub use season::Season;
+use seedling::{Place, Seedling, grow};
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use view::View;
@@ -57,6 +61,8 @@ use view::View;
 const PLANT_MARGIN: f32 = 0.35;
 /// Length of the longest shadow that counts, in plant heights: that of a sun 20° above the horizon.
 const SHADOW: f32 = 2.75;
+/// Radius over which the ground's slope decides how a plant stands, metres.
+const STANCE: f32 = 0.02;
 /// Address of the season's stream, behind those of any number of lights.
 const SEASON: u64 = 1 << 32;
 /// Address of the first of the streams from which lists of lights are drawn, one for each place among the scene file's lights.
@@ -153,33 +159,6 @@ impl Source {
     }
 }
 
-/// A plant to be grown: where, which, how old.
-struct Seedling {
-    species: Arc<Species>,
-    growth: Growth,
-    /// Place of the field's season in a list of growths.
-    season: usize,
-    position: Vec2,
-    turn: f32,
-    only_leaf: Option<u16>,
-    stream: Stream,
-    /// Whose shape and age it has, where all of its species are alike.
-    individual: Option<Individual>,
-    /// Factor on its sizes.
-    vigour: Vary<Positive>,
-    condition: Option<ConditionDesc>,
-    /// See [`identity::of`].
-    id: u32,
-}
-
-impl Seedling {
-    /// The same as vigorous as its entry in the scene file says, and in the entry's condition, if it has one.
-    fn tended(self, vigour: &Vary<Positive>, condition: Option<&ConditionDesc>) -> Self {
-        let condition = condition.cloned().or(self.condition);
-        Self { vigour: vigour.clone(), condition, ..self }
-    }
-}
-
 impl<'a> Builder<'a> {
     fn new(page: &'a RonFile, desc: &'a FieldDesc, options: &'a Options, mut library: Library) -> Result<Self> {
         let (seed, index) = (options.seed.unwrap_or(desc.seed), options.index);
@@ -260,52 +239,23 @@ impl<'a> Builder<'a> {
         self.scene.materials.len() as u32 - 1
     }
 
-    /// A part of the ground; they come before those of the plants.
-    fn part(&mut self, mesh: Mesh, material: u32, kind: PartKind) {
-        self.ground.push(kind);
-        self.scene.parts.push(Part { mesh, mask: None, material, tag: Tag::default() });
-    }
-
     /// The field, and the library with whatever was read for it.
     fn build(mut self) -> Result<(Field, Library)> {
-        let View { area: view, open } = self.looked_at()?;
+        let view = self.looked_at()?;
         let memory = self.options.memory.unwrap_or_else(usual_memory);
-        self.estimate(view, open)?.check(memory).map_err(|(at, error)| self.page.blame(&at, error))?;
-        let (sown, shown) = (view.grown(PLANT_MARGIN), self.has_ground().then_some(view));
+        self.estimate(view.area, view.open)?.check(memory).map_err(|(at, error)| self.page.blame(&at, error))?;
+        let shown = self.has_ground().then_some(view.area);
         self.warn_of_camera();
         self.warn_of_plants()?;
-        let mut known = None;
-        let mut plants = match &self.desc.soil {
+        let desc = self.desc;
+        let (mut plants, soil) = match &desc.soil {
             None => {
-                let (seedlings, _) = self.seedlings(sown, &[])?;
-                self.populate(&seedlings, None, shown)?
+                let (seedlings, _) = self.seedlings(view.area.grown(PLANT_MARGIN), &[])?;
+                (self.populate(&seedlings, None, shown)?, None)
             }
             Some(soil) => {
-                let Earth { ground, maps, mut pile, mut stones } = self.break_ground(soil, view, open)?;
-                self.options.wanted()?;
-                let floor = Floor { ground: &ground, flat: soil.flat };
-                known = Some(self.soil_record(soil, &ground));
-                let texel = self.texel(view);
-                // The bake takes as long as everything else, and neither needs the other.
-                let fabric = |wet| Arc::new(BakedGround::bake(&ground.fabric(&maps, texel, wet)));
-                let (baked, rest) = rayon::join(
-                    || BakedGrounds {
-                        ground: Arc::new(BakedGround::bake(&ground.bake(&maps, texel))),
-                        clods: ground.clods_moisture().map(fabric),
-                        dust: ground.mean_dry(&maps),
-                    },
-                    || {
-                        let taken: Vec<Disc> = stones.iter().map(|s| (s.centre.truncate(), s.radius)).collect();
-                        let (seedlings, _) = self.seedlings(sown, &taken)?;
-                        // Plants first: what grows moves the clods, not the other way round.
-                        let plants = self.populate(&seedlings, Some(floor), shown)?;
-                        Ok::<_, Error>((self.cover(soil, &ground, &mut pile, &mut stones), plants))
-                    },
-                );
-                let (clods, plants) = rest?;
-                self.options.wanted()?;
-                self.lay(floor, clods, stones, &baked);
-                plants
+                let (plants, record) = self.cultivate(soil, view, shown)?;
+                (plants, Some(record))
             }
         };
         let species = self.species()?;
@@ -316,7 +266,7 @@ impl<'a> Builder<'a> {
             sensor: self.desc.sensor.build(&mut self.stream(Purpose::Sensor, 0)).record(),
             lights: std::mem::take(&mut self.lights),
             lighting: std::mem::take(&mut self.lighting),
-            soil: known,
+            soil,
             crops: self.crop_records()?,
             weeds: self.weed_records()?,
             season: self.season,
@@ -409,7 +359,7 @@ impl<'a> Builder<'a> {
                 turn: placed.turn_deg.draw32(&mut stream).to_radians(),
                 only_leaf: placed.only_leaf.map(|l| l.get() as u16),
                 stream: stream.child(Purpose::Plant, 0),
-                individual: self.individual(&species.desc),
+                individual: Individual::of(&species.desc, (self.seed, self.index)),
                 vigour: placed.vigour.clone(),
                 condition: species.desc.condition.clone(),
                 id: identity::of(self.seed, self.index, identity::PLACED, k as u64),
@@ -430,7 +380,7 @@ impl<'a> Builder<'a> {
             turn: 0.0,
             only_leaf: None,
             stream: self.stream(Purpose::Plant, population).child(Purpose::Plant, spot.key),
-            individual: self.individual(&species.desc),
+            individual: Individual::of(&species.desc, (self.seed, self.index)),
             vigour: Vary::fixed(1.0),
             condition: species.desc.condition.clone(),
             id: identity::of(self.seed, self.index, population, spot.key),
@@ -452,21 +402,33 @@ impl<'a> Builder<'a> {
         floor: Option<Floor<'_>>,
         view: Option<Rect>,
     ) -> Result<Vec<PlantRecord>> {
-        let dust = self.dust()?;
-        let (cell, options) = (self.cell(), self.options);
-        let grown: Vec<(PlantRecord, Vec<Grown>)> = (seedlings.par_iter().enumerate())
-            .map(|(i, s)| options.wanted().map(|()| grow(s, i as u16 + 1, floor, (dust, cell))))
-            .collect::<Result<_>>()?;
+        let (dust, cell, options) = (self.dust()?, self.cell(), self.options);
+        let stand = |seedling: &Seedling| {
+            options.wanted()?;
+            let Vec2 { x, y } = seedling.position;
+            let (height, normal) = floor.map_or((0.0, Vec3::Z), |f| (f.height(x, y), f.ground.trend(x, y, STANCE)));
+            let place = Place { height, normal, dust, cell };
+            let known = options.preview.as_ref().and_then(|preview| preview.plant(seedling, &place));
+            Ok(known.unwrap_or_else(|| {
+                let (record, organs) = grow(seedling, &place);
+                Arc::new(Standing { seedling: seedling.clone(), place, record, organs })
+            }))
+        };
+        let grown: Vec<Arc<Standing>> = seedlings.par_iter().map(stand).collect::<Result<_>>()?;
+        if let Some(preview) = &options.preview {
+            preview.keep_plants(&grown);
+        }
         let mut records = Vec::with_capacity(grown.len());
-        for (record, organs) in grown {
+        for (number, grown) in (1..).zip(grown) {
+            let record = PlantRecord { number, ..grown.record.clone() };
             // Grown to know its size, dropped where neither it nor its shadow reaches the view.
             let reach = record.radius + SHADOW * record.height;
             if view.is_some_and(|v| !v.grown(reach).contains(record.position.truncate())) {
                 continue;
             }
             // One material a plant and key: plants differ in their green, and leaves that have met something in more.
-            let mut made: Vec<(String, usize, u32)> = Vec::new();
-            for organ in organs {
+            let mut made: Vec<(&str, usize, u32)> = Vec::new();
+            for organ in &grown.organs {
                 if let Some(fault) = organ.part.mesh.fault() {
                     let (species, number) = (&record.species, record.number);
                     return Err(Error::input(format!(
@@ -475,111 +437,21 @@ impl<'a> Builder<'a> {
                     ))
                     .help("look for extreme sizes in its species file"));
                 }
-                let same = |m: &&(String, usize, u32)| !organ.own && m.0 == organ.key && m.1 == organ.choice;
+                let same = |m: &&(&str, usize, u32)| !organ.own && m.0 == organ.key && m.1 == organ.choice;
                 let known = made.iter().find(same).map(|m| m.2);
                 let material = known.unwrap_or_else(|| {
-                    let material = self.material(Material::Leaf(organ.material));
+                    let material = self.material(Material::Leaf(organ.material.clone()));
                     if !organ.own {
-                        made.push((organ.key, organ.choice, material));
+                        made.push((&organ.key, organ.choice, material));
                     }
                     material
                 });
                 self.organs.push(organ.kind);
-                self.scene.parts.push(Part { material, ..organ.part });
+                let tag = Tag { plant: number, ..organ.part.tag };
+                self.scene.parts.push(Part { material, tag, ..organ.part.clone() });
             }
             records.push(record);
         }
         Ok(records)
     }
 }
-
-/// Grows one plant, in its own stream, its mesh of cells no shorter than `cell`, and stands it on the ground.
-fn grow(
-    s: &Seedling,
-    number: u16,
-    floor: Option<Floor<'_>>,
-    (dust, cell): (Spectrum, f32),
-) -> (PlantRecord, Vec<Grown>) {
-    let desc: &SpeciesDesc = &s.species.desc;
-    let mut stream = s.stream.clone();
-    let stage = s.growth.draw(s.season, &mut stream);
-    let green = (1.0 + desc.chlorophyll_sd.get() * stream.normal()).clamp(0.6, 1.5) as f32;
-    let (x, y) = (s.position.x, s.position.y);
-    let (z, normal) = floor.map_or((0.0, Vec3::Z), |f| (f.height(x, y), f.ground.trend(x, y, STANCE)));
-    let axis = scatter::axis(normal, AXIS_NOISE_DEG, &mut stream);
-    let shape = s.individual.as_ref().map_or(&stream, Individual::shape);
-    let ailing = s.condition.as_ref().map(|condition| Ailing::new(condition, shape, dust));
-    let vigour = s.vigour.draw32(&mut shape.child(Purpose::Plant, VIGOUR));
-    let options = GrowOptions { vigour, condition: ailing.as_ref().map(Ailing::posture), cell };
-    let plant = match &s.individual {
-        Some(individual) => individual.plant(desc, (&s.growth, s.season), &stream, &options),
-        None => plant::grow_with(&desc.plant, stage, &stream, &options),
-    };
-    let foot = Vec3::new(x, y, z);
-    // Plant coordinates: y to the north before the turn, z along the axis. Growing has given it a turn of its own.
-    let ahead = Vec3::new(s.turn.sin(), s.turn.cos(), 0.0);
-    let frame = Frame::with_tangent(axis, ahead.cross(axis));
-    let rotation = Mat3::from_cols(frame.x, frame.y, frame.z);
-    let class = desc.role.class();
-    let kept = |leaf: u16| s.only_leaf.is_none_or(|l| leaf == l);
-    let to_world = |p: Vec3| rotation * p + foot;
-    let axes = plant.leaf_axes().filter(|a| kept(a.leaf));
-    let mut leaf_axes: Vec<LeafAxis> = axes.map(|a| a.moved(to_world)).collect();
-    leaf_axes.sort_by_key(|a| a.leaf);
-    let last = plant.organs.iter().map(|o| o.leaf).max().unwrap_or(0);
-    let organs = plant.organs.into_iter().filter(|o| kept(o.leaf)).flat_map(|organ| {
-        let mut mesh = organ.mesh;
-        mesh.transform(rotation, foot);
-        let choices = &s.species.materials[&organ.material];
-        let choice = shape.child(Purpose::Leaf, 1 << 20 | u64::from(organ.leaf)).index(choices.len());
-        let chosen = &choices[choice];
-        let pigments = &desc.materials[&organ.material].pigments;
-        let cut = matches!(organ.kind, OrganKind::Blade | OrganKind::Cotyledon);
-        let bare = Bare { kind: organ.kind, choice: chosen, pigments, green, ground: z, last };
-        let grown = Grown {
-            part: Part {
-                mesh,
-                mask: if cut { chosen.mask.clone() } else { None },
-                material: 0,
-                tag: Tag { class, plant: number, leaf: organ.leaf },
-            },
-            kind: organ.kind,
-            key: organ.material,
-            choice,
-            material: chosen.material.with_chlorophyll(pigments.chlorophyll.f32(), green),
-            own: false,
-        };
-        match &ailing {
-            Some(ailing) => ailing.dress(&grown, &bare),
-            None => vec![grown],
-        }
-    });
-    let organs: Vec<Grown> = organs.collect();
-    let record = PlantRecord {
-        number,
-        id: s.id,
-        leaf_ids: Vec::new(),
-        species: desc.name.clone(),
-        eppo: desc.eppo.clone(),
-        kind: 0,
-        class,
-        position: foot,
-        axis,
-        bbch: plant.bbch,
-        age_days: plant.age_days,
-        height: plant.height,
-        radius: plant.radius,
-        leaves: organs.iter().map(|o| o.part.tag.leaf).max().unwrap_or(0),
-        leaf_axes,
-        condition: ailing.as_ref().map(Ailing::drawn),
-    };
-    (record, organs)
-}
-
-/// Which of a plant's streams its vigour in the field is drawn from.
-const VIGOUR: u64 = 1 << 21;
-
-/// Radius over which the ground's slope decides how a plant stands, metres.
-const STANCE: f32 = 0.02;
-/// White noise on the growth axis, degrees.
-const AXIS_NOISE_DEG: f32 = 4.0;

@@ -2,10 +2,11 @@
 
 use super::builder::{Builder, FARTHEST, Floor, MOST_PLANTS};
 use super::identity;
+use super::preview::Stood;
 use crate::geometry::Mesh;
 use crate::material::{Material, Painted, Repaint};
 use crate::math::{Mat3, Spectrum, Vec3};
-use crate::model::{Label, Model};
+use crate::model::{self, Label, Model};
 use crate::ron_file::{Num, Step};
 use crate::sampling::Purpose;
 use crate::scene::desc::ModelDesc;
@@ -14,6 +15,7 @@ use crate::scene::{Part, PlantRecord};
 use crate::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::sync::Arc;
 
 impl Builder<'_> {
     /// Places every model; `numbered` plants have their numbers already. Returns the plants among the models.
@@ -55,16 +57,12 @@ impl Builder<'_> {
         let materials: Vec<u32> =
             model.surfaces.iter().map(|s| self.material(Material::Painted(Painted::new(s, &repaint)))).collect();
         let mut plants: BTreeMap<u16, Vec<usize>> = BTreeMap::new();
-        for part in &model.parts {
+        let meshes = self.meshes(k, &Stood { model: model.clone(), turn, scale, foot });
+        for (part, mesh) in model.parts.iter().zip(meshes) {
             let tag = tag(desc.class, part.label.as_ref(), numbered).ok_or_else(|| {
                 let words = format!("labels can number {MOST_PLANTS} plants, and this model has more");
                 self.page.blame(&at, Error::input(words).help("place fewer"))
             })?;
-            let mut mesh = part.mesh.clone();
-            // A model at the origin as it is keeps its bits.
-            if turn != 0.0 || scale != 1.0 || foot != Vec3::ZERO {
-                mesh.transform(Mat3::from_rotation_z(-turn) * scale, foot);
-            }
             let (lo, hi) = mesh.bounds().unwrap_or_default();
             let reach = lo.abs().max(hi.abs()).max_element();
             if !reach.is_finite() || reach > FARTHEST {
@@ -86,6 +84,28 @@ impl Builder<'_> {
             self.record((number, id), &parts, &desc.file, foot, &model)
         });
         Ok(plants.collect())
+    }
+
+    /// The meshes of a model's parts in their places.
+    fn meshes(&self, k: usize, stood: &Stood) -> Vec<Arc<Mesh>> {
+        let preview = self.options.preview.as_ref();
+        if let Some(known) = preview.and_then(|preview| preview.model(k, stood)) {
+            return known;
+        }
+        let Stood { model, turn, scale, foot } = stood;
+        let put = |part: &model::Part| {
+            let mut mesh = part.mesh.clone();
+            // A model at the origin as it is keeps its bits.
+            if *turn != 0.0 || *scale != 1.0 || *foot != Vec3::ZERO {
+                mesh.transform(Mat3::from_rotation_z(-turn) * *scale, *foot);
+            }
+            Arc::new(mesh)
+        };
+        let meshes: Vec<Arc<Mesh>> = model.parts.iter().map(put).collect();
+        if let Some(preview) = preview {
+            preview.keep_model(k, stood, &meshes);
+        }
+        meshes
     }
 
     /// What is known of a plant that is a model, or a part of one.

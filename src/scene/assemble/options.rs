@@ -1,8 +1,7 @@
 //! What is asked of a field beyond its scene file.
 
+use super::preview::Preview;
 use crate::{Error, Result};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What the command line adds to a scene file.
 #[derive(Clone, Debug, Default)]
@@ -18,14 +17,15 @@ pub struct Options {
     /// Most bytes that a field may take; [`usual_memory`](crate::scene::estimate::usual_memory) unless given. Nothing of a field depends on it, but whether it is
     /// made.
     pub memory: Option<u64>,
-    /// Given for a preview: meshes are as coarse as its pixels, and where the flag is raised the field is given up.
-    pub preview: Option<Arc<AtomicBool>>,
+    /// Given for a preview: meshes are as coarse as its pixels, where its flag is raised the field is given up, and what did not change since the
+    /// field before is taken from there.
+    pub preview: Option<Preview>,
 }
 
 impl Options {
     /// An interruption, where a preview is not wanted any more.
     pub(super) fn wanted(&self) -> Result<()> {
-        let outdated = self.preview.as_ref().is_some_and(|outdated| outdated.load(Ordering::Relaxed));
-        if outdated { Err(Error::interrupted()) } else { Ok(()) }
+        let wanted = self.preview.as_ref().is_none_or(Preview::wanted);
+        if wanted { Ok(()) } else { Err(Error::interrupted()) }
     }
 }

@@ -11,6 +11,7 @@ use furrow::error::Kind;
 use furrow::job::{Field, Renderer, Request, SceneFile, Threads};
 use furrow::render::Watch;
 use furrow::ron_file::RonFile;
+use furrow::scene::assemble::Preview;
 use furrow::settings::{Quality, RenderOptions};
 use furrow::{Error, Result};
 use std::sync::Arc;
@@ -26,6 +27,8 @@ pub(super) struct Worker {
     memory: Option<u64>,
     renderer: Renderer,
     tev: Option<Tev>,
+    /// What is kept of the last field.
+    preview: Preview,
     /// The last scene file that could be read, with its textures and species.
     known: Option<SceneFile>,
     /// Pixels across of the scene's own camera, once one was seen.
@@ -42,7 +45,8 @@ impl Worker {
     ) -> Result<Self> {
         let renderer = Renderer::open(&RenderOptions::path_traced(Quality::spp(session.spp())))?;
         let threads = threads.clone();
-        Ok(Self { session, files, threads, memory, renderer, tev, known: None, own_width: None })
+        let preview = Preview::new(session.outdated());
+        Ok(Self { session, files, threads, memory, renderer, tev, preview, known: None, own_width: None })
     }
 
     /// Works until the session ends.
@@ -90,7 +94,7 @@ impl Worker {
             Some(known) => known.reread(Some(&text))?,
             None => SceneFile::open(session.path())?.threads(&self.threads).reread(Some(&text))?,
         };
-        let scene = scene.seed(wish.seed).memory(self.memory).preview(session.outdated());
+        let scene = scene.seed(wish.seed).memory(self.memory).preview(&self.preview);
         let field = Arc::new(self.grow(&scene, wish)?);
         self.files.follow(session.path(), &field.grown().files);
         self.known = Some(scene.clone());
@@ -154,7 +158,8 @@ impl Worker {
             });
         }
         let width = self.own_width.unwrap_or(sheet::WIDTH).min(sheet::WIDTH);
-        let scene = scene.clone().width(width);
+        // Their fields are others: the picture's is kept apart from them.
+        let scene = scene.clone().width(width).preview(&Preview::new(session.outdated()));
         for index in session.shown(|shown| shown.sheet.pictures.len() as u64)..sheet::COUNT {
             if session.outdated().load(Ordering::Relaxed) {
                 return Err(Error::interrupted());

@@ -1,0 +1,138 @@
+//! A plant to be grown, and how it grows in its place.
+
+use super::condition::{Ailing, Bare};
+use super::grown::Grown;
+use super::individual::Individual;
+use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3};
+use crate::plant::{self, ConditionDesc, GrowOptions, LeafAxis, OrganKind};
+use crate::ron_file::{Positive, Vary};
+use crate::sampling::{Purpose, Stream};
+use crate::scatter;
+use crate::scene::desc::{Growth, SpeciesDesc};
+use crate::scene::library::Species;
+use crate::scene::tag::Tag;
+use crate::scene::{Part, PlantRecord};
+use std::sync::Arc;
+
+/// Which of a plant's streams its vigour in the field is drawn from.
+const VIGOUR: u64 = 1 << 21;
+/// White noise on the growth axis, degrees.
+const AXIS_NOISE_DEG: f32 = 4.0;
+
+/// A plant to be grown: where, which, how old.
+#[derive(Clone, PartialEq)]
+pub(super) struct Seedling {
+    pub(super) species: Arc<Species>,
+    pub(super) growth: Growth,
+    /// Place of the field's season in a list of growths.
+    pub(super) season: usize,
+    pub(super) position: Vec2,
+    pub(super) turn: f32,
+    pub(super) only_leaf: Option<u16>,
+    pub(super) stream: Stream,
+    /// Whose shape and age it has, where all of its species are alike.
+    pub(super) individual: Option<Individual>,
+    /// Factor on its sizes.
+    pub(super) vigour: Vary<Positive>,
+    pub(super) condition: Option<ConditionDesc>,
+    /// See [`super::identity::of`].
+    pub(super) id: u32,
+}
+
+impl Seedling {
+    /// The same as vigorous as its entry in the scene file says, and in the entry's condition, if it has one.
+    pub(super) fn tended(self, vigour: &Vary<Positive>, condition: Option<&ConditionDesc>) -> Self {
+        let condition = condition.cloned().or(self.condition);
+        Self { vigour: vigour.clone(), condition, ..self }
+    }
+}
+
+/// Where a plant stands, and what it is meshed for: all that its shape and its materials follow from beside its seedling.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) struct Place {
+    /// Height of its foot, metres.
+    pub(super) height: f32,
+    /// Of the ground about it.
+    pub(super) normal: Vec3,
+    /// Reflectance of the dry soil that lies on leaves.
+    pub(super) dust: Spectrum,
+    /// Shortest cell of its mesh, metres.
+    pub(super) cell: f32,
+}
+
+/// Grows one plant, in its own stream, and stands it in its place. It has no number yet.
+pub(super) fn grow(s: &Seedling, place: &Place) -> (PlantRecord, Vec<Grown>) {
+    let Place { height: z, normal, dust, cell } = *place;
+    let desc: &SpeciesDesc = &s.species.desc;
+    let mut stream = s.stream.clone();
+    let stage = s.growth.draw(s.season, &mut stream);
+    let green = (1.0 + desc.chlorophyll_sd.get() * stream.normal()).clamp(0.6, 1.5) as f32;
+    let axis = scatter::axis(normal, AXIS_NOISE_DEG, &mut stream);
+    let shape = s.individual.as_ref().map_or(&stream, Individual::shape);
+    let ailing = s.condition.as_ref().map(|condition| Ailing::new(condition, shape, dust));
+    let vigour = s.vigour.draw32(&mut shape.child(Purpose::Plant, VIGOUR));
+    let options = GrowOptions { vigour, condition: ailing.as_ref().map(Ailing::posture), cell };
+    let plant = match &s.individual {
+        Some(individual) => individual.plant(desc, (&s.growth, s.season), &stream, &options),
+        None => plant::grow_with(&desc.plant, stage, &stream, &options),
+    };
+    let foot = s.position.extend(z);
+    // Plant coordinates: y to the north before the turn, z along the axis. Growing has given it a turn of its own.
+    let ahead = Vec3::new(s.turn.sin(), s.turn.cos(), 0.0);
+    let frame = Frame::with_tangent(axis, ahead.cross(axis));
+    let rotation = Mat3::from_cols(frame.x, frame.y, frame.z);
+    let class = desc.role.class();
+    let kept = |leaf: u16| s.only_leaf.is_none_or(|l| leaf == l);
+    let to_world = |p: Vec3| rotation * p + foot;
+    let axes = plant.leaf_axes().filter(|a| kept(a.leaf));
+    let mut leaf_axes: Vec<LeafAxis> = axes.map(|a| a.moved(to_world)).collect();
+    leaf_axes.sort_by_key(|a| a.leaf);
+    let last = plant.organs.iter().map(|o| o.leaf).max().unwrap_or(0);
+    let organs = plant.organs.into_iter().filter(|o| kept(o.leaf)).flat_map(|organ| {
+        let mut mesh = organ.mesh;
+        mesh.transform(rotation, foot);
+        let choices = &s.species.materials[&organ.material];
+        let choice = shape.child(Purpose::Leaf, 1 << 20 | u64::from(organ.leaf)).index(choices.len());
+        let chosen = &choices[choice];
+        let pigments = &desc.materials[&organ.material].pigments;
+        let cut = matches!(organ.kind, OrganKind::Blade | OrganKind::Cotyledon);
+        let bare = Bare { kind: organ.kind, choice: chosen, pigments, green, ground: z, last };
+        let grown = Grown {
+            part: Part {
+                mesh: Arc::new(mesh),
+                mask: if cut { chosen.mask.clone() } else { None },
+                material: 0,
+                tag: Tag { class, plant: 0, leaf: organ.leaf },
+            },
+            kind: organ.kind,
+            key: organ.material,
+            choice,
+            material: chosen.material.with_chlorophyll(pigments.chlorophyll.f32(), green),
+            own: false,
+        };
+        match &ailing {
+            Some(ailing) => ailing.dress(&grown, &bare),
+            None => vec![grown],
+        }
+    });
+    let organs: Vec<Grown> = organs.collect();
+    let record = PlantRecord {
+        number: 0,
+        id: s.id,
+        leaf_ids: Vec::new(),
+        species: desc.name.clone(),
+        eppo: desc.eppo.clone(),
+        kind: 0,
+        class,
+        position: foot,
+        axis,
+        bbch: plant.bbch,
+        age_days: plant.age_days,
+        height: plant.height,
+        radius: plant.radius,
+        leaves: organs.iter().map(|o| o.part.tag.leaf).max().unwrap_or(0),
+        leaf_axes,
+        condition: ailing.as_ref().map(Ailing::drawn),
+    };
+    (record, organs)
+}
