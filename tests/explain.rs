@@ -3,6 +3,7 @@
 //!
 //! `cargo run -- reference` (and `cargo run --features train --bin train -- reference`) writes the pages anew.
 
+use furrow::scene::assemble::{Options, Source};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -128,11 +129,14 @@ fn what_was_hardly_meant_is_told() {
         let file = folder.path().join("field.ron");
         let text = format!("Field(camera: {camera}, lights: [Overcast()], crops: [(species: {species:?}, {crop})])");
         fs::write(&file, text).unwrap();
-        let field = furrow::scene::assemble::field(
-            &file,
-            &furrow::scene::assemble::Options { width: Some(32), ..Default::default() },
-        );
-        field.unwrap().warnings.join("\n")
+        let source = Source::open(&file).unwrap();
+        let options = Options { width: Some(32), ..Options::default() };
+        let (foretold, all) = (source.foretold(&options).unwrap(), source.field(&options).unwrap().warnings);
+        // All but what only a grown field can tell is told before it grows.
+        let later: Vec<&String> = all.iter().filter(|warning| !foretold.contains(warning)).collect();
+        assert!(later.iter().all(|warning| warning.contains("no crop stands")), "{later:?}");
+        assert!(foretold.iter().all(|warning| all.contains(warning)), "{foretold:?}");
+        all.join("\n")
     };
     let rows = "rows: (spacing_m: 0.75, in_row_m: 0.05)";
     let low = "JaiAd130(height_m: 3)";
@@ -141,6 +145,8 @@ fn what_was_hardly_meant_is_told() {
     assert!(words.contains("its plants end at BBCH 18, so BBCH 45 looks like that"), "{words}");
     let words = warnings(low, "growth: Bbch(14), rows: (spacing_m: 75)");
     assert!(words.contains("rows of") && words.contains("stand 75 m apart"), "{words}");
+    let words = warnings(low, "growth: Bbch(14), rows: (spacing_m: 0.75, in_row_m: 16)");
+    assert!(words.contains("stands 16 m apart in its rows; in_row_m is in metres"), "{words}");
     let words = warnings(low, "growth: Bbch(11), rows: (spacing_m: 75, offset_m: 30)");
     assert!(words.contains("no crop stands in the camera's view"), "{words}");
     let words = warnings("JaiAd130(height_m: 8), sensor: Phone", &format!("growth: Bbch(14), {rows}"));

@@ -8,7 +8,7 @@
 mod common;
 
 use common::program::{SMALL, small_text, trace};
-use common::python::python;
+use common::python::{python, torch_with};
 use furrow::dataset::format::{self, NAMES};
 use furrow::dataset::recipe::Made;
 use furrow::dataset::sample::IGNORE;
@@ -49,7 +49,12 @@ fn dataset(name: &str, page: &Path, count: u32) -> PathBuf {
 
 /// Has a client's script look at both datasets; `probe` is a line of Python that runs where the client is installed.
 fn ask(script: &str, probe: &str) {
-    let Some(python) = python(probe) else { return };
+    ask_with(python(probe), script);
+}
+
+/// The same of this Python, if there is one.
+fn ask_with(python: Option<PathBuf>, script: &str) {
+    let Some(python) = python else { return };
     for dataset in [&*FIELD, &*BARE] {
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/formats").join(script);
         // No stray files in the sources, nothing asked of the network.
@@ -74,6 +79,11 @@ fn pycocotools_reads_what_we_wrote() {
 #[test]
 fn supervision_reads_what_we_wrote() {
     ask("check_yolo.py", "import supervision");
+}
+
+#[test]
+fn ultralytics_reads_what_we_wrote() {
+    ask_with(torch_with("ultralytics"), "check_ultralytics.py");
 }
 
 #[test]

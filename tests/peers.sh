@@ -2,11 +2,11 @@
 # Installs what the build and the tests need, on Debian 12, as root or as a user who may sudo, and asks nothing: Embree and a C compiler; Mesa's
 # Vulkan for the rasterized engine; and the
 # programs that the tests ask for a second opinion (a browser, a batch system, Python clients in target/venv, Debian's PyTorch for the CPU with
-# target/venv-torch, 151 MB to download); libtorch for the feature `train`.
+# target/venv-torch, 210 MB to download); libtorch for the feature `train`.
 # What is there already is left alone.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-packages="libembree-dev build-essential mesa-vulkan-drivers libvulkan1 python3-venv libllvm19 chromium slurm-wlm munge iproute2 procps parallel python3-torch python3-pil"
+packages="libembree-dev build-essential mesa-vulkan-drivers libvulkan1 python3-venv libllvm19 chromium slurm-wlm munge iproute2 procps parallel python3-torch python3-torchvision python3-pil"
 # shellcheck disable=SC2086 # a list of packages
 if ! dpkg -s $packages >/dev/null 2>&1; then
   sudo=$([ "$(id -u)" = 0 ] || echo sudo)
@@ -19,10 +19,10 @@ if ! cmp -s tests/requirements.txt target/venv/installed; then
   cp tests/requirements.txt target/venv/installed
 fi
 # PyPI's torch for Linux needs three gigabytes of CUDA. Debian's is for the CPU, and is found by Debian's Python only.
-beside_torch="$(grep '^safetensors==' tests/requirements.txt) efficientnet-lite-pytorch==0.1.0"
+beside_torch="$(grep '^safetensors==' tests/requirements.txt) efficientnet-lite-pytorch==0.1.0 ultralytics==8.4.190 opencv-python-headless==4.10.0.84"
 if [ "$(cat target/venv-torch/installed 2>/dev/null || true)" != "$beside_torch" ]; then
   /usr/bin/python3 -m venv --system-site-packages target/venv-torch
-  # shellcheck disable=SC2086 # two packages
+  # shellcheck disable=SC2086 # a list of packages
   target/venv-torch/bin/pip install -q --no-deps $beside_torch
   echo "$beside_torch" > target/venv-torch/installed
 fi

@@ -6,10 +6,10 @@
 //! both must see one geometry. The instruction set is pinned: hits differ in the last bits between instruction sets.
 
 use super::{Surface, rtc};
-use crate::Result;
 use crate::geometry::alpha::{Sorted, sort};
 use crate::geometry::{AlphaMask, Hit, Intersect, PACKET, Ray};
 use crate::math::Vec2;
+use crate::{Error, Result};
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -21,12 +21,26 @@ const ISA: &str = "avx2";
 pub struct EmbreeAccel {
     scene: rtc::Scene<Cut>,
     slots: Vec<Slot>,
+    /// For each part the first of its slots, and the number of all.
+    firsts: Vec<usize>,
 }
 
 /// An Embree geometry's part, and its triangles where they are not simply all of them in order.
 struct Slot {
     part: u32,
-    triangles: Option<Box<[u32]>>,
+    triangles: Option<Arc<[u32]>>,
+}
+
+/// One geometry of a part, and its triangles as in [`Slot`].
+type Piece = (Arc<rtc::Geometry<Cut>>, Option<Arc<[u32]>>);
+
+/// Where a build begins that is not the first: what was built before, and for each surface its place among those of before if it is the very
+/// same mesh with the very same mask.
+pub struct Before<'a> {
+    /// What was built.
+    pub accel: &'a EmbreeAccel,
+    /// One place for each surface.
+    pub places: &'a [Option<usize>],
 }
 
 /// What the filter of a masked geometry asks: the corners' texture coordinates by primitive, and the mask.
@@ -56,35 +70,43 @@ pub fn version() -> Result<String> {
 impl EmbreeAccel {
     /// Builds the hierarchy over all surfaces with `threads` threads (0: all there are); masks are looked at in the pool that it is called in.
     pub fn build(surfaces: &[Surface<'_>], threads: u32) -> Result<Self> {
-        Self::build_until(surfaces, threads, None)
+        Self::build_until(surfaces, threads, None, None)
     }
 
-    /// The same; an interruption where the flag is raised before it is built.
-    pub fn build_until(surfaces: &[Surface<'_>], threads: u32, outdated: Option<&AtomicBool>) -> Result<Self> {
-        let mut scene = rtc::Builder::new(rtc::Device::new(ISA, threads)?)?;
-        let mut slots = Vec::with_capacity(surfaces.len());
-        let cut = |surface: &Surface<'_>| surface.mask.map(|mask| sort(surface.mesh, Some(mask)));
-        let sorted: Vec<Option<Sorted>> = surfaces.par_iter().map(cut).collect();
-        for (part, (Surface { mesh, mask }, sorted)) in surfaces.iter().zip(sorted).enumerate() {
-            let part = part as u32;
-            let (Some(mask), Some(sorted)) = (mask, sorted) else {
-                scene.attach(&mesh.positions, mesh.triangles.iter().copied(), None)?;
-                slots.push(Slot { part, triangles: None });
-                continue;
-            };
-            let only = |i: &u32| mesh.triangles[*i as usize];
-            if !sorted.opaque.is_empty() {
-                scene.attach(&mesh.positions, sorted.opaque.iter().map(only), None)?;
-                slots.push(Slot { part, triangles: Some(sorted.opaque.into()) });
-            }
-            if !sorted.mixed.is_empty() {
-                let uvs = sorted.mixed.iter().map(|i| only(i).map(|k| mesh.uvs[k as usize])).collect();
-                let cut = Cut { uvs, mask: Arc::clone(mask) };
-                scene.attach(&mesh.positions, sorted.mixed.iter().map(only), Some(cut))?;
-                slots.push(Slot { part, triangles: Some(sorted.mixed.into()) });
+    /// The same from what was built before; an interruption where the flag is raised before it is built.
+    pub fn build_until(
+        surfaces: &[Surface<'_>],
+        threads: u32,
+        outdated: Option<&AtomicBool>,
+        before: Option<&Before<'_>>,
+    ) -> Result<Self> {
+        let device = match before {
+            Some(before) => before.accel.scene.device().clone(),
+            None => Arc::new(rtc::Device::new(ISA, threads)?),
+        };
+        let made = |(i, surface): (usize, &Surface<'_>)| match before.and_then(|b| Some((b.accel, b.places[i]?))) {
+            Some((accel, place)) => Ok(accel.pieces(place)),
+            None => pieces(&device, surface),
+        };
+        let made: Vec<Vec<Piece>> = surfaces.par_iter().enumerate().map(made).collect::<Result<_>>()?;
+        let (mut slots, mut geometries) = (Vec::with_capacity(made.len()), Vec::with_capacity(made.len()));
+        let mut firsts = Vec::with_capacity(made.len() + 1);
+        for (part, pieces) in (0..).zip(made) {
+            firsts.push(slots.len());
+            for (geometry, triangles) in pieces {
+                slots.push(Slot { part, triangles });
+                geometries.push(geometry);
             }
         }
-        Ok(Self { scene: scene.commit(outdated)?, slots })
+        firsts.push(slots.len());
+        Ok(Self { scene: rtc::Scene::build(&device, geometries, outdated)?, slots, firsts })
+    }
+
+    /// The geometries of a part.
+    fn pieces(&self, part: usize) -> Vec<Piece> {
+        let range = self.firsts[part]..self.firsts[part + 1];
+        let geometries = self.scene.geometries()[range.clone()].iter();
+        geometries.zip(&self.slots[range]).map(|(g, slot)| (g.clone(), slot.triangles.clone())).collect()
     }
 
     /// Embree's hit as a hit on a part.
@@ -94,6 +116,29 @@ impl EmbreeAccel {
         let triangle = slot.triangles.as_ref().map_or(primitive, |t| t[primitive as usize]);
         Hit { part: slot.part, triangle, u, v, t }
     }
+}
+
+/// The geometries of a surface: what is opaque all over, and what its mask cuts.
+fn pieces(device: &Arc<rtc::Device>, Surface { mesh, mask }: &Surface<'_>) -> Result<Vec<Piece>> {
+    let new = |triangles: &[u32], cut| {
+        let corners = triangles.iter().map(|i| mesh.triangles[*i as usize]);
+        let geometry = rtc::Geometry::new(device, &mesh.positions, corners, cut)?;
+        Ok::<_, Error>((Arc::new(geometry), Some(triangles.into())))
+    };
+    let Some(mask) = mask else {
+        let geometry = rtc::Geometry::new(device, &mesh.positions, mesh.triangles.iter().copied(), None)?;
+        return Ok(vec![(Arc::new(geometry), None)]);
+    };
+    let Sorted { opaque, mixed } = sort(mesh, Some(mask));
+    let mut pieces = Vec::with_capacity(2);
+    if !opaque.is_empty() {
+        pieces.push(new(&opaque, None)?);
+    }
+    if !mixed.is_empty() {
+        let uvs = mixed.iter().map(|i| mesh.triangles[*i as usize].map(|k| mesh.uvs[k as usize])).collect();
+        pieces.push(new(&mixed, Some(Cut { uvs, mask: Arc::clone(mask) }))?);
+    }
+    Ok(pieces)
 }
 
 impl Intersect for EmbreeAccel {

@@ -8,7 +8,7 @@ use crate::geometry::{AlphaMask, Mesh};
 use std::sync::Arc;
 
 pub use brute::Brute;
-pub use embree::{EmbreeAccel, prepare_thread, version};
+pub use embree::{Before, EmbreeAccel, prepare_thread, version};
 
 /// One part as the accelerators see it: its index is its place in the slice that is built.
 #[derive(Clone, Copy, Debug)]

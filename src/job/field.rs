@@ -75,8 +75,8 @@ impl Field {
             let (scene, count) = (&self.grown.scene, self.threads.count() as u32);
             let built = self.threads.install(|| match &self.preview {
                 None => EmbreeAccel::build(&scene.surfaces(), count).map(Arc::new),
-                Some(preview) => preview.geometry(&scene.parts, || {
-                    EmbreeAccel::build_until(&scene.surfaces(), count, Some(preview.outdated()))
+                Some(preview) => preview.geometry(&scene.parts, |before| {
+                    EmbreeAccel::build_until(&scene.surfaces(), count, Some(preview.outdated()), before)
                 }),
             })?;
             let _ = self.geometry.set((built, begin.elapsed()));

@@ -104,6 +104,12 @@ impl SceneFile {
         self
     }
 
+    /// What field `index` warns of that is known before it grows; [`scene::Field::warnings`](crate::scene::Field) repeats it.
+    #[doc(hidden)]
+    pub fn foretold(&self, index: u64) -> Result<Vec<String>> {
+        self.source.foretold(&Options { index, ..self.options.clone() })
+    }
+
     /// How many images are taken of each field.
     pub fn captures(&self) -> u64 {
         self.source.captures()

@@ -12,4 +12,4 @@ mod scene;
 mod sys;
 
 pub(super) use device::{Device, prepare_thread};
-pub(super) use scene::{Builder, Filter, Hit, Scene};
+pub(super) use scene::{Filter, Geometry, Hit, Scene};

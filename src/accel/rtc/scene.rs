@@ -21,7 +21,7 @@ pub(in crate::accel) trait Filter: Send + Sync {
 /// A hit in Embree's numbers.
 #[derive(Clone, Copy)]
 pub(in crate::accel) struct Hit {
-    /// Which call of [`Builder::attach`], from 0.
+    /// Its place among the geometries of [`Scene::build`].
     pub(in crate::accel) geometry: u32,
     /// Which of its triangles.
     pub(in crate::accel) primitive: u32,
@@ -33,10 +33,9 @@ pub(in crate::accel) struct Hit {
 /// A scene that nothing changes any more.
 pub(in crate::accel) struct Scene<F> {
     handle: *mut sys::RTCScene,
-    /// What the geometries' filters point to: it lives as long as the scene, and does not move.
-    filters: Vec<Arc<F>>,
-    /// Released after the scene.
-    device: Device,
+    /// Released after the scene, with what their filters point to. They hold the device.
+    geometries: Vec<Arc<Geometry<F>>>,
+    device: Arc<Device>,
 }
 
 // SAFETY: Embree's committed scenes may be asked from any thread, and from several at once; filters may be as well.
@@ -50,64 +49,25 @@ impl<F> Drop for Scene<F> {
     }
 }
 
-/// A scene that grows.
-pub(in crate::accel) struct Builder<F>(Scene<F>);
-
-impl<F: Filter> Builder<F> {
-    /// An empty scene that is traversed robustly.
-    pub(in crate::accel) fn new(device: Device) -> Result<Self> {
+impl<F: Filter> Scene<F> {
+    /// Builds the hierarchy over geometries of this device, which is traversed robustly; an interruption where the flag is raised meanwhile.
+    pub(in crate::accel) fn build(
+        device: &Arc<Device>,
+        geometries: Vec<Arc<Geometry<F>>>,
+        outdated: Option<&AtomicBool>,
+    ) -> Result<Self> {
         // SAFETY: the device lives.
         let handle = device.made(unsafe { sys::rtcNewScene(device.handle()) })?;
+        let scene = Self { handle, geometries, device: device.clone() };
         // SAFETY: the scene lives; both numbers are among the headers' values.
         unsafe {
             sys::rtcSetSceneFlags(handle, sys::RTC_SCENE_FLAG_ROBUST);
             sys::rtcSetSceneBuildQuality(handle, sys::RTC_BUILD_QUALITY_MEDIUM);
         }
-        Ok(Self(Scene { handle, filters: Vec::new(), device }))
-    }
-
-    /// Adds a geometry; without triangles it is one point, so that numbers follow the order of calls.
-    ///
-    /// # Panics
-    /// Where a triangle names a corner that is not there.
-    pub(in crate::accel) fn attach(
-        &mut self,
-        corners: &[Vec3],
-        triangles: impl ExactSizeIterator<Item = [u32; 3]>,
-        filter: Option<F>,
-    ) -> Result<()> {
-        let scene = &mut self.0;
-        let mut geometry = Geometry::new(&scene.device)?;
-        let (points, count) = (corners.len().max(1), triangles.len().max(1));
-        let to = geometry.buffer(&scene.device, sys::RTC_BUFFER_TYPE_VERTEX, sys::RTC_FORMAT_FLOAT3, points)?;
-        fill(to, corners.iter().map(Vec3::to_array));
-        let to = geometry.buffer(&scene.device, sys::RTC_BUFFER_TYPE_INDEX, sys::RTC_FORMAT_UINT3, count)?;
-        let there = |triangle: &[u32; 3]| triangle.iter().all(|corner| (*corner as usize) < corners.len());
-        fill(to, triangles.inspect(|triangle| assert!(there(triangle), "{triangle:?} of {} corners", corners.len())));
-        // SAFETY: the geometry lives; the number is among the headers' values.
-        unsafe { sys::rtcSetGeometryBuildQuality(geometry.0, sys::RTC_BUILD_QUALITY_MEDIUM) };
-        if let Some(filter) = filter {
-            let filter = Arc::new(filter);
-            let data = Arc::as_ptr(&filter).cast_mut().cast::<c_void>();
-            scene.filters.push(filter);
-            // SAFETY: the geometry lives. `confirm` reads an `F` behind the pointer, and `filters` keeps it while the scene can ask.
-            unsafe {
-                sys::rtcSetGeometryUserData(geometry.0, data);
-                sys::rtcSetGeometryIntersectFilterFunction(geometry.0, confirm::<F>);
-                sys::rtcSetGeometryOccludedFilterFunction(geometry.0, confirm::<F>);
-            }
+        for geometry in &scene.geometries {
+            // SAFETY: geometry and scene live and are of one device; a geometry may be attached to several scenes, and none changes it.
+            unsafe { sys::rtcAttachGeometry(handle, geometry.handle) };
         }
-        // SAFETY: geometry and scene live and are of one device; the scene keeps the geometry when this side lets go of it.
-        unsafe {
-            sys::rtcCommitGeometry(geometry.0);
-            sys::rtcAttachGeometry(scene.handle, geometry.0);
-        }
-        scene.device.check()
-    }
-
-    /// Builds the hierarchy; an interruption where the flag is raised meanwhile.
-    pub(in crate::accel) fn commit(self, outdated: Option<&AtomicBool>) -> Result<Scene<F>> {
-        let handle = self.0.handle;
         if let Some(outdated) = outdated {
             let flag = ptr::from_ref(outdated).cast_mut().cast::<c_void>();
             // SAFETY: the scene lives; `wanted` reads an `AtomicBool` behind the pointer, which outlives the commit, and Embree forgets it below.
@@ -118,8 +78,18 @@ impl<F: Filter> Builder<F> {
             sys::rtcCommitScene(handle);
             sys::rtcSetSceneProgressMonitorFunction(handle, None, ptr::null_mut());
         }
-        self.0.device.check()?;
-        Ok(self.0)
+        scene.device.check()?;
+        Ok(scene)
+    }
+
+    /// The device that it was built with.
+    pub(in crate::accel) fn device(&self) -> &Arc<Device> {
+        &self.device
+    }
+
+    /// The geometries that it was built over.
+    pub(in crate::accel) fn geometries(&self) -> &[Arc<Geometry<F>>] {
+        &self.geometries
     }
 }
 
@@ -129,36 +99,72 @@ unsafe extern "C" fn wanted(flag: *mut c_void, _: f64) -> bool {
     !unsafe { &*flag.cast::<AtomicBool>() }.load(Ordering::Relaxed)
 }
 
-/// A geometry that this side holds.
-struct Geometry(*mut sys::RTCGeometry);
+/// Triangles with a filter, which nothing changes any more.
+pub(in crate::accel) struct Geometry<F> {
+    handle: *mut sys::RTCGeometry,
+    /// What the filter functions point to: it lives as long as the geometry, and does not move.
+    filter: Option<Arc<F>>,
+    /// Released after the geometry.
+    device: Arc<Device>,
+}
 
-impl Drop for Geometry {
+// SAFETY: Embree's objects may be used from any thread; a committed geometry is only read, and so is its filter.
+unsafe impl<F: Send + Sync> Send for Geometry<F> {}
+unsafe impl<F: Send + Sync> Sync for Geometry<F> {}
+
+impl<F> Drop for Geometry<F> {
     fn drop(&mut self) {
-        // SAFETY: the pointer is `rtcNewGeometry`'s, and this is the only release of it.
-        unsafe { sys::rtcReleaseGeometry(self.0) }
+        // SAFETY: the pointer is `rtcNewGeometry`'s, and this is the only release of it; scenes that still have it count for themselves, and are
+        // not asked any more: they hold this.
+        unsafe { sys::rtcReleaseGeometry(self.handle) }
     }
 }
 
-impl Geometry {
-    fn new(device: &Device) -> Result<Self> {
+impl<F: Filter> Geometry<F> {
+    /// One of these triangles; without any it is one point, so that it has a number all the same.
+    ///
+    /// # Panics
+    /// Where a triangle names a corner that is not there.
+    pub(in crate::accel) fn new(
+        device: &Arc<Device>,
+        corners: &[Vec3],
+        triangles: impl ExactSizeIterator<Item = [u32; 3]>,
+        filter: Option<F>,
+    ) -> Result<Self> {
         // SAFETY: the device lives; the number is among the headers' values.
         let handle = unsafe { sys::rtcNewGeometry(device.handle(), sys::RTC_GEOMETRY_TYPE_TRIANGLE) };
-        device.made(handle).map(Self)
+        let handle = device.made(handle)?;
+        let mut geometry = Self { handle, filter: filter.map(Arc::new), device: device.clone() };
+        let (points, count) = (corners.len().max(1), triangles.len().max(1));
+        let to = geometry.buffer(sys::RTC_BUFFER_TYPE_VERTEX, sys::RTC_FORMAT_FLOAT3, points)?;
+        fill(to, corners.iter().map(Vec3::to_array));
+        let to = geometry.buffer(sys::RTC_BUFFER_TYPE_INDEX, sys::RTC_FORMAT_UINT3, count)?;
+        let there = |triangle: &[u32; 3]| triangle.iter().all(|corner| (*corner as usize) < corners.len());
+        fill(to, triangles.inspect(|triangle| assert!(there(triangle), "{triangle:?} of {} corners", corners.len())));
+        // SAFETY: the geometry lives; the number is among the headers' values.
+        unsafe { sys::rtcSetGeometryBuildQuality(handle, sys::RTC_BUILD_QUALITY_MEDIUM) };
+        if let Some(filter) = &geometry.filter {
+            let data = Arc::as_ptr(filter).cast_mut().cast::<c_void>();
+            // SAFETY: the geometry lives. `confirm` reads an `F` behind the pointer, and `filter` keeps it while a scene can ask.
+            unsafe {
+                sys::rtcSetGeometryUserData(handle, data);
+                sys::rtcSetGeometryIntersectFilterFunction(handle, confirm::<F>);
+                sys::rtcSetGeometryOccludedFilterFunction(handle, confirm::<F>);
+            }
+        }
+        // SAFETY: the geometry lives.
+        unsafe { sys::rtcCommitGeometry(handle) };
+        device.check()?;
+        Ok(geometry)
     }
 
     /// A new buffer of `count` triples, to be filled; its format has three values of four bytes, as `T` has.
-    fn buffer<T>(
-        &mut self,
-        device: &Device,
-        kind: u32,
-        format: u32,
-        count: usize,
-    ) -> Result<&mut [MaybeUninit<[T; 3]>]> {
+    fn buffer<T>(&mut self, kind: u32, format: u32, count: usize) -> Result<&mut [MaybeUninit<[T; 3]>]> {
         const { assert!(size_of::<T>() == 4 && align_of::<T>() == 4) };
         let stride = size_of::<[T; 3]>();
         // SAFETY: the geometry lives; the numbers are among the headers' values.
-        let data = unsafe { sys::rtcSetNewGeometryBuffer(self.0, kind, 0, format, stride, count) };
-        let data = device.made(data)?.cast();
+        let data = unsafe { sys::rtcSetNewGeometryBuffer(self.handle, kind, 0, format, stride, count) };
+        let data = self.device.made(data)?.cast();
         // SAFETY: Embree's buffer has that many triples, aligned to 16 bytes; it lives as long as the geometry, which nothing else changes meanwhile.
         Ok(unsafe { std::slice::from_raw_parts_mut(data, count) })
     }

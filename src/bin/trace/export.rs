@@ -52,13 +52,16 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     args.field.check()?;
     let out = args.out.clone().unwrap_or_else(|| args.field.default_folder().join(args.format.name()));
     cli::check_folder(&out)?;
-    let field = args.field.grow(&FULL, &Threads::all()?)?;
-    let export = field.threads().install(|| args.format.write(&out, field.grown()))?;
-    if !args.quiet {
-        for warning in field.grown().warnings.iter().chain(&export.warnings) {
-            furrow::tell!("warning: {warning}");
+    let tell = |words: &str| {
+        if !args.quiet {
+            furrow::tell!("{words}");
         }
-        furrow::tell!("{}: {} files in {}", args.field.path().display(), export.paths.len(), out.display());
+    };
+    let field = args.field.grow(&FULL, &Threads::all()?, tell)?;
+    let export = field.threads().install(|| args.format.write(&out, field.grown()))?;
+    for warning in &export.warnings {
+        tell(&format!("warning: {warning}"));
     }
+    tell(&format!("{}: {} files in {}", args.field.path().display(), export.paths.len(), out.display()));
     Ok(export.paths)
 }

@@ -86,11 +86,16 @@ impl FieldArgs {
         self.scene.check()
     }
 
-    /// Grows the field as an edit has it.
-    pub(crate) fn grow(&self, edit: &'static Edit, threads: &Threads) -> Result<Field> {
+    /// Grows the field as an edit has it; its warnings are told as soon as they are known.
+    pub(crate) fn grow(&self, edit: &'static Edit, threads: &Threads, tell: impl Fn(&str)) -> Result<Field> {
+        let tell = |warning: &String| tell(&format!("warning: {warning}"));
         let SceneArgs { seed, width, height, .. } = self.scene;
         let scene = SceneFile::edited(self.path(), edit)?.seed(seed).width(width).height(height);
-        let mut field = scene.memory(self.memory.bytes).threads(threads).field(self.index)?;
+        let scene = scene.memory(self.memory.bytes).threads(threads);
+        let foretold = scene.foretold(self.index)?;
+        foretold.iter().for_each(tell);
+        let mut field = scene.field(self.index)?;
+        field.grown().warnings.iter().filter(|warning| !foretold.contains(warning)).for_each(tell);
         let captures = &field.grown().captures;
         let place = captures.iter().position(|c| c.frame == self.frame && c.name == self.camera);
         let Some(place) = place else {

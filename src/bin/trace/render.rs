@@ -75,9 +75,8 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     }
     let renderer = Renderer::open(&options)?;
     let threads = Threads::new(args.threads)?;
-    let field = args.field.grow(edit, &threads)?;
-    let warning = renderer.warning(&field).map(String::from);
-    for warning in field.grown().warnings.iter().chain(&warning) {
+    let field = args.field.grow(edit, &threads, |words| args.say(words))?;
+    if let Some(warning) = renderer.warning(&field) {
         args.say(&format!("warning: {warning}"));
     }
     let camera = &field.grown().scene.camera;

@@ -46,6 +46,7 @@ pub trait Format: Sync {
     }
 }
 
+mod boxes;
 mod conditions;
 mod drives;
 mod outline;
@@ -106,6 +107,10 @@ formats! {
         r#"numpy.loadtxt("tum/000000-camera.txt")"#;
     "yolo" => yolo: "YOLO segmentation: a polygon a plant, with what is lost by it, for Ultralytics and `supervision`",
         r#"supervision.DetectionDataset.from_yolo("yolo/images/train", "yolo/labels/train", "yolo/data.yaml", force_masks=True)"#;
+    "yolo-detect" => yolo_detect: "YOLO detection: a box a plant, for Ultralytics and `supervision`",
+        r#"supervision.DetectionDataset.from_yolo("yolo-detect/images/train", "yolo-detect/labels/train", "yolo-detect/data.yaml")"#;
+    "yolo-pose" => yolo_pose: "YOLO pose: a box a plant with its stem and the tips of its leaves, for Ultralytics",
+        r#"ultralytics.data.dataset.YOLODataset(img_path="yolo-pose/images/train", data=data, task="pose")"#;
 }
 
 /// The formats that a recipe names.

@@ -1,19 +1,42 @@
 //! A mask as one closed polygon, with holes and parts joined by cuts, and the mask that readers make of it again.
 //!
-//! Readers of polygons fill them on the grid of pixels and paint their edges too (OpenCV's `fillPoly`, even-odd). So the polygon runs
-//! through the centres of a part's outermost pixels, not along their outer borders: filled that way, a part with all its holes comes back
-//! exactly. Parts and holes are joined by cuts that go there and back over the same pixels. A cut is painted; it goes over pixels
-//! of the mask as far as it can, and over as few others as there must be. Those are all that is lost.
+//! The polygon runs along the borders of pixels, so its area and its box are those of the mask. Ultralytics cuts the digits of corners off,
+//! fills the polygon and paints its edges too (OpenCV's `fillPoly`, even-odd): corners lie a hundredth of a pixel within the mask, so that what is
+//! left of each is a pixel of the mask, and a part with all its holes comes back exactly. Parts and holes are joined by cuts that go there and
+//! back over the same places. A cut has no area, but its pixels are painted; it goes over pixels of the mask as far as it can, and over as few
+//! others as there must be. Those are all that is lost. supervision rounds corners, and paints one pixel more to the right and below.
 //!
-//! Sources: borders, Suzuki and Abe 1985, "Topological Structural Analysis of Digitized Binary Images by Border Following",
-//! algorithm 1, which is what `findContours` runs; cuts, Dijkstra's shortest path on which pixels of the mask are free.
+//! Sources: edges between pixels that are followed with the mask on their right, known as crack codes, Rosenfeld and Kak 1982, "Digital Picture
+//! Processing"; cuts, Dijkstra's shortest path on which pixels of the mask are free.
 
 use crate::dataset::rle::Box2;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// A pixel: column and row.
+/// A pixel, column and row; or the place where its left and its upper border meet.
 pub(super) type Pixel = (i32, i32);
+
+/// How far within the mask corners lie, pixels.
+const WITHIN: f64 = 0.01;
+
+/// A corner of the polygon.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Corner {
+    /// Where four pixels meet.
+    at: Pixel,
+    /// That one of the four in which it lies.
+    pixel: Pixel,
+    /// Whether the polygon runs straight on, so that it may be left out.
+    straight: bool,
+}
+
+impl Corner {
+    /// Its place in the image: 0, 0 is the upper left corner of the upper left pixel.
+    pub(super) fn place(&self) -> (f64, f64) {
+        let within = |at: i32, pixel: i32| f64::from(at) + if pixel == at { WITHIN } else { -WITHIN };
+        (within(self.at.0, self.pixel.0), within(self.at.1, self.pixel.1))
+    }
+}
 
 /// The mask of one thing in its box, with a margin of one pixel about it.
 pub(super) struct Mask {
@@ -24,8 +47,18 @@ pub(super) struct Mask {
     inside: Vec<bool>,
 }
 
-/// The eight neighbours, clockwise on the screen from the right.
+/// The eight neighbours.
 const AROUND: [Pixel; 8] = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
+/// Steps along borders: right, down, left, up.
+const STEPS: [Pixel; 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
+/// From where such a step begins to the pixel on its right, which is in the mask.
+const RIGHT: [Pixel; 4] = [(0, 0), (-1, 0), (-1, -1), (0, -1)];
+/// From there to the pixel on its left, which is not.
+const LEFT: [Pixel; 4] = [(0, -1), (0, 0), (-1, 0), (-1, -1)];
+
+fn plus(a: Pixel, b: Pixel) -> Pixel {
+    (a.0 + b.0, a.1 + b.1)
+}
 
 impl Mask {
     /// The pixels in `bounds` for which `inside(x, y)` holds.
@@ -59,120 +92,97 @@ impl Mask {
         self.in_box((x, y)) && self.inside[self.at((x, y))]
     }
 
-    /// Borders of the parts and of their holes, each a closed chain of neighbouring pixels of the mask.
-    fn borders(&self) -> Vec<Vec<Pixel>> {
-        // What Suzuki and Abe write into the picture: 0 outside, 1 not yet met, k a border's number, −k where its right side is met.
-        let mut marks: Vec<i32> = self.inside.iter().map(|i| i32::from(*i)).collect();
+    /// Whether the step in direction `d` from a place runs along a border, the mask on its right.
+    fn borders(&self, at: Pixel, d: usize) -> bool {
+        self.holds(plus(at, RIGHT[d])) && !self.holds(plus(at, LEFT[d]))
+    }
+
+    /// Borders of the parts and of their holes, each a closed chain of steps. Pixels that touch at a corner alone are parts of their own.
+    fn loops(&self) -> Vec<Vec<Corner>> {
+        let mut met = vec![[false; 4]; self.inside.len()];
         let mut all = Vec::new();
-        let mut number = 1;
-        for y in 0..self.height {
-            for x in 0..self.width {
-                let mark = marks[self.at((x, y))];
-                let outer = mark == 1 && !self.holds((x - 1, y));
-                let hole = mark >= 1 && !self.holds((x + 1, y));
-                if outer || hole {
-                    number += 1;
-                    // Towards the outside: left of an outer border, right of a hole's.
-                    let outside = if outer { 4 } else { 0 };
-                    all.push(self.follow((x, y), outside, number, &mut marks));
+        for y in 1..self.height {
+            for x in 1..self.width {
+                for d in 0..4 {
+                    if self.borders((x, y), d) && !met[self.at((x, y))][d] {
+                        all.push(self.follow((x, y), d, &mut met));
+                    }
                 }
             }
         }
         all
     }
 
-    /// Follows the border that begins at a pixel whose neighbour in direction `outside` is not in the mask.
-    fn follow(&self, start: Pixel, outside: usize, number: i32, marks: &mut [i32]) -> Vec<Pixel> {
-        let step = |(x, y): Pixel, d: usize| (x + AROUND[d % 8].0, y + AROUND[d % 8].1);
-        // The last pixel of the border: the first in the mask clockwise from the outside.
-        let Some(last) = (0..8).map(|k| (outside + k) % 8).find(|d| self.holds(step(start, *d))) else {
-            marks[self.at(start)] = -number;
-            return vec![start];
-        };
-        let last = step(start, last);
-        let mut chain = Vec::new();
-        let (mut before, mut now) = (last, start);
+    /// Follows the border that begins with a step.
+    fn follow(&self, start: Pixel, first: usize, met: &mut [[bool; 4]]) -> Vec<Corner> {
+        let mut corners = Vec::new();
+        let (mut at, mut d) = (start, first);
         loop {
-            chain.push(now);
-            let back = (0..8).find(|d| step(now, *d) == before).unwrap_or(0);
-            // Counterclockwise from where it came, to the next pixel of the mask.
-            let mut right_is_outside = false;
-            let mut next = before;
-            for k in 1..=8 {
-                let d = (back + 8 - k) % 8;
-                if self.holds(step(now, d)) {
-                    next = step(now, d);
-                    break;
-                }
-                right_is_outside |= d == 0;
+            met[self.at(at)][d] = true;
+            at = plus(at, STEPS[d]);
+            // To the right first: it stays with its pixel where another one touches it at this corner.
+            let right = (d + 1) % 4;
+            let next = [right, d, (d + 3) % 4].into_iter().find(|next| self.borders(at, *next)).unwrap_or(right);
+            let pixel = if next == (d + 3) % 4 {
+                // Opposite to the one pixel here that is not in the mask, on the left of the step that has led here.
+                let (x, y) = LEFT[(d + 3) % 4];
+                plus(at, (-1 - x, -1 - y))
+            } else {
+                plus(at, RIGHT[next])
+            };
+            corners.push(Corner { at, pixel, straight: next == d });
+            d = next;
+            if at == start && d == first {
+                return corners;
             }
-            let at = self.at(now);
-            if right_is_outside {
-                marks[at] = -number;
-            } else if marks[at] == 1 {
-                marks[at] = number;
-            }
-            if next == start && now == last {
-                return chain;
-            }
-            (before, now) = (now, next);
         }
     }
 
-    /// One closed chain of neighbouring pixels through all borders; empty for an empty mask. In the box's coordinates.
-    fn chain(&self) -> Vec<Pixel> {
-        let mut borders = self.borders();
-        let mut of_pixel: Vec<Vec<usize>> = vec![Vec::new(); self.inside.len()];
-        for (k, border) in borders.iter().enumerate() {
-            for pixel in border {
-                let at = self.at(*pixel);
-                if of_pixel[at].last() != Some(&k) {
-                    of_pixel[at].push(k);
-                }
+    /// One closed chain of steps along all borders; empty for an empty mask. In the box's coordinates.
+    fn chain(&self) -> Vec<Corner> {
+        let mut loops = self.loops();
+        let mut touching: Vec<Vec<usize>> = vec![Vec::new(); self.inside.len()];
+        for (k, border) in loops.iter().enumerate() {
+            for corner in border {
+                touching[self.at(corner.at)].push(k);
             }
         }
-        let mut waiting: Vec<bool> = vec![true; borders.len()];
-        let Some(first) = borders.first_mut() else { return Vec::new() };
+        let Some(first) = loops.first_mut() else { return Vec::new() };
         let mut chain = std::mem::take(first);
-        waiting[0] = false;
         let mut search = Search::new(self);
-        search.begin(&chain);
-        while let Some(path) = search.nearest(|pixel| of_pixel[self.at(pixel)].iter().any(|k| waiting[*k])) {
-            let Some(end) = path.last() else { break };
-            let met: Vec<usize> = of_pixel[self.at(*end)].iter().copied().filter(|k| waiting[*k]).collect();
-            search.begin(&path);
-            for k in met {
-                waiting[k] = false;
-                let border = std::mem::take(&mut borders[k]);
-                search.begin(&border);
-                splice(&mut chain, &path, &border);
-            }
+        search.begin(chain.iter().map(|corner| corner.at));
+        let mut fresh: Vec<Pixel> = chain.iter().map(|corner| corner.at).collect();
+        // A border that is joined already has been taken.
+        let waiting =
+            |loops: &[Vec<Corner>], at: Pixel| touching[self.at(at)].iter().copied().find(|k| !loops[*k].is_empty());
+        loop {
+            // Borders that touch need no cut.
+            let (path, k) = if let Some(at) = fresh.pop() {
+                let Some(k) = waiting(&loops, at) else { continue };
+                fresh.push(at);
+                (vec![at], k)
+            } else {
+                let Some(path) = search.nearest(|at| waiting(&loops, at).is_some()) else { return chain };
+                let Some(k) = path.last().and_then(|end| waiting(&loops, *end)) else { return chain };
+                (path, k)
+            };
+            let border = std::mem::take(&mut loops[k]);
+            fresh.extend(border.iter().map(|corner| corner.at));
+            search.begin(path.iter().copied().chain(border.iter().map(|corner| corner.at)));
+            splice(&mut chain, &path, &border);
         }
-        chain
     }
 
-    /// The polygon's corners as pixels of the image, none that lie on a straight line between their neighbours; at least three.
-    pub(super) fn polygon(&self) -> Vec<Pixel> {
-        let chain = self.chain();
-        let n = chain.len();
-        let towards = |a: Pixel, b: Pixel| (b.0 - a.0, b.1 - a.1);
-        let turns = |i: &usize| {
-            let (before, here, after) = (chain[(i + n - 1) % n], chain[*i], chain[(i + 1) % n]);
-            towards(before, here) != towards(here, after)
-        };
-        let mut corners: Vec<Pixel> = (0..n).filter(turns).map(|i| chain[i]).collect();
-        if corners.is_empty() {
-            corners.extend(chain.first());
-        }
-        while !corners.is_empty() && corners.len() < 3 {
-            corners.push(corners[corners.len() - 1]);
-        }
-        corners.into_iter().map(|(x, y)| (x + self.origin.0, y + self.origin.1)).collect()
+    /// The polygon's corners in the image, none that lie on a straight line between their neighbours; none of an empty mask.
+    pub(super) fn polygon(&self) -> Vec<Corner> {
+        let corners = self.chain().into_iter().filter(|corner| !corner.straight);
+        corners.map(|c| Corner { at: plus(c.at, self.origin), pixel: plus(c.pixel, self.origin), ..c }).collect()
     }
 
-    /// Intersection over union of the mask and what a reader paints for the polygon; 1 where nothing is lost.
-    pub(super) fn overlap(&self, polygon: &[Pixel]) -> f64 {
-        let local: Vec<Pixel> = polygon.iter().map(|(x, y)| (x - self.origin.0, y - self.origin.1)).collect();
+    /// Intersection over union of the mask and what Ultralytics paints for the polygon; 1 where nothing is lost.
+    pub(super) fn overlap(&self, polygon: &[Corner]) -> f64 {
+        let local: Vec<Pixel> =
+            polygon.iter().map(|c| (c.pixel.0 - self.origin.0, c.pixel.1 - self.origin.1)).collect();
         let painted = self.paint(&local);
         let both = painted.iter().zip(&self.inside).filter(|(a, b)| **a && **b).count();
         let any = painted.iter().zip(&self.inside).filter(|(a, b)| **a || **b).count();
@@ -214,23 +224,33 @@ impl Mask {
 }
 
 /// Inserts a border into a closed chain: along a path that begins on the chain and ends on the border, around it, and back.
-fn splice(chain: &mut Vec<Pixel>, path: &[Pixel], border: &[Pixel]) {
+fn splice(chain: &mut Vec<Corner>, path: &[Pixel], border: &[Corner]) {
     let (Some(from), Some(to)) = (path.first(), path.last()) else { return };
-    let (Some(here), Some(there)) = (chain.iter().position(|p| p == from), border.iter().position(|p| p == to)) else {
-        return;
-    };
-    let mut detour: Vec<Pixel> = path[1..].to_vec();
-    if border.len() > 1 {
-        detour.extend(border[there..].iter().chain(&border[..there]).skip(1));
-        detour.push(*to);
-    }
-    detour.extend(path.iter().rev().skip(1));
-    let rest = chain.split_off(here + 1);
-    chain.extend(detour);
-    chain.extend(rest);
+    let here = chain.iter().position(|corner| corner.at == *from);
+    let there = border.iter().position(|corner| corner.at == *to);
+    let (Some(here), Some(there)) = (here, there) else { return };
+    let cut: Vec<Corner> =
+        if path.len() == 1 { Vec::new() } else { (0..path.len()).map(|i| on_cut(path, i)).collect() };
+    chain[here].straight = false;
+    let back = chain[here];
+    let end = Corner { straight: false, ..border[there] };
+    let mut detour = cut.clone();
+    detour.push(end);
+    detour.extend(border[there..].iter().chain(&border[..there]).skip(1));
+    detour.push(end);
+    detour.extend(cut.into_iter().rev());
+    detour.push(back);
+    chain.splice(here + 1..here + 1, detour);
 }
 
-/// Ways from what is joined to what is not: steps over pixels of the mask cost nothing, others one each.
+/// Corner `i` of a cut.
+fn on_cut(path: &[Pixel], i: usize) -> Corner {
+    let step = |a: Pixel, b: Pixel| (b.0 - a.0, b.1 - a.1);
+    let straight = i > 0 && i + 1 < path.len() && step(path[i - 1], path[i]) == step(path[i], path[i + 1]);
+    Corner { at: path[i], pixel: path[i], straight }
+}
+
+/// Ways from what is joined to what is not, over the upper left corners of pixels: those of the mask cost nothing, others one each.
 struct Search<'a> {
     mask: &'a Mask,
     cost: Vec<u32>,
@@ -244,13 +264,13 @@ impl<'a> Search<'a> {
         Self { mask, cost: vec![u32::MAX; n], before: vec![None; n], queue: BinaryHeap::new() }
     }
 
-    /// Ways may begin at these pixels.
-    fn begin(&mut self, pixels: &[Pixel]) {
-        for pixel in pixels {
-            let at = self.mask.at(*pixel);
-            self.cost[at] = 0;
+    /// Ways may begin at these places.
+    fn begin(&mut self, places: impl Iterator<Item = Pixel>) {
+        for place in places.filter(|place| self.mask.in_box(*place)) {
+            let (at, cost) = (self.mask.at(place), u32::from(!self.mask.holds(place)));
+            self.cost[at] = cost;
             self.before[at] = None;
-            self.queue.push(Reverse((0, *pixel)));
+            self.queue.push(Reverse((cost, place)));
         }
     }
 
@@ -316,13 +336,22 @@ mod tests {
         parts
     }
 
+    /// Area within the polygon's borders, as it is gone around.
+    fn area(polygon: &[Corner]) -> i32 {
+        let next = polygon.iter().cycle().skip(1);
+        polygon.iter().zip(next).map(|(a, b)| a.at.0 * b.at.1 - b.at.0 * a.at.1).sum::<i32>() / 2
+    }
+
     #[test]
     fn a_rectangle_has_four_corners() {
         let mask = mask(&["####", "####", "####"]);
-        let mut corners = mask.polygon();
+        let polygon = mask.polygon();
+        let mut corners: Vec<Pixel> = polygon.iter().map(|corner| corner.at).collect();
         corners.sort_unstable();
-        assert_eq!(corners, [(3, 5), (3, 7), (6, 5), (6, 7)]);
-        assert_eq!(mask.overlap(&mask.polygon()), 1.0);
+        assert_eq!(corners, [(3, 5), (3, 8), (7, 5), (7, 8)]);
+        assert!(polygon.iter().any(|corner| corner.place() == (3.01, 5.01)));
+        assert!(polygon.iter().any(|corner| corner.place() == (6.99, 7.99)));
+        assert_eq!((mask.overlap(&polygon), area(&polygon)), (1.0, 12));
     }
 
     #[test]
@@ -350,7 +379,7 @@ mod tests {
         // Nor does it leave the box, beyond which there may be no image.
         let apart = mask(&["##.##", "##.##"]);
         assert_eq!(apart.overlap(&apart.polygon()), 8.0 / 9.0);
-        assert!(apart.polygon().iter().all(|(x, y)| (3..8).contains(x) && (5..7).contains(y)));
+        assert!(apart.polygon().iter().all(|c| (3..8).contains(&c.pixel.0) && (5..7).contains(&c.pixel.1)));
     }
 
     #[test]
@@ -371,7 +400,13 @@ mod tests {
             let mask = Mask::new(Box2([0, 0, width, height]), |x, y| inside[(y * width + x) as usize]);
             let polygon = mask.polygon();
             prop_assert_eq!(polygon.is_empty(), !inside.contains(&true));
-            let painted = mask.paint(&polygon.iter().map(|(x, y)| (x + 1, y + 1)).collect::<Vec<_>>());
+            // Cuts and holes have no area.
+            prop_assert_eq!(area(&polygon) as usize, inside.iter().filter(|inside| **inside).count());
+            let painted = mask.paint(&polygon.iter().map(|c| plus(c.pixel, (1, 1))).collect::<Vec<_>>());
+            // As OpenCV draws them, edges run along rows, columns and diagonals.
+            let edges = polygon.iter().zip(polygon.iter().cycle().skip(1));
+            let steps = edges.map(|(a, b)| ((b.pixel.0 - a.pixel.0).abs(), (b.pixel.1 - a.pixel.1).abs()));
+            prop_assert!(steps.into_iter().all(|(x, y)| x == 0 || y == 0 || x == y));
             prop_assert!(painted.iter().zip(&mask.inside).all(|(painted, inside)| *painted || !inside));
             if parts(&mask) == 1 {
                 prop_assert_eq!(&painted, &mask.inside);

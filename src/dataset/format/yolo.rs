@@ -1,87 +1,58 @@
-//! YOLO segmentation: `images/SPLIT/NAME.png`, `labels/SPLIT/NAME.txt`, `data.yaml`; Ultralytics and supervision read it.
+//! YOLO segmentation: a polygon a plant, with what is lost by it; Ultralytics and supervision read it.
 //!
 //! A row is a plant: its class (0 crop, 1 weed), then x and y of a polygon's corners, shares of the image's width and height. The
-//! format has one closed polygon a plant and neither holes nor parts; they are joined by cuts, and `loss.json` tells for every plant
-//! the intersection over union of its mask and what readers paint, with the mean and the worst. Leaves, which a plant's row cannot
-//! tell, are left out.
+//! polygon runs along the borders of the plant's pixels, so boxes that readers take from it are the plant's. The format has one closed polygon
+//! a plant and neither holes nor parts; they are joined by cuts, and `loss.json` tells for every plant the intersection over union of its mask and
+//! what Ultralytics paints, with the mean and the worst. Leaves, which a plant's row cannot tell, are left out.
 //!
-//! Corners are pixels. supervision rounds a corner to a pixel, Ultralytics cuts its digits off: 0.4 beyond the pixel's edge both
-//! come to the same one. Boxes, which readers take from the corners, are a pixel narrower than those of other formats.
-//!
-//! `data.yaml` has no `path`: Ultralytics then takes the file's own folder, and would look for a relative one elsewhere. A split
-//! without images is not named.
-//!
-//! Source: Ultralytics documentation, "Instance Segmentation Datasets Overview"; supervision 0.31.2.
+//! Source: Ultralytics documentation, "Instance Segmentation Datasets Overview"; ultralytics 8.4.190; supervision 0.31.2.
 
-use super::outline::{Mask, Pixel};
-use super::{Format, Whole, picture};
+use super::outline::{Corner, Mask};
+use super::{Format, Whole, boxes};
 use crate::dataset::recipe::{Recipe, json};
 use crate::dataset::record::{Plant, Record};
 use crate::dataset::sample::Sample;
 use crate::dataset::set::Set;
 use crate::dataset::split::Split;
 use crate::dataset::File;
-use crate::scene::tag::Class;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
-use std::fmt::Write;
 
 pub(super) struct Writer;
 
 const FOLDER: &str = "yolo";
-
-/// Where in its pixel a corner lies.
-const WITHIN: f64 = 0.4;
 
 /// What is lost of a plant.
 #[derive(Serialize, Deserialize)]
 struct Loss {
     /// Number of the plant in `plants.png`.
     plant: u16,
-    /// Intersection over union of its mask and what readers paint.
+    /// Intersection over union of its mask and what Ultralytics paints.
     iou: f64,
 }
 
 impl Format for Writer {
     fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
         let Record { name, split, .. } = &sample.record;
-        let split = split.name();
-        let (mut rows, mut losses) = (String::new(), Vec::new());
+        let (mut rows, mut losses) = (Vec::new(), Vec::new());
         for plant in sample.record.seen() {
             let Some(mask) = mask(sample, plant) else { continue };
             let polygon = mask.polygon();
-            rows.push_str(&row(sample, plant.class, &polygon));
+            let mut row = boxes::number(plant.class).to_string();
+            boxes::shares(&mut row, sample, polygon.iter().map(Corner::place));
+            rows.push(row);
             losses.push(Loss { plant: plant.number, iou: mask.overlap(&polygon) });
         }
-        if rows.is_empty() {
-            // Nothing to see is not the same as a file that got lost.
-            rows.push('\n');
-        }
-        Ok(vec![
-            picture::photograph(sample, format!("{FOLDER}/images/{split}/{name}.png"))?,
-            File { path: format!("{FOLDER}/labels/{split}/{name}.txt"), bytes: rows.into_bytes() },
-            File { path: loss_path(split, name), bytes: json(&losses)? },
-        ])
+        let mut files = boxes::files(FOLDER, sample, &rows)?;
+        files.push(File { path: loss_path(split.name(), name), bytes: json(&losses)? });
+        Ok(files)
     }
 
     fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
-        out.file(&format!("{FOLDER}/data.yaml"), |w| {
-            for split in Split::ALL {
-                if set.names(split).is_empty() {
-                    w.put(format!("# There are no images in the split {}.\n", split.name()))?;
-                } else {
-                    w.put(format!("{0}: images/{0}\n", split.name()))?;
-                }
-            }
-            w.put("names:\n")?;
-            for class in [Class::Crop, Class::Weed] {
-                w.put(format!("  {}: {}\n", number(class), class.name()))?;
-            }
-            Ok(())
-        })?;
+        boxes::data(FOLDER, set, out, "")?;
         out.file(&format!("{FOLDER}/loss.json"), |w| {
             let mut sum = Sum::default();
-            w.put("{\n\"about\": \"intersection over union of a plant's mask and its polygon as readers paint it\",\n\"plants\": [")?;
+            w.put("{\n\"about\": \"intersection over union of a plant's mask and its polygon as Ultralytics paints it\",\n\"plants\": [")?;
             w.items(Split::ALL.into_iter().flat_map(|split| set.names(split).into_iter().map(move |n| (split, n))).flat_map(
                 |(split, name)| match losses(set, split, &name) {
                     Ok(losses) => losses.iter().map(|loss| Ok(sum.add(split, &name, loss))).collect(),
@@ -112,24 +83,9 @@ fn losses(set: &Set, split: Split, name: &str) -> Result<Vec<Loss>> {
     serde_json::from_slice(&bytes).map_err(|e| Error::damaged(format!("this is no list of losses: {e}")).in_file(path))
 }
 
-fn number(class: Class) -> u8 {
-    (class as u8).saturating_sub(Class::Crop as u8)
-}
-
 fn mask(sample: &Sample, plant: &Plant) -> Option<Mask> {
     let width = sample.record.width;
     plant.seen.bounds.map(|bounds| Mask::new(bounds, |x, y| sample.plants[(y * width + x) as usize] == plant.number))
-}
-
-fn row(sample: &Sample, class: Class, polygon: &[Pixel]) -> String {
-    let (width, height) = sample.size();
-    let mut text = number(class).to_string();
-    for (x, y) in polygon {
-        let share = |pixel: i32, of: u32| (f64::from(pixel) + WITHIN) / f64::from(of);
-        let _ = write!(text, " {:.6} {:.6}", share(*x, width), share(*y, height));
-    }
-    text.push('\n');
-    text
 }
 
 /// All plants' losses as they pass.

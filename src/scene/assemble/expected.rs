@@ -1,4 +1,4 @@
-//! How many plants are to be expected in a field's view, from its densities alone: nothing is grown or placed.
+//! What is known of a field before it grows: its warnings, and how many plants are to be expected in its view, from its densities alone.
 
 use super::builder::Builder;
 use super::{Options, Source};
@@ -11,13 +11,28 @@ impl Source {
     /// About how many plants stand in the view of field `options.index`: the mean over all that chance may place there, with the camera
     /// and the densities that this field has.
     pub fn expected_plants(&self, options: &Options) -> Result<f64> {
+        self.ask(options, |builder| builder.expected_plants())
+    }
+
+    /// What field `options.index` warns of that is known before it grows.
+    pub fn foretold(&self, options: &Options) -> Result<Vec<String>> {
+        self.ask(options, |builder| {
+            builder.looked_at()?;
+            builder.warn_of_camera();
+            builder.warn_of_plants()?;
+            Ok(std::mem::take(&mut builder.warnings))
+        })
+    }
+
+    /// Asks a field that has not grown.
+    fn ask<T>(&self, options: &Options, question: impl FnOnce(&mut Builder<'_>) -> Result<T>) -> Result<T> {
         let held = || self.library.lock().unwrap_or_else(PoisonError::into_inner);
         let library = held().clone();
         let mut builder = Builder::new(&self.page, &self.desc, options, library)?;
-        let plants = builder.expected_plants()?;
-        // Maps of light that were read are read once.
+        let answer = question(&mut builder)?;
+        // What was read is read once.
         *held() = builder.library;
-        Ok(plants)
+        Ok(answer)
     }
 }
 

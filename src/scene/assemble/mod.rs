@@ -403,14 +403,20 @@ impl<'a> Builder<'a> {
         view: Option<Rect>,
     ) -> Result<Vec<PlantRecord>> {
         let (dust, cell, options) = (self.dust()?, self.cell(), self.options);
+        // Grown to know its size, left bare where neither it nor its shadow reaches the view.
+        let reaches = |plant: &PlantRecord| {
+            let reach = plant.radius + SHADOW * plant.height;
+            view.is_none_or(|v| v.grown(reach).contains(plant.position.truncate()))
+        };
         let stand = |seedling: &Seedling| {
             options.wanted()?;
             let Vec2 { x, y } = seedling.position;
             let (height, normal) = floor.map_or((0.0, Vec3::Z), |f| (f.height(x, y), f.ground.trend(x, y, STANCE)));
             let place = Place { height, normal, dust, cell };
             let known = options.preview.as_ref().and_then(|preview| preview.plant(seedling, &place));
+            let known = known.filter(|known| known.organs.is_some() || !reaches(&known.record));
             Ok(known.unwrap_or_else(|| {
-                let (record, organs) = grow(seedling, &place);
+                let (record, organs) = grow(seedling, &place, reaches);
                 Arc::new(Standing { seedling: seedling.clone(), place, record, organs })
             }))
         };
@@ -420,15 +426,11 @@ impl<'a> Builder<'a> {
         }
         let mut records = Vec::with_capacity(grown.len());
         for (number, grown) in (1..).zip(grown) {
+            let (true, Some(organs)) = (reaches(&grown.record), &grown.organs) else { continue };
             let record = PlantRecord { number, ..grown.record.clone() };
-            // Grown to know its size, dropped where neither it nor its shadow reaches the view.
-            let reach = record.radius + SHADOW * record.height;
-            if view.is_some_and(|v| !v.grown(reach).contains(record.position.truncate())) {
-                continue;
-            }
             // One material a plant and key: plants differ in their green, and leaves that have met something in more.
             let mut made: Vec<(&str, usize, u32)> = Vec::new();
-            for organ in &grown.organs {
+            for organ in organs {
                 if let Some(fault) = organ.part.mesh.fault() {
                     let (species, number) = (&record.species, record.number);
                     return Err(Error::input(format!(

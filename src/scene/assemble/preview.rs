@@ -6,7 +6,7 @@ use super::earth::{Bed, Laid, Soil};
 use super::grown::Grown;
 use super::seedling::{Place, Seedling};
 use crate::Result;
-use crate::accel::EmbreeAccel;
+use crate::accel::{Before, EmbreeAccel};
 use crate::geometry::{AlphaMask, Mesh};
 use crate::math::Vec3;
 use crate::model::Model;
@@ -40,7 +40,8 @@ pub(super) struct Standing {
     pub(super) seedling: Seedling,
     pub(super) place: Place,
     pub(super) record: PlantRecord,
-    pub(super) organs: Vec<Grown>,
+    /// None where neither it nor its shadow reaches the view.
+    pub(super) organs: Option<Vec<Grown>>,
 }
 
 /// Triangles and organs of a plant that was grown to know them, and what it grew from.
@@ -167,29 +168,28 @@ impl Preview {
         kept.laid = Some((under, laid.clone()));
     }
 
-    /// The BVH over these parts: the one that was built before, if it was over the very same.
+    /// The BVH over these parts: the one that was built before, if it was over the very same; `build` is told which of them are.
     pub(crate) fn geometry(
         &self,
         parts: &[Part],
-        build: impl FnOnce() -> Result<EmbreeAccel>,
+        build: impl FnOnce(Option<&Before<'_>>) -> Result<EmbreeAccel>,
     ) -> Result<Arc<EmbreeAccel>> {
         let of: Vec<Shape> = parts.iter().map(shape).collect();
-        let equal = |a: &Shape, b: &Shape| {
-            let masks = match (&a.1, &b.1) {
-                (Some(a), Some(b)) => Arc::ptr_eq(a, b),
-                (None, None) => true,
-                _ => false,
-            };
-            masks && Arc::ptr_eq(&a.0, &b.0)
+        let address = |(mesh, mask): &Shape| (Arc::as_ptr(mesh), mask.as_ref().map(Arc::as_ptr));
+        let Some((known, built)) = self.lock().built.clone() else {
+            return self.keep_built(of, build(None)?);
         };
-        if let Some((known, built)) = &self.lock().built
-            && same(known, &of, equal)
-        {
-            return Ok(built.clone());
+        if same(&known, &of, |a, b| address(a) == address(b)) {
+            return Ok(built);
         }
-        // Two at once would take the memory of two.
-        self.lock().built = None;
-        let built = Arc::new(build()?);
+        let places: HashMap<_, usize> = known.iter().enumerate().map(|(i, shape)| (address(shape), i)).collect();
+        let places: Vec<Option<usize>> = of.iter().map(|shape| places.get(&address(shape)).copied()).collect();
+        let built = build(Some(&Before { accel: &built, places: &places }))?;
+        self.keep_built(of, built)
+    }
+
+    fn keep_built(&self, of: Vec<Shape>, built: EmbreeAccel) -> Result<Arc<EmbreeAccel>> {
+        let built = Arc::new(built);
         self.lock().built = Some((of, built.clone()));
         Ok(built)
     }

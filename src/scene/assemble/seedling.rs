@@ -60,8 +60,12 @@ pub(super) struct Place {
     pub(super) cell: f32,
 }
 
-/// Grows one plant, in its own stream, and stands it in its place. It has no number yet.
-pub(super) fn grow(s: &Seedling, place: &Place) -> (PlantRecord, Vec<Grown>) {
+/// Grows one plant, in its own stream, and stands it in its place. It has no number yet, and no organs where it is not `wanted`.
+pub(super) fn grow(
+    s: &Seedling,
+    place: &Place,
+    wanted: impl FnOnce(&PlantRecord) -> bool,
+) -> (PlantRecord, Option<Vec<Grown>>) {
     let Place { height: z, normal, dust, cell } = *place;
     let desc: &SpeciesDesc = &s.species.desc;
     let mut stream = s.stream.clone();
@@ -87,6 +91,27 @@ pub(super) fn grow(s: &Seedling, place: &Place) -> (PlantRecord, Vec<Grown>) {
     let axes = plant.leaf_axes().filter(|a| kept(a.leaf));
     let mut leaf_axes: Vec<LeafAxis> = axes.map(|a| a.moved(to_world)).collect();
     leaf_axes.sort_by_key(|a| a.leaf);
+    let record = PlantRecord {
+        number: 0,
+        id: s.id,
+        leaf_ids: Vec::new(),
+        species: desc.name.clone(),
+        eppo: desc.eppo.clone(),
+        kind: 0,
+        class,
+        position: foot,
+        axis,
+        bbch: plant.bbch,
+        age_days: plant.age_days,
+        height: plant.height,
+        radius: plant.radius,
+        leaves: plant.organs.iter().map(|o| o.leaf).filter(|leaf| kept(*leaf)).max().unwrap_or(0),
+        leaf_axes,
+        condition: ailing.as_ref().map(Ailing::drawn),
+    };
+    if !wanted(&record) {
+        return (record, None);
+    }
     let last = plant.organs.iter().map(|o| o.leaf).max().unwrap_or(0);
     let organs = plant.organs.into_iter().filter(|o| kept(o.leaf)).flat_map(|organ| {
         let mut mesh = organ.mesh;
@@ -115,24 +140,6 @@ pub(super) fn grow(s: &Seedling, place: &Place) -> (PlantRecord, Vec<Grown>) {
             None => vec![grown],
         }
     });
-    let organs: Vec<Grown> = organs.collect();
-    let record = PlantRecord {
-        number: 0,
-        id: s.id,
-        leaf_ids: Vec::new(),
-        species: desc.name.clone(),
-        eppo: desc.eppo.clone(),
-        kind: 0,
-        class,
-        position: foot,
-        axis,
-        bbch: plant.bbch,
-        age_days: plant.age_days,
-        height: plant.height,
-        radius: plant.radius,
-        leaves: organs.iter().map(|o| o.part.tag.leaf).max().unwrap_or(0),
-        leaf_axes,
-        condition: ailing.as_ref().map(Ailing::drawn),
-    };
-    (record, organs)
+    let organs = organs.collect();
+    (record, Some(organs))
 }

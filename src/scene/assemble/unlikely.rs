@@ -12,6 +12,8 @@ use crate::soil::Rect;
 
 /// Widest rows that no one asks about, metres: maize and sunflower stand at 0.75, vines at 2.
 const WIDE_ROWS_M: f32 = 2.0;
+/// Farthest from seed to seed along a row that no one asks about, metres: pumpkins and vines stand about one apart.
+const WIDE_IN_ROW_M: f32 = 1.5;
 /// Height of a camera that no one asks about, metres; robots hold theirs at half a metre to two, masts at three.
 const HIGH_M: f32 = 5.0;
 
@@ -44,12 +46,16 @@ impl Builder<'_> {
         for k in self.sown.clone() {
             let crop = &desc.crops[k];
             let rows = Rows::draw(&crop.rows, &self.stream(Purpose::Scatter, k as u64));
-            if rows.spacing_m > WIDE_ROWS_M {
-                let spacing = rows.spacing_m;
-                self.warnings.push(format!(
-                    "rows of {} stand {spacing} m apart; spacing_m is in metres, 0.75 for 75 cm",
-                    crop.species
-                ));
+            let (species, spacing, in_row) = (&crop.species, rows.spacing_m, rows.in_row_m);
+            if spacing > WIDE_ROWS_M {
+                let words =
+                    format!("rows of {species} stand {spacing} m apart; spacing_m is in metres, 0.75 for 75 cm");
+                self.warnings.push(words);
+            }
+            if in_row > WIDE_IN_ROW_M {
+                let words =
+                    format!("{species} stands {in_row} m apart in its rows; in_row_m is in metres, 0.16 for 16 cm");
+                self.warnings.push(words);
             }
         }
         let crops = self.sown.clone().map(|k| (&desc.crops[k].species, &desc.crops[k].growth));

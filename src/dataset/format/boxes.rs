@@ -1,0 +1,68 @@
+//! What all formats for Ultralytics share: `images/SPLIT/NAME.png`, `labels/SPLIT/NAME.txt` with a row a plant, and `data.yaml`.
+//!
+//! `data.yaml` has no `path`: Ultralytics then takes the file's own folder, and would look for a relative one elsewhere. A split
+//! without images is not named.
+
+use super::{Whole, picture};
+use crate::Result;
+use crate::dataset::File;
+use crate::dataset::record::{Plant, Record};
+use crate::dataset::rle::Box2;
+use crate::dataset::sample::Sample;
+use crate::dataset::set::Set;
+use crate::dataset::split::Split;
+use crate::scene::tag::Class;
+use std::fmt::Write;
+
+/// A plant's class as rows have it: 0 crop, 1 weed.
+pub(super) fn number(class: Class) -> u8 {
+    (class as u8).saturating_sub(Class::Crop as u8)
+}
+
+/// Places in the image, pixels, as a row has them: shares of its width and height.
+pub(super) fn shares(row: &mut String, sample: &Sample, places: impl IntoIterator<Item = (f64, f64)>) {
+    let (width, height) = sample.size();
+    for (x, y) in places {
+        // Writing to a text cannot fail.
+        let _ = write!(row, " {:.6} {:.6}", x / f64::from(width), y / f64::from(height));
+    }
+}
+
+/// A plant's row up to its box: class, then the box's middle, width and height.
+pub(super) fn row(sample: &Sample, plant: &Plant, Box2([x, y, w, h]): Box2) -> String {
+    let mut row = number(plant.class).to_string();
+    let [x, y, w, h] = [x, y, w, h].map(f64::from);
+    shares(&mut row, sample, [(x + w / 2.0, y + h / 2.0), (w, h)]);
+    row
+}
+
+/// An image's photograph and rows.
+pub(super) fn files(folder: &str, sample: &Sample, rows: &[String]) -> Result<Vec<File>> {
+    let Record { name, split, .. } = &sample.record;
+    let split = split.name();
+    // Nothing to see is not the same as a file that got lost.
+    let text = if rows.is_empty() { "\n".to_owned() } else { rows.iter().flat_map(|row| [row, "\n"]).collect() };
+    Ok(vec![
+        picture::photograph(sample, format!("{folder}/images/{split}/{name}.png"))?,
+        File { path: format!("{folder}/labels/{split}/{name}.txt"), bytes: text.into_bytes() },
+    ])
+}
+
+/// `data.yaml`, with `more` behind the splits.
+pub(super) fn data(folder: &str, set: &Set, out: &mut Whole<'_>, more: &str) -> Result<()> {
+    out.file(&format!("{folder}/data.yaml"), |w| {
+        for split in Split::ALL {
+            if set.names(split).is_empty() {
+                w.put(format!("# There are no images in the split {}.\n", split.name()))?;
+            } else {
+                w.put(format!("{0}: images/{0}\n", split.name()))?;
+            }
+        }
+        w.put(more)?;
+        w.put("names:\n")?;
+        for class in [Class::Crop, Class::Weed] {
+            w.put(format!("  {}: {}\n", number(class), class.name()))?;
+        }
+        Ok(())
+    })
+}

@@ -1,0 +1,29 @@
+//! YOLO detection: a box a plant, for Ultralytics and supervision.
+//!
+//! A row is a plant: its class (0 crop, 1 weed), then its box's middle, width and height, shares of the image's. A box holds the plant's
+//! pixels whole, from their left and upper borders to their right and lower ones.
+//!
+//! Source: Ultralytics documentation, "Object Detection Datasets Overview".
+
+use super::{Format, Whole, boxes};
+use crate::Result;
+use crate::dataset::File;
+use crate::dataset::recipe::Recipe;
+use crate::dataset::sample::Sample;
+use crate::dataset::set::Set;
+
+pub(super) struct Writer;
+
+const FOLDER: &str = "yolo-detect";
+
+impl Format for Writer {
+    fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
+        let seen = sample.record.seen();
+        let rows: Vec<String> = seen.filter_map(|plant| Some(boxes::row(sample, plant, plant.seen.bounds?))).collect();
+        boxes::files(FOLDER, sample, &rows)
+    }
+
+    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+        boxes::data(FOLDER, set, out, "")
+    }
+}
