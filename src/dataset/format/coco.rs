@@ -1,12 +1,13 @@
-//! COCO instances and keypoints: `annotations/instances_SPLIT.json` and `images/SPLIT/NAME.png`; `pycocotools.coco.COCO` reads it.
+//! COCO instances and keypoints: `annotations/instances_SPLIT.json` of plants, `annotations/leaves_SPLIT.json` of leaves, and
+//! `images/SPLIT/NAME.png`; `pycocotools.coco.COCO` reads them.
 //!
-//! Categories are 1 crop, 2 weed, 3 leaf. Every plant and every leaf that an image shows is an annotation: `segmentation` is a
-//! compressed run-length mask with `iscrowd` 0, for leaves have holes and parts that polygons cannot hold; `area` is its number of
-//! pixels; ids begin at 1, for `COCOeval` takes a match with id 0 for none.
+//! Categories are 1 crop and 2 weed, and in the file of leaves 3 leaf. Every plant and every leaf that an image shows is an annotation:
+//! `segmentation` is a compressed run-length mask with `iscrowd` 0, for leaves have holes and parts that polygons cannot hold; `area` is its
+//! number of pixels; ids begin at 1, for `COCOeval` takes a match with id 0 for none. Leaves have a file of their own, for `COCOeval` looks at
+//! the hundred best answers of an image unless it is told otherwise, and an image may show hundreds of leaves.
 //!
-//! All categories share the keypoints stem, base, tip, because readers want one number of them in a file: a plant has the first, a
-//! leaf the others, the rest is `0 0 0`. A point in sight has 2, a hidden one 1, one outside the image `0 0 0`. Points are in the
-//! coordinates of the boxes, where the first pixel's centre is (0.5, 0.5).
+//! Keypoints: the stem of a plant, base and tip of a leaf. A point in sight has 2, a hidden one 1, one outside the image `0 0 0`. Points are in
+//! the coordinates of the boxes, where the first pixel's centre is (0.5, 0.5).
 //!
 //! `attributes`, which `pycocotools` passes over and datumaro and CVAT read, tell the number in `plants.png` and `leaves.png`, the
 //! species, and how much is visible.
@@ -46,14 +47,18 @@ impl Format for Writer {
             if set.names(split).is_empty() {
                 continue;
             }
-            out.file(&format!("{FOLDER}/annotations/instances_{}.json", split.name()), |w| {
-                head(w, set, split)?;
-                w.put("\"categories\": [")?;
-                w.items(categories().into_iter().map(Ok))?;
-                w.put("],\n\"annotations\": [")?;
-                w.items(annotations(set, split))?;
-                w.put("]\n}\n")
-            })?;
+            for (file, categories, of_plant) in
+                [("instances", plants(), plant as OfPlant), ("leaves", vec![leaf()], leaves as OfPlant)]
+            {
+                out.file(&format!("{FOLDER}/annotations/{file}_{}.json", split.name()), |w| {
+                    head(w, set, split)?;
+                    w.put("\"categories\": [")?;
+                    w.items(categories.into_iter().map(Ok))?;
+                    w.put("],\n\"annotations\": [")?;
+                    w.items(annotations(set, split, of_plant))?;
+                    w.put("]\n}\n")
+                })?;
+            }
         }
         Ok(())
     }
@@ -106,15 +111,18 @@ pub(super) fn category(class: Class) -> u32 {
     class as u32
 }
 
-fn categories() -> Vec<Value> {
-    let category = |(id, name, supercategory): (u32, &str, &str)| {
-        // The blade runs from keypoint 2, its base, to keypoint 3, its tip.
-        let skeleton = if id == LEAF { json!([[2, 3]]) } else { json!([]) };
-        let keypoints = ["stem", "base", "tip"];
-        json!({ "id": id, "name": name, "supercategory": supercategory, "keypoints": keypoints, "skeleton": skeleton })
+/// Categories of plants.
+fn plants() -> Vec<Value> {
+    let class = |class: Class| {
+        let name = class.name();
+        json!({ "id": category(class), "name": name, "supercategory": "plant", "keypoints": ["stem"], "skeleton": [] })
     };
-    let class = |class: Class| (self::category(class), class.name(), "plant");
-    [class(Class::Crop), class(Class::Weed), (LEAF, "leaf", "organ")].map(category).to_vec()
+    [Class::Crop, Class::Weed].map(class).to_vec()
+}
+
+/// The category of leaves: the blade runs from its first keypoint to its second.
+fn leaf() -> Value {
+    json!({ "id": LEAF, "name": "leaf", "supercategory": "organ", "keypoints": ["base", "tip"], "skeleton": [[1, 2]] })
 }
 
 /// A plant or a leaf.
@@ -132,9 +140,12 @@ struct Annotation {
     attributes: Value,
 }
 
-/// All annotations of a split, image by image, a plant before its leaves.
-fn annotations(set: &Set, split: Split) -> impl Iterator<Item = Result<Annotation>> + '_ {
-    let of_image = |record: Result<Record>| match record {
+/// What of a plant in an image a file tells.
+type OfPlant = fn(&Set, &Record, &Plant) -> Vec<Annotation>;
+
+/// All annotations of a split, image by image.
+fn annotations(set: &Set, split: Split, of_plant: OfPlant) -> impl Iterator<Item = Result<Annotation>> + '_ {
+    let of_image = move |record: Result<Record>| match record {
         Ok(record) => record.seen().flat_map(|plant| of_plant(set, &record, plant)).map(Ok).collect(),
         Err(e) => vec![Err(e)],
     };
@@ -144,9 +155,14 @@ fn annotations(set: &Set, split: Split) -> impl Iterator<Item = Result<Annotatio
     set.records(split).flat_map(of_image).enumerate().map(numbered)
 }
 
-fn of_plant(set: &Set, record: &Record, plant: &Plant) -> Vec<Annotation> {
-    let mut all = vec![annotation(record, category(plant.class), &plant.seen, [plant.stem, None, None], about(set, plant))];
-    for leaf in plant.leaves.iter().filter(|l| l.seen.pixels > 0) {
+/// The plant itself.
+fn plant(set: &Set, record: &Record, plant: &Plant) -> Vec<Annotation> {
+    vec![annotation(record, category(plant.class), &plant.seen, &[plant.stem], about(set, plant))]
+}
+
+/// Its leaves.
+fn leaves(set: &Set, record: &Record, plant: &Plant) -> Vec<Annotation> {
+    let of_leaf = |leaf: &Leaf| {
         let about = json!({
             "plant": plant.number,
             "leaf": leaf.number,
@@ -154,20 +170,20 @@ fn of_plant(set: &Set, record: &Record, plant: &Plant) -> Vec<Annotation> {
             "visible_fraction": leaf.seen.visible_fraction(),
             "inside_fraction": leaf.seen.inside_fraction(),
         });
-        let Leaf { base, tip, .. } = leaf;
-        all.push(annotation(record, LEAF, &leaf.seen, [None, *base, *tip], tracked(set, leaf.id, about)));
-    }
-    all
+        annotation(record, LEAF, &leaf.seen, &[leaf.base, leaf.tip], tracked(set, leaf.id, about))
+    };
+    plant.leaves.iter().filter(|leaf| leaf.seen.pixels > 0).map(of_leaf).collect()
 }
 
 fn annotation(
     record: &Record,
     category_id: u32,
     seen: &Seen,
-    points: [Option<Keypoint>; 3],
+    points: &[Option<Keypoint>],
     attributes: Value,
 ) -> Annotation {
-    let points = points.map(|p| keypoint(p).unwrap_or_else(|| [0, 0, 0].map(Value::from)));
+    let points: Vec<[Value; 3]> =
+        points.iter().map(|p| keypoint(*p).unwrap_or_else(|| [0, 0, 0].map(Value::from))).collect();
     Annotation {
         id: 0,
         image_id: image_id(record),

@@ -1,4 +1,5 @@
-//! COCO instances: masks of plants, and of leaves where it has them, as polygons or run lengths; keypoints by the names stem, base, tip.
+//! COCO instances: masks of plants, and of leaves where it has them, as polygons or run lengths; keypoints by the names stem, base, tip. Leaves may
+//! stand in `leaves_SPLIT.json` beside `instances_SPLIT.json`.
 //!
 //! What no mask covers is soil. Where masks overlap, the smaller lies on top. A leaf belongs to the plant that most of it lies on. A crowd
 //! (`iscrowd` 1) has a class and no instance. Polygons hold the pixels whose centres lie inside, by the even-odd rule; the
@@ -21,6 +22,7 @@ use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Images with their annotations.
 pub struct Coco {
@@ -32,8 +34,6 @@ pub struct Coco {
 /// An image and what is drawn on it.
 struct Annotated {
     path: PathBuf,
-    /// The file that says so.
-    document: PathBuf,
     size: (u32, u32),
     things: Vec<Thing>,
 }
@@ -41,6 +41,8 @@ struct Annotated {
 /// A plant, a leaf, a crowd, a patch without a label.
 struct Thing {
     id: u64,
+    /// The file that says so.
+    document: Arc<Path>,
     meaning: Meaning,
     crowd: bool,
     /// Number of its plant, where its maker told it.
@@ -124,7 +126,7 @@ impl Coco {
         Ok(all)
     }
 
-    /// The images of one file.
+    /// The images of one file, with the leaves of the file beside it.
     fn document(
         &mut self,
         split: Option<Split>,
@@ -132,45 +134,72 @@ impl Coco {
         folder: &Path,
         classes: Option<&Names>,
     ) -> Result<Vec<(Listed, Annotated)>> {
-        let bytes = crate::input::contents(path).map_err(Error::reading(path))?;
-        let _ = writeln!(self.words, "{split:?} {:x?}", Sha256::digest(&bytes));
-        let wrong = |what: String| Error::input(what).in_file(path);
-        let Document { images, annotations, categories } =
-            serde_json::from_slice(&bytes).map_err(|e| wrong(format!("this is not a COCO file of instances: {e}")))?;
-        let mut kinds: BTreeMap<u64, (Meaning, Vec<String>)> = BTreeMap::new();
-        for category in categories {
-            let known = match classes {
-                Some(names) => names.0.get(&category.name).copied(),
-                None => Meaning::named(&category.name),
-            };
-            if let Some(meaning) = known {
-                kinds.insert(category.id, (meaning, category.keypoints));
-            } else if annotations.iter().any(|a| a.category_id == category.id) {
-                let name = &category.name;
-                let help = format!("give --classes '{name}=crop,…'; classes are soil, crop, weed, leaf, ignore");
-                return Err(wrong(format!("no class was given for the category `{name}`")).help(help));
-            }
-        }
+        let instances = Read::open(path)?;
+        let leaves = leaves_beside(path).map(|path| Read::open(&path)).transpose()?;
         let mut found: BTreeMap<u64, (Listed, Annotated)> = BTreeMap::new();
         let scope =
             Scope::Below { folder: folder.into(), help: "name images by their paths below the folder of --images" };
-        for Image { id, file_name, width, height } in images {
+        for Image { id, file_name, width, height } in &instances.document.images {
             let named =
-                |folder: &Path| scope.resolve(folder, &file_name).map_err(|outside| Error::from(outside).in_file(path));
+                |folder: &Path| scope.resolve(folder, file_name).map_err(|outside| Error::from(outside).in_file(path));
             let of_split = split.map(|s| named(&folder.join(s.name()))).transpose()?.filter(|p| p.is_file());
             let image = of_split.map_or_else(|| named(folder), Ok)?;
             if !image.is_file() {
                 let what = format!("its image {} is missing", image.display());
-                return Err(wrong(what).help("say where images lie with --images"));
+                return Err(instances.wrong(what).help("say where images lie with --images"));
             }
-            let annotated = Annotated { path: image, document: path.into(), size: (width, height), things: Vec::new() };
-            if found.insert(id, (Listed { split, name: file_name }, annotated)).is_some() {
-                return Err(wrong(format!("two images have the id {id}")));
+            let annotated = Annotated { path: image, size: (*width, *height), things: Vec::new() };
+            if found.insert(*id, (Listed { split, name: file_name.clone() }, annotated)).is_some() {
+                return Err(instances.wrong(format!("two images have the id {id}")));
             }
         }
+        for read in [Some(instances), leaves].into_iter().flatten() {
+            let _ = writeln!(self.words, "{split:?} {:x?}", Sha256::digest(&read.bytes));
+            read.annotate(classes, &mut found)?;
+        }
+        Ok(found.into_values().collect())
+    }
+}
+
+/// A file of annotations that was read.
+struct Read {
+    path: PathBuf,
+    bytes: Vec<u8>,
+    document: Document,
+}
+
+impl Read {
+    fn open(path: &Path) -> Result<Self> {
+        let bytes = crate::input::contents(path).map_err(Error::reading(path))?;
+        let document = serde_json::from_slice(&bytes)
+            .map_err(|e| Error::input(format!("this is not a COCO file of instances: {e}")).in_file(path))?;
+        Ok(Self { path: path.into(), bytes, document })
+    }
+
+    fn wrong(&self, what: String) -> Error {
+        Error::input(what).in_file(&self.path)
+    }
+
+    /// Gives images what it says of them.
+    fn annotate(mut self, classes: Option<&Names>, found: &mut BTreeMap<u64, (Listed, Annotated)>) -> Result<()> {
+        let annotations = std::mem::take(&mut self.document.annotations);
+        let mut kinds: BTreeMap<u64, (Meaning, &[String])> = BTreeMap::new();
+        for Category { id, name, keypoints } in &self.document.categories {
+            let known = match classes {
+                Some(names) => names.0.get(name).copied(),
+                None => Meaning::named(name),
+            };
+            if let Some(meaning) = known {
+                kinds.insert(*id, (meaning, keypoints));
+            } else if annotations.iter().any(|a| a.category_id == *id) {
+                let help = format!("give --classes '{name}=crop,…'; classes are soil, crop, weed, leaf, ignore");
+                return Err(self.wrong(format!("no class was given for the category `{name}`")).help(help));
+            }
+        }
+        let document: Arc<Path> = self.path.as_path().into();
         for annotation in annotations {
             let id = annotation.id;
-            let wrong = |what: &str| wrong(format!("{}{what}", named(id, &bytes)));
+            let wrong = |what: &str| self.wrong(format!("{}{what}", named(id, &self.bytes)));
             let (_, image) = found
                 .get_mut(&annotation.image_id)
                 .ok_or_else(|| wrong(&format!("is of image {}, which the file lacks", annotation.image_id)))?;
@@ -179,6 +208,7 @@ impl Coco {
                 .ok_or_else(|| wrong(&format!("has the category {}, which the file lacks", annotation.category_id)))?;
             image.things.push(Thing {
                 id,
+                document: document.clone(),
                 meaning: *meaning,
                 crowd: annotation.iscrowd != 0,
                 plant: annotation.attributes["plant"].as_u64().and_then(|n| u32::try_from(n).ok()),
@@ -188,8 +218,14 @@ impl Coco {
                 points: ["stem", "base", "tip"].map(|name| point(names, name, &annotation.keypoints)),
             });
         }
-        Ok(found.into_values().collect())
+        Ok(())
     }
+}
+
+/// The file of leaves beside one of instances, if there is one: `leaves_train.json` beside `instances_train.json`.
+fn leaves_beside(path: &Path) -> Option<PathBuf> {
+    let split = path.file_name()?.to_str()?.strip_prefix("instances_")?;
+    Some(path.with_file_name(format!("leaves_{split}"))).filter(|leaves| leaves.is_file())
 }
 
 /// An annotation by its id and the line where that stands, as the beginning of a sentence. Only annotations are looked through, for images
@@ -337,8 +373,8 @@ fn plant_numbers(things: &[Thing]) -> Vec<u32> {
 fn pixels(image: &Annotated, thing: &Thing) -> Result<Vec<u32>> {
     let (w, h) = image.size;
     let wrong = |what: String| {
-        let document = crate::input::contents(&image.document).unwrap_or_default();
-        Error::input(format!("{}has a wrong mask: {what}", named(thing.id, &document))).in_file(&image.document)
+        let document = crate::input::contents(&thing.document).unwrap_or_default();
+        Error::input(format!("{}has a wrong mask: {what}", named(thing.id, &document))).in_file(thing.document.as_ref())
     };
     let rle = match &thing.segmentation {
         Segmentation::Polygons(polygons) => return Ok(inside(w, h, polygons)),
