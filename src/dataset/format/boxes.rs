@@ -6,6 +6,7 @@
 use super::{Whole, picture};
 use crate::Result;
 use crate::dataset::File;
+use crate::dataset::recipe::Recipe;
 use crate::dataset::record::{Plant, Record};
 use crate::dataset::rle::Box2;
 use crate::dataset::sample::Sample;
@@ -19,12 +20,12 @@ pub(super) fn number(class: Class) -> u8 {
     (class as u8).saturating_sub(Class::Crop as u8)
 }
 
-/// Places in the image, pixels, as a row has them: shares of its width and height.
+/// Places in the image, pixels, as a row has them: shares of its width and height, as finely as readers with single precision have them.
 pub(super) fn shares(row: &mut String, sample: &Sample, places: impl IntoIterator<Item = (f64, f64)>) {
     let (width, height) = sample.size();
     for (x, y) in places {
         // Writing to a text cannot fail.
-        let _ = write!(row, " {:.6} {:.6}", x / f64::from(width), y / f64::from(height));
+        let _ = write!(row, " {:.8} {:.8}", x / f64::from(width), y / f64::from(height));
     }
 }
 
@@ -46,6 +47,17 @@ pub(super) fn files(folder: &str, sample: &Sample, rows: &[String]) -> Result<Ve
         picture::photograph(sample, format!("{folder}/images/{split}/{name}.png"))?,
         File { path: format!("{folder}/labels/{split}/{name}.txt"), bytes: text.into_bytes() },
     ])
+}
+
+/// What the user should know before the images are made.
+pub(super) fn warnings(recipe: &Recipe) -> Vec<String> {
+    let lacks = |split: &Split| !(0..recipe.count).any(|k| recipe.split_of(k) == *split);
+    let lacking: Vec<&str> = [Split::Train, Split::Val].into_iter().filter(lacks).map(Split::name).collect();
+    if lacking.is_empty() {
+        return Vec::new();
+    }
+    let lacking = lacking.join(" and no image in ");
+    vec![format!("no image in {lacking}: Ultralytics opens no such dataset; give another --split or make more images")]
 }
 
 /// `data.yaml`, with `more` behind the splits.

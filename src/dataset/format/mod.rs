@@ -75,7 +75,7 @@ macro_rules! formats {
 formats! {
     "cityscapes" => cityscapes: "Cityscapes' layout: label and instance maps by split and city",
         r#"datumaro.Dataset.import_from("cityscapes", "cityscapes")"#;
-    "coco" => coco: "COCO instances and keypoints of plants and leaves, for `pycocotools`",
+    "coco" => coco: "COCO instances and keypoints of plants, and of leaves in a file of their own, for `pycocotools`",
         r#"COCO("coco/annotations/instances_train.json")"#;
     "colmap" => colmap: "COLMAP's text models: cameras and poses of each field's images, for `pycolmap` and NeRF programs",
         r#"pycolmap.Reconstruction("colmap/000000")"#;

@@ -4,7 +4,9 @@
 //! fills the polygon and paints its edges too (OpenCV's `fillPoly`, even-odd): corners lie a hundredth of a pixel within the mask, so that what is
 //! left of each is a pixel of the mask, and a part with all its holes comes back exactly. Parts and holes are joined by cuts that go there and
 //! back over the same places. A cut has no area, but its pixels are painted; it goes over pixels of the mask as far as it can, and over as few
-//! others as there must be. Those are all that is lost. supervision rounds corners, and paints one pixel more to the right and below.
+//! others as there must be. Those are all that is lost. Corners of cuts lie in the middle of pixels: Ultralytics puts more corners between those
+//! of a polygon when it trains, and none of them may fall into a pixel beside. supervision rounds corners, and paints one pixel more to the right
+//! and below.
 //!
 //! Sources: edges between pixels that are followed with the mask on their right, known as crack codes, Rosenfeld and Kak 1982, "Digital Picture
 //! Processing"; cuts, Dijkstra's shortest path on which pixels of the mask are free.
@@ -28,11 +30,16 @@ pub(super) struct Corner {
     pixel: Pixel,
     /// Whether the polygon runs straight on, so that it may be left out.
     straight: bool,
+    /// Whether it is one of a cut, in the middle of its pixel.
+    cut: bool,
 }
 
 impl Corner {
     /// Its place in the image: 0, 0 is the upper left corner of the upper left pixel.
     pub(super) fn place(&self) -> (f64, f64) {
+        if self.cut {
+            return (f64::from(self.pixel.0) + 0.5, f64::from(self.pixel.1) + 0.5);
+        }
         let within = |at: i32, pixel: i32| f64::from(at) + if pixel == at { WITHIN } else { -WITHIN };
         (within(self.at.0, self.pixel.0), within(self.at.1, self.pixel.1))
     }
@@ -130,7 +137,7 @@ impl Mask {
             } else {
                 plus(at, RIGHT[next])
             };
-            corners.push(Corner { at, pixel, straight: next == d });
+            corners.push(Corner { at, pixel, straight: next == d, cut: false });
             d = next;
             if at == start && d == first {
                 return corners;
@@ -229,25 +236,34 @@ fn splice(chain: &mut Vec<Corner>, path: &[Pixel], border: &[Corner]) {
     let here = chain.iter().position(|corner| corner.at == *from);
     let there = border.iter().position(|corner| corner.at == *to);
     let (Some(here), Some(there)) = (here, there) else { return };
-    let cut: Vec<Corner> =
-        if path.len() == 1 { Vec::new() } else { (0..path.len()).map(|i| on_cut(path, i)).collect() };
     chain[here].straight = false;
     let back = chain[here];
     let end = Corner { straight: false, ..border[there] };
-    let mut detour = cut.clone();
+    let (cut, mut home): (Vec<Corner>, Vec<Corner>) = if path.len() == 1 {
+        // Between pixels that touch at this corner alone, each from the corner into the middle of the other.
+        let diagonal = back.pixel.0 != end.pixel.0 && back.pixel.1 != end.pixel.1;
+        let into = |pixel: Pixel| diagonal.then_some(Corner { at: pixel, pixel, straight: false, cut: true });
+        (into(end.pixel).into_iter().collect(), into(back.pixel).into_iter().collect())
+    } else {
+        let cut: Vec<Corner> = (0..path.len()).map(|i| on_cut(path, i)).collect();
+        (cut.clone(), cut)
+    };
+    home.reverse();
+    let mut detour = cut;
     detour.push(end);
     detour.extend(border[there..].iter().chain(&border[..there]).skip(1));
     detour.push(end);
-    detour.extend(cut.into_iter().rev());
+    detour.extend(home);
     detour.push(back);
-    chain.splice(here + 1..here + 1, detour);
+    let rest = chain.split_off(here + 1);
+    chain.extend(detour.into_iter().chain(rest));
 }
 
 /// Corner `i` of a cut.
 fn on_cut(path: &[Pixel], i: usize) -> Corner {
     let step = |a: Pixel, b: Pixel| (b.0 - a.0, b.1 - a.1);
     let straight = i > 0 && i + 1 < path.len() && step(path[i - 1], path[i]) == step(path[i], path[i + 1]);
-    Corner { at: path[i], pixel: path[i], straight }
+    Corner { at: path[i], pixel: path[i], straight, cut: true }
 }
 
 /// Ways from what is joined to what is not, over the upper left corners of pixels: those of the mask cost nothing, others one each.

@@ -65,11 +65,10 @@ impl Format for Writer {
         })
     }
 
-    fn warnings(&self, _recipe: &Recipe) -> Vec<String> {
-        vec![
-            "a plant is one polygon, holes and parts are joined by cuts, leaves are left out; loss.json tells what is lost of each plant"
-                .into(),
-        ]
+    fn warnings(&self, recipe: &Recipe) -> Vec<String> {
+        let polygons = "a plant is one polygon, holes and parts are joined by cuts, leaves are left out; loss.json tells what is lost of \
+                        each plant";
+        [vec![polygons.into()], boxes::warnings(recipe)].concat()
     }
 }
 

@@ -23,6 +23,10 @@ impl Format for Writer {
         boxes::files(FOLDER, sample, &rows)
     }
 
+    fn warnings(&self, recipe: &Recipe) -> Vec<String> {
+        boxes::warnings(recipe)
+    }
+
     fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
         boxes::data(FOLDER, set, out, "")
     }

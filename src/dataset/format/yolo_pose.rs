@@ -47,8 +47,9 @@ impl Format for Writer {
         boxes::data(FOLDER, set, out, &more)
     }
 
-    fn warnings(&self, _recipe: &Recipe) -> Vec<String> {
-        vec![format!("a plant has the keypoints of its stem and of the tips of its first {TIPS} leaves")]
+    fn warnings(&self, recipe: &Recipe) -> Vec<String> {
+        let points = format!("a plant has the keypoints of its stem and of the tips of its first {TIPS} leaves");
+        [vec![points], boxes::warnings(recipe)].concat()
     }
 }
 
