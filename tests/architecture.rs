@@ -102,7 +102,7 @@ const ALLOWED: &[(&str, &str)] = &[
     // Images, plants, the soil's maps and the sensor's pixels: loops over what is many.
     (
         "rayon",
-        "accel/embree.rs render/ sensor/ job/threads.rs dataset/ compare/ scene/assemble/estimate.rs scene/assemble/mod.rs scene/traits.rs soil/bake.rs soil/ground.rs material/ground.rs raster/sheets.rs",
+        "accel/embree.rs render/ sensor/ job/threads.rs dataset/ compare/ scene/assemble/estimate.rs scene/assemble/ground.rs scene/assemble/mod.rs scene/traits.rs soil/bake.rs soil/ground.rs material/ground.rs raster/sheets.rs",
     ),
     // One reader for all RON files; faults inside a value are found where they lie.
     ("ron", "ron_file/"),
@@ -118,7 +118,7 @@ const ALLOWED: &[(&str, &str)] = &[
     ),
     // Weights, as every trainer reads them.
     ("safetensors", "train/weights.rs"),
-    ("sha2", "scene/library.rs dataset/ train/data/photos.rs train/run.rs train/weights.rs"),
+    ("sha2", "scene/library.rs model/files.rs dataset/ train/data/photos.rs train/run.rs train/weights.rs"),
     ("signal_hook", "cli/signal.rs"),
     // Parts that a pixel met: one or two, nearly always.
     ("smallvec", "film/tally.rs output/exr/cryptomatte.rs"),

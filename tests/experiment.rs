@@ -25,9 +25,8 @@ use furrow::train::weights::{self, Array};
 use furrow::{Error, Result};
 use std::cell::{Cell, RefCell};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex, OnceLock};
 use tempfile::TempDir;
 
 /// Eight labelled images, made once.
@@ -178,7 +177,7 @@ impl Players {
                 training: &|_, _| (),
                 tell: &|_| (),
                 warn: &|words| warned.lock().expect("no panic").push(words.into()),
-                stop: &AtomicBool::new(false),
+                stop: &Arc::default(),
             },
         )
     }

@@ -560,8 +560,9 @@ fn a_preview_is_the_same_field_with_coarser_meshes() {
 
 /// Expected: where it is not wanted any more, nothing is grown.
 #[test]
-fn a_preview_that_is_not_wanted_is_given_up() {
-    let refusal = ploughed(Some(Preview::new(&Arc::new(AtomicBool::new(true))))).err().expect("an interruption");
+fn a_field_that_is_not_wanted_is_given_up() {
+    let stop = Some(Arc::new(AtomicBool::new(true)));
+    let refusal = assemble::field_of(PLOUGHED, &Options { stop, ..Options::default() }).err().expect("an interruption");
     assert_eq!(refusal.kind(), furrow::error::Kind::Interrupted);
 }
 

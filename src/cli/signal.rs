@@ -57,14 +57,14 @@ impl Signals {
     }
 
     /// The flag that signals raise from now on instead of ending the process.
-    pub fn heed(&self) -> &AtomicBool {
+    pub fn heed(&self) -> &Arc<AtomicBool> {
         self.unheeded.store(false, Ordering::SeqCst);
         &self.stop
     }
 
     /// Two flags instead of the end of the process: the first is raised by every signal, the second by INT and TERM alone, which
     /// do not wait for the work in hand.
-    pub fn heed_patiently(&self) -> (&AtomicBool, &AtomicBool) {
+    pub fn heed_patiently(&self) -> (&Arc<AtomicBool>, &Arc<AtomicBool>) {
         (self.heed(), &self.urgent)
     }
 }

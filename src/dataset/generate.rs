@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 /// Which of the images a run is for: those of the fields whose number % of == number.
@@ -79,7 +79,7 @@ pub struct Callbacks<'a> {
     /// Set it to stop when the images under way are done.
     pub soon: &'a AtomicBool,
     /// Set it to stop at once.
-    pub now: &'a AtomicBool,
+    pub now: &'a Arc<AtomicBool>,
 }
 
 /// What remains to be done for an image.
@@ -128,7 +128,9 @@ pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()>
         tasks.chunk_by(|a, b| set.recipe.field_of(a.0).0 == set.recipe.field_of(b.0).0).collect();
     let rendered = tasks.iter().find(|(_, task)| *task == Task::All).map(|(index, _)| *index);
     let source = match (rendered, &renderer) {
-        (Some(index), Some(renderer)) => Some((scene_file(set)?.memory(work.memory), index, renderer)),
+        (Some(index), Some(renderer)) => {
+            Some((scene_file(set)?.memory(work.memory).until(callbacks.now), index, renderer))
+        }
         _ => None,
     };
     let most = source

@@ -5,12 +5,12 @@ use super::plan::{Order, plan};
 use super::{Set, finish};
 use crate::Result;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
+use std::sync::Arc;
 
 /// Makes what is missing of a dataset in `folder` with all threads, and returns the paths of the files that belong to all images.
 /// Killed, stopped or damaged, the same call makes what is missing and ends with the same files.
 pub fn make(folder: impl AsRef<Path>, order: &Order) -> Result<Vec<PathBuf>> {
-    let never = AtomicBool::new(false);
+    let never = Arc::default();
     let callbacks = Callbacks { begin: &|_| (), warn: &|_| (), done: &|_| (), soon: &never, now: &never };
     make_watched(folder.as_ref(), order, &Work::default(), &callbacks)
 }

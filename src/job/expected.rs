@@ -1,4 +1,5 @@
-//! How many plants the images of a scene file show, and how much that differs from image to image.
+//! How many plants the images of a scene file show, and how much that differs from field to field: the mean over where chance may place them,
+//! by the camera and the densities that a field draws. What chance places, above all in patches, differs more.
 
 use super::SceneFile;
 use crate::report::number;
@@ -36,7 +37,12 @@ impl ExpectedPlants {
     /// A sentence.
     pub fn words(&self) -> String {
         let Self { median, low, high } = *self;
-        format!("about {} plants an image, {} to {} in nine of ten", number(median), number(low), number(high))
+        format!(
+            "about {} plants an image, {} to {} by the views and densities of nine fields in ten",
+            number(median),
+            number(low),
+            number(high)
+        )
     }
 
     /// The warning where there is one, else the sentence.
@@ -78,7 +84,9 @@ mod tests {
         assert_eq!((even.low, even.median, even.high), (10.5, 15.0, 19.4));
         assert_eq!(even.warning(), None);
         let wide = ExpectedPlants::of((0..100).map(f64::from).collect()).unwrap();
-        assert!(wide.warning().unwrap().starts_with("about 50 plants an image, 5 to 94 in nine of ten, 18.8 times"));
+        assert!(wide.warning().unwrap().starts_with(
+            "about 50 plants an image, 5 to 94 by the views and densities of nine fields in ten, 18.8 times"
+        ));
         // Fields of less than a plant are not infinitely far from others.
         assert_eq!(ExpectedPlants::of(vec![0.0, 0.2, 0.1, 2.0]).unwrap().spread(), 2.0);
         assert_eq!(ExpectedPlants::of(Vec::new()), None);

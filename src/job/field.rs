@@ -2,10 +2,10 @@
 
 use super::threads::Threads;
 use crate::ablation::Edit;
-use crate::accel::EmbreeAccel;
+use crate::accel::{Before, EmbreeAccel};
 use crate::integrator::World;
 use crate::scene;
-use crate::scene::assemble::Preview;
+use crate::scene::assemble::Options;
 use crate::{Error, Result};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
@@ -15,7 +15,7 @@ pub struct Field {
     grown: scene::Field,
     edit: &'static Edit,
     threads: Threads,
-    preview: Option<Preview>,
+    options: Options,
     grow: Duration,
     geometry: OnceLock<(Arc<EmbreeAccel>, Duration)>,
 }
@@ -25,10 +25,10 @@ impl Field {
         grown: scene::Field,
         edit: &'static Edit,
         threads: Threads,
-        preview: Option<Preview>,
+        options: Options,
         grow: Duration,
     ) -> Self {
-        Self { grown, edit, threads, preview, grow, geometry: OnceLock::new() }
+        Self { grown, edit, threads, options, grow, geometry: OnceLock::new() }
     }
 
     /// Scene, plants and sensor; seed, index and hash of what was read; conditions and warnings.
@@ -73,11 +73,12 @@ impl Field {
         if self.geometry.get().is_none() {
             let begin = Instant::now();
             let (scene, count) = (&self.grown.scene, self.threads.count() as u32);
-            let built = self.threads.install(|| match &self.preview {
-                None => EmbreeAccel::build(&scene.surfaces(), count).map(Arc::new),
-                Some(preview) => preview.geometry(&scene.parts, |before| {
-                    EmbreeAccel::build_until(&scene.surfaces(), count, Some(preview.outdated()), before)
-                }),
+            let build = |before: Option<&Before<'_>>| {
+                EmbreeAccel::build_until(&scene.surfaces(), count, self.options.stop.as_deref(), before)
+            };
+            let built = self.threads.install(|| match &self.options.preview {
+                None => build(None).map(Arc::new),
+                Some(preview) => preview.geometry(&scene.parts, build),
             })?;
             let _ = self.geometry.set((built, begin.elapsed()));
         }

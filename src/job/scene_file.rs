@@ -9,6 +9,7 @@ use crate::scene::assemble::{Options, Preview, Source};
 use crate::scene::estimate::Estimate;
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// A scene file: a distribution over fields. What its fields have read (species, textures, tables) is kept for the next.
@@ -80,9 +81,15 @@ impl SceneFile {
         self
     }
 
-    /// For a look at its fields: meshes of plants are as coarse as the pixels, growing ends with an interruption where the preview's flag is
-    /// raised, and what did not change since the field before is kept. Every random number stays, so plants and labels are those of the field
-    /// but for their outlines.
+    /// With fields that are given up where the flag is raised: growing and building end with an interruption.
+    #[must_use]
+    pub fn until(mut self, stop: &Arc<AtomicBool>) -> Self {
+        self.options.stop = Some(Arc::clone(stop));
+        self
+    }
+
+    /// For a look at its fields: meshes of plants are as coarse as the pixels, and what did not change since the field before is kept. Every
+    /// random number stays, so plants and labels are those of the field but for their outlines.
     #[doc(hidden)]
     #[must_use]
     pub fn preview(mut self, preview: &Preview) -> Self {
@@ -125,6 +132,6 @@ impl SceneFile {
         let begin = Instant::now();
         let options = Options { index, ..self.options.clone() };
         let grown = self.threads.install(|| self.edit.field(&self.source, &options))?;
-        Ok(Field::new(grown, self.edit, self.threads.clone(), options.preview, begin.elapsed()))
+        Ok(Field::new(grown, self.edit, self.threads.clone(), options, begin.elapsed()))
     }
 }

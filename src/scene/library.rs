@@ -287,9 +287,8 @@ impl Library {
             let model = Model::load_within(&full, desc.up, lifted);
             Arc::new(model.map_err(|e| at_its_place(page, path, MODEL_HELP, e))?)
         };
-        for file in &model.files {
-            self.note(file)?;
-        }
+        // Of the bytes that it was made of: the files may have been written since.
+        self.files.extend(model.files.iter().map(|(file, digest)| (file.clone(), *digest)));
         self.models.insert(key, model.clone());
         Ok(model)
     }
@@ -298,7 +297,7 @@ impl Library {
     fn model_before(&self, key: &(PathBuf, bool, bool)) -> Option<Arc<Model>> {
         let before = self.before.as_deref()?;
         let known = before.models.get(key)?;
-        let same = |file: &PathBuf| digest(file).is_ok_and(|digest| before.files.get(file) == Some(&digest));
+        let same = |(file, known): (&PathBuf, &[u8; 32])| digest(file).is_ok_and(|digest| digest == *known);
         known.files.iter().all(same).then(|| known.clone())
     }
 

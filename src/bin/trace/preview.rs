@@ -3,12 +3,14 @@
 use crate::field::{MemoryArgs, scene_file};
 use crate::letters;
 use crate::quality::{samples, threads};
+use crate::render::plants;
 use furrow::cli::{self, signal::Signals};
 use furrow::job::{Renderer, Request, SceneFile, Threads};
 use furrow::output::{self, Picture};
 use furrow::render::Watch;
 use furrow::settings::{Quality, RenderOptions};
 use furrow::{Error, Result};
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -86,24 +88,31 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     cli::check_png(&out, &args.scene)?;
     let renderer = Renderer::open(&RenderOptions::path_traced(Quality::spp(args.spp)))?;
     let scene = SceneFile::open(&args.scene)?.seed(args.seed).width(args.width).memory(args.memory.bytes);
-    let scene = scene.threads(&Threads::new(args.threads)?);
+    let stop = signals.heed();
+    let scene = scene.threads(&Threads::new(args.threads)?).until(stop);
     if !args.quiet
         && let Some(plants) = scene.plants_in_view(MOST)
     {
         furrow::tell!("{}", plants.told());
     }
-    let stop = signals.heed();
-    let (mut shots, mut seed) = (Vec::new(), 0);
+    let (mut shots, mut seed, mut told) = (Vec::new(), 0, BTreeSet::new());
+    let mut warn = |words: &String| {
+        // Fields of one scene file have most of them in common.
+        if !args.quiet && told.insert(words.clone()) {
+            furrow::tell!("warning: {words}");
+        }
+    };
     for index in args.indices.clone() {
+        scene.foretold(index)?.iter().for_each(&mut warn);
         let field = scene.field(index)?;
         let request = Request { watch: Watch { done: &|_| (), stop }, ..Request::default() };
         let photograph = renderer.render(&field, &request)?.photograph();
         let grown = field.grown();
         seed = grown.seed;
         if !args.quiet {
-            furrow::tell!("index {index}: {} plants", grown.plants.len());
-            grown.warnings.iter().for_each(|warning| furrow::tell!("warning: {warning}"));
+            furrow::tell!("index {index}: {}", plants(grown.plants.len()));
         }
+        grown.warnings.iter().for_each(&mut warn);
         shots.push(Shot {
             words: format!("index {index}"),
             width: photograph.width as usize,

@@ -123,14 +123,19 @@ impl Args {
     }
 }
 
+/// So many plants, in words.
+pub(crate) fn plants(number: usize) -> String {
+    format!("{number} plant{}", if number == 1 { "" } else { "s" })
+}
+
 /// What was grown, and how long that took.
 fn grown(path: &Path, field: &Field) -> String {
     let (grow, build) = field.times();
     let scene = &field.grown().scene;
     format!(
-        "{}: {} plants, {} parts, {:.2} M triangles; grown in {:.2} s, built in {:.2} s",
+        "{}: {}, {} parts, {:.2} M triangles; grown in {:.2} s, built in {:.2} s",
         path.display(),
-        field.grown().plants.len(),
+        plants(field.grown().plants.len()),
         scene.parts.len(),
         scene.triangles() as f64 / 1e6,
         grow.as_secs_f64(),

@@ -1,6 +1,7 @@
 //! What is known of a field before it grows: its warnings, and how many plants are to be expected in its view, from its densities alone.
 
 use super::builder::Builder;
+use super::view::View;
 use super::{Options, Source};
 use crate::Result;
 use crate::sampling::Purpose;
@@ -11,13 +12,20 @@ impl Source {
     /// About how many plants stand in the view of field `options.index`: the mean over all that chance may place there, with the camera
     /// and the densities that this field has.
     pub fn expected_plants(&self, options: &Options) -> Result<f64> {
-        self.ask(options, |builder| builder.expected_plants())
+        self.ask(options, expected_plants)
     }
 
     /// What field `options.index` warns of that is known before it grows.
     pub fn foretold(&self, options: &Options) -> Result<Vec<String>> {
         self.ask(options, |builder| {
-            builder.looked_at()?;
+            // What cannot be used is refused before anything is told.
+            let View { area, open } = builder.looked_at()?;
+            if let Some(soil) = &self.desc.soil {
+                builder.soil(soil, area, open)?;
+            }
+            for model in &self.desc.models {
+                builder.library.model(&self.page, model)?;
+            }
             builder.warn_of_camera();
             builder.warn_of_plants()?;
             Ok(std::mem::take(&mut builder.warnings))
@@ -36,23 +44,21 @@ impl Source {
     }
 }
 
-impl Builder<'_> {
-    fn expected_plants(&mut self) -> Result<f64> {
-        let desc = self.desc;
-        let placed = desc.plants.len() as f64;
-        if self.sown.is_empty() && desc.weeds.is_empty() {
-            return Ok(placed);
-        }
-        let crops = self.sown.clone().map(|k| {
-            let rows = Rows::draw(&desc.crops[k].rows, &self.stream(Purpose::Scatter, k as u64)).record();
-            rows.emergence * (1.0 + rows.doubles) / f64::from(rows.spacing_m * rows.in_row_m)
-        });
-        let weeds = desc
-            .weeds
-            .iter()
-            .zip(1000..)
-            .map(|(weed, k)| f64::from(WeedsRecord::draw(&weed.spread, &self.stream(Purpose::Scatter, k)).per_m2));
-        let per_m2: f64 = crops.chain(weeds).sum();
-        Ok(placed + per_m2 * f64::from(self.view()?.area.area()))
+fn expected_plants(builder: &mut Builder<'_>) -> Result<f64> {
+    let desc = builder.desc;
+    let placed = desc.plants.len() as f64;
+    if builder.sown.is_empty() && desc.weeds.is_empty() {
+        return Ok(placed);
     }
+    let crops = builder.sown.clone().map(|k| {
+        let rows = Rows::draw(&desc.crops[k].rows, &builder.stream(Purpose::Scatter, k as u64)).record();
+        rows.emergence * (1.0 + rows.doubles) / f64::from(rows.spacing_m * rows.in_row_m)
+    });
+    let weeds = desc
+        .weeds
+        .iter()
+        .zip(1000..)
+        .map(|(weed, k)| f64::from(WeedsRecord::draw(&weed.spread, &builder.stream(Purpose::Scatter, k)).per_m2));
+    let per_m2: f64 = crops.chain(weeds).sum();
+    Ok(placed + per_m2 * f64::from(builder.view()?.area.area()))
 }

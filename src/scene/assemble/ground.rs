@@ -3,7 +3,7 @@
 use super::PLANT_MARGIN;
 use super::builder::{Builder, Floor};
 use super::earth::{BakedGrounds, Bed, Earth, Laid, Soil};
-use super::preview::{Preview, Under};
+use super::preview::Under;
 use super::view::View;
 use crate::geometry::{Cost, Mesh};
 use crate::material::{BakedGround, Ground as GroundMaterial, Material, Solid};
@@ -93,7 +93,7 @@ impl Builder<'_> {
     }
 
     /// What the ground follows from.
-    fn soil(&mut self, desc: &SoilDesc, view: Rect, open: bool) -> Result<Soil> {
+    pub(super) fn soil(&mut self, desc: &SoilDesc, view: Rect, open: bool) -> Result<Soil> {
         let mut maps: Vec<Arc<Layer>> = Vec::new();
         for layer in &desc.layers {
             maps.push(self.library.layer(self.page, layer)?);
@@ -109,7 +109,7 @@ impl Builder<'_> {
         let ground = Ground::new(desc, colors, maps, site, &self.stream(Purpose::Soil, 0))
             .map_err(|e| self.page.blame(&[Step::Field("soil")], e))?;
         self.options.wanted()?;
-        let mut pile = Pile::new(&ground).until(self.options.preview.as_ref().map(Preview::outdated));
+        let mut pile = Pile::new(&ground).until(self.options.stop.as_ref());
         let stones = soil::stones(&desc.stones, &ground, &mut pile, &self.stream(Purpose::Debris, STONES));
         Ok(Earth { ground: Arc::new(ground), pile, stones })
     }

@@ -2,6 +2,8 @@
 
 use super::preview::Preview;
 use crate::{Error, Result};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What the command line adds to a scene file.
 #[derive(Clone, Debug, Default)]
@@ -17,15 +19,16 @@ pub struct Options {
     /// Most bytes that a field may take; [`usual_memory`](crate::scene::estimate::usual_memory) unless given. Nothing of a field depends on it, but whether it is
     /// made.
     pub memory: Option<u64>,
-    /// Given for a preview: meshes are as coarse as its pixels, where its flag is raised the field is given up, and what did not change since the
-    /// field before is taken from there.
+    /// Where it is raised, the field is given up.
+    pub stop: Option<Arc<AtomicBool>>,
+    /// Given for a preview: meshes are as coarse as its pixels, and what did not change since the field before is taken from there.
     pub preview: Option<Preview>,
 }
 
 impl Options {
-    /// An interruption, where a preview is not wanted any more.
+    /// An interruption, where the field is not wanted any more.
     pub(super) fn wanted(&self) -> Result<()> {
-        let wanted = self.preview.as_ref().is_none_or(Preview::wanted);
+        let wanted = self.stop.as_ref().is_none_or(|stop| !stop.load(Ordering::Relaxed));
         if wanted { Ok(()) } else { Err(Error::interrupted()) }
     }
 }

@@ -13,14 +13,11 @@ use crate::model::Model;
 use crate::scene::{Part, PlantRecord};
 use std::collections::HashMap;
 use std::fmt;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// One look after the other at the fields of a scene file while it is written: a flag that gives up what is not wanted any more, and what is
-/// kept of the last field.
+/// One look after the other at the fields of a scene file while it is written: what is kept of the last field.
 #[derive(Clone, Default)]
 pub struct Preview {
-    outdated: Arc<AtomicBool>,
     kept: Arc<Mutex<Kept>>,
 }
 
@@ -95,26 +92,11 @@ fn same<T>(a: &[T], b: &[T], equal: impl Fn(&T, &T) -> bool) -> bool {
 
 impl fmt::Debug for Preview {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Preview").field("outdated", &self.outdated).finish_non_exhaustive()
+        f.debug_struct("Preview").finish_non_exhaustive()
     }
 }
 
 impl Preview {
-    /// One that has kept nothing yet; where the flag is raised, growing and building end with an interruption.
-    pub fn new(outdated: &Arc<AtomicBool>) -> Self {
-        Self { outdated: Arc::clone(outdated), kept: Arc::default() }
-    }
-
-    /// The flag.
-    pub fn outdated(&self) -> &Arc<AtomicBool> {
-        &self.outdated
-    }
-
-    /// Whether it is wanted.
-    pub(super) fn wanted(&self) -> bool {
-        !self.outdated.load(Ordering::Relaxed)
-    }
-
     fn lock(&self) -> MutexGuard<'_, Kept> {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -177,7 +159,7 @@ impl Preview {
         let of: Vec<Shape> = parts.iter().map(shape).collect();
         let address = |(mesh, mask): &Shape| (Arc::as_ptr(mesh), mask.as_ref().map(Arc::as_ptr));
         let Some((known, built)) = self.lock().built.clone() else {
-            return self.keep_built(of, build(None)?);
+            return Ok(self.keep_built(of, build(None)?));
         };
         if same(&known, &of, |a, b| address(a) == address(b)) {
             return Ok(built);
@@ -185,12 +167,12 @@ impl Preview {
         let places: HashMap<_, usize> = known.iter().enumerate().map(|(i, shape)| (address(shape), i)).collect();
         let places: Vec<Option<usize>> = of.iter().map(|shape| places.get(&address(shape)).copied()).collect();
         let built = build(Some(&Before { accel: &built, places: &places }))?;
-        self.keep_built(of, built)
+        Ok(self.keep_built(of, built))
     }
 
-    fn keep_built(&self, of: Vec<Shape>, built: EmbreeAccel) -> Result<Arc<EmbreeAccel>> {
+    fn keep_built(&self, of: Vec<Shape>, built: EmbreeAccel) -> Arc<EmbreeAccel> {
         let built = Arc::new(built);
         self.lock().built = Some((of, built.clone()));
-        Ok(built)
+        built
     }
 }

@@ -64,7 +64,11 @@ impl Builder<'_> {
         for (path, growth) in crops.chain(weeds).chain(plants) {
             let species = self.library.species(page, path)?;
             if let Some(words) = beyond(&species.desc, growth, self.season.place()) {
-                self.warnings.push(format!("{path}: {words}"));
+                let words = format!("{path}: {words}");
+                // Several entries may be of one species.
+                if !self.warnings.contains(&words) {
+                    self.warnings.push(words);
+                }
             }
         }
         Ok(())

@@ -15,7 +15,7 @@ use crate::{Error, Result};
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Where a real set lies: `NAME=DIR` on the command line.
@@ -149,7 +149,7 @@ impl Bound {
         set: usize,
         tell: &(dyn Fn(&str) + Sync),
         warn: &(dyn Fn(&str) + Sync),
-        stop: &AtomicBool,
+        stop: &Arc<AtomicBool>,
     ) -> Result<()> {
         let (folder, origin) = &self.sets[set];
         let (name, source) = &self.experiment.sets[set];

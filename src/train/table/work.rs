@@ -19,6 +19,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Report of a training, below its folder.
@@ -69,7 +70,7 @@ pub struct Callbacks<'a> {
     /// Called with a warning.
     pub warn: &'a (dyn Fn(&str) + Sync),
     /// Raised by whoever wants it to stop.
-    pub stop: &'a AtomicBool,
+    pub stop: &'a Arc<AtomicBool>,
 }
 
 /// What predicts.
