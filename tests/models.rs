@@ -22,6 +22,7 @@ use furrow::scene::tag::Class;
 use furrow::scene::{Field, Part};
 use proptest::prelude::*;
 use serde_json::{Value, json};
+use sha2::Digest;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -205,6 +206,9 @@ fn an_obj_file_is_read_with_its_materials_and_masks() {
     picture(&folder, "mask.png");
     let model = Model::load(&path, Up::Y).unwrap();
     assert_eq!(model.files.len(), 3, "{:?}", model.files);
+    for (file, digest) in &model.files {
+        assert_eq!(sha2::Sha256::digest(std::fs::read(file).unwrap()).as_slice(), digest, "{}", file.display());
+    }
     let part = &model.parts[0];
     // v runs up in the file: the corner at its (0, 1) is our (0, 0), the picture's top left.
     let corner = |uv: Vec2| part.mesh.uvs.iter().position(|t| *t == uv).map(|i| part.mesh.positions[i]);

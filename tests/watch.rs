@@ -235,6 +235,70 @@ fn a_file_that_is_saved_is_shown_and_a_mistake_in_it_is_told_in_the_programs_wor
     assert!(said.contains("ssh -L") && said.contains("stopped watching"), "{said}");
 }
 
+/// Rationale: a model's materials and pictures are named in the model, not in the scene file; whoever repairs one must see it. Expected: a
+/// material that is saved is shown; one that names a picture that is not there is told; the picture, once it is there, is seen.
+#[test]
+fn what_a_model_names_is_followed_and_so_is_what_it_lacks() {
+    let watched = Watched::start(&[]);
+    let mut events = watched.events();
+    events.done();
+    let write = |name: &str, text: &str| std::fs::write(watched.folder.path().join(name), text).unwrap();
+    write("square.mtl", "newmtl paint\nKd 0.2 0.4 0.6\n");
+    write(
+        "square.obj",
+        "mtllib square.mtl\nusemtl paint\nv 0 0 0\nv 0.1 0 0\nv 0.1 0 0.1\nv 0 0 0.1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n",
+    );
+    let good = watched.text();
+    let text = good.trim_end().trim_end_matches(')');
+    watched.save(&format!("{text}    models: [(file: \"square.obj\", class: Weed, position_m: (0.05, 0.05))],\n)\n"));
+    let mut shown = |hash: &str| {
+        let s = events.until(|s| {
+            s["error"].is_null() && s["picture"]["asked"] == s["asked"] && s["picture"]["hash"].as_str() != Some(hash)
+        });
+        s["picture"]["hash"].as_str().unwrap().to_owned()
+    };
+    let scene = serde_json::from_slice::<Value>(&watched.get("state").1).unwrap()["picture"]["hash"].to_string();
+    let with_model = shown(scene.trim_matches('"'));
+    write("square.mtl", "newmtl paint\nKd 0.6 0.4 0.2\n");
+    let repainted = shown(&with_model);
+    assert_ne!(with_model, repainted);
+    write("square.mtl", "newmtl paint\nKd 0.6 0.4 0.2\nmap_Kd leaf.png\n");
+    let mut events = watched.events();
+    let broken = events.until(|s| !s["error"].is_null());
+    assert!(broken["error"].as_str().unwrap().contains("leaf.png"), "{broken}");
+    std::fs::copy("textures/leaf/galium.png", watched.folder.path().join("leaf.png")).unwrap();
+    let mended = events.done();
+    assert_ne!(mended["picture"]["hash"].as_str(), Some(repainted.as_str()));
+}
+
+/// Rationale: one field of many that is too large must not hide the others. Expected: the picture that is asked for is shown with its sheet open, and a
+/// cell of the sheet that cannot be rendered says why.
+#[test]
+fn a_field_that_cannot_grow_leaves_the_picture_and_the_other_fields() {
+    let watched = Watched::start(&["--seed", "4"]);
+    let mut events = watched.events();
+    events.done();
+    let good = watched.text();
+    let species = good.split('"').nth(1).unwrap();
+    let text = good.trim_end().trim_end_matches(')');
+    let weeds = "Choice([20, 20, 20, 20, 90000000])";
+    watched.save(&format!(
+        "{text}    weeds: [(species: \"{species}\", spread: (per_m2: {weeds}), growth: Bbch(12))],\n)\n"
+    ));
+    assert_eq!(watched.post("wish", &json!({ "sheet": true })).0, 200);
+    let sheet = events.until(|s| s["sheet"]["done"] == 12);
+    let failed = |i: usize| sheet["sheet"]["failed"][i].as_str();
+    assert!(failed(0).is_none(), "the field that is shown can grow: {sheet}");
+    let words: Vec<&str> = (0..12).filter_map(failed).collect();
+    assert!(!words.is_empty() && words.len() < 12, "{sheet}");
+    assert!(words.iter().all(|words| words.starts_with("error: ") && words.contains("weeds")), "{words:?}");
+    let state = events.done();
+    assert!(state["error"].is_null());
+    for i in 0..12 {
+        assert_eq!(watched.get(&format!("sheet/{i}")).0, if failed(i).is_some() { 404 } else { 200 });
+    }
+}
+
 #[test]
 fn a_pixel_tells_what_it_shows() {
     let watched = Watched::start(&[]);

@@ -2,6 +2,8 @@
 
 use super::settle::Wrong;
 use crate::input::{self, Outside, Refusal, Scope};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// What helps where a model names a file outside its folder.
@@ -13,15 +15,15 @@ pub(super) struct Files<'a> {
     /// Its own file.
     path: &'a Path,
     scope: Scope,
-    /// What was read so far.
-    pub(super) read: Vec<PathBuf>,
+    /// What was read so far, with the SHA-256 of the bytes.
+    pub(super) read: BTreeMap<PathBuf, [u8; 32]>,
 }
 
 impl<'a> Files<'a> {
     /// Of the model at `path`: the files that it names lie in its folder and below, or, where that is `lifted`, in this scope.
     pub(super) fn of(path: &'a Path, lifted: Option<&Scope>) -> Self {
         let own = || Scope::Below { folder: folder(path).into(), help: HELP };
-        Self { path, scope: lifted.cloned().unwrap_or_else(own), read: Vec::new() }
+        Self { path, scope: lifted.cloned().unwrap_or_else(own), read: BTreeMap::new() }
     }
 
     /// The bytes of the model's own file; in words why there are none.
@@ -46,7 +48,7 @@ impl<'a> Files<'a> {
             Refusal::Folder => format!("it needs a file `{name}`, which is a folder"),
             other => format!("{name}: {other}"),
         })?;
-        self.read.push(path);
+        self.read.insert(path, Sha256::digest(&bytes).into());
         Ok(bytes)
     }
 }

@@ -4,6 +4,7 @@ use crate::geometry::{AlphaMask, Mesh};
 use crate::math::DMat4;
 use crate::texture::{NormalMap, Texture};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -37,8 +38,8 @@ pub struct Model {
     pub parts: Vec<Part>,
     /// What they look like.
     pub surfaces: Vec<Surface>,
-    /// Every file that was read: the model's own, its buffers, pictures and materials.
-    pub files: Vec<PathBuf>,
+    /// Every file that was read, the model's own, its buffers, pictures and materials, with the SHA-256 of what was in it.
+    pub files: BTreeMap<PathBuf, [u8; 32]>,
 }
 
 /// A piece of a model.

@@ -19,14 +19,28 @@ const QUIET: Duration = Duration::from_millis(25);
 /// How often files are looked at of which no event has come.
 const GLANCE: Duration = Duration::from_secs(1);
 
+/// How coarse the times are that file systems write.
+const COARSE: Duration = Duration::from_secs(2);
+
 /// Most files that are looked into for the names of others.
 const MOST: usize = 4096;
+
+/// What is watched, shared by the threads that follow and look.
+#[derive(Default)]
+struct Followed {
+    /// The files, as they were before they were read, or when they were looked at last.
+    stamps: BTreeMap<PathBuf, Stamp>,
+    /// Whether whatever is saved beside them counts too.
+    beside: bool,
+}
 
 /// The files that are watched.
 pub(super) struct Files {
     watcher: RecommendedWatcher,
     folders: BTreeSet<PathBuf>,
-    paths: Arc<Mutex<BTreeSet<PathBuf>>>,
+    /// What was read for the last picture, and what the last error was about: more than scene files say, since models name files too.
+    read: BTreeSet<PathBuf>,
+    followed: Arc<Mutex<Followed>>,
 }
 
 /// Begins to watch: nothing at first. The session is told when a watched file is saved.
@@ -35,12 +49,13 @@ pub(super) fn watch(session: Arc<Session>) -> Result<Files> {
         Error::failed(format!("cannot watch for changes of files: {e}"))
             .help("fs.inotify.max_user_instances and max_user_watches of sysctl are the limits")
     };
-    let paths: Arc<Mutex<BTreeSet<PathBuf>>> = Arc::default();
-    let (known, looked_at, (send, receive)) = (paths.clone(), paths.clone(), channel());
+    let followed: Arc<Mutex<Followed>> = Arc::default();
+    let (known, looked_at, (send, receive)) = (followed.clone(), followed.clone(), channel());
     let told = move |event: notify::Result<Event>| {
         let Ok(event) = event else { return };
         let known = known.lock().unwrap_or_else(PoisonError::into_inner);
-        if writes(event.kind) && (event.need_rescan() || event.paths.iter().any(|path| known.contains(path))) {
+        let counts = |path| known.beside || known.stamps.contains_key(path);
+        if writes(event.kind) && (event.need_rescan() || event.paths.iter().any(counts)) {
             let _ = send.send(());
         }
     };
@@ -49,13 +64,12 @@ pub(super) fn watch(session: Arc<Session>) -> Result<Files> {
         .name("files".into())
         .spawn(move || wait(&receive, &session, &looked_at))
         .map_err(|e| Error::failed(format!("cannot start a thread: {e}")))?;
-    Ok(Files { watcher, folders: BTreeSet::new(), paths })
+    Ok(Files { watcher, folders: BTreeSet::new(), read: BTreeSet::new(), followed })
 }
 
 /// Tells the session of every burst of events, once. Where no events come, as on network file systems or from a folder that was removed and made
 /// anew, the files' times and sizes tell.
-fn wait(events: &Receiver<()>, session: &Session, paths: &Mutex<BTreeSet<PathBuf>>) {
-    let mut stamps = BTreeMap::new();
+fn wait(events: &Receiver<()>, session: &Session, followed: &Mutex<Followed>) {
     loop {
         let mut changed = match events.recv_timeout(GLANCE) {
             Ok(()) => true,
@@ -66,11 +80,16 @@ fn wait(events: &Receiver<()>, session: &Session, paths: &Mutex<BTreeSet<PathBuf
             // A burst ends when nothing has come for a while.
             while events.recv_timeout(QUIET).is_ok() {}
         }
-        let all = paths.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        let now: BTreeMap<PathBuf, Stamp> = all.into_iter().map(|path| (path.clone(), stamp(&path))).collect();
-        // What is followed from now on was read a moment ago.
-        changed |= now.iter().any(|(path, stamp)| stamps.get(path).is_some_and(|before| before != stamp));
-        stamps = now;
+        let held = || followed.lock().unwrap_or_else(PoisonError::into_inner);
+        // Looked at without the lock, which who reads the files needs.
+        let all: Vec<PathBuf> = held().stamps.keys().cloned().collect();
+        let now: Vec<(PathBuf, Stamp)> = all.into_iter().map(|path| (path.clone(), stamp(&path))).collect();
+        for (path, now) in now {
+            if let Some(before) = held().stamps.get_mut(&path) {
+                changed |= *before != now;
+                *before = now;
+            }
+        }
         if changed {
             session.reload();
         }
@@ -95,12 +114,37 @@ fn writes(kind: EventKind) -> bool {
 }
 
 impl Files {
-    /// Watches these files, and those that a scene file names, from now on.
-    pub(super) fn follow(&mut self, scene: &Path, read: &[PathBuf]) {
+    /// Watches a scene file, the files that it names and those that were read for the last picture, from now on: a change after this is
+    /// seen. Call it before they are read.
+    pub(super) fn expect(&mut self, scene: &Path) {
         let mut all = named(scene);
-        all.extend(read.iter().cloned());
+        all.extend(self.read.iter().cloned());
+        self.follow(&all, false);
+    }
+
+    /// Watches what was read as well, and forgets what is read no more. Whether one of the files that nothing had named before may have been
+    /// written since `begin`, when the reading began.
+    pub(super) fn keep(&mut self, scene: &Path, read: &[PathBuf], begin: SystemTime) -> bool {
+        self.read = read.iter().cloned().collect();
+        let mut all = named(scene);
+        all.extend(self.read.iter().cloned());
+        let new = self.follow(&all, false);
+        new.into_iter().flatten().any(|(written, _)| written + COARSE >= begin)
+    }
+
+    /// Watches, after an error, what was watched, what the error is about, and whatever is saved beside them: what is wrong or missing may be
+    /// named where only a reader of models looks.
+    pub(super) fn fail(&mut self, scene: &Path, about: Option<&Path>) {
+        self.read.extend(about.map(Path::to_owned));
+        let mut all = named(scene);
+        all.extend(self.read.iter().cloned());
+        self.follow(&all, true);
+    }
+
+    /// Watches these files; the stamps of those that were not watched before.
+    fn follow(&mut self, files: &BTreeSet<PathBuf>, beside: bool) -> Vec<Stamp> {
         let mut paths = BTreeSet::new();
-        for file in all {
+        for file in files {
             let name = file.file_name().map(PathBuf::from).unwrap_or_default();
             let folder = file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
             // A link is replaced in its own folder, and written through to where it leads.
@@ -108,7 +152,23 @@ impl Files {
             paths.extend(file.canonicalize().ok());
         }
         let folders: BTreeSet<PathBuf> = paths.iter().filter_map(|p| p.parent().map(Path::to_owned)).collect();
-        *self.paths.lock().unwrap_or_else(PoisonError::into_inner) = paths;
+        let mut new = Vec::new();
+        {
+            let mut followed = self.followed.lock().unwrap_or_else(PoisonError::into_inner);
+            let before = std::mem::take(&mut followed.stamps);
+            followed.beside = beside;
+            followed.stamps = paths
+                .into_iter()
+                .map(|path| {
+                    let known = before.get(&path).copied().unwrap_or_else(|| {
+                        let now = stamp(&path);
+                        new.push(now);
+                        now
+                    });
+                    (path, known)
+                })
+                .collect();
+        }
         for gone in self.folders.difference(&folders) {
             let _ = self.watcher.unwatch(gone);
         }
@@ -122,6 +182,7 @@ impl Files {
             }
         }
         self.folders = watched;
+        new
     }
 }
 

@@ -242,7 +242,7 @@ function slider(about) {
 
 let sheetKey = "";
 function showSheet() {
-  const { wanted, count, done, key } = state.sheet;
+  const { wanted, count, done, failed, key } = state.sheet;
   $("sheet").hidden = !wanted;
   press($("sheet-toggle"), wanted);
   if (!wanted) return;
@@ -251,9 +251,9 @@ function showSheet() {
   sheetKey = now;
   const shape = state.picture ? `${state.picture.width} / ${state.picture.height}` : "4 / 3";
   $("sheet").replaceChildren(...Array.from({ length: count }, (_, i) => {
-    const image = make("img", { alt: `index ${i}` });
+    const there = i < done && !failed[i];
+    const image = there ? make("img", { alt: `index ${i}`, src: `sheet/${i}?v=${key}` }) : make("pre", { textContent: failed[i] ?? "" });
     image.style.aspectRatio = shape;
-    if (i < done) image.src = `sheet/${i}?v=${key}`;
     const button = make("button", { onclick: () => wish({ index: i, sheet: false }) }, image, make("span", { textContent: i < done ? `index ${i}` : `index ${i} …` }));
     press(button, i === state.index);
     return make("li", {}, button);
@@ -276,9 +276,10 @@ function showStatus() {
   const { picture, doing, spp, error, asked } = state;
   const words = [];
   if (error) words.push("error");
-  else if (doing && !(picture && picture.asked === asked)) words.push(doing);
+  else if (picture?.asked !== asked) words.push(doing || "waiting");
   if (picture) {
-    words.push(`${picture.width} × ${picture.height} px`, `${picture.spp} of ${spp} samples a pixel`, `${picture.plants} plants`,
+    if (picture.asked !== asked) words.push(`shown: index ${picture.index} of seed ${picture.seed}, as it was before`);
+    words.push(`${picture.width} × ${picture.height} px`, `${picture.spp} of ${spp} samples a pixel`, `${picture.plants} plant${picture.plants === 1 ? "" : "s"}`,
       `${(picture.triangles / 1e6).toFixed(2)} M triangles`, `first picture after ${picture.first_s.toFixed(2)} s`);
     if (view === "depth") words.push(`depth ${picture.near_m.toFixed(3)} to ${picture.far_m.toFixed(3)} m`);
   }
@@ -304,7 +305,7 @@ function show() {
   for (const button of document.querySelectorAll("[data-view]")) press(button, button.dataset.view === view);
   press($("fit"), fit);
   press($("photo-toggle"), !$("beside").hidden);
-  $("warnings").replaceChildren(...(state.picture?.warnings ?? []).map((w) => make("li", { textContent: w })));
+  $("warnings").replaceChildren(...(state.warnings).map((w) => make("li", { textContent: w })));
   $("warnings-panel").hidden = !$("warnings").childElementCount;
   if (state.photo && !photoSeen) { photoSeen = true; setPhoto("photo", null); }
   showError();

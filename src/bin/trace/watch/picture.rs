@@ -39,6 +39,16 @@ impl Picture {
         Self { field: field.clone(), labels: labels.clone(), photograph, made }
     }
 
+    /// Number of what was asked for that it answers.
+    pub(super) fn asked(&self) -> u64 {
+        self.made.asked
+    }
+
+    /// What its field warns of.
+    pub(super) fn warnings(&self) -> &Vec<String> {
+        &self.field.grown().warnings
+    }
+
     /// What the page says of it.
     pub(super) fn about(&self) -> Value {
         let grown = self.field.grown();
@@ -56,7 +66,6 @@ impl Picture {
             "hash": grown.hash,
             "plants": grown.plants.len(),
             "triangles": grown.scene.triangles(),
-            "warnings": grown.warnings,
             "near_m": near,
             "far_m": far,
             "grow_s": grow.as_secs_f64(),

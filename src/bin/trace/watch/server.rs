@@ -232,7 +232,8 @@ impl Desk {
                 Some(("sheet", number)) => {
                     let index: usize = number.parse().unwrap_or(usize::MAX);
                     match session.shown(|shown| shown.sheet.pictures.get(index).cloned()) {
-                        Some(png) => answer::bytes("image/png", png.to_vec()),
+                        Some(Ok(png)) => answer::bytes("image/png", png.to_vec()),
+                        Some(Err(words)) => answer::text(404, words),
                         None => answer::text(404, "not rendered yet"),
                     }
                 }

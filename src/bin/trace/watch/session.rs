@@ -33,6 +33,8 @@ pub(super) struct Shown {
     pub(super) picture: Option<Arc<Picture>>,
     /// Why the newest could not be.
     pub(super) error: Option<String>,
+    /// What the newest field warns of before it grows, and the number of what was asked for.
+    pub(super) foretold: (u64, Vec<String>),
     /// The scene file's text, as it was read last.
     pub(super) text: String,
     /// Its numbers.
@@ -168,6 +170,9 @@ impl Session {
 
     fn describe(&self, inner: &Inner) -> Value {
         let Inner { wish, asked, version, shown, .. } = inner;
+        let (told_of, foretold) = &shown.foretold;
+        let grown = shown.picture.as_ref().filter(|picture| picture.asked() >= *told_of);
+        let warnings = grown.map_or(foretold, |picture| picture.warnings());
         json!({
             "version": version,
             "asked": asked,
@@ -181,6 +186,7 @@ impl Session {
             "seed": wish.seed,
             "width": wish.width,
             "values": wish.values,
+            "warnings": warnings,
             "sliders": shown.sliders,
             "sheet": shown.sheet.about(wish.sheet),
         })

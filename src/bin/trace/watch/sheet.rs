@@ -1,6 +1,5 @@
 //! Small pictures of the first indices of a scene file: how its fields differ.
 
-use furrow::Result;
 use furrow::job::{Renderer, Request, SceneFile};
 use furrow::output::{self, Picture as Png};
 use furrow::render::Watch;
@@ -21,18 +20,20 @@ const SPP: u32 = 4;
 pub(super) struct Sheet {
     /// What they are pictures of: the file's text with the hash of what was read, and the seed.
     pub(super) of: Option<(String, Option<u64>, u64)>,
-    pub(super) pictures: Vec<Arc<Vec<u8>>>,
+    /// As PNG, or why there is none.
+    pub(super) pictures: Vec<Result<Arc<Vec<u8>>, String>>,
 }
 
 impl Sheet {
     /// What the page says of it.
     pub(super) fn about(&self, wanted: bool) -> Value {
-        json!({ "wanted": wanted, "count": COUNT, "done": self.pictures.len(), "key": self.of.as_ref().map(|of| of.2) })
+        let failed: Vec<Option<&str>> = self.pictures.iter().map(|p| p.as_ref().err().map(String::as_str)).collect();
+        json!({ "wanted": wanted, "count": COUNT, "done": failed.len(), "failed": failed, "key": self.of.as_ref().map(|of| of.2) })
     }
 }
 
 /// One picture of a sheet as PNG.
-pub(super) fn picture(scene: &SceneFile, index: u64, stop: &AtomicBool) -> Result<Vec<u8>> {
+pub(super) fn picture(scene: &SceneFile, index: u64, stop: &AtomicBool) -> furrow::Result<Vec<u8>> {
     let field = scene.field(index)?;
     let request = Request { watch: Watch { done: &|_| (), stop }, ..Request::default() };
     let renderer = Renderer::open(&RenderOptions::path_traced(Quality::spp(SPP)))?;

@@ -16,7 +16,7 @@ use furrow::settings::{Quality, RenderOptions};
 use furrow::{Error, Result};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::Instant;
+use std::time::{Duration, Instant, SystemTime};
 
 /// What renders, and what it has read.
 pub(super) struct Worker {
@@ -45,8 +45,17 @@ impl Worker {
     ) -> Result<Self> {
         let renderer = Renderer::open(&RenderOptions::path_traced(Quality::spp(session.spp())))?;
         let threads = threads.clone();
-        let preview = Preview::new(session.outdated());
-        Ok(Self { session, files, threads, memory, renderer, tev, preview, known: None, own_width: None })
+        Ok(Self {
+            session,
+            files,
+            threads,
+            memory,
+            renderer,
+            tev,
+            preview: Preview::default(),
+            known: None,
+            own_width: None,
+        })
     }
 
     /// Works until the session ends.
@@ -58,7 +67,7 @@ impl Worker {
             match self.answer(asked, &wish) {
                 Err(error) if error.kind() == Kind::Interrupted => {}
                 Err(error) => {
-                    self.files.follow(session.path(), &[]);
+                    self.files.fail(session.path(), error.place().map(|place| place.file.as_path()));
                     // A slider that is moved on must not print the same words again and again.
                     let words = format!("error: {error}");
                     if session.shown(|shown| shown.error.as_ref() != Some(&words)) {
@@ -75,12 +84,9 @@ impl Worker {
 
     /// Reads, grows and renders.
     fn answer(&mut self, asked: u64, wish: &Wish) -> Result<()> {
-        let begin = Instant::now();
+        let (begin, written) = (Instant::now(), SystemTime::now());
         let session = self.session.clone();
-        // Before it is read: a change from now on is seen.
-        if self.known.is_none() {
-            self.files.follow(session.path(), &[]);
-        }
+        self.files.expect(session.path());
         let text = RonFile::read(session.path())?.text;
         session.show(|shown| {
             if shown.text != text || shown.sliders.is_empty() {
@@ -94,18 +100,26 @@ impl Worker {
             Some(known) => known.reread(Some(&text))?,
             None => SceneFile::open(session.path())?.threads(&self.threads).reread(Some(&text))?,
         };
-        let scene = scene.seed(wish.seed).memory(self.memory).preview(&self.preview);
+        let scene = scene.seed(wish.seed).memory(self.memory).preview(&self.preview).until(session.outdated());
+        let foretold = scene.foretold(wish.index)?;
+        session.show(|shown| shown.foretold = (asked, foretold));
         let field = Arc::new(self.grow(&scene, wish)?);
-        self.files.follow(session.path(), &field.grown().files);
+        if self.files.keep(session.path(), &field.grown().files, written) {
+            // Its buffers, materials or pictures may be older than they are now.
+            session.reload();
+        }
         self.known = Some(scene.clone());
-        let grown = begin.elapsed();
+        let passes = (0..u32::BITS).map(|k| 1 << k).take_while(|spp| *spp < session.spp());
+        let passes: Vec<u32> = passes.chain([session.spp()]).collect();
+        let mut first = None;
         if wish.sheet {
+            // The picture comes before the sheet, and its refinement after it.
+            self.refine(&field, asked, &passes[..1], &mut || *first.get_or_insert_with(|| begin.elapsed()))?;
             // Of a species or texture that has changed, the text is the same and the hash of what was read is not.
             let of = [text.as_str(), &field.grown().hash].concat();
             self.sheet(&scene, of, wish, asked)?;
         }
-        // The sheet's time is not the picture's.
-        self.refine(&field, asked, Instant::now().checked_sub(grown).unwrap_or(begin))
+        self.refine(&field, asked, &passes, &mut || *first.get_or_insert_with(|| begin.elapsed()))
     }
 
     /// Grows the field at the width that is asked for, or at the camera's own where that is less.
@@ -119,8 +133,14 @@ impl Worker {
         if wanted == guess { Ok(field) } else { scene.clone().width(wanted).field(wish.index) }
     }
 
-    /// Shows the field with more and more samples.
-    fn refine(&mut self, field: &Arc<Field>, asked: u64, begin: Instant) -> Result<()> {
+    /// Shows the field with more and more samples; `first` says how long the first picture took.
+    fn refine(
+        &mut self,
+        field: &Arc<Field>,
+        asked: u64,
+        passes: &[u32],
+        first: &mut (dyn FnMut() -> Duration + Send),
+    ) -> Result<()> {
         let Self { session, renderer, tev, .. } = self;
         let watch = Watch { done: &|_| (), stop: session.outdated() };
         if watch.stop.load(Ordering::Relaxed) {
@@ -129,16 +149,10 @@ impl Worker {
         session.show(|shown| shown.doing = "building");
         field.geometry()?;
         session.show(|shown| shown.doing = "rendering");
-        let passes: Vec<u32> =
-            (0..u32::BITS).map(|k| 1 << k).take_while(|spp| *spp < session.spp()).chain([session.spp()]).collect();
-        let (mut spp, mut first, mut kept) = (passes.iter(), None, None);
-        renderer.refine(field, &Request { watch, ..Request::default() }, &passes, &mut |film, labels| {
+        let (mut spp, mut kept) = (passes.iter(), None);
+        renderer.refine(field, &Request { watch, ..Request::default() }, passes, &mut |film, labels| {
             let labels = kept.get_or_insert_with(|| Arc::new(labels.clone()));
-            let made = Made {
-                asked,
-                first: *first.get_or_insert_with(|| begin.elapsed()),
-                spp: spp.next().copied().unwrap_or_default(),
-            };
+            let made = Made { asked, first: first(), spp: spp.next().copied().unwrap_or_default() };
             let picture = Arc::new(Picture::new(field, film, labels, made));
             session.show(|shown| (shown.picture, shown.error) = (Some(picture), None));
             if let Some(tev) = tev {
@@ -159,12 +173,17 @@ impl Worker {
         }
         let width = self.own_width.unwrap_or(sheet::WIDTH).min(sheet::WIDTH);
         // Their fields are others: the picture's is kept apart from them.
-        let scene = scene.clone().width(width).preview(&Preview::new(session.outdated()));
+        let scene = scene.clone().width(width).preview(&Preview::default());
         for index in session.shown(|shown| shown.sheet.pictures.len() as u64)..sheet::COUNT {
             if session.outdated().load(Ordering::Relaxed) {
                 return Err(Error::interrupted());
             }
-            let picture = Arc::new(sheet::picture(&scene, index, session.outdated())?);
+            let picture = match sheet::picture(&scene, index, session.outdated()) {
+                Ok(png) => Ok(Arc::new(png)),
+                Err(error) if error.kind() == Kind::Interrupted => return Err(error),
+                // The others may have pictures.
+                Err(error) => Err(format!("error: {error}")),
+            };
             session.show(|shown| shown.sheet.pictures.push(picture));
         }
         Ok(())
