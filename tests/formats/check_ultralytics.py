@@ -43,7 +43,9 @@ def ious(own, segments):
         truth = own.plant_mask(plant)
         iou = painted(truth, segment)
         more = painted(truth, resample_segments([segment.copy()], n=most)[0])
-        assert abs(more - iou) < 0.01, (iou, more)
+        # The truth is painted whole, so its pixels over the overlap are the pixels painted.
+        beside = truth.sum() / more - truth.sum() / iou
+        assert beside <= 2 + 0.01 * truth.sum(), (iou, more, truth.sum())
         yield plant, iou
 
 
