@@ -118,7 +118,7 @@ fn a_lying_label_is_found_though_its_hash_is_right() {
     let mut sample = native::read(&data, "000001").unwrap();
     let other = sample.semantics.iter().position(|c| *c == 0).unwrap();
     sample.semantics[other] = 2;
-    let files = native::files(&sample, "").unwrap();
+    let files = native::files(&set.recipe, &sample, "").unwrap();
     let mut seal = ChecksumRecord::read(&data, 1).unwrap();
     for file in files {
         fs::write(data.join(&file.path), &file.bytes).unwrap();
@@ -164,7 +164,9 @@ fn other_kernels_are_named_and_their_difference_is_bounded() {
     // Every value of one photograph one level aside: an exposure, not a hit.
     let mut sample = native::read(&data, "000001").unwrap();
     sample.rgb.as_flattened_mut().iter_mut().for_each(|value| *value ^= 1);
-    let file = native::files(&sample, "").unwrap().into_iter().find(|file| file.path.ends_with("rgb.png")).unwrap();
+    let recipe = Set::open(&data).unwrap().recipe;
+    let file =
+        native::files(&recipe, &sample, "").unwrap().into_iter().find(|file| file.path.ends_with("rgb.png")).unwrap();
     fs::write(data.join(&file.path), &file.bytes).unwrap();
     seal(1, &|seal| drop(seal.files.insert(file.path.clone(), Checksum::of(&file.bytes))));
     succeed(verb("finish", &data, &[]));
@@ -363,11 +365,12 @@ fn samples_come_back_from_their_files() {
     let (_keep, data) = scratch();
     succeed(make(&data, 1, &[]));
     let sample = native::read(&data, "000000").unwrap();
-    for file in native::files(&sample, "").unwrap().iter().filter(|f| !f.path.contains(".png")) {
+    let recipe = Set::open(&data).unwrap().recipe;
+    for file in native::files(&recipe, &sample, "").unwrap().iter().filter(|f| !f.path.contains(".png")) {
         assert!(fs::read(data.join(&file.path)).unwrap() == file.bytes, "{}", file.path);
     }
     let (_keep, copy) = scratch();
-    for file in native::files(&sample, "").unwrap() {
+    for file in native::files(&recipe, &sample, "").unwrap() {
         fs::create_dir_all(copy.join(&file.path).parent().unwrap()).unwrap();
         fs::write(copy.join(&file.path), &file.bytes).unwrap();
     }

@@ -8,11 +8,11 @@
 mod common;
 
 use common::dataset::{make, same, succeed, tree};
+use furrow::dataset::classes::Classes;
 use furrow::dataset::generate::Shard;
 use furrow::error::Kind;
 use furrow::ron_file::RonFile;
 use furrow::train::baseline::files;
-use furrow::train::classes::Classes;
 use furrow::train::data::{Normalization, Pick, Resize, Selection, Shape, Store};
 use furrow::train::fit::checkpoint::History;
 use furrow::train::fit::{Hyperparameters, Plan};

@@ -7,10 +7,10 @@
 mod common;
 
 use common::python::{ask, python};
+use furrow::dataset::classes::Classes;
 use furrow::output::{Picture, write_png};
 use furrow::ron_file::RonFile;
 use furrow::sampling::{Purpose, Stream};
-use furrow::train::classes::Classes;
 use furrow::train::data::{Augment, Band, Loader, Normalization, Order, Pick, Selection, Shape, Store};
 use furrow::train::fit::{Plan, settings};
 use furrow::train::run::{self, Results, TrainedModel};

@@ -4,6 +4,8 @@ use super::record::{ClassShare, Keypoint, Leaf, Plant, PointState, Seen};
 use super::rle::{Box2, Rle};
 use super::sample::{IGNORE, Sample};
 use crate::math::Vec3;
+use crate::render::LabelMap;
+use crate::scene::PartKind;
 use crate::scene::tag::Class;
 use crate::sensor::Camera;
 use std::collections::BTreeMap;
@@ -84,6 +86,12 @@ pub fn plants(sample: &Sample) -> Vec<Plant> {
         }
     }
     all
+}
+
+/// The number of what each pixel shows, 0 for nothing.
+pub fn part_numbers(labels: &LabelMap, kinds: &[PartKind]) -> Vec<u8> {
+    let number = |part: &u32| kinds.get(*part as usize).map_or(0, |kind| kind.number());
+    labels.parts.iter().map(number).collect()
 }
 
 /// The class that a number of `semantics` stands for; `None` for [`IGNORE`] and numbers of no class.

@@ -2,7 +2,8 @@
 
 use super::File;
 use super::checksum_record::write_files;
-use super::recipe::{FILE, Recipe};
+use super::keep::Kept;
+use super::recipe::{FILE, Made, Recipe};
 use crate::output::{create_atomically, is_unfinished};
 use crate::{Error, Result};
 use std::path::Path;
@@ -22,6 +23,16 @@ pub(super) fn begin(folder: &Path, recipe: Recipe, files: &[File]) -> Result<Rec
 
 fn go_on(folder: &Path, mut recipe: Recipe, files: &[File]) -> Result<Recipe> {
     let before = Recipe::read(folder)?;
+    // Who asks for nothing in particular leaves labels and maps as they are.
+    if recipe.labelling.is_usual() {
+        recipe.labelling.clone_from(&before.labelling);
+    }
+    if let (Made::Rendered(now), Made::Rendered(then)) = (&mut recipe.made, &before.made) {
+        now.parts |= then.parts;
+        if now.keep == Kept::USUAL {
+            now.keep.clone_from(&then.keep);
+        }
+    }
     before.check_goes_on(folder, &recipe)?;
     // Formats that are there stay.
     recipe.formats.extend(before.formats);

@@ -21,6 +21,9 @@ pub struct ChecksumRecord {
     pub index: u64,
     /// [`Recipe::fingerprint`] of what made it.
     pub recipe: String,
+    /// [`Labelling::fingerprint`](super::labelling::Labelling::fingerprint) of its formats' labels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub labelling: Option<String>,
     /// Its files by path below the dataset's folder.
     pub files: BTreeMap<String, Checksum>,
 }
@@ -38,7 +41,7 @@ impl ChecksumRecord {
     /// Of files that were just made.
     pub fn of(index: u64, recipe: &Recipe, files: &[File]) -> Result<Self> {
         let files = files.iter().map(|f| (f.path.clone(), Checksum::of(&f.bytes))).collect();
-        Ok(Self { index, recipe: recipe.fingerprint()?, files })
+        Ok(Self { index, recipe: recipe.fingerprint()?, labelling: recipe.labelling.fingerprint()?, files })
     }
 
     /// Where the checksums of an image lie.
@@ -69,6 +72,7 @@ impl ChecksumRecord {
     pub fn image_hash(&self) -> Result<String> {
         let mut own = self.clone();
         own.files.retain(|path, _| path.starts_with("images/"));
+        own.labelling = None;
         own.hash()
     }
 

@@ -3,6 +3,7 @@
 use super::checksum::Checksum;
 use super::checksum_record::ChecksumRecord;
 use super::generate::{self, Task};
+use super::labels::LeftOut;
 use super::recipe::{FILE, Recipe};
 use super::set::{Set, Stream, Whole};
 use super::{format, report};
@@ -104,6 +105,10 @@ fn manifest(set: &Set, files: &BTreeMap<String, Checksum>, out: &mut Stream<'_>)
         out.put(",\n\"scene_text\": ")?;
         out.json(&std::fs::read_to_string(&scene).map_err(Error::io(&scene))?)?;
         out.put(",\n\"times\": \"ledger/*.jsonl\"")?;
+    }
+    if let Some(left_out) = LeftOut::of(set)? {
+        out.put(",\n\"left_out\": ")?;
+        out.json(&left_out)?;
     }
     out.put(",\n\"files\": {")?;
     let mut first = true;

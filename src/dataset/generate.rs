@@ -5,7 +5,7 @@
 //! a part of another, and may take up all of it.) Memory grows with the images at once, not with the dataset.
 
 use super::checksum_record::{ChecksumRecord, write_files};
-use super::render::{Kept, Times, render, renderer, scene_file};
+use super::render::{LastField, Times, render, renderer, scene_file};
 use super::set::Set;
 use super::timing_log::{ImageTiming, TimingLog};
 use super::{File, format, native};
@@ -162,7 +162,7 @@ pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()>
             scope.spawn(|| {
                 let ended = || stopped() || failed.load(Ordering::Relaxed);
                 while let Some(field) = fields.get(next.fetch_add(1, Ordering::Relaxed)).filter(|_| !ended()) {
-                    let mut kept = Kept::default();
+                    let mut kept = LastField::default();
                     for (index, task) in field.iter().take_while(|_| !ended()) {
                         match worker.install(|| run.image(*index, *task, worker, &mut kept)) {
                             Ok(()) => {
@@ -246,7 +246,8 @@ pub(super) fn remaining(set: &Set, checksums: &ChecksumRecord) -> Result<Task> {
     if checksums.recipe != set.recipe.fingerprint()? {
         return Ok(Task::All);
     }
-    let mut task = Task::Done;
+    let other_labels = checksums.labelling != set.recipe.labelling.fingerprint()?;
+    let mut task = if other_labels { Task::Formats } else { Task::Done };
     for (name, format) in format::all(&set.recipe)? {
         if format.has_images() && !checksums.files.keys().any(|path| in_format(path, name)) {
             if format.needs_film() {
@@ -276,7 +277,7 @@ struct Run<'a> {
 
 impl Run<'_> {
     /// Makes one image and writes its checksums.
-    fn image(&self, index: u64, task: Task, threads: &Threads, kept: &mut Kept) -> Result<()> {
+    fn image(&self, index: u64, task: Task, threads: &Threads, kept: &mut LastField) -> Result<()> {
         let begin = Instant::now();
         let Set { folder, recipe } = self.set;
         // Another run may have made it meanwhile.
@@ -290,7 +291,7 @@ impl Run<'_> {
             let watch = Watch { done: &|_| (), stop: self.callbacks.now };
             let made = render(self.set, &scene.clone().threads(threads), index, renderer, watch, kept)?;
             super::invariants::check(recipe, &made.sample)?;
-            let mut files = native::files(&made.sample, &made.text)?;
+            let mut files = native::files(recipe, &made.sample, &made.text)?;
             files.extend(formatted(self.set, &made.sample)?);
             (files, made.times)
         };

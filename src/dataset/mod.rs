@@ -18,6 +18,8 @@
 //! | file | idea |
 //! |---|---|
 //! | `recipe`, `split` | what makes a dataset; which image is for what |
+//! | `keep` | which maps images keep |
+//! | `classes`, `labelling`, `labels` | a user's own classes; what else may be asked of labels; how formats name and choose what images show |
 //! | `render` | an image from its field, by [`crate::job`] |
 //! | `sample`, `record`, `annotate`, `rle` | one image and all that is known of it |
 //! | `native`, `format` | as files: ours (`images/`), and those of other tools |
@@ -37,6 +39,8 @@ pub mod checksum;
 #[doc(hidden)]
 pub mod checksum_record;
 #[doc(hidden)]
+pub mod classes;
+#[doc(hidden)]
 pub mod cluster;
 #[doc(hidden)]
 pub mod difference;
@@ -53,6 +57,12 @@ pub mod generate;
 pub mod import;
 #[doc(hidden)]
 pub mod invariants;
+#[doc(hidden)]
+pub mod keep;
+#[doc(hidden)]
+pub mod labelling;
+#[doc(hidden)]
+pub mod labels;
 mod make;
 #[doc(hidden)]
 pub mod native;

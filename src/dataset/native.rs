@@ -5,16 +5,19 @@
 //! | `rgb.png`, `nir.png` | the photographs, 8 bit |
 //! | `semantics.png` | class, indexed: 0 soil, 1 crop, 2 weed, 255 no label |
 //! | `species.png` | number of the species in `dataset.json`, 8 bit, 0 for none |
+//! | `parts.png` | what is there, indexed: organs and things on the ground, as `parts/names.json` of the format parts; where classes need it |
 //! | `plants.png`, `leaves.png` | number of the plant, of the leaf on it; 16 bit, 0 for none |
 //! | `coverage.png` | share of soil, crop, weed in the pixel as R, G, B; sums to 255 |
-//! | `geometry.exr` | `depth.Z` (metres along the optical axis), `normal.X/Y/Z` (world) |
+//! | `geometry.exr` | `depth.Z` (metres along the optical axis), `normal.X/Y/Z` (world), in the precision that the recipe keeps |
 //! | `record.json` | what is known in words and numbers |
 
 use super::File;
-use super::recipe::compact;
+use super::keep::Kept;
+use super::recipe::{Recipe, compact};
 use super::record::Record;
 use super::sample::{IGNORE, Sample};
-use crate::output::{self, Picture};
+use crate::output::{self, Picture, Precision};
+use crate::scene::PartKind;
 use crate::scene::tag::Class;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -39,7 +42,7 @@ pub fn palette(with_ignore: bool) -> Vec<[u8; 3]> {
 }
 
 /// The files of a sample; `text` goes into the pictures' comments.
-pub fn files(sample: &Sample, text: &str) -> Result<Vec<File>> {
+pub fn files(recipe: &Recipe, sample: &Sample, text: &str) -> Result<Vec<File>> {
     let (w, h) = sample.size();
     let base = folder(&sample.record.name);
     let mut files = Vec::new();
@@ -54,13 +57,18 @@ pub fn files(sample: &Sample, text: &str) -> Result<Vec<File>> {
     if !sample.species.is_empty() {
         add("species.png", png(&Picture::Gray(&sample.species))?);
     }
+    if !sample.parts.is_empty() {
+        add("parts.png", png(&Picture::Indexed(&sample.parts, &PartKind::palette()))?);
+    }
     add("plants.png", png(&Picture::Gray16(&sample.plants))?);
     add("leaves.png", png(&Picture::Gray16(&sample.leaves))?);
     if !sample.coverage.is_empty() {
         add("coverage.png", png(&Picture::Linear(&sample.coverage))?);
     }
-    if !sample.depth.is_empty() {
-        add("geometry.exr", output::encode_geometry(w, h, &sample.depth, &sample.normals)?);
+    if !sample.depth.is_empty() || !sample.normals.is_empty() {
+        let small = !(recipe.keeps(Kept::Depth32) && recipe.keeps(Kept::Normals16));
+        let depth = if recipe.keeps(Kept::Depth) { Precision::Half } else { Precision::Single };
+        add("geometry.exr", output::encode_geometry(w, h, (&sample.depth, depth), &sample.normals, small)?);
     }
     add("record.json", compact(&sample.record)?);
     Ok(files)
@@ -83,8 +91,11 @@ pub fn read(dataset: &Path, name: &str) -> Result<Sample> {
         check(&at(file), size, (w, h))?;
         Ok(values)
     };
-    let (w, h, semantics) = output::read_indexed(&at("semantics.png"))?;
-    check(&at("semantics.png"), size, (w, h))?;
+    let indexed = |file: &str| -> Result<Vec<u8>> {
+        let (w, h, values) = output::read_indexed(&at(file))?;
+        check(&at(file), size, (w, h))?;
+        Ok(values)
+    };
     let coverage = if at("coverage.png").is_file() {
         let (w, h, values) = output::read_rgb(&at("coverage.png"))?;
         check(&at("coverage.png"), size, (w, h))?;
@@ -103,8 +114,9 @@ pub fn read(dataset: &Path, name: &str) -> Result<Sample> {
         record,
         rgb,
         nir: if at("nir.png").is_file() { gray("nir.png")? } else { Vec::new() },
-        semantics,
+        semantics: indexed("semantics.png")?,
         species: if at("species.png").is_file() { gray("species.png")? } else { Vec::new() },
+        parts: if at("parts.png").is_file() { indexed("parts.png")? } else { Vec::new() },
         plants: gray16("plants.png")?,
         leaves: gray16("leaves.png")?,
         coverage,

@@ -1,7 +1,11 @@
 //! Begins a dataset: checks the scene file by growing its first field, takes everything that it reads into the folder, writes the recipe.
 
 use super::begin::begin;
+use super::classes::Classes;
 use super::gather::{Gathered, gather};
+use super::keep::{self, Kept};
+use super::labelling::Labelling;
+use super::labels::Labels;
 use super::recipe::{FILE, Made, Recipe, Rendering};
 use super::set::Set;
 use super::split::Shares;
@@ -27,6 +31,10 @@ pub struct Order {
     pub height: Option<u32>,
     /// Formats beside the native one.
     pub formats: Vec<String>,
+    /// Classes of the formats, and what they leave out.
+    pub labelling: Labelling,
+    /// Maps that images keep beside photograph, labels and record.
+    pub keep: Vec<Kept>,
     /// How the images are split.
     pub split: Shares,
     /// What others may do with them.
@@ -49,6 +57,8 @@ impl Order {
             width: None,
             height: None,
             formats: Vec::new(),
+            labelling: Labelling::default(),
+            keep: Kept::USUAL.to_vec(),
             split: Shares::default(),
             licence: Self::NO_LICENCE.into(),
             options: RenderOptions::default(),
@@ -105,15 +115,20 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
             without: options.techniques.left_out().to_vec(),
             max_depth: options.techniques.max_depth,
             clamp: options.techniques.clamp,
+            parts: order.labelling.classes.as_ref().is_some_and(Classes::needs_parts),
+            keep: keep::checked(order.keep.clone())?,
             kernels,
             edit: order.edit.label(),
         }),
         count: order.count,
         split: order.split,
         formats: order.formats.clone(),
+        labelling: order.labelling.clone(),
         licence: order.licence.clone(),
         species: field.species.clone(),
     };
+    Labels::of(&recipe)?;
+    check_kept(&recipe)?;
     let mut told = field.warnings.clone();
     told.extend(warnings(&recipe)?);
     let recipe = begin(folder, recipe, &files)?;
@@ -144,6 +159,18 @@ fn hash_of_copies(order: &Order, files: &[File], scene: &str) -> Result<String> 
     }
 }
 
+/// An error where a format holds a map that images do not keep.
+fn check_kept(recipe: &Recipe) -> Result<()> {
+    for (format, writer) in format::all(recipe)? {
+        let lacks = writer.needs_maps().iter().find(|map| !recipe.keeps(**map));
+        if let Some((name, ..)) = lacks.and_then(|map| Kept::NAMED.iter().find(|(_, kept, _)| kept == map)) {
+            return Err(Error::misuse(format!("--format {format} holds {name}, which these images do not keep"))
+                .help(format!("begin a dataset with {name} among --keep, or leave --format {format} out")));
+        }
+    }
+    Ok(())
+}
+
 /// What the formats of a recipe cannot hold or do otherwise.
 fn warnings(recipe: &Recipe) -> Result<Vec<String>> {
     let mut all = Vec::new();
@@ -153,9 +180,21 @@ fn warnings(recipe: &Recipe) -> Result<Vec<String>> {
     Ok(all)
 }
 
-/// Adds formats to a dataset; their files are made by the next run. Returns what the user should know.
-pub fn add_formats(set: &mut Set, names: &[String]) -> Result<Vec<String>> {
+/// Adds formats to a dataset, and gives all of them other labels where some are given; their files are made by the next run. Returns what the
+/// user should know.
+pub fn add_formats(set: &mut Set, names: &[String], labelling: &Labelling) -> Result<Vec<String>> {
     let mut recipe = set.recipe.clone();
+    if !labelling.is_usual() {
+        recipe.labelling = labelling.clone();
+        Labels::of(&recipe).map_err(|e| e.in_file(&set.folder))?;
+        if labelling.classes.as_ref().is_some_and(Classes::needs_parts) && !recipe.rendering().is_ok_and(|r| r.parts) {
+            return Err(Error::input(
+                "classes of organs or of things on the ground need parts.png, which these images lack",
+            )
+            .in_file(&set.folder)
+            .help("leave those labels out, or make the dataset anew with these --classes"));
+        }
+    }
     for name in names {
         if !recipe.formats.contains(name) {
             recipe.formats.push(name.clone());
@@ -174,6 +213,7 @@ pub fn add_formats(set: &mut Set, names: &[String]) -> Result<Vec<String>> {
              added; `trace dataset finish --help` lists them",
         ));
     }
+    check_kept(&recipe)?;
     let warnings = warnings(&recipe)?;
     checksum_record::write_files(&set.folder, &[File { path: FILE.into(), bytes: recipe.text()? }])?;
     set.recipe = recipe;

@@ -3,6 +3,8 @@
 //! Everything that decides a byte of an image stands here or in the `scene/` beside it, and nothing else does: no clock, no path
 //! of a machine, no number of threads. So any shard on any machine that has the folder can go on with it.
 
+use super::keep::Kept;
+use super::labelling::Labelling;
 use super::split::{Shares, Split};
 use crate::ablation::{self, Edit};
 use crate::input::{Scope, below};
@@ -26,6 +28,9 @@ pub struct Recipe {
     pub split: Shares,
     /// Formats beside the native one, by name.
     pub formats: Vec<String>,
+    /// Classes of the formats, and what they leave out.
+    #[serde(default, skip_serializing_if = "Labelling::is_usual")]
+    pub labelling: Labelling,
     /// What others may do with it, in its owner's words.
     pub licence: String,
     /// The species that `species.png` numbers from 1.
@@ -75,11 +80,25 @@ pub struct Rendering {
     pub max_depth: Option<u32>,
     /// Most radiance of a path, where there is a limit.
     pub clamp: Option<f32>,
+    /// Whether images have a `parts.png`.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub parts: bool,
+    /// Maps that images keep beside photograph, labels and record; [`Kept::OLDEST`] where a recipe of before does not say.
+    #[serde(default = "oldest", skip_serializing_if = "is_oldest")]
+    pub keep: Vec<Kept>,
     /// The ray tracing kernels and their instruction set, or the graphics card and its driver.
     pub kernels: String,
     /// What was changed of the field, by its name among [`ablation::EDITS`]. What an edit of the drawing changes stands above as well.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub edit: Option<String>,
+}
+
+fn oldest() -> Vec<Kept> {
+    Kept::OLDEST.to_vec()
+}
+
+fn is_oldest(kept: &[Kept]) -> bool {
+    kept == Kept::OLDEST
 }
 
 fn one() -> u64 {
@@ -157,8 +176,24 @@ impl Recipe {
 
     /// What decides the bytes of an image's native files: SHA-256 of the recipe without its length, formats and words.
     pub fn fingerprint(&self) -> Result<String> {
-        let same = Self { count: 0, formats: Vec::new(), licence: String::new(), ..self.clone() };
+        let (formats, labelling, licence) = (Vec::new(), Labelling::default(), String::new());
+        let same = Self { count: 0, formats, labelling, licence, ..self.clone() };
         Ok(hex::encode(Sha256::digest(json(&same)?)))
+    }
+
+    /// Of images that were never made, of these species.
+    #[cfg(test)]
+    pub(super) fn of_species(species: Vec<SpeciesRecord>) -> Self {
+        Self {
+            furrow: String::new(),
+            made: Made::Imported { from: String::new(), source_sha256: String::new() },
+            count: 0,
+            split: Shares::default(),
+            formats: Vec::new(),
+            labelling: Labelling::default(),
+            licence: String::new(),
+            species,
+        }
     }
 
     /// How many images are taken of each field; 1 of what was imported.
@@ -192,6 +227,14 @@ impl Recipe {
         }
     }
 
+    /// Whether images keep a map; all of them do that were imported with it.
+    pub fn keeps(&self, map: Kept) -> bool {
+        match &self.made {
+            Made::Rendered(rendering) => rendering.keep.contains(&map),
+            Made::Imported { .. } => true,
+        }
+    }
+
     /// The name of a species by its number in `species.png`; `None` for 0 and numbers of no species.
     pub fn species_name(&self, number: u16) -> Option<&str> {
         let place = usize::from(number).checked_sub(1)?;
@@ -201,7 +244,7 @@ impl Recipe {
     /// Whether `other` makes the same images as far as both go: it may be longer and have other formats.
     pub fn check_goes_on(&self, folder: &Path, other: &Self) -> Result<()> {
         let (before, now) = (fields(self)?, fields(other)?);
-        let free = ["count", "formats", "licence"];
+        let free = ["count", "formats", "licence", "classes", "min_pixels", "min_visible"];
         let keys: std::collections::BTreeSet<&String> = before.keys().chain(now.keys()).collect();
         let value = |of: &std::collections::BTreeMap<String, String>, key: &String| {
             of.get(key).cloned().unwrap_or_else(|| "none".into())

@@ -1,13 +1,13 @@
 //! Renders field k: a [`Sample`].
 
 use super::annotate::{self, keypoint, of_255};
+use super::keep::{self, Kept};
 use super::recipe::{self, Recipe};
 use super::record::{CaptureRecord, Exposure, Grown, Leaf, Plant, Record, Seen};
 use super::sample::{Rendered, Sample};
 use super::set::Set;
 use super::{flow, format};
 use crate::job::{Field, Image, Renderer, Request, SceneFile};
-use crate::output::half;
 use crate::render::{self, LabelMap, Watch};
 use crate::scene::drive::Capture;
 use crate::scene::traits::{PlantTraits, Traits};
@@ -80,9 +80,9 @@ fn same(set: &Set, what: &str, there: &str, here: &str) -> Result<()> {
 
 /// The field that was grown last, for the next image of it.
 #[derive(Default)]
-pub struct Kept(Option<Field>);
+pub struct LastField(Option<Field>);
 
-impl Kept {
+impl LastField {
     /// The field that an image of a dataset shows, as that image has it, and how long it took to grow and build it now.
     fn at(&mut self, set: &Set, scene_file: &SceneFile, index: u64) -> Result<(&Field, Duration)> {
         let Set { folder, recipe } = set;
@@ -110,7 +110,7 @@ pub fn render(
     index: u64,
     renderer: &Renderer,
     watch: Watch<'_>,
-    kept: &mut Kept,
+    kept: &mut LastField,
 ) -> Result<RenderedSample> {
     let (field, grow) = kept.at(set, scene_file, index)?;
     let image = renderer.render(field, &Request { watch, ..Request::default() })?;
@@ -161,15 +161,20 @@ fn describe(recipe: &Recipe, index: u64, image: Image<'_>) -> Result<Sample> {
             warnings: field.warnings.clone(),
         },
         rgb: photograph.rgb.as_chunks::<3>().0.to_vec(),
-        nir: photograph.nir,
+        nir: if recipe.keeps(Kept::Nir) { photograph.nir } else { Vec::new() },
         semantics: labels.tags.iter().map(|t| t.class as u8).collect(),
         // The recipe holds no more species than 8 bits number.
         species: labels.tags.iter().map(|t| kind(t.plant) as u8).collect(),
+        parts: if recipe.rendering()?.parts { annotate::part_numbers(&labels, &field.kinds) } else { Vec::new() },
         plants: labels.tags.iter().map(|t| t.plant).collect(),
         leaves: labels.tags.iter().map(|t| t.leaf).collect(),
-        coverage: render::coverage(&film, &tags).into_iter().map(of_255).collect(),
-        depth: labels.depth.clone(),
-        normals: labels.normals.iter().map(|n| n.to_array().map(half)).collect(),
+        coverage: if recipe.keeps(Kept::Coverage) {
+            render::coverage(&film, &tags).into_iter().map(of_255).collect()
+        } else {
+            Vec::new()
+        },
+        depth: keep::depths(&recipe.rendering()?.keep, &labels.depth),
+        normals: keep::normals(&recipe.rendering()?.keep, labels.normals.iter().map(|n| n.to_array())),
         film: None,
     };
     (sample.record.classes, sample.record.ignored) = annotate::classes(&sample);

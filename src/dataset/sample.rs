@@ -19,6 +19,8 @@ pub struct Sample {
     pub semantics: Vec<u8>,
     /// Number of the species in the dataset's table, 0 for none.
     pub species: Vec<u8>,
+    /// Number of what is there among [`PartKind::NUMBERED`](crate::scene::PartKind::NUMBERED), 0 for nothing.
+    pub parts: Vec<u8>,
     /// Number of the plant, 0 for none.
     pub plants: Vec<u16>,
     /// Number of the leaf on its plant, 0 for none.

@@ -5,7 +5,7 @@ use super::checksum_record::ChecksumRecord;
 use super::difference::Difference;
 use super::finish::{MANIFEST, lacks, ranges};
 use super::generate::Task;
-use super::render::{Kept, RenderedSample, render, scene_file};
+use super::render::{LastField, RenderedSample, render, scene_file};
 use super::set::Set;
 use super::split::Split;
 use super::{File, format, generate, invariants, native, timing_log};
@@ -113,7 +113,7 @@ pub fn verify(
     let Some(renderer) = again.renderer.filter(|_| again.images > 0) else { return Ok(found) };
     found.kernels = OtherKernels::of(set, renderer)?;
     let scene = scene_file(set)?.memory(again.memory).threads(threads);
-    let mut kept = Kept::default();
+    let mut kept = LastField::default();
     for index in drawn(count, again.images) {
         if found.missing.contains(&index) {
             continue;
@@ -244,7 +244,7 @@ fn drawn(count: u64, again: u64) -> Vec<u64> {
 
 /// The files of an image that come out otherwise.
 fn other_bytes(set: &Set, made: &RenderedSample) -> Result<Option<String>> {
-    let mut files = native::files(&made.sample, &made.text)?;
+    let mut files = native::files(&set.recipe, &made.sample, &made.text)?;
     for (_, format) in format::all(&set.recipe)? {
         files.extend(format.image(&set.recipe, &made.sample)?);
     }

@@ -34,6 +34,16 @@ impl PartKind {
         (16, "sheath", [0, 150, 150], Self::Organ(OrganKind::Sheath)),
     ];
 
+    /// Colours of the numbers in label maps, from 0; black where there is none.
+    pub fn palette() -> Vec<[u8; 3]> {
+        let last = Self::NUMBERED.iter().map(|(number, ..)| usize::from(*number)).max().unwrap_or(0);
+        let mut all = vec![[0; 3]; last + 1];
+        for (number, _, color, _) in Self::NUMBERED {
+            all[usize::from(number)] = color;
+        }
+        all
+    }
+
     /// Its number in label maps.
     pub fn number(self) -> u8 {
         Self::NUMBERED.iter().find(|(.., kind)| *kind == self).map_or(0, |(number, ..)| *number)

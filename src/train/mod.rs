@@ -45,7 +45,6 @@ pub mod adapt;
 #[doc(hidden)]
 pub mod baseline;
 #[doc(hidden)]
-pub mod classes;
 #[doc(hidden)]
 pub mod data;
 #[doc(hidden)]
@@ -75,7 +74,7 @@ pub mod torch;
 pub mod weights;
 pub mod zoo;
 
-pub use classes::Classes;
+pub use crate::dataset::classes::Classes;
 pub use data::{Band, Pick, Selection, Shape};
 pub use fit::{Hyperparameters, Plan, Settings};
 pub use measure::{Report, Scores};

@@ -8,7 +8,6 @@
 //! result.json              loss curve, validation passes, time; written last
 //! ```
 
-use super::classes::Classes;
 use super::data::{Band, Normalization, Resize, Shape, Store};
 use super::fit::Plan;
 use super::fit::checkpoint::History;
@@ -16,6 +15,7 @@ use super::fit::hyper::SIDES;
 use super::net::{Network, Parameter, Pretrained, parameters};
 use super::refine::Refine;
 use super::weights::{self, Array, Stored};
+use crate::dataset::classes::Classes;
 use crate::input::{below, shipped};
 use crate::output::{Together, write_atomically, write_together};
 use crate::{Error, Result};

@@ -2,8 +2,8 @@
 
 use super::dataset::{path, succeed};
 use super::program::{SMALL, trace};
+use furrow::dataset::classes::Classes;
 use furrow::sampling::{Purpose, Stream};
-use furrow::train::classes::Classes;
 use furrow::train::data::{Band, Pick, Selection, Shape};
 use furrow::train::fit::hyper::NormalizationMode;
 use furrow::train::fit::{Callbacks, Hyperparameters, Plan};

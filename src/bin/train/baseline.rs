@@ -2,8 +2,8 @@
 
 use crate::report;
 use furrow::cli::signal::Signals;
+use furrow::dataset::classes::Classes;
 use furrow::train::baseline::{Kind, files};
-use furrow::train::classes::Classes;
 use furrow::train::data::{Band, Pick, Selection, Shape};
 use furrow::train::fit::settings::{self, parse_size};
 use furrow::train::run;

@@ -6,18 +6,18 @@
 use super::{Whole, picture};
 use crate::Result;
 use crate::dataset::File;
+use crate::dataset::labels::Labels;
 use crate::dataset::recipe::Recipe;
-use crate::dataset::record::{Plant, Record};
+use crate::dataset::record::Record;
 use crate::dataset::rle::Box2;
 use crate::dataset::sample::Sample;
 use crate::dataset::set::Set;
 use crate::dataset::split::Split;
-use crate::scene::tag::Class;
 use std::fmt::Write;
 
-/// A plant's class as rows have it: 0 crop, 1 weed.
-pub(super) fn number(class: Class) -> u8 {
-    (class as u8).saturating_sub(Class::Crop as u8)
+/// A class as rows have it: its place among those that plants may have, such as 0 crop, 1 weed.
+pub(super) fn number(labels: &Labels<'_>, class: u8) -> usize {
+    labels.of_plants().iter().take_while(|of| **of != class).count()
 }
 
 /// Places in the image, pixels, as a row has them: shares of its width and height, as finely as readers with single precision have them.
@@ -29,9 +29,9 @@ pub(super) fn shares(row: &mut String, sample: &Sample, places: impl IntoIterato
     }
 }
 
-/// A plant's row up to its box: class, then the box's middle, width and height.
-pub(super) fn row(sample: &Sample, plant: &Plant, Box2([x, y, w, h]): Box2) -> String {
-    let mut row = number(plant.class).to_string();
+/// A plant's row up to its box: number of the class, then the box's middle, width and height.
+pub(super) fn row(sample: &Sample, number: usize, Box2([x, y, w, h]): Box2) -> String {
+    let mut row = number.to_string();
     let [x, y, w, h] = [x, y, w, h].map(f64::from);
     shares(&mut row, sample, [(x + w / 2.0, y + h / 2.0), (w, h)]);
     row
@@ -72,8 +72,12 @@ pub(super) fn data(folder: &str, set: &Set, out: &mut Whole<'_>, more: &str) -> 
         }
         w.put(more)?;
         w.put("names:\n")?;
-        for class in [Class::Crop, Class::Weed] {
-            w.put(format!("  {}: {}\n", number(class), class.name()))?;
+        let labels = Labels::of(&set.recipe)?;
+        for class in labels.of_plants() {
+            w.put(format!("  {}: ", number(&labels, class)))?;
+            // JSON texts are YAML texts.
+            w.json(&labels.classes()[usize::from(class)].name)?;
+            w.put("\n")?;
         }
         Ok(())
     })

@@ -2,7 +2,7 @@
 //! `gtFine/SPLIT/CITY/…_gtFine_{labelIds,labelTrainIds,instanceIds,color}.png`; torchvision, mmsegmentation and datumaro read it.
 //!
 //! The city is the scene file's name, the sequence and frame are the image's number. `labelIds` and `labelTrainIds` are the same:
-//! 0 soil, 1 crop, 2 weed, 255 no label. `instanceIds`, 16 bit, are class · 1000 + k for the k-th plant of its class in the image,
+//! 0 soil, 1 crop, 2 weed, or the classes that the dataset was given; 255 no label. `instanceIds`, 16 bit, are class · 1000 + k for the k-th plant of its class in the image,
 //! k from 0, and the class alone where there is no plant. `label_colors.txt` tells datumaro the classes, which it would else take for
 //! streets'; it reads classes from `labelTrainIds`, since it knows no instances.
 //!
@@ -15,12 +15,12 @@
 use super::{Format, Whole, picture};
 use crate::Result;
 use crate::dataset::File;
+use crate::dataset::labels::Labels;
 use crate::dataset::recipe::{Made, Recipe};
 use crate::dataset::record::{Plant, Record};
 use crate::dataset::sample::Sample;
 use crate::dataset::set::Set;
 use crate::output::Picture;
-use crate::scene::tag::Class;
 use serde_json::json;
 use std::collections::BTreeMap;
 
@@ -34,16 +34,20 @@ const MOST: usize = 1000;
 impl Format for Writer {
     fn image(&self, recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
         let record = &sample.record;
+        let of_set = Labels::of(recipe)?;
+        let classes = of_set.pixels(sample);
         let at = |kind: &str, suffix: &str| path(recipe, record, kind, suffix);
-        let labels = |suffix: &str| picture::file(sample, at("gtFine", suffix), &Picture::Gray(&sample.semantics));
-        let numbers = numbers(record);
+        let labels = |suffix: &str| picture::file(sample, at("gtFine", suffix), &Picture::Gray(&classes));
+        let numbers = numbers(&of_set, record);
+        // A pixel may be of another class than its plant, where organs have classes.
         let instance = |(class, plant): (&u8, &u16)| match numbers.get(plant) {
-            Some(k) => u16::from(*class) * MOST as u16 + k,
-            None => u16::from(*class),
+            Some((of, k)) if of == class => u16::from(*class) * MOST as u16 + k,
+            _ => u16::from(*class),
         };
-        let instances: Vec<u16> = sample.semantics.iter().zip(&sample.plants).map(instance).collect();
-        let color = |class: &u8| crate::dataset::annotate::class_of(*class).map_or([128; 3], Class::color);
-        let colors: Vec<[u8; 3]> = sample.semantics.iter().map(color).collect();
+        let instances: Vec<u16> = classes.iter().zip(&sample.plants).map(instance).collect();
+        let of_class = of_set.colors();
+        let color = |class: &u8| of_class.get(usize::from(*class)).copied().unwrap_or([128; 3]);
+        let colors: Vec<[u8; 3]> = classes.iter().map(color).collect();
         Ok(vec![
             picture::photograph(sample, at("leftImg8bit", "leftImg8bit"))?,
             labels("gtFine_labelIds")?,
@@ -54,10 +58,10 @@ impl Format for Writer {
     }
 
     fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+        let labels = Labels::of(&set.recipe)?;
         out.file(&format!("{FOLDER}/label_colors.txt"), |w| {
-            for class in Class::ALL {
-                let [r, g, b] = class.color();
-                w.put(format!("{r} {g} {b} {}\n", class.name()))?;
+            for (class, [r, g, b]) in labels.classes().iter().zip(labels.colors()) {
+                w.put(format!("{r} {g} {b} {}\n", class.name))?;
             }
             Ok(())
         })?;
@@ -65,7 +69,7 @@ impl Format for Writer {
             w.put("{\n\"about\": \"plants beyond the largest 1000 of their class, whose instanceIds are the class alone\",\n")?;
             w.put("\"groups\": [")?;
             w.items(set.all().flat_map(|record| match record {
-                Ok(record) => groups(&record).into_iter().map(Ok).collect(),
+                Ok(record) => groups(&labels, &record).into_iter().map(Ok).collect(),
                 Err(e) => vec![Err(e)],
             }))?;
             w.put("]\n}\n")
@@ -91,33 +95,39 @@ fn city(recipe: &Recipe) -> String {
 }
 
 /// The plants of a class that an image shows, the largest first where they are too many to be numbered, else by number.
-fn ordered(record: &Record, class: Class) -> Vec<&Plant> {
-    let mut plants: Vec<&Plant> = record.seen().filter(|p| p.class == class).collect();
+fn ordered<'r>(labels: &Labels<'_>, record: &'r Record, class: u8) -> Vec<&'r Plant> {
+    let mut plants: Vec<&Plant> = labels.plants(record).filter(|(_, of)| *of == class).map(|(plant, _)| plant).collect();
     if plants.len() > MOST {
         plants.sort_by_key(|p| (std::cmp::Reverse(p.seen.pixels), p.number));
     }
     plants
 }
 
-/// The place of each plant among those of its class; plants beyond [`MOST`] have none.
-fn numbers(record: &Record) -> BTreeMap<u16, u16> {
-    let place = |(k, plant): (usize, &Plant)| (plant.number, k as u16);
-    let of_class = |class: Class| ordered(record, class).into_iter().take(MOST).enumerate().map(place).collect::<Vec<_>>();
-    [Class::Crop, Class::Weed].into_iter().flat_map(of_class).collect()
+/// The class of each plant and its place among those of its class; plants beyond [`MOST`] have none.
+fn numbers(labels: &Labels<'_>, record: &Record) -> BTreeMap<u16, (u8, u16)> {
+    let mut all = BTreeMap::new();
+    for class in labels.of_plants() {
+        for (k, plant) in (0..).zip(ordered(labels, record, class).into_iter().take(MOST)) {
+            all.insert(plant.number, (class, k));
+        }
+    }
+    all
 }
 
 /// The plants of each class that have no number.
-fn groups(record: &Record) -> Vec<serde_json::Value> {
-    let of_class = |class: Class| {
-        let rest: Vec<u16> = ordered(record, class).iter().skip(MOST).map(|p| p.number).collect();
-        (!rest.is_empty()).then(|| json!({ "image": record.name, "class": class.name(), "plants": rest }))
+fn groups(labels: &Labels<'_>, record: &Record) -> Vec<serde_json::Value> {
+    let of_class = |class: u8| {
+        let rest: Vec<u16> = ordered(labels, record, class).iter().skip(MOST).map(|p| p.number).collect();
+        let name = &labels.classes()[usize::from(class)].name;
+        (!rest.is_empty()).then(|| json!({ "image": record.name, "class": name, "plants": rest }))
     };
-    [Class::Crop, Class::Weed].into_iter().filter_map(of_class).collect()
+    labels.of_plants().into_iter().filter_map(of_class).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::tag::Class;
     use crate::dataset::record::Seen;
     use crate::dataset::split::Split;
 
@@ -154,30 +164,27 @@ mod tests {
 
     #[test]
     fn a_thousand_plants_of_a_class_have_numbers() {
-        let record = weeds(1000);
-        assert_eq!(numbers(&record).last_key_value(), Some((&1000, &999)));
-        assert!(groups(&record).is_empty());
+        let (record, recipe) = (weeds(1000), Recipe::of_species(Vec::new()));
+        let labels = Labels::of(&recipe).unwrap();
+        assert_eq!(numbers(&labels, &record).last_key_value(), Some((&1000, &(2, 999))));
+        assert!(groups(&labels, &record).is_empty());
     }
 
     #[test]
     fn of_more_the_smallest_are_a_group_and_listed() {
-        let record = weeds(1002);
-        let numbers = numbers(&record);
+        let (record, recipe) = (weeds(1002), Recipe::of_species(Vec::new()));
+        let labels = Labels::of(&recipe).unwrap();
+        let numbers = numbers(&labels, &record);
         assert_eq!(numbers.len(), MOST);
-        assert_eq!((numbers.get(&1), numbers.get(&2), numbers.get(&1002)), (None, None, Some(&0)));
-        assert_eq!(groups(&record), [json!({ "image": "000007", "class": "weed", "plants": [2, 1] })]);
+        assert_eq!((numbers.get(&1), numbers.get(&2), numbers.get(&1002)), (None, None, Some(&(2, 0))));
+        assert_eq!(groups(&labels, &record), [json!({ "image": "000007", "class": "weed", "plants": [2, 1] })]);
     }
 
     #[test]
     fn a_city_has_no_underscore() {
         let of = |from: &str| Recipe {
-            furrow: String::new(),
             made: Made::Imported { from: from.into(), source_sha256: String::new() },
-            count: 0,
-            split: crate::dataset::split::Shares::default(),
-            formats: Vec::new(),
-            licence: String::new(),
-            species: Vec::new(),
+            ..Recipe::of_species(Vec::new())
         };
         assert_eq!(city(&of("Pheno_Bench 2")), "phenobench2");
         assert_eq!(city(&of("___")), "field");

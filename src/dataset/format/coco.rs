@@ -1,7 +1,7 @@
 //! COCO instances and keypoints: `annotations/instances_SPLIT.json` of plants, `annotations/leaves_SPLIT.json` of leaves, and
 //! `images/SPLIT/NAME.png`; `pycocotools.coco.COCO` reads them.
 //!
-//! Categories are 1 crop and 2 weed, and in the file of leaves 3 leaf. Every plant and every leaf that an image shows is an annotation:
+//! Categories are 1 crop and 2 weed, or the classes that the dataset was given, and in the file of leaves the next, leaf. Every plant and every leaf that an image shows is an annotation:
 //! `segmentation` is a compressed run-length mask with `iscrowd` 0, for leaves have holes and parts that polygons cannot hold; `area` is its
 //! number of pixels; ids begin at 1, for `COCOeval` takes a match with id 0 for none. Leaves have a file of their own, for `COCOeval` looks at
 //! the hundred best answers of an image unless it is told otherwise, and an image may show hundreds of leaves.
@@ -18,13 +18,13 @@
 //! Source: COCO data format, <https://cocodataset.org/#format-data>; cocoapi issue 332 on id 0.
 
 use super::{Format, Whole, picture};
+use crate::dataset::labels::Labels;
 use crate::dataset::recipe::Recipe;
-use crate::dataset::record::{Keypoint, Leaf, Plant, PointState, Record, Seen};
+use crate::dataset::record::{Keypoint, Plant, PointState, Record, Seen};
 use crate::dataset::sample::Sample;
 use crate::dataset::set::{Set, Stream};
 use crate::dataset::split::Split;
 use crate::dataset::File;
-use crate::scene::tag::Class;
 use crate::Result;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -33,9 +33,6 @@ pub(super) struct Writer;
 
 const FOLDER: &str = "coco";
 
-/// Category of leaves, behind those of the classes.
-const LEAF: u32 = 3;
-
 impl Format for Writer {
     fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
         let Record { name, split, .. } = &sample.record;
@@ -43,19 +40,21 @@ impl Format for Writer {
     }
 
     fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+        let labels = Labels::of(&set.recipe)?;
         for split in Split::ALL {
             if set.names(split).is_empty() {
                 continue;
             }
-            for (file, categories, of_plant) in
-                [("instances", plants(), plant as OfPlant), ("leaves", vec![leaf()], leaves as OfPlant)]
-            {
+            for (file, categories, of_image) in [
+                ("instances", plant_categories(&labels), plants as OfImage),
+                ("leaves", vec![about_leaves(&labels)], leaves as OfImage),
+            ] {
                 out.file(&format!("{FOLDER}/annotations/{file}_{}.json", split.name()), |w| {
                     head(w, set, split)?;
                     w.put("\"categories\": [")?;
                     w.items(categories.into_iter().map(Ok))?;
                     w.put("],\n\"annotations\": [")?;
-                    w.items(annotations(set, split, of_plant))?;
+                    w.items(annotations(set, &labels, split, of_image))?;
                     w.put("]\n}\n")
                 })?;
             }
@@ -106,23 +105,29 @@ fn tracked(set: &Set, id: Option<u32>, mut about: Value) -> Value {
     about
 }
 
-/// The category of a class: its number.
-pub(super) fn category(class: Class) -> u32 {
-    class as u32
+/// The category of a class: its place among those that plants may have, from 1.
+pub(super) fn category(labels: &Labels<'_>, class: u8) -> u32 {
+    labels.of_plants().iter().take_while(|of| **of != class).count() as u32 + 1
+}
+
+/// The category of leaves, behind those of plants.
+pub(super) fn leaf_category(labels: &Labels<'_>) -> u32 {
+    labels.of_plants().len() as u32 + 1
 }
 
 /// Categories of plants.
-fn plants() -> Vec<Value> {
-    let class = |class: Class| {
-        let name = class.name();
-        json!({ "id": category(class), "name": name, "supercategory": "plant", "keypoints": ["stem"], "skeleton": [] })
+fn plant_categories(labels: &Labels<'_>) -> Vec<Value> {
+    let about = |class: u8| {
+        let (id, name) = (category(labels, class), &labels.classes()[usize::from(class)].name);
+        json!({ "id": id, "name": name, "supercategory": "plant", "keypoints": ["stem"], "skeleton": [] })
     };
-    [Class::Crop, Class::Weed].map(class).to_vec()
+    labels.of_plants().into_iter().map(about).collect()
 }
 
 /// The category of leaves: the blade runs from its first keypoint to its second.
-fn leaf() -> Value {
-    json!({ "id": LEAF, "name": "leaf", "supercategory": "organ", "keypoints": ["base", "tip"], "skeleton": [[1, 2]] })
+fn about_leaves(labels: &Labels<'_>) -> Value {
+    let id = leaf_category(labels);
+    json!({ "id": id, "name": "leaf", "supercategory": "organ", "keypoints": ["base", "tip"], "skeleton": [[1, 2]] })
 }
 
 /// A plant or a leaf.
@@ -140,13 +145,18 @@ struct Annotation {
     attributes: Value,
 }
 
-/// What of a plant in an image a file tells.
-type OfPlant = fn(&Set, &Record, &Plant) -> Vec<Annotation>;
+/// What of an image a file tells.
+type OfImage = fn(&Set, &Labels<'_>, &Record) -> Vec<Annotation>;
 
 /// All annotations of a split, image by image.
-fn annotations(set: &Set, split: Split, of_plant: OfPlant) -> impl Iterator<Item = Result<Annotation>> + '_ {
+fn annotations<'a>(
+    set: &'a Set,
+    labels: &'a Labels<'a>,
+    split: Split,
+    of_image: OfImage,
+) -> impl Iterator<Item = Result<Annotation>> + 'a {
     let of_image = move |record: Result<Record>| match record {
-        Ok(record) => record.seen().flat_map(|plant| of_plant(set, &record, plant)).map(Ok).collect(),
+        Ok(record) => of_image(set, labels, &record).into_iter().map(Ok).collect(),
         Err(e) => vec![Err(e)],
     };
     let numbered = |(i, annotation): (usize, Result<Annotation>)| {
@@ -155,24 +165,32 @@ fn annotations(set: &Set, split: Split, of_plant: OfPlant) -> impl Iterator<Item
     set.records(split).flat_map(of_image).enumerate().map(numbered)
 }
 
-/// The plant itself.
-fn plant(set: &Set, record: &Record, plant: &Plant) -> Vec<Annotation> {
-    vec![annotation(record, category(plant.class), &plant.seen, &[plant.stem], about(set, plant))]
+/// The plants.
+fn plants(set: &Set, labels: &Labels<'_>, record: &Record) -> Vec<Annotation> {
+    let of_plant = |(plant, class): (&Plant, u8)| {
+        annotation(record, category(labels, class), &plant.seen, &[plant.stem], about(set, plant))
+    };
+    labels.plants(record).map(of_plant).collect()
 }
 
-/// Its leaves.
-fn leaves(set: &Set, record: &Record, plant: &Plant) -> Vec<Annotation> {
-    let of_leaf = |leaf: &Leaf| {
-        let about = json!({
-            "plant": plant.number,
-            "leaf": leaf.number,
-            "class": plant.class.name(),
-            "visible_fraction": leaf.seen.visible_fraction(),
-            "inside_fraction": leaf.seen.inside_fraction(),
-        });
-        annotation(record, LEAF, &leaf.seen, &[leaf.base, leaf.tip], tracked(set, leaf.id, about))
-    };
-    plant.leaves.iter().filter(|leaf| leaf.seen.pixels > 0).map(of_leaf).collect()
+/// The leaves.
+fn leaves(set: &Set, labels: &Labels<'_>, record: &Record) -> Vec<Annotation> {
+    let mut all = Vec::new();
+    for plant in record.seen() {
+        let Some(class) = labels.class(plant) else { continue };
+        for leaf in labels.leaves(plant) {
+            let about = json!({
+                "plant": plant.number,
+                "leaf": leaf.number,
+                "class": labels.classes()[usize::from(class)].name,
+                "visible_fraction": leaf.seen.visible_fraction(),
+                "inside_fraction": leaf.seen.inside_fraction(),
+            });
+            let points = [leaf.base, leaf.tip];
+            all.push(annotation(record, leaf_category(labels), &leaf.seen, &points, tracked(set, leaf.id, about)));
+        }
+    }
+    all
 }
 
 fn annotation(

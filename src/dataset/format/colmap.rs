@@ -12,6 +12,7 @@
 use super::Whole;
 use super::drives::{self, OfFields, Taken};
 use crate::Result;
+use crate::dataset::set::Set;
 use std::fmt::Write;
 
 pub(super) struct Writer;
@@ -19,7 +20,7 @@ pub(super) struct Writer;
 const FOLDER: &str = "colmap";
 
 impl OfFields for Writer {
-    fn field(&self, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
+    fn field(&self, _set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
         let folder = format!("{FOLDER}/{name}");
         out.file(&format!("{folder}/cameras.txt"), |w| w.put(cameras(images)))?;
         out.file(&format!("{folder}/images.txt"), |w| w.put(poses(images)))?;

@@ -19,6 +19,7 @@
 
 use super::conditions::Brief;
 use super::{Format, Whole, picture};
+use crate::dataset::labels;
 use crate::dataset::recipe::Recipe;
 use crate::dataset::record::{Plant, Record};
 use crate::dataset::sample::Sample;
@@ -28,7 +29,7 @@ use crate::dataset::File;
 use crate::output::{self, Picture};
 use crate::{Error, Result};
 use serde_json::json;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 pub(super) struct Writer;
 
@@ -79,10 +80,12 @@ impl Format for Writer {
         let jpeg = output::encode_jpeg(width, height, &sample.rgb, QUALITY)?;
         let mut rows = csv::WriterBuilder::new().has_headers(false).from_writer(Vec::new());
         let mut of_plant = BTreeMap::new();
+        let listed: BTreeSet<u16> = labels::Labels::of(recipe)?.plants(record).map(|(plant, _)| plant.number).collect();
         for plant in record.seen() {
             let label = labels.of_plant(plant);
             of_plant.insert(plant.number, label);
-            if let Some(row) = row(plant, label) {
+            if listed.contains(&plant.number)
+                && let Some(row) = row(plant, label) {
                 rows.serialize(row).map_err(|e| failed(&e))?;
             }
         }

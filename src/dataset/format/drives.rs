@@ -21,7 +21,7 @@ pub(super) struct Taken {
 /// A format that is written field by field, of its images' cameras and records alone.
 pub(super) trait OfFields: Sync {
     /// The files of a field of this name.
-    fn field(&self, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()>;
+    fn field(&self, set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()>;
 }
 
 impl<T: OfFields> Format for T {
@@ -35,7 +35,7 @@ impl<T: OfFields> Format for T {
 
     fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
         let fields = set.recipe.count.div_ceil(set.recipe.captures());
-        (0..fields).try_for_each(|field| self.field(&Set::name(field), &images(set, field)?, out))
+        (0..fields).try_for_each(|field| self.field(set, &Set::name(field), &images(set, field)?, out))
     }
 
     fn warnings(&self, recipe: &Recipe) -> Vec<String> {

@@ -11,6 +11,7 @@ use super::conditions::Brief;
 use super::{Format, Whole, picture};
 use crate::Result;
 use crate::dataset::File;
+use crate::dataset::labels::Labels;
 use crate::dataset::recipe::Recipe;
 use crate::dataset::record::Record;
 use crate::dataset::sample::Sample;
@@ -27,14 +28,14 @@ pub(super) struct Writer;
 const FOLDER: &str = "imagefolder";
 
 impl Format for Writer {
-    fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
+    fn image(&self, recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
         let Record { name, split, .. } = &sample.record;
         let at = |kind: &str| format!("{FOLDER}/{}/{kind}/{name}.png", split.name());
         let file = |kind: &str, picture: &Picture<'_>| picture::file(sample, at(kind), picture);
         let mut files = vec![
             picture::photograph(sample, at("images"))?,
             // Numbers, not palette colours: a reader that turns pictures into RGB would lose them.
-            file("masks", &Picture::Gray(&sample.semantics))?,
+            file("masks", &Picture::Gray(&Labels::of(recipe)?.pixels(sample)))?,
             file("plants", &Picture::Gray16(&sample.plants))?,
             file("leaves", &Picture::Gray16(&sample.leaves))?,
         ];
@@ -167,7 +168,9 @@ fn card(set: &Set, splits: &[Split], w: &mut Stream<'_>) -> Result<()> {
         );
         w.put(line)?;
     }
-    w.put(COLUMNS)?;
+    let labels = Labels::of(recipe)?;
+    let classes = labels.classes().iter().enumerate().map(|(i, class)| format!("{i} {}", plain(&class.name)));
+    w.put(COLUMNS.replace("{classes}", &classes.collect::<Vec<_>>().join(", ")))?;
     w.put("\n`species` numbers:\n\n| number | species | EPPO code | class |\n|---|---|---|---|\n| 0 | none | | |\n")?;
     for (i, species) in recipe.species.iter().enumerate() {
         let (name, eppo) = (plain(&species.name), plain(&species.eppo));
@@ -180,7 +183,7 @@ const COLUMNS: &str = "\
 | column | holds |
 |---|---|
 | `image`, `nir` | the photographs: colour, near infrared |
-| `mask` | class of each pixel: 0 soil, 1 crop, 2 weed, 255 no label |
+| `mask` | class of each pixel: {classes}, 255 no label |
 | `plants`, `leaves` | number of the plant, of the leaf on it; 16 bit, 0 for none |
 | `species` | number of the species, 0 for none |
 | `soil_pixels`, `crop_pixels`, `weed_pixels` | pixels of each class |

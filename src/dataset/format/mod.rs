@@ -3,6 +3,7 @@
 //! A format is a file here that implements [`Format`], and one line in `formats!`. The tests find it unasked.
 
 use super::File;
+use super::keep::Kept;
 use super::recipe::Recipe;
 use super::sample::Sample;
 use super::set::{Set, Whole};
@@ -28,6 +29,11 @@ pub trait Format: Sync {
     /// Whether it is made of what only the renderer knows ([`Sample::film`]), so that adding it renders anew.
     fn needs_film(&self) -> bool {
         false
+    }
+
+    /// Maps of the images that it cannot do without.
+    fn needs_maps(&self) -> &'static [Kept] {
+        &[]
     }
 
     /// Whether it tells of cameras, which imported images do not.

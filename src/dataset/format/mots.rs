@@ -8,6 +8,8 @@
 use super::Whole;
 use super::drives::{self, OfFields, Taken};
 use crate::Result;
+use crate::dataset::labels::Labels;
+use crate::dataset::set::Set;
 use std::fmt::Write;
 
 pub(super) struct Writer;
@@ -15,13 +17,14 @@ pub(super) struct Writer;
 const FOLDER: &str = "mots";
 
 impl OfFields for Writer {
-    fn field(&self, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
+    fn field(&self, set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
+        let labels = Labels::of(&set.recipe)?;
         for (camera, of) in drives::by_camera(images) {
             let mut text = String::new();
             for image in of {
-                for plant in image.record.seen() {
+                for (plant, class) in labels.plants(&image.record) {
                     let (Some(id), Some(mask)) = (plant.id, &plant.seen.mask) else { continue };
-                    let ([height, width], class) = (mask.size, plant.class as u8);
+                    let [height, width] = mask.size;
                     let frame = image.capture.frame;
                     let _ = writeln!(text, "{frame} {id} {class} {height} {width} {}", mask.counts);
                 }

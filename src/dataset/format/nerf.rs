@@ -12,6 +12,7 @@ use super::Whole;
 use super::drives::{self, OfFields, Taken};
 use crate::dataset::recipe::json;
 use crate::Result;
+use crate::dataset::set::Set;
 use serde_json::{Map, Value, json};
 
 pub(super) struct Writer;
@@ -19,7 +20,7 @@ pub(super) struct Writer;
 const FOLDER: &str = "nerf";
 
 impl OfFields for Writer {
-    fn field(&self, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
+    fn field(&self, _set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
         let mut all = images.first().map(intrinsics).unwrap_or_default();
         all.insert("frames".into(), images.iter().map(frame).collect());
         let text = json(&all)?;

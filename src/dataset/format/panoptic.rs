@@ -2,8 +2,8 @@
 //! panopticapi read it.
 //!
 //! A pixel's segment is R + 256 G + 65536 B, 0 for none. A plant's segment is its number in `plants.png`; what belongs to no plant is
-//! 65536 + category: soil, and crop or weed that an imported mask gives no plant, which is a crowd. Soil is stuff, plants are
-//! things. Categories are those of COCO instances, and 4 for soil, for 0 is no category.
+//! 65536 + category: soil, and crop or weed that an imported mask gives no plant or that is too small to be listed, which is a crowd. Soil is
+//! stuff, plants are things. Categories are those of COCO instances, and 4 for soil, for 0 is no category.
 //!
 //! Boxes of segments without a plant stand in no record, so each image's `segments_info` is written with the image, to
 //! `segments/SPLIT/NAME.json`, and gathered in the end.
@@ -11,15 +11,15 @@
 //! Source: COCO data format, panoptic segmentation, <https://cocodataset.org/#format-data>; panopticapi's `rgb2id`.
 
 use super::{Format, Whole, coco, picture};
+use crate::dataset::labels::Labels;
 use crate::dataset::recipe::{Recipe, json};
 use crate::dataset::record::Record;
 use crate::dataset::rle::Box2;
-use crate::dataset::sample::Sample;
+use crate::dataset::sample::{IGNORE, Sample};
 use crate::dataset::set::Set;
 use crate::dataset::split::Split;
-use crate::dataset::{File, annotate};
+use crate::dataset::File;
 use crate::output::Picture;
-use crate::scene::tag::Class;
 use crate::{Error, Result};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -32,10 +32,10 @@ const FOLDER: &str = "panoptic";
 const STUFF: u32 = 1 << 16;
 
 impl Format for Writer {
-    fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
+    fn image(&self, recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
         let Record { name, split, .. } = &sample.record;
         let split = split.name();
-        let (ids, segments) = segments(sample);
+        let (ids, segments) = segments(&Labels::of(recipe)?, sample);
         let colors: Vec<[u8; 3]> = ids.iter().map(|id| [*id as u8, (id >> 8) as u8, (id >> 16) as u8]).collect();
         Ok(vec![
             picture::photograph(sample, format!("{FOLDER}/images/{split}/{name}.png"))?,
@@ -56,7 +56,7 @@ impl Format for Writer {
             out.file(&format!("{FOLDER}/annotations/panoptic_{}.json", split.name()), |w| {
                 coco::head(w, set, split)?;
                 w.put("\"categories\": ")?;
-                w.json(&categories())?;
+                w.json(&categories(&Labels::of(&set.recipe)?))?;
                 w.put(",\n\"annotations\": [")?;
                 w.items(set.records(split).map(|record| annotation(set, &record?)))?;
                 w.put("]\n}\n")
@@ -70,49 +70,62 @@ fn segments_path(split: &str, name: &str) -> String {
     format!("{FOLDER}/segments/{split}/{name}.json")
 }
 
-fn category(class: Class) -> u32 {
-    match class {
-        Class::Soil => 4,
-        plant => coco::category(plant),
+/// The category of a class: those of plants as in COCO instances, others behind the leaves' there.
+fn category(labels: &Labels<'_>, class: u8) -> u32 {
+    let things = labels.of_plants();
+    if things.contains(&class) {
+        return coco::category(labels, class);
     }
+    let others = (0..class).filter(|other| !things.contains(other)).count();
+    coco::leaf_category(labels) + 1 + others as u32
 }
 
-fn categories() -> Value {
-    let category = |class: Class| {
-        let thing = class != Class::Soil;
+fn categories(labels: &Labels<'_>) -> Value {
+    let things = labels.of_plants();
+    let others = (0..labels.classes().len() as u8).filter(|class| !things.contains(class));
+    let colors = labels.colors();
+    let category = |class: u8| {
+        let thing = things.contains(&class);
         // Soil is black in our masks; here black is void.
-        let color = if thing { class.color() } else { [120, 85, 60] };
+        let color = Some(colors[usize::from(class)]).filter(|color| *color != [0; 3]).unwrap_or([120, 85, 60]);
         json!({
-            "id": category(class),
-            "name": class.name(),
+            "id": category(labels, class),
+            "name": labels.classes()[usize::from(class)].name,
             "supercategory": if thing { "plant" } else { "ground" },
             "isthing": u32::from(thing),
             "color": color,
         })
     };
-    json!([Class::Crop, Class::Weed, Class::Soil].map(category))
+    things.iter().copied().chain(others).map(category).collect()
 }
 
-/// The segment of each pixel, and what is known of each segment.
-fn segments(sample: &Sample) -> (Vec<u32>, Value) {
+/// The segment of each pixel, and what is known of each segment. A pixel is of its plant's class where it has one, and of its own where that is no
+/// plant's, such as an organ's.
+fn segments(labels: &Labels<'_>, sample: &Sample) -> (Vec<u32>, Value) {
     let width = sample.record.width;
+    let things = labels.of_plants();
+    let of_plant: BTreeMap<u16, u8> = labels.plants(&sample.record).map(|(plant, class)| (plant.number, class)).collect();
     let mut ids = Vec::with_capacity(sample.pixels());
-    let mut found: BTreeMap<u32, (Class, u32, Box2)> = BTreeMap::new();
-    for (i, (class, plant)) in sample.semantics.iter().zip(&sample.plants).enumerate() {
-        let Some(class) = annotate::class_of(*class) else {
+    let mut found: BTreeMap<u32, (u8, u32, Box2)> = BTreeMap::new();
+    for (i, (class, plant)) in labels.pixels(sample).iter().zip(&sample.plants).enumerate() {
+        if *class == IGNORE {
             ids.push(0);
             continue;
+        }
+        let (class, id) = match of_plant.get(plant).filter(|_| things.contains(class)) {
+            Some(of_plant) => (*of_plant, u32::from(*plant)),
+            None => (*class, STUFF + category(labels, *class)),
         };
-        let id = if *plant == 0 { STUFF + category(class) } else { u32::from(*plant) };
         let (x, y) = (i as u32 % width, i as u32 / width);
         let (_, area, bounds) = found.entry(id).or_insert((class, 0, Box2::of(x, y)));
         *area += 1;
         bounds.add(x, y);
         ids.push(id);
     }
-    let info = |(id, (class, area, bounds)): (u32, (Class, u32, Box2))| {
-        let crowd = id >= STUFF && class != Class::Soil;
-        json!({ "id": id, "category_id": category(class), "iscrowd": u32::from(crowd), "area": area, "bbox": bounds })
+    let info = |(id, (class, area, bounds)): (u32, (u8, u32, Box2))| {
+        let crowd = id >= STUFF && things.contains(&class);
+        let category = category(labels, class);
+        json!({ "id": id, "category_id": category, "iscrowd": u32::from(crowd), "area": area, "bbox": bounds })
     };
     (ids, found.into_iter().map(info).collect())
 }

@@ -4,6 +4,7 @@
 
 use super::{Format, Whole, picture};
 use crate::dataset::recipe::Recipe;
+use crate::dataset::annotate::part_numbers;
 use crate::dataset::sample::Sample;
 use crate::dataset::set::Set;
 use crate::dataset::File;
@@ -16,21 +17,11 @@ pub(super) struct Writer;
 
 const FOLDER: &str = "parts";
 
-/// Colours of the numbers from 0; black where there is none.
-fn colors() -> Vec<[u8; 3]> {
-    let last = PartKind::NUMBERED.iter().map(|(number, ..)| usize::from(*number)).max().unwrap_or(0);
-    let mut all = vec![[0; 3]; last + 1];
-    for (number, _, color, _) in PartKind::NUMBERED {
-        all[usize::from(number)] = color;
-    }
-    all
-}
-
 impl Format for Writer {
     fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
         let record = &sample.record;
         let path = format!("{FOLDER}/{}/{}.png", record.split.name(), record.name);
-        Ok(vec![picture::file(sample, path, &Picture::Indexed(&numbers(FOLDER, sample)?, &colors()))?])
+        Ok(vec![picture::file(sample, path, &Picture::Indexed(&numbers(FOLDER, sample)?, &PartKind::palette()))?])
     }
 
     fn whole(&self, _set: &Set, out: &mut Whole<'_>) -> Result<()> {
@@ -49,6 +40,5 @@ impl Format for Writer {
 /// The number of what each pixel shows; an error that names `format` for an image that was not rendered.
 pub(super) fn numbers(format: &str, sample: &Sample) -> Result<Vec<u8>> {
     let rendered = sample.rendered(format)?;
-    let number = |part: &u32| rendered.kinds.get(*part as usize).map_or(0, |kind| kind.number());
-    Ok(rendered.labels.parts.iter().map(number).collect())
+    Ok(part_numbers(&rendered.labels, &rendered.kinds))
 }

@@ -67,6 +67,9 @@ impl Format for Writer {
 
     fn warnings(&self, recipe: &Recipe) -> Vec<String> {
         let mut all = Vec::new();
+        if recipe.labelling.classes.is_some() {
+            all.push("classes are soil, crop and weed, as `phenobench-eval` has them".into());
+        }
         if (0..recipe.count).any(|k| recipe.split_of(k) == Split::Test) {
             all.push("images of the split test have no labels, as in the original; `images/` and other formats have them".into());
         }

@@ -14,6 +14,7 @@
 //! Source: Turk 1994, "The PLY Polygon File Format".
 
 use super::{Format, parts};
+use crate::dataset::keep::Kept;
 use crate::dataset::recipe::Recipe;
 use crate::dataset::sample::Sample;
 use crate::dataset::File;
@@ -69,6 +70,10 @@ impl Format for Writer {
         let mut bytes = header(count, &recipe.furrow).into_bytes();
         bytes.append(&mut points);
         Ok(vec![File { path: format!("{FOLDER}/{}/{}.ply", record.split.name(), record.name), bytes }])
+    }
+
+    fn needs_maps(&self) -> &'static [Kept] {
+        &[Kept::Nir]
     }
 
     fn needs_film(&self) -> bool {

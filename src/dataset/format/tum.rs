@@ -8,6 +8,7 @@
 use super::Whole;
 use super::drives::{self, OfFields, Taken};
 use crate::Result;
+use crate::dataset::set::Set;
 use std::fmt::Write;
 
 pub(super) struct Writer;
@@ -15,7 +16,7 @@ pub(super) struct Writer;
 const FOLDER: &str = "tum";
 
 impl OfFields for Writer {
-    fn field(&self, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
+    fn field(&self, _set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
         for (camera, of) in drives::by_camera(images) {
             let mut text = "# time_s x_m y_m z_m qx qy qz qw\n".to_owned();
             for image in of {

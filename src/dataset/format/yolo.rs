@@ -9,6 +9,7 @@
 
 use super::outline::{Corner, Mask};
 use super::{Format, Whole, boxes};
+use crate::dataset::labels::Labels;
 use crate::dataset::recipe::{Recipe, json};
 use crate::dataset::record::{Plant, Record};
 use crate::dataset::sample::Sample;
@@ -32,13 +33,14 @@ struct Loss {
 }
 
 impl Format for Writer {
-    fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
+    fn image(&self, recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
         let Record { name, split, .. } = &sample.record;
+        let labels = Labels::of(recipe)?;
         let (mut rows, mut losses) = (Vec::new(), Vec::new());
-        for plant in sample.record.seen() {
+        for (plant, class) in labels.plants(&sample.record) {
             let Some(mask) = mask(sample, plant) else { continue };
             let polygon = mask.polygon();
-            let mut row = boxes::number(plant.class).to_string();
+            let mut row = boxes::number(&labels, class).to_string();
             boxes::shares(&mut row, sample, polygon.iter().map(Corner::place));
             rows.push(row);
             losses.push(Loss { plant: plant.number, iou: mask.overlap(&polygon) });

@@ -8,7 +8,9 @@
 use super::{Format, Whole, boxes};
 use crate::Result;
 use crate::dataset::File;
+use crate::dataset::labels::Labels;
 use crate::dataset::recipe::Recipe;
+use crate::dataset::record::Plant;
 use crate::dataset::sample::Sample;
 use crate::dataset::set::Set;
 
@@ -17,9 +19,10 @@ pub(super) struct Writer;
 const FOLDER: &str = "yolo-detect";
 
 impl Format for Writer {
-    fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
-        let seen = sample.record.seen();
-        let rows: Vec<String> = seen.filter_map(|plant| Some(boxes::row(sample, plant, plant.seen.bounds?))).collect();
+    fn image(&self, recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
+        let labels = Labels::of(recipe)?;
+        let row = |(plant, class): (&Plant, u8)| Some(boxes::row(sample, boxes::number(&labels, class), plant.seen.bounds?));
+        let rows: Vec<String> = labels.plants(&sample.record).filter_map(row).collect();
         boxes::files(FOLDER, sample, &rows)
     }
 

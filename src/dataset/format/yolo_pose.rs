@@ -9,6 +9,7 @@
 use super::{Format, Whole, boxes};
 use crate::Result;
 use crate::dataset::File;
+use crate::dataset::labels::Labels;
 use crate::dataset::recipe::Recipe;
 use crate::dataset::record::{Keypoint, Plant, PointState};
 use crate::dataset::sample::Sample;
@@ -22,11 +23,12 @@ const FOLDER: &str = "yolo-pose";
 const TIPS: u16 = 16;
 
 impl Format for Writer {
-    fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
+    fn image(&self, recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
+        let labels = Labels::of(recipe)?;
         let mut rows = Vec::new();
-        for plant in sample.record.seen() {
+        for (plant, class) in labels.plants(&sample.record) {
             let Some(bounds) = plant.seen.bounds else { continue };
-            let mut row = boxes::row(sample, plant, bounds);
+            let mut row = boxes::row(sample, boxes::number(&labels, class), bounds);
             for point in points(plant) {
                 let (place, seen) = told(point);
                 boxes::shares(&mut row, sample, [place]);
@@ -43,7 +45,9 @@ impl Format for Writer {
         // A mirrored leaf has the number that it had.
         let same = list(&|k| k.to_string());
         let names = list(&|k| if k == 0 { "stem".to_owned() } else { format!("tip {k}") });
-        let more = format!("kpt_shape: [{count}, 3]\nflip_idx: [{same}]\nkpt_names:\n  0: [{names}]\n  1: [{names}]\n");
+        let classes = Labels::of(&set.recipe)?.of_plants().len();
+        let of_classes: String = (0..classes).map(|class| format!("  {class}: [{names}]\n")).collect();
+        let more = format!("kpt_shape: [{count}, 3]\nflip_idx: [{same}]\nkpt_names:\n{of_classes}");
         boxes::data(FOLDER, set, out, &more)
     }
 

@@ -21,6 +21,7 @@ pub mod phenobench;
 use super::begin::{self, refuse_full};
 use super::checksum_record::{ChecksumRecord, write_files};
 use super::generate::{self, Task};
+use super::labelling::Labelling;
 use super::recipe::{FILE, Made, Recipe};
 use super::record::{Keypoint, Record};
 use super::sample::Sample;
@@ -139,6 +140,7 @@ fn begin(folder: &Path, source: &dyn Source, order: &Order) -> Result<Set> {
         count: images.len() as u64,
         split,
         formats: Vec::new(),
+        labelling: Labelling::default(),
         licence: order.licence.clone(),
         species: Vec::new(),
     };
@@ -153,7 +155,7 @@ fn bring(set: &Set, source: &dyn Source, index: u64) -> Result<()> {
         Task::Formats | Task::All => {
             let sample = sample(recipe, &source.images()[index as usize], index, source.read(index as usize)?);
             invariants::check(recipe, &sample)?;
-            let mut files = native::files(&sample, "")?;
+            let mut files = native::files(recipe, &sample, "")?;
             files.extend(generate::formatted(set, &sample)?);
             files
         }
@@ -187,6 +189,7 @@ fn sample(recipe: &Recipe, listed: &Listed, index: u64, read: Labelled) -> Sampl
         nir: read.nir,
         semantics: read.semantics,
         species: Vec::new(),
+        parts: Vec::new(),
         plants: read.plants,
         leaves: read.leaves,
         coverage: Vec::new(),

@@ -55,7 +55,7 @@ pub fn encode_layers(film: &Film, labels: &LabelMap, tags: &[Tag], text: &str) -
         words.extend(matte.attributes());
         channels.extend(matte.channels.into_iter().map(|(name, values)| channel(&name, FlatSamples::F32(values))));
     }
-    write_with(film.window, channels, text, words)
+    write_with(film.window, channels, text, words, Compression::ZIP16)
 }
 
 /// What a part is called in a Cryptomatte.
@@ -118,13 +118,38 @@ pub fn half(x: f32) -> f32 {
     f16::from_f32(x).to_f32()
 }
 
-/// Encodes what lies at the pixels' centres: `depth.Z` (f32) and `normal.X/Y/Z` (f16).
-pub fn encode_geometry(width: u32, height: u32, depth: &[f32], normals: &[[f32; 3]]) -> Result<Vec<u8>> {
-    let axis = |i: usize| FlatSamples::F16(normals.iter().map(|n| f16::from_f32(n[i])).collect());
+/// Precision of a channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Precision {
+    /// 16 bits.
+    Half,
+    /// 32 bits.
+    Single,
+}
+
+/// Encodes what lies at the pixels' centres: `depth.Z` and `normal.X/Y/Z` (f16), each if there is any. `wavelets` is a compression (PIZ) that
+/// makes numbers of few steps smaller than the usual one does.
+pub fn encode_geometry(
+    width: u32,
+    height: u32,
+    (depth, precision): (&[f32], Precision),
+    normals: &[[f32; 3]],
+    wavelets: bool,
+) -> Result<Vec<u8>> {
+    let halves = |values: &mut dyn Iterator<Item = f32>| FlatSamples::F16(values.map(f16::from_f32).collect());
     let mut channels = SmallVec::new();
-    channels.push(channel("depth.Z", FlatSamples::F32(depth.to_vec())));
-    channels.extend(["X", "Y", "Z"].iter().enumerate().map(|(i, name)| channel(&format!("normal.{name}"), axis(i))));
-    write(Window::full(width, height), channels, "")
+    if !depth.is_empty() {
+        let values = match precision {
+            Precision::Half => halves(&mut depth.iter().copied()),
+            Precision::Single => FlatSamples::F32(depth.to_vec()),
+        };
+        channels.push(channel("depth.Z", values));
+    }
+    for (i, axis) in ["X", "Y", "Z"].iter().enumerate().filter(|_| !normals.is_empty()) {
+        channels.push(channel(&format!("normal.{axis}"), halves(&mut normals.iter().map(|n| n[i]))));
+    }
+    let compression = if wavelets { Compression::PIZ } else { Compression::ZIP16 };
+    write_with(Window::full(width, height), channels, "", Vec::new(), compression)
 }
 
 /// Encodes any channels of single precision; their names do not repeat.
@@ -133,7 +158,7 @@ pub fn encode_planes(width: u32, height: u32, planes: Vec<(String, Vec<f32>)>) -
     write(Window::full(width, height), channels, "")
 }
 
-/// Width, height, depths, normals.
+/// Width, height, depths, normals; one of the last two may be empty.
 pub type Geometry = (u32, u32, Vec<f32>, Vec<[f32; 3]>);
 
 /// Reads what [`encode_geometry`] wrote.
@@ -149,18 +174,28 @@ pub fn read_geometry(path: &Path) -> Result<Geometry> {
         let found = found.ok_or_else(|| wrong(format!("it has no channel {name}")))?;
         Ok(found.sample_data.values_as_f32().collect())
     };
-    let [depth, x, y, z] = ["depth.Z", "normal.X", "normal.Y", "normal.Z"].map(values);
-    let (x, y, z) = (x?, y?, z?);
-    let normals = x.into_iter().zip(y).zip(z).map(|((x, y), z)| [x, y, z]).collect();
-    Ok((layer.size.0 as u32, layer.size.1 as u32, depth?, normals))
+    let has = |name: &str| layer.channel_data.list.iter().any(|c| c.name.eq_case_insensitive(name));
+    let depth = if has("depth.Z") { values("depth.Z")? } else { Vec::new() };
+    let mut normals = Vec::new();
+    if depth.is_empty() || ["normal.X", "normal.Y", "normal.Z"].into_iter().any(has) {
+        let (x, y, z) = (values("normal.X")?, values("normal.Y")?, values("normal.Z")?);
+        normals = x.into_iter().zip(y).zip(z).map(|((x, y), z)| [x, y, z]).collect();
+    }
+    Ok((layer.size.0 as u32, layer.size.1 as u32, depth, normals))
 }
 
 fn write(w: Window, channels: Channels, text: &str) -> Result<Vec<u8>> {
-    write_with(w, channels, text, Vec::new())
+    write_with(w, channels, text, Vec::new(), Compression::ZIP16)
 }
 
 /// The same with further words in the header, by their names.
-fn write_with(w: Window, channels: Channels, text: &str, words: Vec<(String, String)>) -> Result<Vec<u8>> {
+fn write_with(
+    w: Window,
+    channels: Channels,
+    text: &str,
+    words: Vec<(String, String)>,
+    compression: Compression,
+) -> Result<Vec<u8>> {
     let failed = |e: &dyn std::fmt::Display| Error::failed(format!("cannot encode an EXR: {e}"));
     let mut attributes = LayerAttributes {
         layer_position: Vec2(w.x0 as i32, w.y0 as i32),
@@ -174,11 +209,8 @@ fn write_with(w: Window, channels: Channels, text: &str, words: Vec<(String, Str
         attributes.other.insert(name, exr::prelude::attribute::AttributeValue::Text(value));
     }
     // Rows in increasing order, whichever thread compressed them first: equal runs write equal bytes.
-    let encoding = Encoding {
-        compression: Compression::ZIP16,
-        blocks: Blocks::ScanLines,
-        line_order: exr::prelude::attribute::LineOrder::Increasing,
-    };
+    let encoding =
+        Encoding { compression, blocks: Blocks::ScanLines, line_order: exr::prelude::attribute::LineOrder::Increasing };
     let size = Vec2(w.width() as usize, w.height() as usize);
     let image = Image::from_layer(Layer::new(size, attributes, encoding, AnyChannels::sort(channels)));
     let mut bytes = std::io::Cursor::new(Vec::new());

@@ -1,7 +1,7 @@
 //! Baselines from files to scores: fitted to images of datasets and evaluated on them, at the size at which networks see them.
 
 use super::{Baseline, Cut, Example, Kind};
-use crate::train::classes::Classes;
+use crate::dataset::classes::Classes;
 use crate::train::data::{self, Band, Pick, Selection, Shape, Store};
 use crate::train::measure::{Evaluation, Prediction, Report};
 use crate::{Error, Result};

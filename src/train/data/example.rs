@@ -2,10 +2,10 @@
 
 use super::bands::{self, Band};
 use super::margin;
+use crate::dataset::classes::Map;
 use crate::dataset::sample::IGNORE;
 use crate::dataset::{Set, native};
 use crate::output;
-use crate::train::classes::Map;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -80,6 +80,13 @@ impl Example {
             same(&path, (lw, lh))?;
             species = numbers;
         }
+        let mut parts = Vec::new();
+        if map.needs_parts() {
+            let path = folder.join("parts.png");
+            let (lw, lh, numbers) = output::read_indexed(&path)?;
+            same(&path, (lw, lh))?;
+            parts = numbers;
+        }
         let mut plants = Vec::new();
         if with_plants {
             let path = folder.join("plants.png");
@@ -87,7 +94,7 @@ impl Example {
             same(&path, (lw, lh))?;
             plants = numbers;
         }
-        let mut labels = map.labels(&semantics, &species);
+        let mut labels = map.labels(&semantics, &species, &parts);
         if margin != 0.0 {
             labels = margin::moved(&labels, (w, h), margin);
         }

@@ -3,8 +3,8 @@
 use super::example::{Example, Shape};
 use super::select::{Pick, Selection};
 use crate::Result;
+use crate::dataset::classes::{Classes, Map};
 use crate::dataset::{Set, native};
-use crate::train::classes::{Classes, Map};
 use std::borrow::Cow;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -40,7 +40,7 @@ impl Store {
         let (mut sets, mut images) = (Vec::new(), Vec::new());
         for selection in selections {
             let (set, numbers) = selection.open(otherwise, seed)?;
-            let map = classes.of(&set.recipe).map_err(|e| e.in_file(&set.folder))?;
+            let map = classes.of(&set.recipe.species).map_err(|e| e.in_file(&set.folder))?;
             images.extend(numbers.into_iter().map(|n| (sets.len(), n)));
             sets.push((set, map, selection.margin));
         }

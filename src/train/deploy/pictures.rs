@@ -7,7 +7,6 @@
 
 use crate::dataset::{Set, native};
 use crate::output;
-use crate::train::classes::Classes;
 use crate::train::data::{Band, Pick, Resize, Selection, Shape};
 use crate::train::refine::Refine;
 use crate::train::run::{self, ModelCard};
@@ -318,8 +317,7 @@ impl Prediction {
                 }
             }
         }
-        let Classes(classes) = &card.classes;
-        let classes = classes.iter().map(|c| c.name.clone()).zip(card.classes.colors()).collect();
+        let classes = card.classes.names().into_iter().zip(card.classes.colors()).collect();
         let prediction = Self {
             furrow: env!("CARGO_PKG_VERSION").into(),
             network: card.network.name().into(),

@@ -1,7 +1,7 @@
 //! A training plan: everything that decides what a training results in.
 
 use super::hyper::Hyperparameters;
-use crate::train::classes::Classes;
+use crate::dataset::classes::Classes;
 use crate::train::data::{Band, Normalization, Selection, Shape};
 use crate::train::net::Network;
 use serde::{Deserialize, Serialize};

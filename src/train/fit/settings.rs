@@ -7,7 +7,7 @@ use super::class_weights::ClassWeights;
 use super::hyper::{Invalid, LossFunction, NormalizationMode, OptimiserKind, SIDES, check_size};
 use super::plan::Plan;
 use super::schedule::Schedule;
-use crate::train::classes::Classes;
+use crate::dataset::classes::Classes;
 use crate::train::data::{Augment, Band, Resize};
 use crate::train::net::Pretrained;
 use crate::train::refine::Refine;

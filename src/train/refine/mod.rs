@@ -13,8 +13,8 @@
 mod colour;
 mod plants;
 
-use super::classes::Classes;
 use super::data::Band;
+use crate::dataset::classes::Classes;
 use serde::{Deserialize, Serialize};
 
 /// Which steps are done, in the order of the table above.

@@ -3,12 +3,12 @@
 use super::desc::{ExperimentDesc, Named, PartDesc, ScaleDesc, SetDesc};
 use super::names::{slug, unknown};
 use super::renamed::old_name;
+use crate::dataset::classes::Classes;
 use crate::dataset::recipe::{self, Recipe};
 use crate::dataset::split::Shares;
 use crate::ron_file::{RonFile, Step, choose, place};
 use crate::sampling::Sampler;
 use crate::train::baseline::Kind;
-use crate::train::classes::Classes;
 use crate::train::data::margin::MOST;
 use crate::train::data::{Band, Pick};
 use crate::train::fit::{Plan, Settings};

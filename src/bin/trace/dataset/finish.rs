@@ -1,10 +1,11 @@
 //! What belongs to all images: `trace dataset finish`.
 
-use super::order::formats;
+use super::order::{LabelArgs, formats};
 use super::render::{WorkArgs, generate};
 use furrow::Result;
 use furrow::cli::signal::Signals;
 use furrow::dataset::generate::Shard;
+use furrow::dataset::labels::LeftOut;
 use furrow::dataset::{Set, finish, plan};
 use std::path::PathBuf;
 
@@ -20,17 +21,32 @@ pub(crate) struct Args {
     #[arg(long, value_delimiter = ',', value_name = "FORMAT", value_parser = formats())]
     format: Vec<String>,
     #[command(flatten)]
+    labels: LabelArgs,
+    #[command(flatten)]
     work: WorkArgs,
 }
 
 /// Adds formats, then writes what belongs to all.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let mut set = Set::open(&args.dir)?;
-    if !args.format.is_empty() {
-        for warning in plan::add_formats(&mut set, &args.format)? {
+    let labelling = args.labels.labelling();
+    if !args.format.is_empty() || !labelling.is_usual() {
+        for warning in plan::add_formats(&mut set, &args.format, &labelling)? {
             furrow::tell!("warning: {warning}");
         }
         generate(&set, &args.work, Shard::ALL, None, signals)?;
     }
-    finish::finish(&set, args.shards)
+    let files = finish::finish(&set, args.shards)?;
+    tell_left_out(&set)?;
+    Ok(files)
+}
+
+/// Tells what of the images stands in no list of a format.
+pub(super) fn tell_left_out(set: &Set) -> Result<()> {
+    if let Some(LeftOut { ignored_plants, plants, leaves }) = LeftOut::of(set)? {
+        furrow::tell!(
+            "left out of the formats' lists: {plants} plants and {leaves} leaves too small or too hidden, {ignored_plants} plants of no class"
+        );
+    }
+    Ok(())
 }

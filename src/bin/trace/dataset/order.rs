@@ -3,6 +3,9 @@
 use crate::field::{MemoryArgs, SceneArgs};
 use crate::quality::{TechniqueArgs, samples};
 use furrow::ablation::{Edit, FULL};
+use furrow::dataset::classes::Classes;
+use furrow::dataset::keep::{self, Kept};
+use furrow::dataset::labelling::Labelling;
 use furrow::dataset::plan::{self, Order};
 use furrow::dataset::split::Shares;
 use furrow::dataset::{self, Set, format};
@@ -36,6 +39,11 @@ pub(crate) struct ImageArgs {
     /// Formats to write beside the native one, separated by commas.
     #[arg(long, value_delimiter = ',', value_name = "FORMAT", value_parser = formats())]
     format: Vec<String>,
+    #[command(flatten)]
+    labels: LabelArgs,
+    /// Maps to keep beside photograph, labels and record, separated by commas; none for nothing more.
+    #[arg(long, value_delimiter = ',', value_name = "MAP", default_value = "nir,coverage,depth,normals", value_parser = maps())]
+    keep: Vec<String>,
     /// Shares of train, val and test.
     #[arg(long, value_name = "TRAIN,VAL,TEST", default_value = "8,1,1", value_parser = Shares::parse)]
     split: Shares,
@@ -50,6 +58,44 @@ pub(crate) struct ImageArgs {
     denoise: bool,
     #[command(flatten)]
     technique: TechniqueArgs,
+}
+
+/// How formats label what images show.
+#[derive(clap::Args)]
+pub(crate) struct LabelArgs {
+    /// Classes of the formats, such as `soil; beet=BEAVA; fat hen=CHEAL; weed; ignore=stone`: names with their labels. A label is soil,
+    /// crop, weed, a species by name or EPPO code, an organ, or a thing on the ground; the most particular decides. Pixels of no
+    /// class, and those of one named ignore, have no label.
+    #[arg(long, value_name = "CLASSES", value_parser = Classes::parse)]
+    classes: Option<Classes>,
+    /// Leave plants and leaves of fewer pixels out of the formats' lists.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    min_pixels: Option<u32>,
+    /// Leave those out of which less is shown: share of all of it, with what others hide and what lies beyond the frame.
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    min_visible: Option<f64>,
+}
+
+/// A share from 0 to 1.
+fn share(text: &str) -> std::result::Result<f64, String> {
+    let share = text.trim().parse().ok().filter(|share| (0.0..=1.0).contains(share));
+    share.ok_or_else(|| "it is a share: a number from 0 to 1, such as 0.2".into())
+}
+
+impl LabelArgs {
+    /// What they ask for.
+    pub(crate) fn labelling(&self) -> Labelling {
+        let Self { classes, min_pixels, min_visible } = self;
+        Labelling { classes: classes.clone(), min_pixels: *min_pixels, min_visible: *min_visible }
+    }
+}
+
+/// The names of the maps that may be kept, with what they are.
+fn maps() -> clap::builder::PossibleValuesParser {
+    let value =
+        |(name, _, words): &(&'static str, Kept, &'static str)| clap::builder::PossibleValue::new(*name).help(*words);
+    let none = clap::builder::PossibleValue::new("none").help("nothing more");
+    clap::builder::PossibleValuesParser::new(Kept::NAMED.iter().map(value).chain([none]))
 }
 
 /// The names of the formats, with what they are.
@@ -100,6 +146,12 @@ impl ImageArgs {
         self.technique.options(Quality { denoise: self.denoise, ..Quality::spp(self.spp) })
     }
 
+    /// The maps to keep.
+    fn kept(&self) -> Result<Vec<Kept>> {
+        let named = |name: &String| Kept::NAMED.iter().find(|(known, ..)| known == name).map(|(_, kept, _)| *kept);
+        keep::checked(self.keep.iter().filter_map(named).collect())
+    }
+
     /// A dataset of these images as an edit has them.
     pub(crate) fn order(&self, edit: &'static Edit) -> Result<Order> {
         self.scene.check()?;
@@ -113,6 +165,8 @@ impl ImageArgs {
             width: self.scene.width,
             height: self.scene.height,
             formats,
+            labelling: self.labels.labelling(),
+            keep: self.kept()?,
             split: self.split,
             licence: self.licence.clone(),
             options: self.options(),

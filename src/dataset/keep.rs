@@ -1,0 +1,96 @@
+//! Which maps images keep beside photograph, labels and record.
+
+use crate::output::half;
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+/// A map that an image may go without.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kept {
+    /// `nir.png`.
+    Nir,
+    /// `coverage.png`.
+    Coverage,
+    /// Depth in half precision, to one part in 2048.
+    Depth,
+    /// Depth in single precision.
+    Depth32,
+    /// Normals to a hundred-and-twenty-eighth in each axis.
+    Normals,
+    /// Normals in half precision.
+    Normals16,
+}
+
+impl Kept {
+    /// All of them with their names and what they are.
+    pub const NAMED: [(&str, Self, &str); 6] = [
+        ("nir", Self::Nir, "near infrared"),
+        ("coverage", Self::Coverage, "shares of soil, crop and weed in each pixel"),
+        ("depth", Self::Depth, "depth to one part in 2048 (half precision)"),
+        ("depth32", Self::Depth32, "depth in single precision, instead"),
+        ("normals", Self::Normals, "normals, each axis to 1/128"),
+        ("normals16", Self::Normals16, "normals in half precision, instead"),
+    ];
+
+    /// What a new dataset keeps unless said otherwise.
+    pub const USUAL: [Self; 4] = [Self::Nir, Self::Coverage, Self::Depth, Self::Normals];
+
+    /// What datasets of before kept, whose recipes do not say it.
+    pub const OLDEST: [Self; 4] = [Self::Nir, Self::Coverage, Self::Depth32, Self::Normals16];
+}
+
+/// The same in order, each once; an error where something is asked for in two precisions.
+pub fn checked(mut kept: Vec<Kept>) -> Result<Vec<Kept>> {
+    kept.sort_unstable();
+    kept.dedup();
+    for (a, b, what) in [(Kept::Depth, Kept::Depth32, "depth"), (Kept::Normals, Kept::Normals16, "normals")] {
+        if kept.contains(&a) && kept.contains(&b) {
+            return Err(Error::input(format!("--keep asks for {what} in two precisions")).help("leave one of them out"));
+        }
+    }
+    Ok(kept)
+}
+
+/// Depths as they are kept.
+pub fn depths(kept: &[Kept], depth: &[f32]) -> Vec<f32> {
+    match kept {
+        kept if kept.contains(&Kept::Depth32) => depth.to_vec(),
+        kept if kept.contains(&Kept::Depth) => depth.iter().copied().map(half).collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// Normals as they are kept.
+pub fn normals(kept: &[Kept], normals: impl Iterator<Item = [f32; 3]>) -> Vec<[f32; 3]> {
+    match kept {
+        kept if kept.contains(&Kept::Normals16) => normals.map(|n| n.map(half)).collect(),
+        kept if kept.contains(&Kept::Normals) => normals.map(|n| n.map(|x| (x * STEPS).round() / STEPS)).collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// Steps of a normal's axis from 0 to 1, each a number of half precision.
+const STEPS: f32 = 128.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Expected: halves err by 2⁻¹² of a depth at most, steps by half of one, and what is not there stays so.
+    #[test]
+    fn precision_is_as_promised() {
+        let depth: Vec<f32> = (1..2000).map(|i| 0.3 + i as f32 * 0.0137).chain([f32::INFINITY]).collect();
+        for (exact, kept) in depth.iter().zip(depths(&Kept::USUAL, &depth)) {
+            assert!(*exact == kept || (exact / kept - 1.0).abs() <= 1.0 / 2048.0, "{exact} {kept}");
+        }
+        assert_eq!(depths(&Kept::OLDEST, &depth), depth);
+        assert!(depths(&[Kept::Nir], &depth).is_empty() && normals(&[], [[0.0; 3]].into_iter()).is_empty());
+        let slanted = [[0.6, -0.8, 0.0], [0.0; 3], [0.0, 0.36, 0.933]];
+        for (exact, kept) in slanted.iter().zip(normals(&Kept::USUAL, slanted.into_iter())) {
+            assert!(exact.iter().zip(kept).all(|(a, b)| (a - b).abs() <= 0.5 / STEPS && half(b) == b));
+        }
+        assert!(checked(vec![Kept::Depth, Kept::Depth32]).is_err());
+        assert_eq!(checked(vec![Kept::Normals, Kept::Nir, Kept::Nir]).unwrap(), [Kept::Nir, Kept::Normals]);
+    }
+}
