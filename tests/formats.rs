@@ -207,6 +207,7 @@ fn every_format_takes_an_image_that_little_is_known_of() {
         nir: Vec::new(),
         semantics: vec![0, 1, 1, ignore, 2, 2, 0, 1],
         species: Vec::new(),
+        parts: Vec::new(),
         plants: vec![none, 7, 7, none, 9, 9, none, none],
         leaves: vec![none; 8],
         coverage: Vec::new(),

@@ -2,6 +2,7 @@
 
 use super::File;
 use super::checksum_record::write_files;
+use super::format;
 use super::keep::Kept;
 use super::recipe::{FILE, Made, Recipe};
 use crate::output::{create_atomically, is_unfinished};
@@ -28,7 +29,7 @@ fn go_on(folder: &Path, mut recipe: Recipe, files: &[File]) -> Result<Recipe> {
         recipe.labelling.clone_from(&before.labelling);
     }
     if let (Made::Rendered(now), Made::Rendered(then)) = (&mut recipe.made, &before.made) {
-        now.parts |= then.parts;
+        now.parts = then.parts;
         if now.keep == Kept::USUAL {
             now.keep.clone_from(&then.keep);
         }
@@ -39,6 +40,7 @@ fn go_on(folder: &Path, mut recipe: Recipe, files: &[File]) -> Result<Recipe> {
     // In whatever order they were asked for, it is one dataset.
     recipe.formats.sort();
     recipe.formats.dedup();
+    format::check_maps(&recipe).map_err(|e| e.in_file(folder))?;
     write_changed(folder, files)?;
     write_changed(folder, &[File { path: FILE.into(), bytes: recipe.text()? }])?;
     Ok(recipe)

@@ -1,6 +1,6 @@
 //! The classes that a user asks for, and which labels of a dataset belong to which of them.
 //!
-//! Written `soil; crop; weed`, or with labels, `soil; beet=BEAVA; chamomile=scentless mayweed; weed; ignore=stone`. A label is
+//! Written `soil; crop; weed`, or with labels, `soil; beet=BEAVX; chamomile=scentless mayweed; weed; ignore=stone`. A label is
 //!
 //! | label | is |
 //! |---|---|
@@ -170,7 +170,7 @@ impl Classes {
         let species: Vec<[&str; 2]> = species.iter().map(|s| [s.name.as_str(), s.eppo.as_str()]).collect();
         let known = |label: &str| {
             let is = |other: &&str| other.eq_ignore_ascii_case(label);
-            SEMANTICS.contains(&label) || part(label).is_some() || species.iter().flatten().any(|s| is(s))
+            SEMANTICS.contains(&label) || part(label).is_some() || species.iter().flatten().any(is)
         };
         if let Some(label) = self.0.iter().flat_map(|class| &class.labels).find(|label| !known(label)) {
             return Err(unknown(label, records));

@@ -93,6 +93,7 @@ mod tests {
             nir: vec![100; n],
             semantics: vec![1; n],
             species: vec![1; n],
+            parts: Vec::new(),
             plants: vec![7; n],
             leaves: vec![2; n],
             coverage: Vec::new(),

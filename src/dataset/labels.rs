@@ -6,7 +6,7 @@ use super::recipe::Recipe;
 use super::record::{Leaf, Plant, Record};
 use super::sample::Sample;
 use super::set::Set;
-use crate::Result;
+use crate::{Error, Result};
 use serde::Serialize;
 use std::borrow::Cow;
 
@@ -22,6 +22,7 @@ impl<'a> Labels<'a> {
     pub fn of(recipe: &'a Recipe) -> Result<Self> {
         let labelling = &recipe.labelling;
         let classes = labelling.classes.as_ref().map_or_else(|| Cow::Owned(Classes::default()), Cow::Borrowed);
+        classes.check().map_err(|what| Error::damaged(format!("the classes of this dataset are none: {what}")))?;
         Ok(Self { labelling, map: classes.of(&recipe.species)?, classes })
     }
 

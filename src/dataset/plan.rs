@@ -128,7 +128,7 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
         species: field.species.clone(),
     };
     Labels::of(&recipe)?;
-    check_kept(&recipe)?;
+    format::check_maps(&recipe)?;
     let mut told = field.warnings.clone();
     told.extend(warnings(&recipe)?);
     let recipe = begin(folder, recipe, &files)?;
@@ -159,18 +159,6 @@ fn hash_of_copies(order: &Order, files: &[File], scene: &str) -> Result<String> 
     }
 }
 
-/// An error where a format holds a map that images do not keep.
-fn check_kept(recipe: &Recipe) -> Result<()> {
-    for (format, writer) in format::all(recipe)? {
-        let lacks = writer.needs_maps().iter().find(|map| !recipe.keeps(**map));
-        if let Some((name, ..)) = lacks.and_then(|map| Kept::NAMED.iter().find(|(_, kept, _)| kept == map)) {
-            return Err(Error::misuse(format!("--format {format} holds {name}, which these images do not keep"))
-                .help(format!("begin a dataset with {name} among --keep, or leave --format {format} out")));
-        }
-    }
-    Ok(())
-}
-
 /// What the formats of a recipe cannot hold or do otherwise.
 fn warnings(recipe: &Recipe) -> Result<Vec<String>> {
     let mut all = Vec::new();
@@ -187,13 +175,6 @@ pub fn add_formats(set: &mut Set, names: &[String], labelling: &Labelling) -> Re
     if !labelling.is_usual() {
         recipe.labelling = labelling.clone();
         Labels::of(&recipe).map_err(|e| e.in_file(&set.folder))?;
-        if labelling.classes.as_ref().is_some_and(Classes::needs_parts) && !recipe.rendering().is_ok_and(|r| r.parts) {
-            return Err(Error::input(
-                "classes of organs or of things on the ground need parts.png, which these images lack",
-            )
-            .in_file(&set.folder)
-            .help("leave those labels out, or make the dataset anew with these --classes"));
-        }
     }
     for name in names {
         if !recipe.formats.contains(name) {
@@ -213,7 +194,7 @@ pub fn add_formats(set: &mut Set, names: &[String], labelling: &Labelling) -> Re
              added; `trace dataset finish --help` lists them",
         ));
     }
-    check_kept(&recipe)?;
+    format::check_maps(&recipe).map_err(|e| e.in_file(&set.folder))?;
     let warnings = warnings(&recipe)?;
     checksum_record::write_files(&set.folder, &[File { path: FILE.into(), bytes: recipe.text()? }])?;
     set.recipe = recipe;

@@ -174,7 +174,7 @@ fn describe(recipe: &Recipe, index: u64, image: Image<'_>) -> Result<Sample> {
             Vec::new()
         },
         depth: keep::depths(&recipe.rendering()?.keep, &labels.depth),
-        normals: keep::normals(&recipe.rendering()?.keep, labels.normals.iter().map(|n| n.to_array())),
+        normals: keep::normals(&recipe.rendering()?.keep, labels.normals.iter().map(glam::Vec3::to_array)),
         film: None,
     };
     (sample.record.classes, sample.record.ignored) = annotate::classes(&sample);

@@ -3,6 +3,7 @@
 //! A format is a file here that implements [`Format`], and one line in `formats!`. The tests find it unasked.
 
 use super::File;
+use super::classes::Classes;
 use super::keep::Kept;
 use super::recipe::Recipe;
 use super::sample::Sample;
@@ -131,4 +132,22 @@ pub fn all(recipe: &Recipe) -> Result<Vec<(&str, &'static dyn Format)>> {
         all.push((name.as_str(), format));
     }
     Ok(all)
+}
+
+/// An error where a format, or a class of its labels, needs a map that the images of this recipe do not have.
+pub fn check_maps(recipe: &Recipe) -> Result<()> {
+    for (format, writer) in all(recipe)? {
+        let lacks = writer.needs_maps().iter().find(|map| !recipe.keeps(**map));
+        if let Some((name, ..)) = lacks.and_then(|map| Kept::NAMED.iter().find(|(_, kept, _)| kept == map)) {
+            return Err(Error::misuse(format!("--format {format} holds {name}, which these images do not keep"))
+                .help(format!("begin a dataset with {name} among --keep, or leave --format {format} out")));
+        }
+    }
+    let needs_parts = recipe.labelling.classes.as_ref().is_some_and(Classes::needs_parts);
+    if needs_parts && !recipe.rendering().is_ok_and(|rendering| rendering.parts) {
+        let what = "classes of organs or of things on the ground need parts.png, which these images lack";
+        let help = "leave those labels out of --classes, or begin another dataset with these --classes";
+        return Err(Error::misuse(what).help(help));
+    }
+    Ok(())
 }

@@ -46,8 +46,8 @@ impl Format for Writer {
         let same = list(&|k| k.to_string());
         let names = list(&|k| if k == 0 { "stem".to_owned() } else { format!("tip {k}") });
         let classes = Labels::of(&set.recipe)?.of_plants().len();
-        let of_classes: String = (0..classes).map(|class| format!("  {class}: [{names}]\n")).collect();
-        let more = format!("kpt_shape: [{count}, 3]\nflip_idx: [{same}]\nkpt_names:\n{of_classes}");
+        let of_classes = (0..classes).map(|class| format!("  {class}: [{names}]")).collect::<Vec<_>>().join("\n");
+        let more = format!("kpt_shape: [{count}, 3]\nflip_idx: [{same}]\nkpt_names:\n{of_classes}\n");
         boxes::data(FOLDER, set, out, &more)
     }
 

@@ -63,7 +63,7 @@ pub(crate) struct ImageArgs {
 /// How formats label what images show.
 #[derive(clap::Args)]
 pub(crate) struct LabelArgs {
-    /// Classes of the formats, such as `soil; beet=BEAVA; fat hen=CHEAL; weed; ignore=stone`: names with their labels. A label is soil,
+    /// Classes of the formats, such as `soil; beet=BEAVX; fat hen=CHEAL; weed; ignore=stone`: names with their labels. A label is soil,
     /// crop, weed, a species by name or EPPO code, an organ, or a thing on the ground; the most particular decides. Pixels of no
     /// class, and those of one named ignore, have no label.
     #[arg(long, value_name = "CLASSES", value_parser = Classes::parse)]

@@ -1,0 +1,270 @@
+//! Classes that a user asks for, what else formats leave out, and which maps images keep.
+//!
+//! Rationale: a class of a user's own must mean the same in every format, must be what the native maps say, and must cost no image that is
+//! there already. Expected: equality pixel by pixel with the native maps put together here in another way, list by list with the records,
+//! and byte by byte between datasets that got their classes early and late. Source: the native files; EPPO codes from the species files.
+
+mod common;
+
+use common::dataset::{fail, path, same, succeed, tree, verb};
+use common::program::{SMALL, scratch, trace};
+use furrow::dataset::record::{Plant, Record};
+use furrow::dataset::sample::IGNORE;
+use furrow::dataset::{Sample, Set, native};
+use furrow::output;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+/// Beets by their code, petioles of all plants, no fat hen; blades of weeds that have no class of their own would be weed.
+const CLASSES: &str = "soil; beet=beavx; petiole; weed; ignore=fat hen";
+
+/// Numbers of `parts.png`.
+const PETIOLE: u8 = 12;
+
+/// The command that makes `count` small images.
+fn make(folder: &Path, count: &str, more: &[&str]) -> Command {
+    let mut command = trace(&["dataset", "--scene", SMALL, "--quiet", "--out", path(folder), "--count", count]);
+    command.args(["--width", "96", "--spp", "2", "--split", "2,1,1"]).args(more);
+    command
+}
+
+/// All images of a dataset.
+fn samples(folder: &Path) -> (Set, Vec<Sample>) {
+    let set = Set::open(folder).unwrap();
+    let samples = (0..set.recipe.count).map(|k| native::read(folder, &Set::name(k)).unwrap()).collect();
+    (set, samples)
+}
+
+fn json(file: &Path) -> Value {
+    serde_json::from_slice(&fs::read(file).unwrap_or_else(|e| panic!("{}: {e}", file.display()))).unwrap()
+}
+
+/// The entries of a list in a JSON file.
+fn list(file: &Path, of: &str) -> Vec<Value> {
+    json(file)[of].as_array().unwrap().clone()
+}
+
+/// The species of a plant by its EPPO code.
+fn eppo<'a>(set: &'a Set, plant: &Plant) -> &'a str {
+    &set.recipe.species[usize::from(plant.kind) - 1].eppo
+}
+
+/// All annotations of COCO's instances, by image and number of category.
+fn instances(folder: &Path) -> Vec<(u64, u64, u64)> {
+    let mut all = Vec::new();
+    for split in ["train", "val", "test"] {
+        for a in list(&folder.join(format!("coco/annotations/instances_{split}.json")), "annotations") {
+            let number = |key: &str| a[key].as_u64().unwrap();
+            all.push((number("image_id") - 1, number("category_id"), number("area")));
+        }
+    }
+    all.sort_unstable();
+    all
+}
+
+/// Of each plant that is seen and passes: its image, number of category, pixels.
+fn expected(set: &Set, samples: &[Sample], category: impl Fn(&str) -> Option<u64>) -> Vec<(u64, u64, u64)> {
+    let of = |record: &Record| -> Vec<_> {
+        let listed = record.plants.iter().filter(|plant| plant.seen.pixels > 0);
+        let about = |p: &Plant| Some((record.index, category(eppo(set, p))?, u64::from(p.seen.pixels)));
+        listed.filter_map(about).collect()
+    };
+    let mut all: Vec<_> = samples.iter().flat_map(|s| of(&s.record)).collect();
+    all.sort_unstable();
+    all
+}
+
+#[test]
+fn classes_of_species_organs_and_none_mean_the_same_in_every_format() {
+    let (_keep, data) = scratch();
+    let formats = "coco,yolo,yolo-detect,panoptic,cityscapes,imagefolder,parts";
+    succeed(make(&data, "4", &["--classes", CLASSES, "--format", formats]));
+    let (set, samples) = samples(&data);
+    let seen = |code: &str| samples.iter().flat_map(|s| s.record.seen()).filter(|p| eppo(&set, p) == code).count();
+    assert!(seen("BEAVX") > 0 && seen("CHEAL") > 0, "both are to be seen, or nothing is tested");
+
+    // Pixels: organs before species before class; what is ignored has no label.
+    let mut counted = BTreeMap::new();
+    for sample in &samples {
+        let plain = |i: usize| match (sample.parts[i], sample.species[i], sample.semantics[i]) {
+            (PETIOLE, ..) => 2,
+            (_, 0, 0) => 0,
+            (_, n, _) if set.recipe.species[usize::from(n) - 1].eppo == "BEAVX" => 1,
+            (_, n, _) if set.recipe.species[usize::from(n) - 1].eppo == "CHEAL" => IGNORE,
+            _ => 9,
+        };
+        let labels: Vec<u8> = (0..sample.semantics.len()).map(plain).collect();
+        for label in &labels {
+            *counted.entry(*label).or_insert(0) += 1;
+        }
+        let (name, split) = (&sample.record.name, sample.record.split.name());
+        let city = format!("cityscapes/gtFine/{split}/small/small_000000_{name}_gtFine_labelIds.png");
+        let folder = format!("imagefolder/{split}/masks/{name}.png");
+        for file in [city, folder] {
+            assert_eq!(output::read_gray(&data.join(&file)).unwrap().2, labels, "{file}");
+        }
+        let native = fs::read(data.join(format!("images/{name}/parts.png"))).unwrap();
+        let format = output::read_indexed(&data.join(format!("parts/{split}/{name}.png"))).map(|(.., map)| map);
+        assert!(!native.is_empty() && format.is_ok_and(|map| map == sample.parts), "parts.png is the format's map");
+    }
+    assert_eq!(
+        counted.keys().copied().collect::<Vec<_>>(),
+        [0, 1, 2, IGNORE],
+        "each of them is to be seen: {counted:?}"
+    );
+
+    // Lists: beets alone, each as many pixels as its record says.
+    assert_eq!(instances(&data), expected(&set, &samples, |code| (code == "BEAVX").then_some(1)));
+    let categories = list(&data.join("coco/annotations/instances_train.json"), "categories");
+    assert_eq!(categories.iter().map(|c| c["name"].as_str().unwrap()).collect::<Vec<_>>(), ["beet", "weed"]);
+    for format in ["yolo", "yolo-detect"] {
+        let words = fs::read_to_string(data.join(format).join("data.yaml")).unwrap();
+        assert!(words.contains("0: beet\n") && words.contains("1: weed\n") && !words.contains("2:"), "{words}");
+        for sample in &samples {
+            let (name, split) = (&sample.record.name, sample.record.split.name());
+            let rows = fs::read_to_string(data.join(format!("{format}/labels/{split}/{name}.txt"))).unwrap();
+            let beets = sample.record.seen().filter(|p| eppo(&set, p) == "BEAVX").count();
+            assert_eq!(rows.lines().count(), beets, "{format} {name}");
+            assert!(rows.lines().all(|row| row.starts_with("0 ")), "{rows}");
+        }
+    }
+    let said = succeed(verb("verify", &data, &["--rerender", "1"])).stderr;
+    assert!(String::from_utf8_lossy(&said).contains("; 0 faults"), "{}", String::from_utf8_lossy(&said));
+}
+
+#[test]
+fn classes_and_limits_may_be_asked_for_later_and_are_counted() {
+    let (_keep, late) = scratch();
+    let (_keep, early) = scratch();
+    let formats = ["--format", "coco,cityscapes,yolo"];
+    let labels = ["--classes", "soil; beet=BEAVX; CHEAL", "--min-pixels", "60", "--min-visible", "0.5"];
+    succeed(make(&late, "4", &formats));
+    let before = tree(&late);
+    let (set, samples) = samples(&late);
+    let all = expected(&set, &samples, |code| Some(if code == "BEAVX" { 1 } else { 2 }));
+    assert_eq!(instances(&late), all);
+
+    let told = succeed(verb("finish", &late, &labels)).stderr;
+    let told = String::from_utf8_lossy(&told).into_owned();
+    let listed = instances(&late);
+    let kept = |p: &Plant| p.seen.pixels >= 60 && p.seen.shown_fraction() >= 0.5;
+    let left = samples.iter().flat_map(|s| s.record.seen()).filter(|p| !kept(p)).count();
+    assert!(left > 0 && listed.len() > 1, "the limits are to decide something");
+    assert_eq!(listed.len(), all.len() - left);
+    assert!(listed.iter().all(|row| all.contains(row) && row.2 >= 60));
+    assert!(told.contains(&format!("{left} plants and ")), "{told}");
+    let counted = &json(&late.join("manifest.json"))["left_out"];
+    assert_eq!((counted["plants"].as_u64(), counted["ignored_plants"].as_u64()), (Some(left as u64), Some(0)));
+
+    // No image was made again, and all is as if the classes had been asked for at once.
+    let images = |tree: &BTreeMap<String, Vec<u8>>| -> BTreeMap<String, Vec<u8>> {
+        tree.iter().filter(|(name, _)| name.starts_with("images/")).map(|(n, b)| (n.clone(), b.clone())).collect()
+    };
+    same(&images(&tree(&late)), &images(&before));
+    succeed(make(&early, "4", &[&formats[..], &labels].concat()));
+    same(&tree(&late), &tree(&early));
+    // Who says nothing of labels leaves them as they are.
+    succeed(make(&late, "4", &formats));
+    same(&tree(&late), &tree(&early));
+}
+
+#[test]
+fn what_a_set_does_not_have_is_refused_with_nothing_changed() {
+    let (_keep, data) = scratch();
+    let words = fail(make(&data, "1", &["--classes", "soil; horse; weed"]), 2);
+    assert!(words.contains("`horse`") && words.contains("CHEAL") && words.contains("petiole"), "{words}");
+    for (keep, part) in [("depth,depth32", "two precisions"), ("normals,normals16", "two precisions"), ("dept", "dept")]
+    {
+        let words = fail(make(&data, "1", &["--keep", keep]), 2);
+        assert!(words.contains(part), "{words}");
+    }
+    let words = fail(make(&data, "1", &["--keep", "none", "--format", "ply"]), 2);
+    assert!(words.contains("--format ply holds ") && words.contains("--keep"), "{words}");
+    assert!(!data.exists() || fs::read_dir(&data).unwrap().next().is_none(), "nothing was begun");
+
+    succeed(make(&data, "1", &["--keep", "none", "--format", "coco"]));
+    let before = tree(&data);
+    for (more, part) in [
+        (&["--classes", CLASSES][..], "need parts.png"),
+        (&["--classes", "soil; horse"], "`horse`"),
+        (&["--format", "ply"], "--format ply holds "),
+        (&["--min-visible", "1.5"], "a share"),
+        (&["--min-pixels", "0"], "0"),
+        (&["--classes", "soil; a=crop; b=crop"], "belongs to `a`"),
+    ] {
+        let words = fail(verb("finish", &data, more), 2);
+        assert!(words.contains(part), "{more:?}: {words}");
+        same(&tree(&data), &before);
+    }
+    for (more, part) in [(&["--format", "ply"][..], "--format ply holds "), (&["--classes", CLASSES], "need parts.png")]
+    {
+        let words = fail(make(&data, "1", more), 2);
+        assert!(words.contains(part), "{more:?}: {words}");
+        same(&tree(&data), &before);
+    }
+    // Classes that only a forged recipe can have.
+    let recipe = data.join("dataset.json");
+    let forged = fs::read_to_string(&recipe).unwrap();
+    for classes in ["[]", r#"[{ "name": "a", "labels": ["crop"] }, { "name": "a", "labels": ["weed"] }]"#] {
+        let labelling = format!("\"labelling\": {{ \"classes\": {classes} }},\n  \"licence\"");
+        fs::write(&recipe, forged.replace("\"licence\"", &labelling)).unwrap();
+        let words = fail(verb("finish", &data, &[]), 2);
+        assert!(words.contains("classes of this dataset"), "{words}");
+    }
+}
+
+#[test]
+fn maps_are_kept_as_asked() {
+    let files = |folder: &Path| common::program::names(&folder.join("images/000000"));
+    let labels = ["leaves.png", "plants.png", "record.json", "rgb.png", "semantics.png", "species.png"];
+    let with = |more: &[&str]| {
+        let mut all: Vec<String> = labels.iter().chain(more).map(ToString::to_string).collect();
+        all.sort();
+        all
+    };
+    let (_keep, usual) = scratch();
+    succeed(make(&usual, "2", &[]));
+    assert_eq!(files(&usual), with(&["coverage.png", "geometry.exr", "nir.png"]));
+
+    let (_keep, bare) = scratch();
+    succeed(make(&bare, "2", &["--keep", "none"]));
+    assert_eq!(files(&bare), with(&[]));
+    let (_keep, depth) = scratch();
+    succeed(make(&depth, "2", &["--keep", "depth32"]));
+    assert_eq!(files(&depth), with(&["geometry.exr"]));
+    let (_keep, oldest) = scratch();
+    let all = ["--keep", "nir,coverage,depth32,normals16"];
+    succeed(make(&oldest, "2", &all));
+    for folder in [&usual, &bare, &depth, &oldest] {
+        let said = succeed(verb("verify", folder, &["--rerender", "2"])).stderr;
+        assert!(String::from_utf8_lossy(&said).contains("2 rendered again and the same; 0 faults"));
+    }
+
+    // The same field, to the precision that is promised.
+    let read = |folder: &Path| native::read(folder, "000000").unwrap();
+    let (half, single, both) = (read(&usual), read(&depth), read(&oldest));
+    assert_eq!((single.depth.len(), single.normals.len()), (96 * 72, 0));
+    assert_eq!(single.depth, both.depth);
+    for (a, b) in half.depth.iter().zip(&single.depth) {
+        assert!(a == b || (a / b - 1.0).abs() <= 1.0 / 2048.0, "{a} {b}");
+    }
+    assert!(half.depth != single.depth, "halves are coarser");
+    for (a, b) in half.normals.iter().flatten().zip(both.normals.iter().flatten()) {
+        assert!((a - b).abs() <= 0.5 / 128.0 + 1e-3, "{a} {b}");
+    }
+    assert_eq!((&half.rgb, &half.semantics, &half.record), (&both.rgb, &both.semantics, &both.record));
+    let size = |folder: &Path| fs::metadata(folder.join("images/000000/geometry.exr")).unwrap().len();
+    assert!(size(&usual) < size(&oldest), "{} {}", size(&usual), size(&oldest));
+
+    // A dataset of before says nothing of maps, and goes on with those that it has.
+    let recipe = fs::read_to_string(oldest.join("dataset.json")).unwrap();
+    assert!(!recipe.contains("keep"), "{recipe}");
+    succeed(make(&oldest, "3", &[]));
+    assert_eq!(common::program::names(&oldest.join("images/000002")), files(&oldest));
+    assert!(!fs::read_to_string(oldest.join("dataset.json")).unwrap().contains("keep"));
+    let words = fail(make(&oldest, "3", &["--keep", "depth"]), 2);
+    assert!(words.contains("another dataset lies in this folder: keep "), "{words}");
+}
