@@ -77,6 +77,23 @@ fn expected(set: &Set, samples: &[Sample], category: impl Fn(&str) -> Option<u64
     all
 }
 
+/// Expected: networks learn the labels that formats hold.
+#[cfg(feature = "train")]
+fn learnt_alike(set: &Set, samples: &[Sample]) {
+    use furrow::train::data::bands::Band;
+    use furrow::train::data::example::Example;
+    let map = furrow::dataset::classes::Classes::parse(CLASSES).unwrap().of(&set.recipe.species).unwrap();
+    for sample in samples {
+        let (split, name) = (sample.record.split.name(), &sample.record.name);
+        let written = output::read_gray(&set.folder.join(format!("imagefolder/{split}/masks/{name}.png"))).unwrap().2;
+        let (_, learnt) = Example::read_whole(set, sample.record.index, &map, 0.0, &[Band::Red], false).unwrap();
+        assert_eq!(learnt.labels, written, "{name}");
+    }
+}
+
+#[cfg(not(feature = "train"))]
+fn learnt_alike(_: &Set, _: &[Sample]) {}
+
 #[test]
 fn classes_of_species_organs_and_none_mean_the_same_in_every_format() {
     let (_keep, data) = scratch();
@@ -110,6 +127,7 @@ fn classes_of_species_organs_and_none_mean_the_same_in_every_format() {
         let format = output::read_indexed(&data.join(format!("parts/{split}/{name}.png"))).map(|(.., map)| map);
         assert!(!native.is_empty() && format.is_ok_and(|map| map == sample.parts), "parts.png is the format's map");
     }
+    learnt_alike(&set, &samples);
     assert_eq!(
         counted.keys().copied().collect::<Vec<_>>(),
         [0, 1, 2, IGNORE],

@@ -254,6 +254,8 @@ fn what_cannot_be_gone_on_with_is_told() {
     assert!(error.contains("no trained network"), "{error}");
     let error = refuse(fit(&set, &folder.join("a"), "").args(["--classes", "soil; galium=Galium aparine"]), 2);
     assert!(error.contains("Galium aparine") && error.contains("knows no species"), "{error}");
+    let error = refuse(fit(&set, &folder.join("a"), "").args(["--classes", "soil; stone; plant=crop,weed"]), 2);
+    assert!(error.contains("need parts.png"), "{error}");
     let error = refuse(&mut fit(&set, &folder.join("b"), "--bands rgbn"), 2);
     assert!(error.contains("no band `nir`"), "{error}");
     let error = refuse(&mut fit(&set, &folder.join("c"), &format!("--val {}@3..9", set.display())), 2);

@@ -3,6 +3,7 @@
 //! Everything that decides a byte of an image stands here or in the `scene/` beside it, and nothing else does: no clock, no path
 //! of a machine, no number of threads. So any shard on any machine that has the folder can go on with it.
 
+use super::classes::Classes;
 use super::keep::Kept;
 use super::labelling::Labelling;
 use super::split::{Shares, Split};
@@ -212,6 +213,17 @@ impl Recipe {
     /// The split of an image: all images of a field are in one.
     pub fn split_of(&self, index: u64) -> Split {
         self.split.of(self.field_of(index).0)
+    }
+
+    /// An error where classes are told apart by `parts.png` alone, and its images have none.
+    pub fn check_parts(&self, classes: &Classes) -> Result<()> {
+        let has_parts = matches!(&self.made, Made::Rendered(rendering) if rendering.parts);
+        if has_parts || !classes.needs_parts() {
+            return Ok(());
+        }
+        let what = "classes of organs or of things on the ground need parts.png, which these images lack";
+        let help = "leave those labels out of --classes, or begin another dataset with these --classes";
+        Err(Error::misuse(what).help(help))
     }
 
     /// How it is rendered; an error for images from elsewhere.

@@ -3,7 +3,6 @@
 //! A format is a file here that implements [`Format`], and one line in `formats!`. The tests find it unasked.
 
 use super::File;
-use super::classes::Classes;
 use super::keep::Kept;
 use super::recipe::Recipe;
 use super::sample::Sample;
@@ -143,11 +142,5 @@ pub fn check_maps(recipe: &Recipe) -> Result<()> {
                 .help(format!("begin a dataset with {name} among --keep, or leave --format {format} out")));
         }
     }
-    let needs_parts = recipe.labelling.classes.as_ref().is_some_and(Classes::needs_parts);
-    if needs_parts && !recipe.rendering().is_ok_and(|rendering| rendering.parts) {
-        let what = "classes of organs or of things on the ground need parts.png, which these images lack";
-        let help = "leave those labels out of --classes, or begin another dataset with these --classes";
-        return Err(Error::misuse(what).help(help));
-    }
-    Ok(())
+    recipe.labelling.classes.as_ref().map_or(Ok(()), |classes| recipe.check_parts(classes))
 }

@@ -41,6 +41,7 @@ impl Store {
         for selection in selections {
             let (set, numbers) = selection.open(otherwise, seed)?;
             let map = classes.of(&set.recipe.species).map_err(|e| e.in_file(&set.folder))?;
+            set.recipe.check_parts(classes).map_err(|e| e.in_file(&set.folder))?;
             images.extend(numbers.into_iter().map(|n| (sets.len(), n)));
             sets.push((set, map, selection.margin));
         }

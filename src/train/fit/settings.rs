@@ -28,7 +28,7 @@ use std::sync::LazyLock;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, clap::Args, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default, rename = "Hyperparameters")]
 pub struct Settings {
-    /// Classes to tell apart, with a semicolon between, each with its labels: "soil; beet=crop; other=weed".
+    /// Classes to tell apart, with a semicolon between, each with its labels, as for datasets: "soil; beet=BEAVX; other=crop,weed; ignore=stone".
     #[arg(long, value_name = "CLASSES", default_value = default_of("classes"))]
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-example" = "\"soil; beet=crop; other=weed\""))]
