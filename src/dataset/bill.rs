@@ -81,15 +81,22 @@ impl Bill {
 
 /// Tells what an order will cost, and what the user should know; given up where the flag is raised.
 pub fn bill(order: &Order, threads: &Threads, stop: &Arc<AtomicBool>) -> Result<(Bill, Vec<String>)> {
-    let Draft { recipe, files, warnings, scene, scene_sha256 } = draft(order, stop)?;
+    let Draft { recipe, files, mut warnings, scene, scene_sha256 } = draft(order, stop)?;
     // What the process has taken until now, the dataset's own process takes too.
     let start = cpu()?;
     let base_memory = meter::memory().unwrap_or(0);
     let images = Images::of(&recipe, scene_sha256, scene.threads(threads))?;
     let indices = BTreeSet::from([0, recipe.count / 2, recipe.count.saturating_sub(1)]);
     let mut probes = Vec::new();
-    for index in &indices {
-        probes.push(threads.install(|| images.probe(*index, stop))?);
+    for index in indices {
+        match threads.install(|| images.probe(index, stop)) {
+            Ok(probe) => probes.push(probe),
+            Err(e) if e.is_of_one_field() => warnings.push(format!("image {}: {e}", Set::name(index))),
+            Err(e) => return Err(e),
+        }
+    }
+    if probes.is_empty() {
+        return Err(Error::input(format!("no image of three could be made: {}", warnings.join("; "))));
     }
     let peak = meter::peak_memory().unwrap_or(0);
     let mean = |of: &dyn Fn(&Probe) -> f64| probes.iter().map(of).sum::<f64>() / probes.len().max(1) as f64;
@@ -107,7 +114,7 @@ pub fn bill(order: &Order, threads: &Threads, stop: &Arc<AtomicBool>) -> Result<
     }
     let bill = Bill {
         images: recipe.count,
-        probes: indices.into_iter().collect(),
+        probes: probes.iter().map(|probe| probe.record.index).collect(),
         spp: images.drawn,
         core_s: grow_s + sample_s + rest_s,
         grow_s,
