@@ -227,11 +227,13 @@ impl Images {
         let [few, many] = &self.renderers;
         let [fewer, more] = self.drawn.map(f64::from);
         let spp = f64::from(self.spp);
-        let less = if fewer < more { Some(draw(few)?) } else { None };
+        // Of the first drawing only its numbers are kept: a run of the dataset holds one image at a time as well.
+        let less =
+            if fewer < more { Some(draw(few).map(|(_, files, seconds)| (length(&files), seconds))?) } else { None };
         let (mut made, files, seconds) = draw(many)?;
-        let (sample_s, longer) = less.map_or((0.0, 1.0), |(_, short, short_s)| {
+        let (sample_s, longer) = less.map_or((0.0, 1.0), |(short, short_s)| {
             let doublings = |from: f64, to: f64| (to / from).log2();
-            let (short, long) = (length(&short) as f64, length(&files) as f64);
+            let (short, long) = (short as f64, length(&files) as f64);
             // Noise halves its variance with each doubling of samples, and takes as many bits less of each pixel.
             let steepness = (long - short) / doublings(fewer, more);
             ((seconds - short_s).max(0.0) / (more - fewer), 1.0 + steepness * doublings(more, spp) / long)
