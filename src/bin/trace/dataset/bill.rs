@@ -36,6 +36,7 @@ fn rows(folder: &Path, bill: &Bill, threads: usize) -> Vec<[String; 2]> {
     let probes: Vec<String> = bill.probes.iter().map(|index| dataset::Set::name(*index)).collect();
     let [fewer, more] = bill.spp;
     let samples = if fewer == more { more.to_string() } else { format!("{fewer} and {more}") };
+    let with = count(threads as u64, "thread", "threads");
     let memory = (bill.memory(CORES as usize) as f64 * SPARE / GIB).ceil().max(1.0);
     vec![
         row("from", format!("{} with {samples} samples a pixel", probes.join(", "))),
@@ -50,12 +51,7 @@ fn rows(folder: &Path, bill: &Bill, threads: usize) -> Vec<[String; 2]> {
                 part(core_s - sample_s - grow_s)
             ),
         ),
-        row(
-            "here",
-            format!("{} hours with {}", number(core_s / 3600.0 / threads as f64), {
-                count(threads as u64, "thread", "threads")
-            }),
-        ),
+        row("here", format!("{} hours with {with}", number(core_s / 3600.0 / threads as f64))),
         row("disk", format!("{} GB ({} MB)", number(bytes as f64 / 1e9), number(bytes as f64 / 1e6))),
         row("files", format!("{files} ({})", count(images, "image", "images"))),
         row(
