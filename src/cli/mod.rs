@@ -46,13 +46,18 @@ pub fn end(done: Result<Vec<PathBuf>>) -> ExitCode {
 
 /// Prints rows to stdout with their columns below each other. A closed pipe is no failure.
 pub fn print_rows<const N: usize>(rows: &[[String; N]]) {
+    let _ = io::stdout().lock().write_all(columns(rows).as_bytes());
+}
+
+/// Rows as lines whose columns stand below each other.
+pub fn columns<const N: usize>(rows: &[[String; N]]) -> String {
     let widths: [usize; N] =
         std::array::from_fn(|k| rows.iter().map(|row| row[k].chars().count()).max().unwrap_or_default());
-    let mut out = io::stdout().lock();
-    for row in rows {
+    let line = |row: &[String; N]| {
         let cells: Vec<String> = row.iter().zip(widths).map(|(cell, width)| format!("{cell:<width$}")).collect();
-        let _ = writeln!(out, "{}", cells.join("  ").trim_end());
-    }
+        cells.join("  ").trim_end().to_owned() + "\n"
+    };
+    rows.iter().map(line).collect()
 }
 
 /// Prints an error to stderr and returns its exit code: 1 failed, 2 misused, 75 stopped cleanly, which is called no error.

@@ -87,7 +87,7 @@ impl ChecksumRecord {
 }
 
 /// Bytes from which on a file takes more than one block of a disk.
-const BLOCK: usize = 4096;
+pub(super) const BLOCK: usize = 4096;
 
 /// Writes files, all of them or none. Those of the same bytes, such as the photograph in several formats, are one file with several
 /// names.

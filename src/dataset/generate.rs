@@ -7,8 +7,8 @@
 use super::checksum_record::{ChecksumRecord, write_files};
 use super::render::{LastField, Times, render, renderer, scene_file};
 use super::set::Set;
-use super::timing_log::{ImageTiming, TimingLog};
-use super::{File, format, native};
+use super::timing_log::{Began, End, Ended, ImageFailure, ImageTiming, Row, TimingLog, now};
+use super::{File, format, meter, native};
 use crate::error::Kind;
 use crate::job::{Renderer, SceneFile, Threads};
 use crate::render::Watch;
@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Which of the images a run is for: those of the fields whose number % of == number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,7 +94,7 @@ pub enum Task {
 }
 
 /// Images under way at once unless said otherwise: more would take more memory than they save time.
-const MOST_AT_ONCE: usize = 16;
+pub(super) const MOST_AT_ONCE: usize = 16;
 
 /// How many fields like one of them the memory is for. Where that cannot be told, one: its image will say why.
 fn fitting(scene: &SceneFile, index: u64, memory: Option<u64>) -> usize {
@@ -147,6 +147,10 @@ pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()>
         at_once,
         timing_log: TimingLog::new(&set.folder, &format!("{}-of-{}", shard.number, shard.of)),
     };
+    let cpu_before = meter::cpu();
+    if !tasks.is_empty() {
+        run.timing_log.add(&Row::Began(Began { began_s: now(), images: tasks.len(), at_once, threads }))?;
+    }
     let next = AtomicUsize::new(0);
     let made = AtomicUsize::new(0);
     let failures: Mutex<BTreeMap<u64, Error>> = Mutex::default();
@@ -154,6 +158,8 @@ pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()>
     let fail = |index: u64, error: Error| {
         // What is wrong with one field is no reason to lose a night; what is wrong with the disk is.
         failed.fetch_or(!error.is_of_one_field(), Ordering::Relaxed);
+        // Where the disk is full it cannot be noted, and the error itself is told.
+        let _ = run.timing_log.add(&Row::Failure(ImageFailure { index, error: error.to_string(), failed_s: now() }));
         failures.lock().unwrap_or_else(PoisonError::into_inner).insert(index, error);
     };
     let stopped = || callbacks.soon.load(Ordering::Relaxed) || callbacks.now.load(Ordering::Relaxed);
@@ -178,11 +184,18 @@ pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()>
         }
     });
     let failures = failures.into_inner().unwrap_or_else(PoisonError::into_inner);
+    // It may have been stopped after the last image was done.
+    let lacking = tasks.len() - made.into_inner();
+    let end = match lacking {
+        _ if !failures.is_empty() => End::Failed,
+        0 => End::Done,
+        _ => End::Stopped,
+    };
+    let noted = if tasks.is_empty() { Ok(()) } else { run.ended(end, cpu_before) };
     if !failures.is_empty() {
         return Err(together(failures));
     }
-    // It may have been stopped after the last image was done.
-    let lacking = tasks.len() - made.into_inner();
+    noted?;
     if lacking == 0 { Ok(()) } else { Err(interrupted(&set.folder, wanted - lacking, wanted)) }
 }
 
@@ -311,14 +324,19 @@ impl Run<'_> {
         }
         checksums.write(folder)?;
         let seconds = begin.elapsed().as_secs_f64();
-        self.timing_log.add(&ImageTiming::new(
-            index,
-            checksums.image_hash()?,
-            seconds,
-            &times,
-            self.at_once,
-            self.threads,
-        ))
+        let hash = checksums.image_hash()?;
+        self.timing_log.add(&Row::Image(ImageTiming::new(index, hash, seconds, &times, self.at_once, self.threads)))
+    }
+
+    /// Notes that the run ends, and what it took since the process had taken so much.
+    fn ended(&self, end: End, cpu_before: Option<Duration>) -> Result<()> {
+        let taken = meter::cpu().zip(cpu_before).map(|(now, before)| now.saturating_sub(before));
+        self.timing_log.add(&Row::Ended(Ended {
+            ended_s: now(),
+            end,
+            cpu_s: taken.map(|taken| taken.as_secs_f64()),
+            peak_bytes: meter::peak_memory(),
+        }))
     }
 }
 

@@ -9,7 +9,7 @@
 //! images/000123/        one image: photographs, label maps, record.json
 //! coco/ phenobench/ …   the same for other people's tools
 //! seals/000123.json     checksums: SHA-256 of each of its files; written last
-//! ledger/               timing log: how long each image took, one file a run: the only place with clock times
+//! ledger/               timing log: when runs began and ended, how long each image took, which failed; one file a run: the only place with clock times
 //! jobs/                 what `emit` wrote for a scheduler, and its logs; belongs to no image
 //! manifest.json         everything above in one list, written when all images are there
 //! report.html           what is in it, for people
@@ -26,6 +26,8 @@
 //! | `checksum`, `checksum_record`, `set` | SHA-256 of a file; those of an image's files; the dataset on disk |
 //! | `make` | all of it in one call |
 //! | `plan`, `gather`, `begin`, `generate`, `timing_log`, `finish` | from a scene file, copied with all that it names, to images and a manifest; what remains to be done is found by looking at the disk |
+//! | `bill`, `meter` | what a dataset will cost, from three of its images; what this process has taken |
+//! | `status` | how far a dataset is, from what lies in its folder |
 //! | `cluster` | the same on many machines: job files for schedulers |
 //! | `invariants`, `difference`, `verify` | what must hold of every image; how far two of them lie apart; whether all is so |
 //! | `import` | other people's images and labels |
@@ -34,6 +36,8 @@
 #[doc(hidden)]
 pub mod annotate;
 mod begin;
+#[doc(hidden)]
+pub mod bill;
 #[doc(hidden)]
 pub mod checksum;
 #[doc(hidden)]
@@ -65,6 +69,8 @@ pub mod labelling;
 pub mod labels;
 mod make;
 #[doc(hidden)]
+pub mod meter;
+#[doc(hidden)]
 pub mod native;
 #[doc(hidden)]
 pub mod plan;
@@ -83,6 +89,8 @@ pub mod sample;
 pub mod set;
 #[doc(hidden)]
 pub mod split;
+#[doc(hidden)]
+pub mod status;
 #[doc(hidden)]
 pub mod timing_log;
 #[doc(hidden)]

@@ -15,6 +15,8 @@ use crate::job::{Renderer, SceneFile};
 use crate::settings::RenderOptions;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// What a dataset is to be: scene file, number of images, size, formats, render options.
 #[derive(Clone, Debug)]
@@ -77,6 +79,27 @@ const MOST_SPECIES: usize = u8::MAX as usize;
 /// Begins a dataset in `folder`, or goes on with the same one: it may get longer and get more formats. Returns it with what the user
 /// should know.
 pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
+    let Draft { recipe, files, warnings, .. } = draft(order, &Arc::default())?;
+    let recipe = begin(folder, recipe, &files)?;
+    Ok((Set { folder: folder.into(), recipe }, warnings))
+}
+
+/// A dataset that was checked and not begun.
+pub(super) struct Draft {
+    /// What would make it.
+    pub(super) recipe: Recipe,
+    /// The scene that it would hold.
+    pub(super) files: Vec<File>,
+    /// What the user should know.
+    pub(super) warnings: Vec<String>,
+    /// The scene file where it lies now.
+    pub(super) scene: SceneFile,
+    /// [`Rendering::scene_sha256`] of the scene where it lies now.
+    pub(super) scene_sha256: String,
+}
+
+/// Checks an order by growing its first field; given up where the flag is raised.
+pub(super) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
     // Names are checked before anything is written.
     let options = order.edit.options(order.options.clone());
     if !options.quality.is_fixed() {
@@ -85,7 +108,7 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
     }
     // Before anything grows: what could not be rendered here.
     let kernels = Renderer::open(&options)?.kernels().to_owned();
-    let source = opened(&order.scene, order)?;
+    let source = opened(&order.scene, order)?.until(stop);
     let first = source.field(0)?;
     let field = first.grown();
     if field.species.len() > MOST_SPECIES {
@@ -98,7 +121,7 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
     }
     let Gathered { files, scene, rewritten } = gather(&field.files, &field.shipped, &order.scene)?;
     let elsewhere = rewritten || source.allows_outside();
-    let scene_sha256 = if elsewhere { hash_of_copies(order, &files, &scene)? } else { field.hash.clone() };
+    let scene_sha256 = if elsewhere { hash_of_copies(order, &files, &scene, stop)? } else { field.hash.clone() };
     let camera = &field.scene.camera;
     let recipe = Recipe {
         furrow: env!("CARGO_PKG_VERSION").into(),
@@ -131,8 +154,8 @@ pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
     format::check_maps(&recipe)?;
     let mut told = field.warnings.clone();
     told.extend(warnings(&recipe)?);
-    let recipe = begin(folder, recipe, &files)?;
-    Ok((Set { folder: folder.into(), recipe }, told))
+    let scene_sha256 = field.hash.clone();
+    Ok(Draft { recipe, files, warnings: told, scene: source, scene_sha256 })
 }
 
 /// A scene file as an order asks for it.
@@ -143,10 +166,10 @@ fn opened(scene: &Path, order: &Order) -> Result<SceneFile> {
 
 /// SHA-256 of a scene whose copies may name other files than the originals do, found by growing the first field from them in
 /// a folder of their own; an error where it still reads something outside.
-fn hash_of_copies(order: &Order, files: &[File], scene: &str) -> Result<String> {
+fn hash_of_copies(order: &Order, files: &[File], scene: &str, stop: &Arc<AtomicBool>) -> Result<String> {
     let folder = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir()))?;
     checksum_record::write_files(folder.path(), files)?;
-    let first = opened(&folder.path().join(scene), order)?.field(0)?;
+    let first = opened(&folder.path().join(scene), order)?.until(stop).field(0)?;
     let field = first.grown();
     match field.files.iter().find(|file| !file.starts_with(folder.path())) {
         None => Ok(field.hash.clone()),

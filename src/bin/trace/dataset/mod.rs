@@ -1,11 +1,13 @@
 //! `trace dataset`: many fields, with all their labels, in the formats of other tools.
 
+mod bill;
 mod emit;
 mod finish;
 mod import;
 pub(crate) mod order;
 pub(crate) mod progress;
 pub(crate) mod render;
+mod status;
 mod verify;
 
 use clap::{Parser, Subcommand};
@@ -29,6 +31,8 @@ pub(crate) struct Cli {
 const AFTER: &str = "\
 Examples:
   trace dataset --scene scenes/synthetic-d.ron --count 1300 --out data/d --width 480 --height 360 --spp 32 --format phenobench,coco
+  trace dataset --scene scenes/synthetic-d.ron --count 1300 --out data/d --spp 32 --dry-run   what it would take; nothing is made
+  trace dataset status data/d --watch                   how far it is, again every five seconds
   trace dataset verify data/d --rerender 5              hashes, invariants, and five images rendered again
   trace dataset finish data/d --format yolo             a further format of the same images
   trace dataset import --format masks --images real/images --masks real/labels --out data/real
@@ -42,17 +46,28 @@ On several machines that share a folder:
 #[derive(Subcommand)]
 enum Verb {
     /// Begin a dataset: check the scene file, take all that it reads into the folder, write the recipe.
-    Plan(order::Args),
+    Plan(PlanArgs),
     /// Render the images of a shard that are missing.
     Render(render::Args),
     /// Write what belongs to all images: lists of the formats, manifest, report.
     Finish(finish::Args),
     /// Bring other people's images and labels in: masks, PhenoBench, COCO.
     Import(Box<import::Args>),
+    /// Tell how far a dataset is: images done, rate, time left, slow and failed images, shard by shard.
+    Status(status::Args),
     /// Check every file and every label; render some images again.
     Verify(verify::Args),
     /// Write job files for a cluster: Slurm, Kubernetes, or GNU parallel.
     Emit(emit::Args),
+}
+
+#[derive(clap::Args)]
+struct PlanArgs {
+    #[command(flatten)]
+    order: order::Args,
+    /// Begin nothing: draw three images with fewer samples, and tell core hours, disk, files, memory and a number of shards.
+    #[arg(long)]
+    bill: bool,
 }
 
 #[derive(clap::Args)]
@@ -61,21 +76,32 @@ struct MakeArgs {
     order: order::Args,
     #[command(flatten)]
     work: render::WorkArgs,
+    /// Make nothing: draw three images with fewer samples, and tell core hours, disk, files, memory and a number of shards.
+    #[arg(long)]
+    dry_run: bool,
 }
 
 /// Runs a verb on datasets; returns the paths of the files that matter.
 pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
     match &cli.verb {
-        Some(Verb::Plan(args)) => {
-            let set = order::run(args)?;
+        Some(Verb::Plan(PlanArgs { order, bill: true })) => {
+            bill::run(order.images.folder(), &order.order()?, 0, signals)
+        }
+        Some(Verb::Plan(PlanArgs { order, bill: false })) => {
+            let set = order::run(order)?;
             order::tell_plants(&set, false)?;
             Ok(vec![set.folder.join(furrow::dataset::recipe::FILE)])
         }
         Some(Verb::Render(args)) => render::run(args, signals),
         Some(Verb::Finish(args)) => finish::run(args, signals),
         Some(Verb::Import(args)) => import::run(args, signals),
+        Some(Verb::Status(args)) => status::run(args, signals),
         Some(Verb::Verify(args)) => verify::run(args, signals),
         Some(Verb::Emit(args)) => emit::run(args),
+        None if cli.make.dry_run => {
+            let MakeArgs { order, work, .. } = &cli.make;
+            bill::run(order.images.folder(), &order.order()?, work.threads, signals)
+        }
         None => {
             let set = order::run(&cli.make.order)?;
             order::tell_plants(&set, cli.make.work.quiet)?;

@@ -29,7 +29,7 @@ pub(crate) struct Args {
 pub(crate) struct WorkArgs {
     /// Threads; 0 for one on each core.
     #[arg(long, default_value_t = 0, value_parser = threads)]
-    threads: usize,
+    pub(crate) threads: usize,
     /// Images under way at once, which share the threads; each takes the memory of a field. 0 for one a thread, 16 at most, and no more
     /// than the memory is for.
     #[arg(long, default_value_t = 0, value_parser = threads)]

@@ -1,0 +1,75 @@
+//! What a dataset will cost: `trace dataset … --dry-run` and `trace dataset plan … --bill`.
+
+use furrow::cli;
+use furrow::cli::signal::Signals;
+use furrow::dataset::Order;
+use furrow::dataset::bill::{self, Bill};
+use furrow::job::Threads;
+use furrow::report::{count, number};
+use furrow::{Result, dataset};
+use std::path::{Path, PathBuf};
+
+/// Cores of a shard, as `emit` takes them unless told otherwise.
+const CORES: u32 = 8;
+/// Memory that is asked of a scheduler beyond what is expected: it ends what takes more.
+const SPARE: f64 = 1.25;
+/// Bytes of a GiB.
+const GIB: f64 = (1_u64 << 30) as f64;
+
+/// Tells what an order will cost; nothing is written into its folder.
+pub(crate) fn run(folder: &Path, order: &Order, threads: usize, signals: &Signals) -> Result<Vec<PathBuf>> {
+    cli::check_folder(folder)?;
+    let threads = Threads::new(threads)?;
+    let (bill, warnings) = bill::bill(order, &threads, signals.heed())?;
+    for warning in warnings {
+        furrow::tell!("warning: {warning}");
+    }
+    cli::print_rows(&rows(folder, &bill, threads.count()));
+    Ok(Vec::new())
+}
+
+/// A bill in words.
+fn rows(folder: &Path, bill: &Bill, threads: usize) -> Vec<[String; 2]> {
+    let Bill { images, core_s, grow_s, sample_s, bytes, files, .. } = *bill;
+    let row = |name: &str, words: String| [name.to_owned(), words];
+    let part = |seconds: f64| format!("{:.0} %", 100.0 * seconds / core_s.max(1e-9));
+    let probes: Vec<String> = bill.probes.iter().map(|index| dataset::Set::name(*index)).collect();
+    let [fewer, more] = bill.spp;
+    let samples = if fewer == more { more.to_string() } else { format!("{fewer} and {more}") };
+    let with = count(threads as u64, "thread", "threads");
+    let memory = (bill.memory(CORES as usize) as f64 * SPARE / GIB).ceil().max(1.0);
+    vec![
+        row("from", format!("{} with {samples} samples a pixel", probes.join(", "))),
+        row(
+            "core hours",
+            format!(
+                "{} ({} core seconds: {} drawing, {} growing, {} labels and files)",
+                number(core_s / 3600.0),
+                number(core_s),
+                part(sample_s),
+                part(grow_s),
+                part(core_s - sample_s - grow_s)
+            ),
+        ),
+        row("here", format!("{} hours with {with}", number(core_s / 3600.0 / threads as f64))),
+        row("disk", format!("{} GB ({} MB)", number(bytes as f64 / 1e9), number(bytes as f64 / 1e6))),
+        row("files", format!("{files} ({})", count(images, "image", "images"))),
+        row(
+            "memory",
+            format!(
+                "{} GiB with one image under way, {} GiB with {threads} cores",
+                number(bill.memory(1) as f64 / GIB),
+                number(bill.memory(threads) as f64 / GIB)
+            ),
+        ),
+        row(
+            "shards",
+            format!(
+                "trace dataset emit {} --shards {} --cpus {CORES} --memory {memory:.0}: about {} hours each",
+                folder.display(),
+                bill.shards(CORES),
+                number(core_s / 3600.0 / f64::from(CORES) / bill.shards(CORES) as f64)
+            ),
+        ),
+    ]
+}

@@ -1,0 +1,368 @@
+//! How far a dataset is, and what it will cost before it is begun.
+//!
+//! Rationale: whoever renders for a night wants to know in the evening what it takes and in between whether it gets there. Expected: the
+//! numbers of `status` are those of the files, whatever became of the runs; the bill's number of files is exact, its bytes are within
+//! 30 %, and nothing is left anywhere. Source: the files themselves, counted and measured here.
+#![cfg(target_os = "linux")]
+
+mod common;
+
+use common::dataset::{SIZE, fail, made, make, path, succeed, tree, verb};
+use common::program::{SMALL, names, scratch, trace};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fs;
+use std::os::unix::fs::MetadataExt;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// What `trace dataset status --json` prints.
+fn status(data: &Path, more: &[&str]) -> Value {
+    let output = succeed(verb("status", data, &[&["--json"][..], more].concat()));
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(text.lines().count(), 1, "{text}");
+    serde_json::from_str(&text).unwrap()
+}
+
+/// A number of a status.
+fn number(status: &Value, key: &str) -> f64 {
+    status[key].as_f64().unwrap_or_else(|| panic!("no {key}: {status}"))
+}
+
+/// What the program prints for people.
+fn told(data: &Path, more: &[&str]) -> String {
+    String::from_utf8(succeed(verb("status", data, more)).stdout).unwrap()
+}
+
+#[test]
+fn a_dataset_that_is_done_says_so() {
+    let (_keep, data) = scratch();
+    succeed(make(&data, 4, &["--at-once", "1"]));
+    let before = tree(&data);
+    let found = status(&data, &[]);
+    assert_eq!((number(&found, "images"), number(&found, "done"), number(&found, "left_s")), (4.0, 4.0, 0.0));
+    assert_eq!((number(&found, "working"), found["failures"].as_array().unwrap().len()), (0.0, 0));
+    let shard = &found["shards"].as_array().unwrap()[..];
+    assert_eq!((shard.len(), &shard[0]["state"]), (1, &Value::from("done")));
+    // As many images as the log has, over the time from its first row to its last image.
+    let rows = furrow::dataset::timing_log::rows(&data).unwrap();
+    let seconds: f64 = rows.iter().map(|row| row.seconds).sum();
+    let rate = number(&found, "images_per_hour");
+    assert!(rate > 0.0 && rate < 3600.0 * 4.0 / seconds * 1.1, "{rate} an hour, but {seconds} s for four");
+    // Slow ones come first, with parts that make no more than the whole, and with the plants of their records.
+    let slow = found["slowest"].as_array().unwrap();
+    assert_eq!(slow.len(), 4);
+    for pair in slow.windows(2) {
+        assert!(number(&pair[0], "seconds") >= number(&pair[1], "seconds"));
+    }
+    for image in slow {
+        let name = format!("images/{:06}/record.json", number(image, "index"));
+        let record: Value = serde_json::from_slice(&before[&name]).unwrap();
+        assert_eq!(number(image, "plants") as usize, record["plants"].as_array().unwrap().len(), "{name}");
+        let parts: f64 = ["grow_s", "draw_s", "label_s"].map(|part| number(image, part)).iter().sum();
+        assert!(parts <= number(image, "seconds"), "{image}");
+    }
+    assert!(number(&found, "core_s") > 0.0 && number(&found, "peak_bytes") > 1e6, "{found}");
+    // Watched, it ends at once; looking changes nothing.
+    let words = told(&data, &["--watch"]);
+    assert!(
+        words.contains("4 of 4 images") && words.contains("all done") && words.contains("slowest images:"),
+        "{words}"
+    );
+    assert!(before == tree(&data));
+}
+
+/// Rationale: the folder was copied in part, or files were lost. Expected: images without one of their files, with half of one, or without
+/// checksums count as missing, in the shard that they belong to.
+#[test]
+fn images_whose_files_are_gone_are_missing() {
+    let (_keep, data) = scratch();
+    succeed(make(&data, 6, &[]));
+    fs::remove_file(data.join("images/000000/plants.png")).unwrap();
+    fs::remove_file(data.join("imagefolder/train/masks/000002.png")).unwrap();
+    fs::File::options().write(true).open(data.join("images/000003/rgb.png")).unwrap().set_len(9).unwrap();
+    fs::remove_file(data.join("seals/000005.json")).unwrap();
+    let found = status(&data, &["--shards", "2"]);
+    assert_eq!((number(&found, "images"), number(&found, "done")), (6.0, 2.0));
+    let shards: Vec<_> =
+        found["shards"].as_array().unwrap().iter().map(|s| (number(s, "images"), number(s, "done"))).collect();
+    assert_eq!(shards, [(3.0, 1.0), (3.0, 1.0)]);
+    // At the rate of the run that was, for four images.
+    let expected = 4.0 * 3600.0 / number(&found, "images_per_hour");
+    assert!((number(&found, "left_s") / expected - 1.0).abs() < 1e-6, "{found}");
+    let words = told(&data, &[]);
+    assert!(words.contains("2 of 6 images") && words.contains("left") && !words.contains("all done"), "{words}");
+    succeed(make(&data, 6, &[]));
+    assert_eq!(number(&status(&data, &[]), "done"), 6.0);
+}
+
+/// Waits until some images are there; an error of the test where none come.
+fn some_images(data: &Path, child: &mut Child) {
+    let begin = Instant::now();
+    while made(data).len() < 2 {
+        assert!(child.try_wait().unwrap().is_none(), "it ended early");
+        assert!(begin.elapsed() < Duration::from_secs(120), "no image in two minutes");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+fn send(signal: &str, child: &Child) {
+    assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+}
+
+/// Expected: a run that was told to stop says so in its log; one that was killed cannot, and is at work until it has been silent for long.
+/// In both cases, and while it runs, what is done is what has checksums.
+#[test]
+fn a_run_that_is_stopped_or_killed_leaves_its_status() {
+    for (signal, state) in [("-USR1", "stopped"), ("-KILL", "working")] {
+        let (_keep, data) = scratch();
+        let mut child =
+            make(&data, 500, &["--at-once", "2"]).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        some_images(&data, &mut child);
+        let running = status(&data, &[]);
+        assert_eq!((number(&running, "working"), &running["shards"][0]["state"]), (1.0, &Value::from("working")));
+        assert!(number(&running, "done") >= 2.0 && number(&running, "images_per_hour") > 0.0, "{running}");
+        assert!(number(&running, "left_s") > 0.0, "{running}");
+        send(signal, &child);
+        child.wait().unwrap();
+        let found = status(&data, &[]);
+        assert_eq!(found["shards"][0]["state"], *state, "{signal}");
+        let sealed =
+            names(&data.join("seals")).iter().filter(|name| name.ends_with(".json") && !name.starts_with('.')).count();
+        assert_eq!(number(&found, "done") as usize, sealed, "{signal}");
+        assert!(sealed < 500, "{signal}: it was done before");
+        assert_eq!(found["left_s"].as_f64().map(|left| left > 0.0), Some(true), "{signal}");
+        if signal == "-KILL" {
+            // The clock of its last row, an hour ago.
+            let log = data.join("ledger/shard-0-of-1-run-1.jsonl");
+            let old = furrow::dataset::timing_log::now() - 3600.0;
+            let aged = |line: &str| {
+                let Ok(mut row) = serde_json::from_str::<Value>(line) else { return line.to_owned() };
+                for key in ["began_s", "done_s"] {
+                    if row[key].is_number() {
+                        row[key] = old.into();
+                    }
+                }
+                row.to_string()
+            };
+            let lines: Vec<String> = fs::read_to_string(&log).unwrap().lines().map(aged).collect();
+            fs::write(&log, lines.join("\n") + "\n").unwrap();
+            let found = status(&data, &[]);
+            assert_eq!((&found["shards"][0]["state"], number(&found, "working")), (&Value::from("silent"), 0.0));
+            assert!(told(&data, &[]).contains("perhaps killed"));
+        }
+    }
+}
+
+/// Expected: Ctrl-C ends the watching of what is not done, with the code of what was stopped, and nothing is written.
+#[test]
+fn watching_ends_with_a_signal() {
+    let (_keep, data) = scratch();
+    succeed(trace(&[&["dataset", "plan", "--scene", SMALL, "--count", "3", "--out", path(&data)], &SIZE[..]].concat()));
+    let before = tree(&data);
+    let mut child =
+        verb("status", &data, &["--watch", "--json"]).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    let mut line = String::new();
+    let mut talk = std::io::BufReader::new(child.stdout.take().unwrap());
+    std::io::BufRead::read_line(&mut talk, &mut line).unwrap();
+    let found: Value = serde_json::from_str(&line).unwrap();
+    assert_eq!(
+        (number(&found, "done"), &found["left_s"], &found["shards"][0]["state"]),
+        (0.0, &Value::Null, &Value::from("missing"))
+    );
+    send("-INT", &child);
+    assert_eq!(child.wait().unwrap().code(), Some(75));
+    assert!(before == tree(&data));
+}
+
+/// A sun that has set in some fields: those images fail, each with its error, until a run makes them.
+#[test]
+fn images_that_fail_are_told_with_their_errors() {
+    let (_keep, data) = scratch();
+    let page = data.with_extension("ron");
+    let text = |seed: u32| {
+        format!(
+            "Field(seed: {seed}, camera: Pinhole(size: (32, 24), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 1)),
+             lights: [Daylight(sun: At(latitude_deg: 50, longitude_deg: 7, utc: \"2026-06-01T12:00:00Z\", later_h: Uniform(0, 24)))])"
+        )
+    };
+    let begun = (0..20).any(|seed| {
+        fs::write(&page, text(seed)).unwrap();
+        let plan = ["dataset", "plan", "--scene", path(&page), "--count", "12", "--spp", "2", "--out", path(&data)];
+        trace(&plan).output().unwrap().status.success()
+    });
+    assert!(begun, "twenty times the sun had set in the first field");
+    let said = fail(verb("render", &data, &["--quiet"]), 2);
+    let found = status(&data, &[]);
+    let failures = found["failures"].as_array().unwrap();
+    assert!(!failures.is_empty());
+    assert_eq!(number(&found, "done") as usize + failures.len(), 12);
+    assert_eq!(number(&found["shards"][0], "failed") as usize, failures.len());
+    assert_eq!(found["shards"][0]["state"], "failed");
+    for failure in failures {
+        let error = failure["error"].as_str().unwrap();
+        assert!(error.contains("below the horizon"), "{error}");
+        let name = format!("{:06}", number(failure, "index"));
+        assert!(said.contains(&format!("image {name}: {error}")), "{name}: {error}: {said}");
+        assert!(!data.join("seals").join(format!("{name}.json")).exists(), "{name}");
+    }
+    let words = told(&data, &[]);
+    assert!(words.contains(&format!("{} failed", failures.len())) && words.contains("failed images:"), "{words}");
+}
+
+/// Expected: each shard has its own images, rate and state; the number of shards is read off the log, and can be given.
+#[test]
+fn shards_are_told_apart() {
+    let (_keep, data) = scratch();
+    succeed(trace(&[&["dataset", "plan", "--scene", SMALL, "--count", "5", "--out", path(&data)], &SIZE[..]].concat()));
+    succeed(verb("render", &data, &["--shard", "1/2", "--quiet"]));
+    let found = status(&data, &[]);
+    let shards = found["shards"].as_array().unwrap();
+    let numbers: Vec<_> =
+        shards.iter().map(|s| ["number", "images", "done", "failed"].map(|key| number(s, key))).collect();
+    assert_eq!(numbers, [[0.0, 3.0, 0.0, 0.0], [1.0, 2.0, 2.0, 0.0]]);
+    let states: Vec<_> = shards.iter().map(|shard| shard["state"].as_str().unwrap()).collect();
+    assert_eq!(states, ["missing", "done"]);
+    assert!(shards[0]["images_per_hour"].is_null() && number(&shards[1], "images_per_hour") > 0.0);
+    let words = told(&data, &[]);
+    assert!(words.contains("2 of 5 images") && words.contains("shard  images"), "{words}");
+    assert_eq!(status(&data, &["--shards", "1"])["shards"].as_array().unwrap().len(), 1);
+    succeed(verb("render", &data, &["--shard", "0/2", "--quiet"]));
+    assert_eq!(number(&status(&data, &[]), "done"), 5.0);
+}
+
+#[test]
+fn what_is_no_dataset_is_refused() {
+    let (_keep, data) = scratch();
+    let said = fail(verb("status", &data, &[]), 2);
+    assert!(said.contains("this is no dataset") && said.contains(path(&data)), "{said}");
+    fs::create_dir_all(&data).unwrap();
+    let said = fail(verb("status", &data, &["--watch"]), 2);
+    assert!(said.contains("it has no dataset.json") && said.contains("trace dataset plan"), "{said}");
+    fs::write(data.join("dataset.json"), "{}").unwrap();
+    let said = fail(verb("status", &data, &["--json"]), 1);
+    assert!(said.contains("not a dataset's recipe"), "{said}");
+    fail(verb("status", &data, &["--shards", "0"]), 2);
+}
+
+/// The rows of a bill by their names.
+fn bill(arguments: &[&str]) -> BTreeMap<String, String> {
+    let output = succeed(trace(arguments));
+    let text = String::from_utf8(output.stdout).unwrap();
+    let row = |line: &str| {
+        let (name, words) = line.split_once("  ").unwrap_or_else(|| panic!("no row: {line}"));
+        (name.trim().to_owned(), words.trim().to_owned())
+    };
+    text.lines().map(row).collect()
+}
+
+/// The number that some words begin with; thousands are parted by narrow spaces.
+fn first_number(words: &str) -> f64 {
+    let digits: String =
+        words.chars().filter(|c| *c != '\u{202f}').take_while(|c| c.is_ascii_digit() || *c == '.').collect();
+    digits.parse().unwrap_or_else(|_| panic!("no number: {words}"))
+}
+
+/// Number of files below a folder, and their bytes, where names of one file count once.
+fn measured(folder: &Path) -> (u64, u64) {
+    let (mut files, mut lengths) = (0, BTreeMap::new());
+    let mut todo = vec![folder.to_path_buf()];
+    while let Some(at) = todo.pop() {
+        for entry in fs::read_dir(at).unwrap() {
+            let entry = entry.unwrap();
+            let about = entry.metadata().unwrap();
+            if about.is_dir() {
+                todo.push(entry.path());
+            } else {
+                files += 1;
+                lengths.insert(about.ino(), about.len());
+            }
+        }
+    }
+    (files, lengths.values().sum())
+}
+
+/// Expected: the files are those that are made, to the last one, whatever the splits, formats and cameras; bytes within 30 %; time and memory
+/// are more than nothing and less than a small machine could take; neither `--out` nor the folder for temporary files has anything in it.
+#[test]
+fn the_bill_is_what_is_taken() {
+    let drive = "scenes/09-drive.ron";
+    let orders: [(&str, &[&str]); 3] = [
+        ("12", &["--scene", SMALL, "--width", "96", "--spp", "16", "--format", "coco,imagefolder,phenobench,yolo"]),
+        ("3", &["--scene", SMALL, "--width", "64", "--spp", "1", "--split", "1,1,0"]),
+        (
+            "7",
+            &["--scene", drive, "--width", "48", "--spp", "2", "--format", "colmap,mots,nerf,tum", "--split", "1,1,1"],
+        ),
+    ];
+    for (count, order) in orders {
+        let (keep, data) = scratch();
+        let temporary = keep.path().join("temporary");
+        fs::create_dir(&temporary).unwrap();
+        let all = [&["dataset"][..], order, &["--count", count, "--out", path(&data)]].concat();
+        let mut dry = trace(&all);
+        dry.arg("--dry-run").env("TMPDIR", &temporary);
+        let output = succeed(dry);
+        assert!(!data.exists() && names(&temporary).is_empty(), "{order:?}");
+        let rows =
+            bill(&[&["dataset", "plan"][..], order, &["--count", count, "--out", path(&data), "--bill"]].concat());
+        assert!(!data.exists(), "{order:?}");
+        let text = String::from_utf8(output.stdout).unwrap();
+        for name in rows.keys() {
+            assert!(text.contains(name), "the same rows: {name}: {text}");
+        }
+        succeed(trace(&[&all[..], &["--quiet"]].concat()));
+        let (files, bytes) = measured(&data);
+        assert_eq!(first_number(&rows["files"]) as u64, files, "{order:?}");
+        let (_, told) = rows["disk"].split_once('(').unwrap();
+        let off = first_number(told) * 1e6 / bytes as f64;
+        assert!((0.7..1.3).contains(&off), "{order:?}: {off} of {bytes} bytes");
+        let (_, core) = rows["core hours"].split_once('(').unwrap();
+        let memory = first_number(&rows["memory"]);
+        assert!((0.05..3600.0).contains(&first_number(core)) && (0.01..16.0).contains(&memory), "{rows:?}");
+        assert!(rows["shards"].contains("--shards 1 "), "{rows:?}");
+    }
+}
+
+/// Expected: Ctrl-C ends it soon, with the code of what was stopped, and leaves nothing.
+#[test]
+fn a_bill_that_is_stopped_leaves_nothing() {
+    let (keep, data) = scratch();
+    let temporary = keep.path().join("temporary");
+    fs::create_dir(&temporary).unwrap();
+    let order = [
+        "dataset",
+        "--scene",
+        SMALL,
+        "--width",
+        "256",
+        "--spp",
+        "65536",
+        "--count",
+        "1000",
+        "--out",
+        path(&data),
+        "--dry-run",
+    ];
+    let mut child =
+        trace(&order).env("TMPDIR", &temporary).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    std::thread::sleep(Duration::from_secs(3));
+    assert!(child.try_wait().unwrap().is_none(), "hours of samples were drawn in seconds");
+    send("-INT", &child);
+    let begin = Instant::now();
+    assert_eq!(child.wait().unwrap().code(), Some(75));
+    assert!(begin.elapsed() < Duration::from_secs(60));
+    assert!(!data.exists() && names(&temporary).is_empty());
+}
+
+#[test]
+fn orders_that_cannot_be_have_no_bill() {
+    let (_keep, data) = scratch();
+    let order = |scene: &str, more: &[&str]| {
+        trace(&[&["dataset", "--scene", scene, "--out", path(&data), "--count", "3", "--dry-run"], more].concat())
+    };
+    fail(order("tests/ref/nowhere.ron", &[]), 2);
+    fail(order(SMALL, &["--format", "coca"]), 2);
+    assert!(!data.exists());
+}
