@@ -26,6 +26,7 @@
 //! | `checksum`, `checksum_record`, `set` | SHA-256 of a file; those of an image's files; the dataset on disk |
 //! | `make` | all of it in one call |
 //! | `plan`, `gather`, `begin`, `generate`, `timing_log`, `finish` | from a scene file, copied with all that it names, to images and a manifest; what remains to be done is found by looking at the disk |
+//! | `stream` | the images of a dataset without its folder, as an archive for a program that reads them as they are made |
 //! | `cluster` | the same on many machines: job files for schedulers |
 //! | `invariants`, `difference`, `verify` | what must hold of every image; how far two of them lie apart; whether all is so |
 //! | `import` | other people's images and labels |
@@ -83,6 +84,8 @@ pub mod sample;
 pub mod set;
 #[doc(hidden)]
 pub mod split;
+#[doc(hidden)]
+pub mod stream;
 #[doc(hidden)]
 pub mod timing_log;
 #[doc(hidden)]
