@@ -88,7 +88,12 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let out = BufWriter::with_capacity(1 << 20, io::stdout());
     let written = stream.write(&args.work.of(args.shard, args.memory.bytes), out, &listener);
     if !args.work.quiet {
-        furrow::tell!("{} images in {:.1} s: {}", images.get(), begin.elapsed().as_secs_f64(), rate(images.get(), begin));
+        furrow::tell!(
+            "{} images in {:.1} s: {}",
+            images.get(),
+            begin.elapsed().as_secs_f64(),
+            rate(images.get(), begin)
+        );
     }
     written.map(|_| Vec::new())
 }
