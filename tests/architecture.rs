@@ -126,14 +126,19 @@ const ALLOWED: &[(&str, &str)] = &[
     ("solar_positioning", "light/position.rs"),
     // How far a misspelt name is from those that are known.
     ("strsim", "ron_file/suggest.rs"),
+    // Images as one archive, for programs that read them as they are made.
+    ("tar", "dataset/stream.rs"),
     // libtorch: networks and how they learn.
     (
         "tch",
         "train/torch/ train/fit/gradients.rs train/fit/loss.rs train/fit/optimiser.rs train/fit/trainer.rs train/deploy/",
     ),
     // Files appear whole or not at all: images of fields, and drawn textures below them. The denoiser's go through a folder,
-    // and so do a scene that is taken into a dataset and the small dataset that a bill is made of.
-    ("tempfile", "cli/mod.rs dataset/bill.rs dataset/plan.rs output/atomic.rs output/denoise.rs texture/draw/write.rs"),
+    // and so do a scene that is taken into a dataset or a stream, and the small dataset that a bill is made of.
+    (
+        "tempfile",
+        "cli/mod.rs dataset/bill.rs dataset/plan.rs dataset/stream.rs output/atomic.rs output/denoise.rs texture/draw/write.rs",
+    ),
     // Another program that shows pictures.
     ("tev_client", "bin/trace/watch/tev.rs"),
     // A page on this machine.

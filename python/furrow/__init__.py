@@ -8,6 +8,9 @@
     data = furrow.Dataset("data/d", split="train")                # a folder that `trace dataset` has made
     print(len(data), data[0]["plants"].max(), data[0]["record"]["conditions"]["camera"])
 
+    for sample in furrow.stream("field", spp=16, width=324):      # one field after another, none of them written to disk
+        train(sample["image"], sample["semantics"])
+
 Needs numpy and Pillow. A `Dataset` goes into PyTorch's `DataLoader` as it is; `transform` chooses what a batch holds.
 """
 
@@ -20,14 +23,15 @@ import os
 import shutil
 import subprocess
 import sysconfig
+import tarfile
 import tempfile
 from pathlib import Path
-from typing import Any, Callable, Dict, Iterator, Optional, Sequence, SupportsIndex, Union
+from typing import IO, Any, Callable, Dict, Generator, Iterator, Optional, Sequence, SupportsIndex, Tuple, Union
 
 import numpy as np
 from PIL import Image
 
-__all__ = ["Dataset", "Error", "Sample", "program", "render"]
+__all__ = ["Dataset", "Error", "Sample", "program", "render", "stream"]
 
 SPLITS = ("train", "val", "test")
 
@@ -45,7 +49,7 @@ class Sample(Dict[str, Any]):
     semantics  uint8, (H, W)           0 soil, 1 crop, 2 weed, 255 no label
     plants     int32, (H, W)           number of the plant, 0 for none
     leaves     int32, (H, W)           number of the leaf on its plant, 0 for none
-    record     dict                    a dataset's `record.json`; of `render`, where the image came from
+    record     dict                    `record.json` of a dataset or a stream; of `render`, where the image came from
     ========== ======================= ==========================================================
     """
 
@@ -56,37 +60,53 @@ class Sample(Dict[str, Any]):
         return out.getvalue()
 
 
-def _read(path: Path, kind: type[np.generic]) -> np.ndarray[Any, Any]:
-    """A picture's values, in memory that may be written."""
+def _read(file: Union[Path, IO[bytes]], kind: type[np.generic], name: object = None) -> np.ndarray[Any, Any]:
+    """A picture's values, in memory that may be written; `name` is what errors call the file."""
     try:
-        with Image.open(path) as picture:
+        with Image.open(file) as picture:
             return np.array(picture).astype(kind)
     # What Pillow raises for files that are no pictures, or are cut short.
     except (OSError, SyntaxError, ValueError) as error:
-        raise Error(f"{path}: {error}") from error
+        raise Error(f"{name or file}: {error}") from error
+
+
+def _object(text: Union[str, bytes], name: object) -> Dict[str, Any]:
+    """What stands in JSON that holds an object."""
+    try:
+        found = json.loads(text)
+    except ValueError as error:
+        raise Error(f"{name}: {error}") from error
+    if not isinstance(found, dict):
+        raise Error(f"{name}: this is no JSON object")
+    return found
 
 
 def _json(path: Path) -> Dict[str, Any]:
     """What stands in a JSON file that holds an object."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        return _object(path.read_text(encoding="utf-8"), path)
+    except (OSError, UnicodeError) as error:
         raise Error(f"{path}: {error}") from error
-    if not isinstance(found, dict):
-        raise Error(f"{path}: this is no JSON object")
-    return found
+
+
+# Names of pictures in a sample and as files, with the types of their values.
+# Not the 16 bits of the files: PyTorch before 2.3 takes none without a sign.
+_MAPS = (
+    ("image", "rgb", np.uint8),
+    ("nir", "nir", np.uint8),
+    ("semantics", "semantics", np.uint8),
+    ("plants", "plants", np.int32),
+    ("leaves", "leaves", np.int32),
+)
 
 
 def _sample(folder: Path, photographs: str = "") -> Sample:
     """The pictures and labels of an image's folder; `photographs` ends the names of other photographs."""
-    sample = Sample(image=_read(folder / f"rgb{photographs}.png", np.uint8))
-    nir = folder / f"nir{photographs}.png"
-    if nir.is_file():
-        sample["nir"] = _read(nir, np.uint8)
-    sample["semantics"] = _read(folder / "semantics.png", np.uint8)
-    # Not the 16 bits of the files: PyTorch before 2.3 takes none without a sign.
-    for name in ("plants", "leaves"):
-        sample[name] = _read(folder / f"{name}.png", np.int32)
+    sample = Sample()
+    for name, file, kind in _MAPS:
+        path = folder / f"{file}{photographs if name in ('image', 'nir') else ''}.png"
+        if name != "nir" or path.is_file():
+            sample[name] = _read(path, kind)
     return sample
 
 
@@ -181,3 +201,72 @@ def render(scene: Union[str, "os.PathLike[str]"], index: int = 0, spp: Optional[
             comment = str(picture.info.get("Comment", ""))
         sample["record"] = dict(line.split(": ", 1) for line in comment.splitlines() if ": " in line)
         return sample
+
+
+def _entries(archive: IO[bytes]) -> Iterator[Tuple[str, bytes]]:
+    """Names and contents of the files in a tar archive that is being written; ends where the archive does, or is cut."""
+    # Not `tarfile.open`, which keeps a list of all files: an archive may go on for days.
+    while header := archive.read(tarfile.BLOCKSIZE):
+        try:
+            entry = tarfile.TarInfo.frombuf(header, "utf-8", "strict")
+        except tarfile.HeaderError:  # Zeros at the end, or a part of a header.
+            return
+        content = archive.read(entry.size)
+        if len(content) < entry.size:
+            return
+        archive.read(-entry.size % tarfile.BLOCKSIZE)
+        yield entry.name, content
+
+
+def _samples(archive: IO[bytes]) -> Iterator[Sample]:
+    """The samples of an archive; of each image, the record is the last file."""
+    files: Dict[str, bytes] = {}
+    for path, content in _entries(archive):
+        key, name = path.split(".", 1)
+        files[name] = content
+        if name == "record.json":
+            sample = Sample()
+            for of, file, kind in _MAPS:
+                if f"{file}.png" in files:
+                    sample[of] = _read(io.BytesIO(files[f"{file}.png"]), kind, f"{key}.{file}.png")
+            sample["record"] = _object(content, path)
+            files = {}
+            yield sample
+
+
+def stream(
+    scene: Union[str, "os.PathLike[str]"],
+    spp: Optional[int] = 16,
+    first: int = 0,
+    count: Optional[int] = None,
+    shard: Optional[Tuple[int, int]] = None,
+    **flags: Any,
+) -> Generator[Sample, None, None]:
+    """Fields of a scene file from number `first` on, each rendered shortly before it is asked for; without `count` they never end.
+
+    Image k is the one that a dataset of the same scene file, size and samples has, its record included. With several readers, `shard`
+    `(k, n)` gives each its own: reader k of n. Further keywords are the flags of `trace stream` with `_` for `-`: `width=324`, `seed=3`,
+    `denoise=True`, `threads=2`. The program runs until the generator is closed or dropped. Raises `Error` with the program's own words.
+    """
+    # Only what becomes an array is encoded.
+    chosen: Dict[str, Any] = {"keep": "nir", "spp": spp, "first": first, "count": count, **flags}
+    if shard is not None:
+        chosen["shard"] = "/".join(map(str, shard))
+    command = [program(), "stream", "--quiet", "--scene", os.fspath(scene), *_flags(chosen)]
+    # A file, which unlike a pipe takes any number of warnings.
+    with tempfile.TemporaryFile(prefix="furrow-") as said:
+        try:
+            process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=said)
+        except OSError as error:
+            raise Error(f"{command[0]}: {error}") from error
+        with process:
+            assert process.stdout is not None
+            try:
+                yield from _samples(process.stdout)
+                failed = process.wait() != 0
+            finally:
+                # Does nothing to a program that has ended.
+                process.terminate()
+        if failed:
+            said.seek(0)
+            raise Error(said.read().decode(errors="replace").strip() or f"{command[0]} ended with {process.returncode}")

@@ -97,14 +97,14 @@ pub enum Task {
 pub(super) const MOST_AT_ONCE: usize = 16;
 
 /// How many fields like one of them the memory is for. Where that cannot be told, one: its image will say why.
-fn fitting(scene: &SceneFile, index: u64, memory: Option<u64>) -> usize {
+pub(super) fn fitting(scene: &SceneFile, index: u64, memory: Option<u64>) -> usize {
     let memory = memory.unwrap_or_else(usual_memory) as f64;
     let one = scene.estimate(index).map_or(memory, |estimate| estimate.total().bytes);
     ((memory / one) as usize).clamp(1, MOST_AT_ONCE)
 }
 
 /// Threads of one worker, of all that are shared out among so many workers; at least one.
-fn share(threads: usize, workers: usize, worker: usize) -> usize {
+pub(super) fn share(threads: usize, workers: usize, worker: usize) -> usize {
     (threads / workers + usize::from(worker < threads % workers)).max(1)
 }
 
@@ -210,7 +210,7 @@ pub(super) fn interrupted(folder: &Path, there: usize, wanted: usize) -> Error {
 const MOST_TOLD: usize = 20;
 
 /// What went wrong in a run, by image: the whole run's failure alone, or those of single images in one.
-fn together(failures: BTreeMap<u64, Error>) -> Error {
+pub(super) fn together(failures: BTreeMap<u64, Error>) -> Error {
     let mut words = Vec::new();
     let more = failures.len().saturating_sub(MOST_TOLD);
     let mut input = true;

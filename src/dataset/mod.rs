@@ -28,6 +28,7 @@
 //! | `plan`, `gather`, `begin`, `generate`, `timing_log`, `finish` | from a scene file, copied with all that it names, to images and a manifest; what remains to be done is found by looking at the disk |
 //! | `bill`, `meter` | what a dataset will cost, from three of its images; what this process has taken |
 //! | `status` | how far a dataset is, from what lies in its folder |
+//! | `stream` | the images of a dataset without its folder, as an archive for a program that reads them as they are made |
 //! | `cluster` | the same on many machines: job files for schedulers |
 //! | `invariants`, `difference`, `verify` | what must hold of every image; how far two of them lie apart; whether all is so |
 //! | `import` | other people's images and labels |
@@ -91,6 +92,8 @@ pub mod set;
 pub mod split;
 #[doc(hidden)]
 pub mod status;
+#[doc(hidden)]
+pub mod stream;
 #[doc(hidden)]
 pub mod timing_log;
 #[doc(hidden)]

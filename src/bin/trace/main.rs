@@ -20,6 +20,7 @@ mod preview;
 mod quality;
 mod render;
 mod sequence;
+mod stream;
 mod texture;
 mod watch;
 
@@ -53,6 +54,7 @@ Examples:
   trace watch scenes/field.ron                          a page that shows the field whenever the file is saved
   trace preview scenes/field.ron --indices 0..12 --out sheet.png   twelve fields of the same kind on one sheet
   trace dataset --scene scenes/field.ron --count 100 --out data   a hundred of them, labelled, resumable
+  trace stream --scene scenes/field.ron | python3 train.py        fields as a program asks for them, without files
   trace sequence --scene scenes/09-drive.ron --out drive          a stereo pair that drives along a row
   trace ablate --scene scenes/field.ron --count 100 --out ab      the same hundred with one thing changed at a time
   trace export --scene scenes/field.ron --format gltf   the same field for another program
@@ -87,6 +89,8 @@ enum Verb {
     Compare(compare::Args),
     /// Make many fields with all their labels, in the formats of other tools.
     Dataset(Box<dataset::Cli>),
+    /// Write images with their labels to stdout as they are made, as a tar archive for a program that reads them.
+    Stream(Box<stream::Args>),
     /// Drive through a field and take all images of its cameras: poses, optical flow, tracks.
     Sequence(Box<sequence::Args>),
     /// Make a dataset, and the same again with one thing changed at a time: what does each matter to a network?
@@ -127,6 +131,7 @@ fn main() -> ExitCode {
         Some(Verb::Dataset(args)) => dataset::run(&args, &signals),
         Some(Verb::Ablate(args)) => ablate::run(&args, &signals),
         Some(Verb::Sequence(args)) => sequence::run(&args, &signals),
+        Some(Verb::Stream(args)) => stream::run(&args, &signals),
         Some(Verb::Export(args)) => export::run(&args),
         Some(Verb::Texture(args)) => texture::run(&args),
         Some(Verb::Leaf(args)) => leaf::run(&args),

@@ -41,15 +41,29 @@ pub(crate) struct ImageArgs {
     format: Vec<String>,
     #[command(flatten)]
     labels: LabelArgs,
+    #[command(flatten)]
+    content: ContentArgs,
+    /// What others may do with the images, such as CC-BY-4.0; stands in the manifest.
+    #[arg(long, value_name = "TEXT", default_value = Order::NO_LICENCE)]
+    licence: String,
+    #[command(flatten)]
+    look: LookArgs,
+}
+
+/// What an image is given.
+#[derive(clap::Args)]
+pub(crate) struct ContentArgs {
     /// Maps to keep beside photograph, labels and record, separated by commas; none for nothing more.
     #[arg(long, value_delimiter = ',', value_name = "MAP", default_value = "nir,coverage,depth,normals", value_parser = maps())]
     keep: Vec<String>,
     /// Shares of train, val and test.
     #[arg(long, value_name = "TRAIN,VAL,TEST", default_value = "8,1,1", value_parser = Shares::parse)]
     split: Shares,
-    /// What others may do with the images, such as CC-BY-4.0; stands in the manifest.
-    #[arg(long, value_name = "TEXT", default_value = Order::NO_LICENCE)]
-    licence: String,
+}
+
+/// How photographs are rendered.
+#[derive(clap::Args)]
+pub(crate) struct LookArgs {
     /// Samples a pixel.
     #[arg(long, default_value_t = Quality::SPP, value_parser = samples())]
     spp: u32,
@@ -135,6 +149,23 @@ pub(crate) fn begin(folder: &Path, order: &Order) -> Result<Set> {
     Ok(set)
 }
 
+impl LookArgs {
+    /// How images are rendered without an edit.
+    pub(crate) fn options(&self) -> RenderOptions {
+        self.technique.options(Quality { denoise: self.denoise, ..Quality::spp(self.spp) })
+    }
+}
+
+impl ContentArgs {
+    /// Enters what is asked for into an order.
+    pub(crate) fn enter(&self, order: &mut Order) -> Result<()> {
+        let named = |name: &String| Kept::NAMED.iter().find(|(known, ..)| known == name).map(|(_, kept, _)| *kept);
+        order.keep = keep::checked(self.keep.iter().filter_map(named).collect())?;
+        order.split = self.split;
+        Ok(())
+    }
+}
+
 impl ImageArgs {
     /// Where they go.
     pub(crate) fn folder(&self) -> &Path {
@@ -143,13 +174,7 @@ impl ImageArgs {
 
     /// How the images are rendered without an edit.
     pub(crate) fn options(&self) -> RenderOptions {
-        self.technique.options(Quality { denoise: self.denoise, ..Quality::spp(self.spp) })
-    }
-
-    /// The maps to keep.
-    fn kept(&self) -> Result<Vec<Kept>> {
-        let named = |name: &String| Kept::NAMED.iter().find(|(known, ..)| known == name).map(|(_, kept, _)| *kept);
-        keep::checked(self.keep.iter().filter_map(named).collect())
+        self.look.options()
     }
 
     /// A dataset of these images as an edit has them.
@@ -158,20 +183,19 @@ impl ImageArgs {
         let mut formats = self.format.clone();
         formats.sort();
         formats.dedup();
-        Ok(Order {
-            scene: self.scene.path().to_path_buf(),
+        let mut order = Order {
             seed: self.scene.seed,
-            count: self.count.unwrap_or(0),
             width: self.scene.width,
             height: self.scene.height,
             formats,
             labelling: self.labels.labelling(),
-            keep: self.kept()?,
-            split: self.split,
             licence: self.licence.clone(),
             options: self.options(),
             edit,
             memory: self.memory.bytes,
-        })
+            ..Order::new(self.scene.path(), self.count.unwrap_or(0))
+        };
+        self.content.enter(&mut order)?;
+        Ok(order)
     }
 }

@@ -39,6 +39,13 @@ pub(crate) struct WorkArgs {
     pub(crate) quiet: bool,
 }
 
+impl WorkArgs {
+    /// The work of a shard.
+    pub(crate) fn of(&self, shard: Shard, memory: Option<u64>) -> Work {
+        Work { shard, threads: self.threads, at_once: self.at_once, memory }
+    }
+}
+
 /// Makes the images of a shard.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let set = Set::open(&args.dir)?;
@@ -55,8 +62,7 @@ pub(crate) fn generate(set: &Set, args: &WorkArgs, shard: Shard, memory: Option<
     let done = |_| progress.add();
     let warn = |words: &str| furrow::tell!("warning: {words}");
     let callbacks = Callbacks { begin: &total, warn: &warn, done: &done, soon, now };
-    let work = Work { shard, threads: args.threads, at_once: args.at_once, memory };
-    let made = generate::generate(set, &work, &callbacks);
+    let made = generate::generate(set, &args.of(shard, memory), &callbacks);
     let (images, rate) = progress.finish();
     if !args.quiet {
         let rate = if images > 0 { format!(": {rate:.0} images an hour") } else { String::new() };

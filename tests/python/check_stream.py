@@ -1,0 +1,81 @@
+"""`furrow.stream`: the samples of a dataset, without it. Arguments: a scene file, a dataset of two images of it."""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+
+import furrow
+import numpy as np
+
+scene, dataset = sys.argv[1:]
+SIZE = {"width": 48, "spp": 1}
+started = []
+popen = subprocess.Popen
+
+
+def remembered(*arguments, **named):
+    """The program, remembered."""
+    started.append(popen(*arguments, **named))
+    return started[-1]
+
+
+furrow.subprocess.Popen = remembered
+
+# Twenty of a stream that has no end; then the program is gone, and so is what it kept.
+with tempfile.TemporaryDirectory() as folder:
+    os.environ["TMPDIR"] = tempfile.tempdir = folder
+    samples = furrow.stream(scene, threads=2, **SIZE)
+    first = [next(samples) for _ in range(20)]
+    assert started[0].poll() is None, "an endless stream"
+    begin = time.monotonic()
+    del samples
+    assert started[0].poll() is not None and time.monotonic() - begin < 30, "it runs on"
+    assert not os.listdir(folder), os.listdir(folder)
+    os.environ.pop("TMPDIR")
+    tempfile.tempdir = None
+assert [s["record"]["index"] for s in first] == list(range(20))
+
+# What a dataset of the same order has.
+for ours, other in zip(first, furrow.Dataset(dataset)):
+    assert list(ours) == list(other), list(ours)
+    assert ours["record"] == other["record"]
+    for name in ours:
+        if name != "record":
+            assert ours[name].dtype == other[name].dtype and np.array_equal(ours[name], other[name]), name
+            ours[name][:] = 0  # Its memory is the caller's.
+
+# Parts, and an end.
+indices = [s["record"]["index"] for s in furrow.stream(scene, first=2, count=5, shard=(1, 2), **SIZE)]
+assert indices == [3, 5], indices
+assert started[1].returncode == 0
+bare = next(furrow.stream(scene, keep="none", **SIZE))
+assert "nir" not in bare and "image" in bare, list(bare)
+
+# The program's own words.
+for flags, words in [({"count": 0}, "0 is not in"), ({"shard": (3, 2)}, "k/N"), ({"without": ["none-such"]}, "none-such")]:
+    try:
+        next(furrow.stream(scene, **flags))
+    except furrow.Error as error:
+        assert words in str(error), error
+    else:
+        raise AssertionError(flags)
+# Killed by someone else, it is an error and no end.
+samples = furrow.stream(scene, **SIZE)
+next(samples)
+started[-1].kill()
+try:
+    for _ in samples:
+        pass
+except furrow.Error as error:
+    assert "ended with -9" in str(error), error
+else:
+    raise AssertionError("a stream that was cut")
+os.environ["FURROW_TRACE"] = "/nowhere/trace"
+try:
+    next(furrow.stream(scene))
+except furrow.Error as error:
+    assert "/nowhere/trace" in str(error), error
+else:
+    raise AssertionError("a program that is not there")
