@@ -131,8 +131,7 @@ impl Status {
             .collect();
         let now = timing_log::now();
         // More shards than images are named by nobody, and would fill the memory.
-        let mut all: Vec<ShardStatus> =
-            (0..of.min(set.recipe.count.max(1))).map(|number| ShardStatus::empty(number)).collect();
+        let mut all: Vec<ShardStatus> = (0..of.min(set.recipe.count.max(1))).map(ShardStatus::empty).collect();
         for (index, done) in (0..).zip(&there) {
             if let Some(shard) = all.get_mut(shard_of(index) as usize) {
                 shard.images += 1;

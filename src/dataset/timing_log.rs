@@ -226,7 +226,9 @@ mod tests {
             Row::Failure(ImageFailure { index: 7, error: "no sun\n help: wait".into(), failed_s: 2.0 }),
             Row::Ended(Ended { ended_s: 3.0, end: End::Failed, cpu_s: Some(2.5), peak_bytes: None }),
         ];
-        rows.iter().for_each(|row| log.add(row).unwrap());
+        for row in &rows {
+            log.add(row).unwrap();
+        }
         let old =
             r#"{"index":9,"image":"cd","seconds":1.0,"grow_s":0.1,"draw_s":0.8,"label_s":0.1,"at_once":1,"threads":1}"#;
         std::fs::write(folder.path().join("ledger/shard-0-of-1-run-1.jsonl"), format!("{old}\n{{\"index\":1")).unwrap();

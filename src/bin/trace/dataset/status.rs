@@ -3,7 +3,7 @@
 use furrow::cli;
 use furrow::cli::signal::Signals;
 use furrow::dataset::Set;
-use furrow::dataset::status::{ShardStatus, State, Status};
+use furrow::dataset::status::{FailedImage, ShardStatus, State, Status};
 use furrow::report::{count, number};
 use furrow::{Error, Result};
 use humantime::format_duration;
@@ -91,11 +91,10 @@ fn told(set: &Set, status: &Status) -> String {
     }
     if !status.failures.is_empty() {
         text += "failed images:\n";
-        for failure in status.failures.iter().take(MOST_TOLD) {
-            text += &format!("{}: {}\n", Set::name(failure.index), failure.error);
-        }
+        let line = |failure: &FailedImage| format!("{}: {}\n", Set::name(failure.index), failure.error);
+        text.extend(status.failures.iter().take(MOST_TOLD).map(line));
         if let Some(more) = status.failures.len().checked_sub(MOST_TOLD).filter(|more| *more > 0) {
-            text += &format!("and {more} more; --json tells all\n");
+            text.extend([format!("and {more} more; --json tells all\n")]);
         }
     }
     text
