@@ -138,7 +138,7 @@ impl Classes {
 
     /// sRGB colours, in order: soil, crop and weed as in the label images, others spread around the colour circle.
     pub fn colors(&self) -> Vec<[u8; 3]> {
-        let known = crate::dataset::native::palette(false);
+        let known = crate::scene::tag::Class::ALL.map(crate::scene::tag::Class::color);
         let place = |c: &Class| SEMANTICS.iter().position(|s| c.labels.iter().any(|l| l == s));
         let mut taken = [false; 3];
         let mut colors = Vec::new();

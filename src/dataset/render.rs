@@ -8,6 +8,7 @@ use super::sample::{Rendered, Sample};
 use super::set::Set;
 use super::{flow, format};
 use crate::job::{Field, Image, Renderer, Request, SceneFile};
+use crate::math::Vec3;
 use crate::render::{self, LabelMap, Watch};
 use crate::scene::drive::Capture;
 use crate::scene::traits::{PlantTraits, Traits};
@@ -168,16 +169,15 @@ fn describe(recipe: &Recipe, index: u64, image: Image<'_>) -> Result<Sample> {
         parts: if recipe.rendering()?.parts { annotate::part_numbers(&labels, &field.kinds) } else { Vec::new() },
         plants: labels.tags.iter().map(|t| t.plant).collect(),
         leaves: labels.tags.iter().map(|t| t.leaf).collect(),
-        coverage: if recipe.keeps(Kept::Coverage) {
-            render::coverage(&film, &tags).into_iter().map(of_255).collect()
-        } else {
-            Vec::new()
-        },
+        coverage: render::coverage(&film, &tags).into_iter().map(of_255).collect(),
         depth: keep::depths(&recipe.rendering()?.keep, &labels.depth),
-        normals: keep::normals(&recipe.rendering()?.keep, labels.normals.iter().map(glam::Vec3::to_array)),
+        normals: keep::normals(&recipe.rendering()?.keep, labels.normals.iter().map(Vec3::to_array)),
         film: None,
     };
     (sample.record.classes, sample.record.ignored) = annotate::classes(&sample);
+    if !recipe.keeps(Kept::Coverage) {
+        sample.coverage.clear();
+    }
     let traits = Traits::of(field);
     sample.record.canopy = traits.canopy;
     sample.record.plants = plants(field, &traits, &labels, &sample);
