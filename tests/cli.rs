@@ -120,7 +120,7 @@ fn talk_goes_to_stderr() {
     let folder = folder();
     let done = run(folder.path(), &["--scene", "page.ron", "--spp", "1", "--out", "there/deep"]);
     assert!(done.status.success());
-    assert!(text(&done.stderr).contains("1 plants"), "{}", text(&done.stderr));
+    assert!(text(&done.stderr).contains("1 plant, 20 parts"), "{}", text(&done.stderr));
     assert!(text(&done.stdout).lines().all(|l| folder.path().join(l).is_file()));
     assert!(folder.path().join("there/deep/rgb.png").is_file());
 }
