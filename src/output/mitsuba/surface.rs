@@ -4,9 +4,9 @@
 //! |---|---|---|
 //! | Lambert | `diffuse` | exact |
 //! | sheet without coats | blend of `diffuse` on either side and `principledthin` that only transmits | exact |
-//! | Oren–Nayar | `diffuse` of A times the albedo | exact seen along the normal, no retroreflection elsewhere |
+//! | Oren–Nayar | `diffuse` of (A + (2/3 − 64/(45π)) B) times the albedo | as bright on the mean over all directions, no retroreflection |
 //! | coats, films of water | blend with `roughplastic` that has no base | Smith's masking is uncorrelated there |
-//! | what lies under a coat | Lambert | exact along the normal, not darker towards the horizon |
+//! | what lies under a coat | Lambert | as bright where it is seen along the normal and lit from all sides alike |
 //! | coats rougher across than along | `roughplastic` of the geometric mean | as bright, of another shape |
 //! | relief | `normalmap` | in the frame of the mesh's normal, not added to its slope |
 //!
@@ -19,7 +19,6 @@
 use super::files::{Band, Files, Plugins};
 use super::look::{Kind, Look};
 use super::xml::Element;
-use crate::bsdf::fresnel;
 use crate::bsdf::microfacet::Ggx;
 use crate::math::{Spectrum, Vec3};
 use crate::{Error, Result};
@@ -31,6 +30,8 @@ const THROUGH: f32 = 0.4;
 const COAT: f32 = 0.2;
 /// Optical depth of hairs and bloom over what is written for it: colours above 1 are refused.
 const DEEPEST_LAYER: f32 = 16.0;
+/// Mean of max(0, cos Δφ) sin α tan β, the term of B in Oren & Nayar 1994, over both hemispheres, weighed by both cosines: 2/3 − 64/(45π).
+const MEAN_B: f32 = 0.213_961;
 /// Weight of a film of water over soil.
 const FILM: f32 = 0.1;
 
@@ -67,10 +68,10 @@ impl Surface {
     /// Writes the pictures of a look, their names beginning with `stem`.
     pub(super) fn write(look: &Look, stem: &str, mask: Option<String>, files: &mut Files<'_>) -> Result<Self> {
         let (factor, through) = match look.kind {
-            Kind::Soil { shape: [a, _], film } => ([a / film.map_or(1.0, |_| 1.0 - FILM); 2], 0.0),
+            Kind::Soil { .. } => ([Self::corner_factor(look.kind); 2], 0.0),
             Kind::Sheet { coats, .. } => {
-                let side = |c: Option<Ggx>| under(c).powi(2) / ((1.0 - THROUGH) * c.map_or(1.0, |_| 1.0 - COAT));
-                (coats.map(side), under(coats[0]) * under(coats[1]) / THROUGH)
+                let side = |c: Option<Ggx>| 1.0 / ((1.0 - THROUGH) * c.map_or(1.0, |_| 1.0 - COAT));
+                (coats.map(side), 1.0 / THROUGH)
             }
         };
         let mut paint = |what: &str, scale: f32, of: &dyn Fn(usize) -> Spectrum| -> Result<Paint> {
@@ -135,7 +136,7 @@ impl Surface {
     /// What reflectances at a mesh's corners are multiplied by.
     pub(super) fn corner_factor(kind: Kind) -> f32 {
         match kind {
-            Kind::Soil { shape: [a, _], film } => a / film.map_or(1.0, |_| 1.0 - FILM),
+            Kind::Soil { shape: [a, b], film } => (a + MEAN_B * b) / film.map_or(1.0, |_| 1.0 - FILM),
             Kind::Sheet { .. } => 1.0,
         }
     }
@@ -148,7 +149,7 @@ impl Surface {
         match self.kind {
             Kind::Soil { shape: [_, b], film } => {
                 if b > 0.0 {
-                    warn("Oren–Nayar is written as Lambert, equal seen along the normal");
+                    warn("Oren–Nayar is written as Lambert, equal on the mean over all directions");
                 }
                 if film.is_some() {
                     warn("the film of water is about equal");
@@ -271,11 +272,6 @@ impl Surface {
         }
         own
     }
-}
-
-/// What lies under a coat and is seen along the normal, over what it would be without.
-fn under(coat: Option<Ggx>) -> f32 {
-    coat.map_or(1.0, |c| ((1.0 - fresnel::dielectric(1.0, c.ior)) / (1.0 - fresnel::hemispherical(c.ior))).sqrt())
 }
 
 /// A coat alone, its reflectance multiplied by `weight`.
