@@ -5,6 +5,7 @@ use crate::geometry::{Mesh, outline};
 use crate::math::{Vec2, Vec3};
 use crate::ron_file::Vary;
 use crate::sampling::Purpose;
+use crate::scene::species_file::SpeciesFile;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::collections::BTreeMap;
@@ -40,8 +41,8 @@ fn pages() -> Vec<Page> {
     files
         .iter()
         .map(|f| {
-            let text = std::fs::read_to_string(f).unwrap();
-            ron::from_str(&text).unwrap_or_else(|e| panic!("{}: {e}", f.display()))
+            let file = SpeciesFile::read(f).unwrap_or_else(|e| panic!("{e}"));
+            ron::from_str(&file.page().text).unwrap_or_else(|e| panic!("{}: {e}", f.display()))
         })
         .collect()
 }
