@@ -5,6 +5,7 @@
 //! a part of another, and may take up all of it.) Memory grows with the images at once, not with the dataset.
 
 use super::checksum_record::{ChecksumRecord, write_files};
+use super::pack::{Id, Packing, store};
 use super::render::{LastField, Times, render, renderer, scene_file};
 use super::set::Set;
 use super::timing_log::{Began, End, Ended, ImageFailure, ImageTiming, Row, TimingLog, now};
@@ -21,7 +22,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Which of the images a run is for: those of the fields whose number % of == number.
+/// Which of the images a run is for: those of the [units](super::Recipe::unit_of) whose number % of == number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
     /// From 0.
@@ -34,9 +35,9 @@ impl Shard {
     /// All images.
     pub const ALL: Self = Self { number: 0, of: 1 };
 
-    /// Whether it holds a field.
-    pub fn holds(self, field: u64) -> bool {
-        field % self.of == self.number
+    /// Whether it holds a unit.
+    pub fn holds(self, unit: u64) -> bool {
+        unit % self.of == self.number
     }
 
     /// Reads `k/N`, k from 0 to N − 1.
@@ -116,13 +117,15 @@ pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()>
     let all = Threads::new(work.threads)?;
     let threads = all.count();
     let shard = work.shard;
-    let held = |k: &u64| shard.holds(set.recipe.field_of(*k).0);
+    let held = |k: &u64| shard.holds(set.recipe.unit_of(*k));
     let wanted: Vec<u64> = (0..set.recipe.count).filter(held).collect();
-    let tasks: Vec<(u64, Task)> =
-        all.install(|| wanted.into_par_iter().map(|k| task(set, k).map(|t| (k, t))).collect::<Result<Vec<_>>>())?;
+    let open = all.install(|| OpenPacks::of(set, shard))?;
+    let look = |k: u64| Ok((k, if open.is_settled(set, k) { Task::Done } else { task(set, k)? }));
+    let tasks: Vec<(u64, Task)> = all.install(|| wanted.into_par_iter().map(look).collect::<Result<Vec<_>>>())?;
     let wanted = tasks.len();
     let tasks: Vec<(u64, Task)> = tasks.into_iter().filter(|(_, t)| *t != Task::Done).collect();
     (callbacks.begin)(tasks.len());
+    open.expect(set, &tasks)?;
     // Images of one field follow each other on one worker, which grows it once.
     let fields: Vec<&[(u64, Task)]> =
         tasks.chunk_by(|a, b| set.recipe.field_of(a.0).0 == set.recipe.field_of(b.0).0).collect();
@@ -170,7 +173,7 @@ pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()>
                 while let Some(field) = fields.get(next.fetch_add(1, Ordering::Relaxed)).filter(|_| !ended()) {
                     let mut kept = LastField::default();
                     for (index, task) in field.iter().take_while(|_| !ended()) {
-                        match worker.install(|| run.image(*index, *task, worker, &mut kept)) {
+                        match worker.install(|| run.image(*index, *task, worker, &mut kept)).and_then(|()| open.made(set, *index)) {
                             Ok(()) => {
                                 made.fetch_add(1, Ordering::Relaxed);
                                 (callbacks.done)(*index);
@@ -236,13 +239,13 @@ pub(super) fn together(failures: BTreeMap<u64, Error>) -> Error {
 
 /// What remains to be done for an image, from what lies on the disk.
 pub fn task(set: &Set, index: u64) -> Result<Task> {
-    let Some(checksums) = ChecksumRecord::read(&set.folder, index) else { return Ok(Task::All) };
+    let Some(checksums) = set.checksums(index) else { return Ok(Task::All) };
     let task = remaining(set, &checksums)?;
     if task == Task::All {
         return Ok(task);
     }
     let formats = format::all(&set.recipe)?;
-    let broken = checksums.faults(&set.folder);
+    let broken = set.faults(&checksums);
     let lost = |(path, _): &(String, String)| {
         path.starts_with("images/") || formats.iter().any(|(name, f)| f.needs_film() && in_format(path, name))
     };
@@ -277,6 +280,45 @@ fn in_format(path: &str, format: &str) -> bool {
     path.strip_prefix(format).is_some_and(|rest| rest.starts_with('/'))
 }
 
+/// The packs of a shard that are not whole yet.
+struct OpenPacks(BTreeMap<Id, AtomicUsize>);
+
+impl OpenPacks {
+    /// Those of a shard, none where images lie in folders.
+    fn of(set: &Set, shard: Shard) -> Result<Self> {
+        let Some(packing) = Packing::of(&set.recipe) else { return Ok(Self(BTreeMap::new())) };
+        let held: Vec<Id> = packing.all().filter(|id| shard.holds(packing.place(*id))).collect();
+        let open = held.into_par_iter().map(|id| Ok((id, store::settle(set, id)?))).collect::<Result<Vec<_>>>()?;
+        Ok(Self(open.into_iter().filter(|(_, whole)| !whole).map(|(id, _)| (id, AtomicUsize::new(0))).collect()))
+    }
+
+    /// Whether an image lies in a pack that is whole.
+    fn is_settled(&self, set: &Set, index: u64) -> bool {
+        Packing::of(&set.recipe).is_some_and(|packing| !self.0.contains_key(&packing.id(index)))
+    }
+
+    /// Is told what remains to be done; closes the packs of which nothing does.
+    fn expect(&self, set: &Set, tasks: &[(u64, Task)]) -> Result<()> {
+        let Some(packing) = Packing::of(&set.recipe) else { return Ok(()) };
+        for (index, _) in tasks {
+            if let Some(left) = self.0.get(&packing.id(*index)) {
+                left.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+        let ready = self.0.iter().filter(|(_, left)| left.load(Ordering::Relaxed) == 0);
+        ready.map(|(id, _)| *id).try_for_each(|id| store::close(set, id))
+    }
+
+    /// Is told of an image that is there; closes its pack after the last.
+    fn made(&self, set: &Set, index: u64) -> Result<()> {
+        let Some(id) = Packing::of(&set.recipe).map(|packing| packing.id(index)) else { return Ok(()) };
+        match self.0.get(&id) {
+            Some(left) if left.fetch_sub(1, Ordering::AcqRel) == 1 => store::close(set, id),
+            _ => Ok(()),
+        }
+    }
+}
+
 /// A run of a shard.
 struct Run<'a> {
     set: &'a Set,
@@ -292,9 +334,9 @@ impl Run<'_> {
     /// Makes one image and writes its checksums.
     fn image(&self, index: u64, task: Task, threads: &Threads, kept: &mut LastField) -> Result<()> {
         let begin = Instant::now();
-        let Set { folder, recipe } = self.set;
+        let Set { folder, recipe, .. } = self.set;
         // Another run may have made it meanwhile.
-        if ChecksumRecord::path(folder, index).exists() && self::task(self.set, index)? == Task::Done {
+        if self::task(self.set, index)? == Task::Done {
             return Ok(());
         }
         let (files, times) = if task == Task::Formats {
@@ -351,7 +393,7 @@ pub(super) fn formatted(set: &Set, sample: &super::Sample) -> Result<Vec<File>> 
 
 /// The files of those formats that follow from the native files.
 fn derived(set: &Set, index: u64) -> Result<Vec<File>> {
-    let sample = native::read(&set.folder, &Set::name(index))?;
+    let sample = set.sample(index)?;
     let mut files = Vec::new();
     for (_, format) in format::all(&set.recipe)?.into_iter().filter(|(_, format)| !format.needs_film()) {
         files.extend(format.image(&set.recipe, &sample)?);

@@ -59,8 +59,10 @@ pub fn emit(set: &Set, job: &Job, folder: &Path) -> Result<(Vec<PathBuf>, Vec<St
 fn check(set: &Set, job: &Job) -> Result<()> {
     set.recipe.rendering()?;
     let fault = |words: String, help: &str| Err(Error::misuse(words).help(help));
-    if job.shards > set.recipe.count {
-        let words = format!("{} shards of {} images: some would be empty", job.shards, set.recipe.count);
+    let units = set.recipe.units();
+    if job.shards > units {
+        let what = if set.recipe.pack.is_some() { "packs" } else { "images" };
+        let words = format!("{} shards of {units} {what}: some would be empty", job.shards);
         return fault(words, "give fewer --shards; a shard should last minutes");
     }
     if let Scheduler::Kubernetes(pod) = &job.scheduler {

@@ -36,6 +36,11 @@ pub trait Format: Sync {
         &[]
     }
 
+    /// Whether it names the photographs in `images/`, which it does not copy.
+    fn names_photographs(&self) -> bool {
+        false
+    }
+
     /// Whether it tells of cameras, which imported images do not.
     fn needs_camera(&self) -> bool {
         false

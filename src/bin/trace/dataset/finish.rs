@@ -7,6 +7,7 @@ use furrow::cli::signal::Signals;
 use furrow::dataset::generate::Shard;
 use furrow::dataset::labels::LeftOut;
 use furrow::dataset::{Set, finish, plan};
+use furrow::job::Threads;
 use std::path::PathBuf;
 
 /// Which dataset.
@@ -36,9 +37,12 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         }
         generate(&set, &args.work, Shard::ALL, None, signals)?;
     }
-    let files = finish::finish(&set, args.shards)?;
-    tell_left_out(&set)?;
-    Ok(files)
+    let threads = Threads::new(args.work.threads)?;
+    threads.install(|| {
+        let files = finish::finish(&set, args.shards)?;
+        tell_left_out(&set)?;
+        Ok(files)
+    })
 }
 
 /// Tells what of the images stands in no list of a format.

@@ -107,11 +107,13 @@ pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
             order::tell_plants(&set, cli.make.work.quiet)?;
             let memory = cli.make.order.images.memory.bytes;
             render::generate(&set, &cli.make.work, furrow::dataset::generate::Shard::ALL, memory, signals)?;
-            let files = furrow::dataset::finish::finish(&set, None)?;
-            if !cli.make.work.quiet {
-                finish::tell_left_out(&set)?;
-            }
-            Ok(files)
+            furrow::job::Threads::new(cli.make.work.threads)?.install(|| {
+                let files = furrow::dataset::finish::finish(&set, None)?;
+                if !cli.make.work.quiet {
+                    finish::tell_left_out(&set)?;
+                }
+                Ok(files)
+            })
         }
     }
 }
