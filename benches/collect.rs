@@ -104,33 +104,49 @@ fn copies(data: &Path, count: u64) {
     assert!(plan.output().expect("the program").status.success());
     let set = Set::open(data).expect("a dataset");
     let sources: Vec<_> = (0..RENDERED).map(|k| source(&set, k)).collect();
-    for index in RENDERED..count {
-        let (record, files) = &sources[(index % RENDERED) as usize];
-        let name = Set::name(index);
-        let mut own = record.clone();
-        (own.index, own.name) = (index, name.clone());
-        let copy = |(file, bytes): &(String, Vec<u8>)| {
-            let bytes = if file == "record.json" {
-                let mut bytes = serde_json::to_vec(&own).expect("JSON");
-                bytes.push(b'\n');
-                bytes
-            } else {
-                bytes.clone()
-            };
-            File { path: format!("{}/{file}", native::folder(&name)), bytes }
-        };
-        let files: Vec<File> = files.iter().map(copy).collect();
-        fs::create_dir_all(data.join(native::folder(&name))).expect("a folder");
-        for file in &files {
-            fs::write(data.join(&file.path), &file.bytes).expect("a file");
+    std::thread::scope(|scope| {
+        for worker in 0..WORKERS {
+            let (set, sources) = (&set, &sources);
+            scope.spawn(move || {
+                let own = (RENDERED..count).filter(|index| index % WORKERS == worker);
+                own.for_each(|index| write_copy(set, index, &sources[(index % RENDERED) as usize]));
+            });
         }
-        let checksums = ChecksumRecord::of(index, &set.recipe, &files).expect("checksums");
-        checksums.write(data).expect("a file");
-    }
+    });
 }
 
+/// Threads that write copies: they wait for the disk.
+const WORKERS: u64 = 16;
+
 /// An image's record, and its files by their names.
-fn source(set: &Set, index: u64) -> (furrow::dataset::Record, Vec<(String, Vec<u8>)>) {
+type Source = (furrow::dataset::Record, Vec<(String, Vec<u8>)>);
+
+/// Writes an image under another number.
+fn write_copy(set: &Set, index: u64, (record, files): &Source) {
+    let name = Set::name(index);
+    let mut own = record.clone();
+    (own.index, own.name) = (index, name.clone());
+    let copy = |(file, bytes): &(String, Vec<u8>)| {
+        let bytes = if file == "record.json" {
+            let mut bytes = serde_json::to_vec(&own).expect("JSON");
+            bytes.push(b'\n');
+            bytes
+        } else {
+            bytes.clone()
+        };
+        File { path: format!("{}/{file}", native::folder(&name)), bytes }
+    };
+    let files: Vec<File> = files.iter().map(copy).collect();
+    fs::create_dir_all(set.folder.join(native::folder(&name))).expect("a folder");
+    for file in &files {
+        fs::write(set.folder.join(&file.path), &file.bytes).expect("a file");
+    }
+    let checksums = ChecksumRecord::of(index, &set.recipe, &files).expect("checksums");
+    checksums.write(&set.folder).expect("a file");
+}
+
+/// An image of a dataset.
+fn source(set: &Set, index: u64) -> Source {
     let folder = set.folder.join(native::folder(&Set::name(index)));
     let mut files = Vec::new();
     for entry in fs::read_dir(&folder).expect("a folder") {

@@ -139,7 +139,7 @@ const ALLOWED: &[(&str, &str)] = &[
     // and so do a scene that is taken into a dataset or a stream, and the small dataset that a bill is made of.
     (
         "tempfile",
-        "cli/mod.rs dataset/bill.rs dataset/plan.rs dataset/stream.rs output/atomic.rs output/denoise.rs texture/draw/write.rs",
+        "cli/mod.rs dataset/bill.rs dataset/plan.rs dataset/push.rs dataset/stream.rs output/atomic.rs output/denoise.rs texture/draw/write.rs",
     ),
     // Another program that shows pictures.
     ("tev_client", "bin/trace/watch/tev.rs"),

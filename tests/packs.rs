@@ -170,6 +170,84 @@ fn packs_do_not_cut_fields() {
     assert!(said.contains("would cut fields") && !data.exists(), "{said}");
 }
 
+/// Expected: a command that copies builds the same dataset at the other place, in names of any letters; one that fails is told with its words
+/// and code 1, and the next run goes on with what is not pushed; what was pushed is not pushed again; freed images are not made again.
+#[test]
+fn what_is_finished_is_pushed_once_and_whole() {
+    let (_keep, whole) = scratch();
+    succeed(packed(&whole, 9, &[]));
+    let whole = tree(&whole);
+    let (_keep, data) = scratch();
+    let (data, there) = (data.join("it's $HOME"), data.join("the \"other\" place"));
+    fs::create_dir_all(&there).expect("a folder");
+    let there_quoted = path(&there).replace('"', "\\\"");
+    let copy = format!("cp -r {{dir}}/. \"{there_quoted}/\" && echo {{dir}} >> \"{there_quoted}.log\"");
+    // The second pack fails.
+    let failing = format!("case {{dir}} in *train-000001) echo no room >&2; exit 7;; esac; {copy}");
+    let said = fail(packed(&data, 9, &["--push", &failing, "--push-tries", "1", "--threads", "1"]), 1);
+    assert!(said.contains("train-000001 was not pushed") && said.contains("ended with 7: no room"), "{said}");
+    assert!(there.join("packs/train-000000.tar").is_file() && there.join("dataset.json").is_file());
+    let refused = fail(packed(&data, 9, &["--push", "true"]), 2);
+    assert!(refused.contains("write {dir}"), "{refused}");
+    // Freed: what the next run needs stays.
+    succeed(packed(&data, 9, &["--push", &copy, "--push-check", "test -d {dir}", "--push-free"]));
+    assert!(!tree(&data).keys().any(|name| name.starts_with("packs/") || name.starts_with("images/")));
+    let log = fs::read_to_string(format!("{}.log", path(&there))).expect("a log");
+    let pushed: Vec<&str> = log.lines().filter_map(|line| line.rsplit('/').next()).collect();
+    assert_eq!(pushed.len(), 4, "{log}");
+    assert_eq!(pushed[..2], ["recipe", "train-000000"], "{log}");
+    // Nothing is left to do, and nothing is done.
+    succeed(verb("render", &data, &["--quiet", "--push", &copy, "--push-free"]));
+    assert_eq!(fs::read_to_string(format!("{}.log", path(&there))).expect("a log"), log);
+    let status = String::from_utf8_lossy(&succeed(verb("status", &data, &[])).stdout).into_owned();
+    assert!(status.contains("9 of 9 images"), "{status}");
+    let said = fail(verb("finish", &data, &["--quiet"]), 2);
+    assert!(said.contains("3 packs were pushed and removed here"), "{said}");
+    succeed(verb("finish", &there, &["--quiet"]));
+    same(&tree(&there), &whole);
+    succeed(verb("verify", &there, &["--quiet"]));
+}
+
+/// The same of images in folders, and of what belongs to all.
+#[test]
+fn folders_are_pushed_too() {
+    let (_keep, data) = scratch();
+    let there = data.with_extension("there");
+    fs::create_dir_all(&there).expect("a folder");
+    let mut make = trace(&["dataset", "--scene", SMALL, "--quiet", "--width", "48", "--spp", "1", "--count", "3"]);
+    make.args(["--format", "coco", "--push", &format!("cp -r {{dir}}/. {}", path(&there)), "--out"]).arg(&data);
+    succeed(make);
+    let mut expected = tree(&data);
+    expected.retain(|name, _| !name.starts_with("pushed/"));
+    same(&tree(&there), &expected);
+    fs::remove_dir_all(there).expect("it goes");
+}
+
+/// Expected: the guide's few lines for webdataset, `datasets` and supervision do on a small dataset what they say.
+#[test]
+fn examples_of_the_guide_run() {
+    let Some(python) = python("import webdataset, datasets, supervision") else { return };
+    let (_keep, folder) = scratch();
+    let data = folder.join("data/packed");
+    let mut make = trace(&["dataset", "--scene", SMALL, "--quiet", "--width", "48", "--spp", "1", "--count", "8", "--pack", "2"]);
+    make.args(["--split", "1,0,0", "--format", "coco", "--out"]).arg(&data);
+    succeed(make);
+    std::os::unix::fs::symlink(&data, folder.join("data/own")).expect("another name");
+    let page = common::book::read("docs/guide/datasets.md");
+    let mut ran = 0;
+    for block in common::book::blocks(&page) {
+        let lines = ["webdataset.WebDataset", "datasets.load_dataset", "from_coco"];
+        if !lines.iter().any(|line| block.text.contains(line)) {
+            continue;
+        }
+        let mut command = Command::new(&python);
+        command.current_dir(&folder).arg("-c").arg(&block.text).envs([("HF_DATASETS_OFFLINE", "1"), ("OMP_NUM_THREADS", "1")]);
+        succeed(command);
+        ran += 1;
+    }
+    assert_eq!(ran, 3);
+}
+
 /// Expected: each reader finds the images of the dataset, and the tables say what the records say.
 #[test]
 fn readers_of_others_open_packs_and_tables() {

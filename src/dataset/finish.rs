@@ -8,7 +8,7 @@ use super::native::is_native;
 use super::pack::{Id, Packing, store};
 use super::recipe::{FILE, Recipe};
 use super::set::{Set, Stream, Whole};
-use super::{format, index, report};
+use super::{format, index, push, report};
 use crate::output::{is_unfinished, remove_unfinished};
 use crate::{Error, Result};
 use rayon::prelude::*;
@@ -23,6 +23,7 @@ pub const MANIFEST: &str = "manifest.json";
 /// `shards`, those.
 pub fn finish(set: &Set, shards: Option<u64>) -> Result<Vec<PathBuf>> {
     let Set { folder, recipe, .. } = set;
+    push::refuse_freed(set)?;
     let mut missing = Vec::new();
     for (index, checksums) in (0..).zip(set.all_checksums()) {
         match checksums {

@@ -6,6 +6,7 @@
 
 use super::checksum_record::{ChecksumRecord, write_files};
 use super::pack::{Id, Packing, store};
+use super::push::{Push, Unit};
 use super::render::{LastField, Times, render, renderer, scene_file};
 use super::set::Set;
 use super::timing_log::{Began, End, Ended, ImageFailure, ImageTiming, Row, TimingLog, now};
@@ -16,7 +17,7 @@ use crate::render::Watch;
 use crate::scene::estimate::usual_memory;
 use crate::{Error, Result};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -51,7 +52,7 @@ impl Shard {
 
 /// How a run works; none of it changes a byte.
 #[derive(Clone, Copy, Debug)]
-pub struct Work {
+pub struct Work<'a> {
     /// Which images.
     pub shard: Shard,
     /// Workers; 0 for one on each core.
@@ -60,12 +61,14 @@ pub struct Work {
     pub at_once: usize,
     /// Bytes of memory that a field may take; the usual share of the machine's unless given.
     pub memory: Option<u64>,
+    /// How what is finished is sent elsewhere.
+    pub push: Option<&'a Push>,
 }
 
-impl Default for Work {
+impl Default for Work<'_> {
     /// All images, on all cores.
     fn default() -> Self {
-        Self { shard: Shard::ALL, threads: 0, at_once: 0, memory: None }
+        Self { shard: Shard::ALL, threads: 0, at_once: 0, memory: None, push: None }
     }
 }
 
@@ -112,7 +115,9 @@ pub(super) fn share(threads: usize, workers: usize, worker: usize) -> usize {
 /// Makes what is missing of a shard. Stopped, it returns [`Kind::Interrupted`] with the number of images that are there, and the same
 /// call goes on later. A fault of one field ([`Error::is_of_one_field`]) is told when all others are made; a cause that lasts ends the
 /// run at once. What is made is kept in any case.
-pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()> {
+pub fn generate(set: &Set, work: &Work<'_>, callbacks: &Callbacks<'_>) -> Result<()> {
+    let sent = |unit: Unit| work.push.map_or(Ok(()), |push| push.unit(set, unit, callbacks.now));
+    sent(Unit::Recipe)?;
     let renderer = renderer(set)?;
     let all = Threads::new(work.threads)?;
     let threads = all.count();
@@ -120,12 +125,20 @@ pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()>
     let held = |k: &u64| shard.holds(set.recipe.unit_of(*k));
     let wanted: Vec<u64> = (0..set.recipe.count).filter(held).collect();
     let open = all.install(|| OpenPacks::of(set, shard))?;
-    let look = |k: u64| Ok((k, if open.is_settled(set, k) { Task::Done } else { task(set, k)? }));
+    let is_freed = |k: u64| set.recipe.pack.is_none() && Unit::Image(k).is_freed(set);
+    let look = |k: u64| Ok((k, if open.is_settled(set, k) || is_freed(k) { Task::Done } else { task(set, k)? }));
     let tasks: Vec<(u64, Task)> = all.install(|| wanted.into_par_iter().map(look).collect::<Result<Vec<_>>>())?;
     let wanted = tasks.len();
     let tasks: Vec<(u64, Task)> = tasks.into_iter().filter(|(_, t)| *t != Task::Done).collect();
     (callbacks.begin)(tasks.len());
     open.expect(set, &tasks)?;
+    if work.push.is_some() {
+        // What is there and was not pushed: units that lack nothing.
+        let lacking: BTreeSet<String> = tasks.iter().map(|(index, _)| Unit::of(set, *index).name()).collect();
+        let mut units: Vec<Unit> = held_units(set, shard);
+        units.retain(|unit| !lacking.contains(&unit.name()));
+        units.into_iter().try_for_each(|unit| if callbacks.soon.load(Ordering::Relaxed) { Ok(()) } else { sent(unit) })?;
+    }
     // Images of one field follow each other on one worker, which grows it once.
     let fields: Vec<&[(u64, Task)]> =
         tasks.chunk_by(|a, b| set.recipe.field_of(a.0).0 == set.recipe.field_of(b.0).0).collect();
@@ -173,7 +186,7 @@ pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()>
                 while let Some(field) = fields.get(next.fetch_add(1, Ordering::Relaxed)).filter(|_| !ended()) {
                     let mut kept = LastField::default();
                     for (index, task) in field.iter().take_while(|_| !ended()) {
-                        match worker.install(|| run.image(*index, *task, worker, &mut kept)).and_then(|()| open.made(set, *index)) {
+                        match worker.install(|| run.image(*index, *task, worker, &mut kept)).and_then(|()| if open.made(set, *index)? { sent(Unit::of(set, *index)) } else { Ok(()) }) {
                             Ok(()) => {
                                 made.fetch_add(1, Ordering::Relaxed);
                                 (callbacks.done)(*index);
@@ -280,6 +293,14 @@ fn in_format(path: &str, format: &str) -> bool {
     path.strip_prefix(format).is_some_and(|rest| rest.starts_with('/'))
 }
 
+/// What a shard pushes, images or packs.
+fn held_units(set: &Set, shard: Shard) -> Vec<Unit> {
+    match Packing::of(&set.recipe) {
+        Some(packing) => packing.all().filter(|id| shard.holds(packing.place(*id))).map(Unit::Pack).collect(),
+        None => (0..set.recipe.count).filter(|k| shard.holds(set.recipe.unit_of(*k))).map(Unit::Image).collect(),
+    }
+}
+
 /// The packs of a shard that are not whole yet.
 struct OpenPacks(BTreeMap<Id, AtomicUsize>);
 
@@ -309,13 +330,14 @@ impl OpenPacks {
         ready.map(|(id, _)| *id).try_for_each(|id| store::close(set, id))
     }
 
-    /// Is told of an image that is there; closes its pack after the last.
-    fn made(&self, set: &Set, index: u64) -> Result<()> {
-        let Some(id) = Packing::of(&set.recipe).map(|packing| packing.id(index)) else { return Ok(()) };
-        match self.0.get(&id) {
-            Some(left) if left.fetch_sub(1, Ordering::AcqRel) == 1 => store::close(set, id),
-            _ => Ok(()),
+    /// Is told of an image that is there; closes its pack after the last. Whether the unit that it belongs to is finished.
+    fn made(&self, set: &Set, index: u64) -> Result<bool> {
+        let Some(id) = Packing::of(&set.recipe).map(|packing| packing.id(index)) else { return Ok(true) };
+        let is_last = self.0.get(&id).is_some_and(|left| left.fetch_sub(1, Ordering::AcqRel) == 1);
+        if is_last {
+            store::close(set, id)?;
         }
+        Ok(is_last)
     }
 }
 

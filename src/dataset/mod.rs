@@ -27,6 +27,7 @@
 //! | `native`, `format` | as files: ours (`images/`), and those of other tools |
 //! | `checksum`, `checksum_record`, `set` | SHA-256 of a file; those of an image's files; the dataset on disk |
 //! | `pack`, `archive` | images in archives instead of folders; names in them |
+//! | `push` | sends what is finished elsewhere, by a command of the user's |
 //! | `make` | all of it in one call |
 //! | `plan`, `gather`, `begin`, `generate`, `timing_log`, `finish` | from a scene file, copied with all that it names, to images and a manifest; what remains to be done is found by looking at the disk |
 //! | `bill`, `meter` | what a dataset will cost, from three of its images; what this process has taken |
@@ -84,6 +85,8 @@ pub mod native;
 pub mod pack;
 #[doc(hidden)]
 pub mod plan;
+#[doc(hidden)]
+pub mod push;
 #[doc(hidden)]
 pub mod recipe;
 pub mod record;

@@ -1,6 +1,7 @@
 //! A dataset that lies in a folder: its recipe, its images by name, the files that belong to all of them.
 
 use super::checksum::Checksum;
+use super::archive::entry_name;
 use super::checksum_record::ChecksumRecord;
 use super::native::{self, Files};
 use super::pack::record::Packs;
@@ -144,7 +145,11 @@ impl Files for Set {
     }
 
     fn place(&self, path: &str) -> PathBuf {
-        self.folder.join(path)
+        let full = self.folder.join(path);
+        match self.pack_of(path) {
+            Some(id) if !full.exists() => self.folder.join(id.path()).join(entry_name(path)),
+            _ => full,
+        }
     }
 }
 

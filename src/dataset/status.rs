@@ -5,6 +5,7 @@
 
 use super::checksum_record::ChecksumRecord;
 use super::generate::{Task, remaining};
+use super::push::{self, Unit};
 use super::recipe::compact;
 use super::set::Set;
 use super::timing_log::{self, End, ImageFailure, ImageTiming, Row, RunLog};
@@ -288,12 +289,14 @@ fn last_shards(runs: &[Run<'_>]) -> u64 {
 
 /// Of each image, whether it is there.
 fn there(set: &Set, stop: &AtomicBool) -> Result<Vec<bool>> {
+    let freed = push::freed(set);
     let look = |index: u64| {
         if stop.load(Ordering::Relaxed) {
             return Err(Error::stopped("stopped looking; nothing was changed"));
         }
         let Some(checksums) = set.checksums(index) else { return Ok(false) };
-        Ok(remaining(set, &checksums)? == Task::Done && has_files(set, &checksums))
+        let is_there = || has_files(set, &checksums) || freed.contains(&Unit::of(set, index).name());
+        Ok(remaining(set, &checksums)? == Task::Done && is_there())
     };
     (0..set.recipe.count).into_par_iter().map(look).collect()
 }

@@ -63,7 +63,7 @@ impl ImageStream {
     /// Makes the images of a shard and writes them to `out`; returns how many were written. That nobody reads them any longer is no
     /// failure. Fields that cannot be made are left out: told when it happens, and as the error at the end. After
     /// [`MOST_LEFT_OUT`] in a row it ends. Stopped, it returns [`Kind::Interrupted`].
-    pub fn write(&self, work: &Work, out: impl Write + Send + 'static, listener: &Listener<'_>) -> Result<u64> {
+    pub fn write(&self, work: &Work<'_>, out: impl Write + Send + 'static, listener: &Listener<'_>) -> Result<u64> {
         let set = &self.set;
         let Some(renderer) = renderer(set)? else { return Ok(0) };
         let stop = Arc::<AtomicBool>::default();
@@ -106,7 +106,7 @@ impl ImageStream {
     }
 
     /// The threads, shared out among the images under way at once.
-    fn workers(&self, work: &Work, scene: &SceneFile) -> Result<Vec<Threads>> {
+    fn workers(&self, work: &Work<'_>, scene: &SceneFile) -> Result<Vec<Threads>> {
         let threads = Threads::new(work.threads)?.count();
         let (first, _) = self.set.recipe.field_of(self.indices.start);
         let at_once = match work.at_once {

@@ -9,7 +9,7 @@ use super::pack::{Id, Packing};
 use super::render::{LastField, RenderedSample, render, scene_file};
 use super::set::Set;
 use super::split::Split;
-use super::{File, format, generate, invariants, native, timing_log};
+use super::{File, format, generate, invariants, native, push, timing_log};
 use crate::input::below;
 use crate::job::{Renderer, Threads};
 use crate::render::Watch;
@@ -87,6 +87,7 @@ pub fn verify(
     done: &(dyn Fn(u64) + Sync),
     stop: &AtomicBool,
 ) -> Result<Findings> {
+    push::refuse_freed(set)?;
     let count = set.recipe.count;
     let look_at = |index: u64| {
         if stop.load(std::sync::atomic::Ordering::Relaxed) {

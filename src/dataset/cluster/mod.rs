@@ -68,6 +68,16 @@ fn check(set: &Set, job: &Job) -> Result<()> {
     if let Scheduler::Kubernetes(pod) = &job.scheduler {
         pod.check()?;
     }
+    if let Some(push) = &job.push {
+        push.check()?;
+        if push.free {
+            return fault("--push-free leaves nothing for the job that finishes".into(), "leave it out here");
+        }
+        if matches!(job.scheduler, Scheduler::Kubernetes(_)) {
+            let help = "write --push into the command of render.yaml by hand";
+            return fault("--push is for slurm and parallel".into(), help);
+        }
+    }
     if job.grace >= job.time {
         let words = format!("--grace {} leaves nothing of --time {} s", job.grace.as_secs(), job.time.as_secs());
         return fault(words, "--grace is how long before the end of --time a shard is told to stop");

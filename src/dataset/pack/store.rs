@@ -5,6 +5,7 @@ use super::{Id, Packing};
 use crate::dataset::archive::{BLOCK, append, entry_name};
 use crate::dataset::checksum_record::{ChecksumRecord, write_files};
 use crate::dataset::generate::{Task, remaining};
+use crate::dataset::push::Unit;
 use crate::dataset::set::{Set, Whole};
 use crate::dataset::{File, native};
 use crate::{Error, Result};
@@ -18,6 +19,14 @@ pub(in crate::dataset) fn settle(set: &Set, id: Id) -> Result<bool> {
     let Set { folder, packs, .. } = set;
     packs.forget(id);
     let Some(record) = packs.get(folder, id) else { return Ok(false) };
+    if Unit::Pack(id).is_freed(set) {
+        if is_complete(set, id, &record)? {
+            return Ok(true);
+        }
+        return Err(Error::misuse(format!("{} was pushed and removed here, and is to hold other images or formats now", id.name()))
+            .help("bring it back, or make what is to be added as a dataset of its own")
+            .in_file(folder));
+    }
     if is_complete(set, id, &record)?
         && record.tar.holds(&folder.join(id.path()))
         && record.images.values().all(|image| set.faults_beside_packs(image).is_empty())
