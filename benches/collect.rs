@@ -27,7 +27,10 @@ fn main() {
         copies(&data, count);
         for (place, pack) in [("folders", None), ("packs", Some("1000"))] {
             let count_words = count.to_string();
-            let made = ["dataset", "--scene", SCENE, "--width", "16", "--height", "12", "--spp", "1", "--split", "1,0,0", "--quiet"];
+            let made = [
+                "dataset", "--scene", SCENE, "--width", "16", "--height", "12", "--spp", "1", "--split", "1,0,0",
+                "--quiet",
+            ];
             let mut make = made.to_vec();
             make.extend(["--count", &count_words, "--out", data.to_str().expect("UTF-8")]);
             if let Some(pack) = pack {
@@ -80,7 +83,8 @@ fn peak(shell: u32) -> u64 {
         let children = fs::read_to_string(format!("/proc/{shell}/task/{shell}/children")).unwrap_or_default();
         for child in children.split_whitespace() {
             let about = fs::read_to_string(format!("/proc/{child}/status")).unwrap_or_default();
-            let kilobytes = about.lines().find_map(|line| line.strip_prefix("VmHWM:")?.split_whitespace().next()?.parse().ok());
+            let kilobytes =
+                about.lines().find_map(|line| line.strip_prefix("VmHWM:")?.split_whitespace().next()?.parse().ok());
             most = most.max(kilobytes.unwrap_or(0_u64) * 1024);
         }
         // A program that nobody waits for any more keeps its folder.
@@ -94,7 +98,8 @@ fn peak(shell: u32) -> u64 {
 
 /// A dataset of so many images, of which few were rendered; in folders, nothing finished.
 fn copies(data: &Path, count: u64) {
-    let made = ["dataset", "--scene", SCENE, "--width", "16", "--height", "12", "--spp", "1", "--split", "1,0,0", "--quiet"];
+    let made =
+        ["dataset", "--scene", SCENE, "--width", "16", "--height", "12", "--spp", "1", "--split", "1,0,0", "--quiet"];
     let mut few = Command::new(env!("CARGO_BIN_EXE_trace"));
     few.current_dir(env!("CARGO_MANIFEST_DIR")).args(made).args(["--count", &RENDERED.to_string(), "--out"]).arg(data);
     assert!(few.output().expect("the program").status.success());

@@ -50,7 +50,8 @@ fn archives_hold_the_files_of_the_folders() {
     let mut plain = trace(&["dataset", "--scene", SMALL, "--quiet", "--width", "48", "--spp", "1", "--count", "9"]);
     plain.args(["--split", "3,1,0", "--format", "coco", "--out"]).arg(&folders);
     succeed(plain);
-    let image = |(name, bytes): (&String, &Vec<u8>)| Some((name.strip_prefix("images/")?.replace('/', "."), bytes.clone()));
+    let image =
+        |(name, bytes): (&String, &Vec<u8>)| Some((name.strip_prefix("images/")?.replace('/', "."), bytes.clone()));
     let (packed_tree, folder_tree) = (tree(&data), tree(&folders));
     assert_eq!(members(&data), folder_tree.iter().filter_map(image).collect());
     let names: Vec<&String> = packed_tree.keys().filter(|name| name.starts_with("packs/")).collect();
@@ -104,12 +105,10 @@ fn however_it_is_made_its_files_are_those_of_one_run() {
     succeed(folders);
     succeed(packed(&later, 11, &[]));
     same(&tree(&later), &whole);
-    let said = fail({
-        let mut other = packed(&later, 11, &[]);
-        other.args(["--pack", "5"]);
-        other
-    }, 2);
-    assert!(said.contains("pack"), "{said}");
+    let mut other = trace(&["dataset", "--scene", SMALL, "--quiet", "--width", "48", "--spp", "1", "--count", "11"]);
+    other.args(["--split", "3,1,0", "--pack", "5", "--out"]).arg(&later);
+    let said = fail(other, 2);
+    assert!(said.contains("another dataset lies in this folder: pack 4 there, 5 here"), "{said}");
 
     // Killed again and again.
     let (_keep, killed) = scratch();
@@ -164,7 +163,9 @@ fn packs_do_not_cut_fields() {
     let (_keep, data) = scratch();
     let size = ["--width", "32", "--height", "24", "--spp", "1", "--keep", "none", "--quiet", "--count", "4"];
     let make = |pack: &str| {
-        trace(&[&["dataset", "--scene", "scenes/09-drive.ron", "--pack", pack, "--out", path(&data)], &size[..]].concat())
+        trace(
+            &[&["dataset", "--scene", "scenes/09-drive.ron", "--pack", pack, "--out", path(&data)], &size[..]].concat(),
+        )
     };
     let said = fail(make("1"), 2);
     assert!(said.contains("would cut fields") && !data.exists(), "{said}");
@@ -229,7 +230,8 @@ fn examples_of_the_guide_run() {
     let Some(python) = python("import webdataset, datasets, supervision") else { return };
     let (_keep, folder) = scratch();
     let data = folder.join("data/packed");
-    let mut make = trace(&["dataset", "--scene", SMALL, "--quiet", "--width", "48", "--spp", "1", "--count", "8", "--pack", "2"]);
+    let mut make =
+        trace(&["dataset", "--scene", SMALL, "--quiet", "--width", "48", "--spp", "1", "--count", "8", "--pack", "2"]);
     make.args(["--split", "1,0,0", "--format", "coco", "--out"]).arg(&data);
     succeed(make);
     std::os::unix::fs::symlink(&data, folder.join("data/own")).expect("another name");
@@ -241,7 +243,11 @@ fn examples_of_the_guide_run() {
             continue;
         }
         let mut command = Command::new(&python);
-        command.current_dir(&folder).arg("-c").arg(&block.text).envs([("HF_DATASETS_OFFLINE", "1"), ("OMP_NUM_THREADS", "1")]);
+        command
+            .current_dir(&folder)
+            .arg("-c")
+            .arg(&block.text)
+            .envs([("HF_DATASETS_OFFLINE", "1"), ("OMP_NUM_THREADS", "1")]);
         succeed(command);
         ran += 1;
     }
@@ -257,6 +263,10 @@ fn readers_of_others_open_packs_and_tables() {
         ask(&python, "packs/check_readers.py", &[path(&data)]);
     }
     if let Some(python) = torch_with("PIL") {
-        ask(&python, "packs/check_module.py", &[path(&data), path(&Path::new(env!("CARGO_MANIFEST_DIR")).join("python"))]);
+        ask(
+            &python,
+            "packs/check_module.py",
+            &[path(&data), path(&Path::new(env!("CARGO_MANIFEST_DIR")).join("python"))],
+        );
     }
 }

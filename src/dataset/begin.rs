@@ -2,9 +2,9 @@
 
 use super::File;
 use super::checksum_record::write_files;
-use super::{format, pack};
 use super::keep::Kept;
 use super::recipe::{FILE, Made, Recipe};
+use super::{format, pack};
 use crate::output::{create_atomically, is_unfinished};
 use crate::{Error, Result};
 use std::path::Path;

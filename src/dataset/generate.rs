@@ -137,7 +137,9 @@ pub fn generate(set: &Set, work: &Work<'_>, callbacks: &Callbacks<'_>) -> Result
         let lacking: BTreeSet<String> = tasks.iter().map(|(index, _)| Unit::of(set, *index).name()).collect();
         let mut units: Vec<Unit> = held_units(set, shard);
         units.retain(|unit| !lacking.contains(&unit.name()));
-        units.into_iter().try_for_each(|unit| if callbacks.soon.load(Ordering::Relaxed) { Ok(()) } else { sent(unit) })?;
+        units
+            .into_iter()
+            .try_for_each(|unit| if callbacks.soon.load(Ordering::Relaxed) { Ok(()) } else { sent(unit) })?;
     }
     // Images of one field follow each other on one worker, which grows it once.
     let fields: Vec<&[(u64, Task)]> =
@@ -186,7 +188,10 @@ pub fn generate(set: &Set, work: &Work<'_>, callbacks: &Callbacks<'_>) -> Result
                 while let Some(field) = fields.get(next.fetch_add(1, Ordering::Relaxed)).filter(|_| !ended()) {
                     let mut kept = LastField::default();
                     for (index, task) in field.iter().take_while(|_| !ended()) {
-                        match worker.install(|| run.image(*index, *task, worker, &mut kept)).and_then(|()| if open.made(set, *index)? { sent(Unit::of(set, *index)) } else { Ok(()) }) {
+                        match worker
+                            .install(|| run.image(*index, *task, worker, &mut kept))
+                            .and_then(|()| if open.made(set, *index)? { sent(Unit::of(set, *index)) } else { Ok(()) })
+                        {
                             Ok(()) => {
                                 made.fetch_add(1, Ordering::Relaxed);
                                 (callbacks.done)(*index);

@@ -181,7 +181,8 @@ pub(super) fn sample(files: &(impl Files + ?Sized), name: &str) -> Result<Sample
     let record = record(files, name)?;
     let size = (record.width, record.height);
     let rgb = sized(&image, "rgb.png", size, image.rgb("rgb.png")?)?;
-    let of_size = |file: &str| image.gray_if_there(file)?.map_or(Ok(Vec::new()), |found| sized(&image, file, size, found));
+    let of_size =
+        |file: &str| image.gray_if_there(file)?.map_or(Ok(Vec::new()), |found| sized(&image, file, size, found));
     let (nir, species) = (of_size("nir.png")?, of_size("species.png")?);
     let coverage = match image.optional("coverage.png")? {
         Some((place, bytes)) => sized(&image, "coverage.png", size, output::decode_rgb(&place, &bytes)?)?,

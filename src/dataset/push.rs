@@ -104,7 +104,7 @@ impl Unit {
             Self::Pack(id) => match set.packs.get(folder, id) {
                 None => None,
                 Some(record) => {
-                    let formats = record.images.values().flat_map(|image| image.files.keys());
+                    let formats = record.images.iter().flat_map(|image| image.files.keys());
                     let mut files: Vec<String> = formats.filter(|path| !native::is_native(path)).cloned().collect();
                     files.extend([id.path(), id.seal()]);
                     Some((files, record.hash()?))
@@ -193,8 +193,7 @@ fn lists(folder: &Path, set: &Set, format: &str) -> Vec<String> {
     let listed: Option<Listed> = serde_json::from_slice(&bytes).ok();
     let mut all: Vec<String> = listed.map(|listed| listed.files.into_keys().collect()).unwrap_or_default();
     all.retain(|path| path.strip_prefix(format).is_some_and(|rest| rest.starts_with('/')));
-    let of_images: BTreeSet<String> =
-        set.all_checksums().flatten().flat_map(|image| image.files.into_keys()).collect();
+    let of_images: BTreeSet<String> = set.all_checksums().flatten().flat_map(|image| image.files.into_keys()).collect();
     all.retain(|path| !of_images.contains(path));
     all
 }
@@ -250,7 +249,8 @@ impl Push {
     fn send(&self, set: &Set, unit: Unit, files: &[String], stop: &AtomicBool) -> Result<()> {
         let folder = std::path::absolute(&set.folder).map_err(Error::io(&set.folder))?;
         // Of the name of unfinished files: what a killed run leaves is cleared away with these.
-        let staged = tempfile::Builder::new().prefix(".furrow-push-").tempdir_in(&folder).map_err(Error::io(&folder))?;
+        let staged =
+            tempfile::Builder::new().prefix(".furrow-push-").tempdir_in(&folder).map_err(Error::io(&folder))?;
         let dir = staged.path().join(unit.name());
         for file in files {
             let (from, to) = (below(&folder, file)?, below(&dir, file)?);
@@ -305,7 +305,9 @@ fn free(set: &Set, files: &[String]) -> Result<()> {
 /// Runs a command; what is wrong in words where it fails. It is ended where the run is to stop.
 fn run(command: &str, dir: &Path, stop: &AtomicBool) -> Result<Option<String>> {
     let place = dir.to_str().ok_or_else(|| {
-        Error::misuse("a folder whose name is not UTF-8 cannot stand in --push").in_file(dir).help("name --out otherwise")
+        Error::misuse("a folder whose name is not UTF-8 cannot stand in --push")
+            .in_file(dir)
+            .help("name --out otherwise")
     })?;
     let filled = filled(command, place);
     // A file, which unlike a pipe takes any number of words.
@@ -334,7 +336,10 @@ fn run(command: &str, dir: &Path, stop: &AtomicBool) -> Result<Option<String>> {
     let _ = said.take(TOLD).read_to_end(&mut text);
     let text = String::from_utf8_lossy(&text);
     let last = text.trim().lines().last().unwrap_or("it said nothing");
-    Ok(Some(format!("`{filled}` ended with {}: {last}", ended.code().map_or("a signal".into(), |code| code.to_string()))))
+    Ok(Some(format!(
+        "`{filled}` ended with {}: {last}",
+        ended.code().map_or("a signal".into(), |code| code.to_string())
+    )))
 }
 
 /// A command with the folder in its place, as one word whatever it holds, within and without quotes.

@@ -1,7 +1,7 @@
 //! A dataset that lies in a folder: its recipe, its images by name, the files that belong to all of them.
 
-use super::checksum::Checksum;
 use super::archive::entry_name;
+use super::checksum::Checksum;
 use super::checksum_record::ChecksumRecord;
 use super::native::{self, Files};
 use super::pack::record::Packs;
@@ -81,7 +81,7 @@ impl Set {
     pub fn checksums(&self, index: u64) -> Option<ChecksumRecord> {
         ChecksumRecord::read(&self.folder, index).or_else(|| {
             let id = Packing::of(&self.recipe)?.id(index);
-            self.packs.get(&self.folder, id)?.images.get(&index).cloned()
+            self.packs.get(&self.folder, id)?.image(index).cloned()
         })
     }
 

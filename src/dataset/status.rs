@@ -303,9 +303,10 @@ fn there(set: &Set, stop: &AtomicBool) -> Result<Vec<bool>> {
 
 /// Whether the files that checksums name are there, as long as they say.
 fn has_files(set: &Set, checksums: &ChecksumRecord) -> bool {
-    checksums.files.iter().all(|(path, sum)| {
-        below(&set.folder, path).is_ok() && set.length(path).is_ok_and(|length| length == sum.bytes)
-    })
+    checksums
+        .files
+        .iter()
+        .all(|(path, sum)| below(&set.folder, path).is_ok() && set.length(path).is_ok_and(|length| length == sum.bytes))
 }
 
 /// What each image last failed of.

@@ -82,8 +82,7 @@ fn decode(path: &Path, bytes: &[u8], depth: BitDepth, color: ColorType, what: &s
     if reader.info().bit_depth != depth || reader.info().color_type != color {
         return Err(wrong(&format!("it is not {what}")));
     }
-    let size =
-        plausible(reader.output_buffer_size(), (w, h), bytes.len() as u64).map_err(|what| wrong(&what))?;
+    let size = plausible(reader.output_buffer_size(), (w, h), bytes.len() as u64).map_err(|what| wrong(&what))?;
     let mut data = vec![0; size];
     reader.next_frame(&mut data).map_err(|e| wrong(&e))?;
     Ok((w, h, data))

@@ -132,9 +132,9 @@ mod tests {
     /// Expected: every image is in one pack, the one that lists it, of its split; packs are full but for the last of a split.
     #[test]
     fn every_image_is_in_one_pack() {
-        for (count, shares, pack) in [(100, [8, 1, 1], 7), (33, [1, 0, 0], 10), (7, [2, 3, 1], 100), (50, [0, 1, 2], 4)] {
-            let recipe =
-                Recipe { count, split: Shares(shares), pack: Some(pack), ..Recipe::of_species(Vec::new()) };
+        for (count, shares, pack) in [(100, [8, 1, 1], 7), (33, [1, 0, 0], 10), (7, [2, 3, 1], 100), (50, [0, 1, 2], 4)]
+        {
+            let recipe = Recipe { count, split: Shares(shares), pack: Some(pack), ..Recipe::of_species(Vec::new()) };
             let packing = Packing::of(&recipe).unwrap();
             let mut seen = Vec::new();
             for (place, id) in packing.all().enumerate() {

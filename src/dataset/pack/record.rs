@@ -25,8 +25,8 @@ pub(in crate::dataset) struct PackRecord {
     pub(in crate::dataset) tar: Checksum,
     /// Where the contents of each file begin in the archive, and their length.
     pub(in crate::dataset) members: BTreeMap<String, (u64, u64)>,
-    /// Its images by their numbers.
-    pub(in crate::dataset) images: BTreeMap<u64, ChecksumRecord>,
+    /// Its images in the order of their numbers.
+    pub(in crate::dataset) images: Vec<ChecksumRecord>,
 }
 
 /// A record as it lies on disk.
@@ -39,6 +39,11 @@ struct Written {
 }
 
 impl PackRecord {
+    /// The checksums of an image.
+    pub(in crate::dataset) fn image(&self, index: u64) -> Option<&ChecksumRecord> {
+        self.images.get(self.images.binary_search_by_key(&index, |image| image.index).ok()?)
+    }
+
     /// Reads a pack's record; `None` where there is none or it is damaged.
     pub(in crate::dataset) fn read(folder: &Path, id: Id) -> Option<Self> {
         let bytes = input::contents(&folder.join(id.seal())).ok()?;
@@ -113,5 +118,34 @@ impl Packs {
         let record = self.get(folder, id).ok_or_else(not_found)?;
         let place = *record.members.get(&entry_name(path)).ok_or_else(not_found)?;
         Ok((record, place))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::split::Split;
+
+    /// Expected: a record comes back as it was written, and one of which a digit was changed is none.
+    #[test]
+    fn records_come_back_as_they_were() {
+        let folder = tempfile::tempdir().unwrap();
+        let id = Id { split: Split::Val, number: 3 };
+        let sum = Checksum::of(b"x");
+        let image = ChecksumRecord {
+            index: 7,
+            recipe: "ab".into(),
+            labelling: None,
+            files: [("images/000007/rgb.png".to_owned(), sum.clone())].into(),
+        };
+        let members = [("000007.rgb.png".to_owned(), (512, 1))].into();
+        let record = PackRecord { pack: id.name(), tar: sum, members, images: vec![image] };
+        record.write(folder.path(), id).unwrap();
+        assert_eq!(PackRecord::read(folder.path(), id).as_ref(), Some(&record));
+        assert!(record.image(7).is_some() && record.image(8).is_none());
+        let path = folder.path().join(id.seal());
+        let text = std::fs::read_to_string(&path).unwrap();
+        std::fs::write(&path, text.replace("512", "513")).unwrap();
+        assert_eq!(PackRecord::read(folder.path(), id), None);
     }
 }

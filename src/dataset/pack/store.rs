@@ -23,13 +23,16 @@ pub(in crate::dataset) fn settle(set: &Set, id: Id) -> Result<bool> {
         if is_complete(set, id, &record)? {
             return Ok(true);
         }
-        return Err(Error::misuse(format!("{} was pushed and removed here, and is to hold other images or formats now", id.name()))
-            .help("bring it back, or make what is to be added as a dataset of its own")
-            .in_file(folder));
+        return Err(Error::misuse(format!(
+            "{} was pushed and removed here, and is to hold other images or formats now",
+            id.name()
+        ))
+        .help("bring it back, or make what is to be added as a dataset of its own")
+        .in_file(folder));
     }
     if is_complete(set, id, &record)?
         && record.tar.holds(&folder.join(id.path()))
-        && record.images.values().all(|image| set.faults_beside_packs(image).is_empty())
+        && record.images.iter().all(|image| set.faults_beside_packs(image).is_empty())
     {
         clear(folder, &record)?;
         return Ok(true);
@@ -52,10 +55,10 @@ pub(in crate::dataset) fn ensure(set: &Set, id: Id) -> Result<()> {
 fn is_complete(set: &Set, id: Id, record: &PackRecord) -> Result<bool> {
     let Some(packing) = Packing::of(&set.recipe) else { return Ok(false) };
     let wanted = packing.images(id);
-    if !record.images.keys().eq(wanted.iter()) {
+    if !record.images.iter().map(|image| image.index).eq(wanted) {
         return Ok(false);
     }
-    for image in record.images.values() {
+    for image in &record.images {
         if remaining(set, image)? != Task::Done {
             return Ok(false);
         }
@@ -81,10 +84,10 @@ pub(in crate::dataset) fn close(set: &Set, id: Id) -> Result<()> {
 fn written(set: &Set, id: Id) -> Result<()> {
     let Set { folder, packs, .. } = set;
     let Some(packing) = Packing::of(&set.recipe) else { return Ok(()) };
-    let mut images = BTreeMap::new();
+    let mut images = Vec::new();
     for index in packing.images(id) {
         match ChecksumRecord::read(folder, index) {
-            Some(image) if remaining(set, &image)? == Task::Done => drop(images.insert(index, image)),
+            Some(image) if remaining(set, &image)? == Task::Done => images.push(image),
             _ => {
                 // Of a pack that is there already, what a killed run has left.
                 return match packs.get(folder, id) {
@@ -98,7 +101,7 @@ fn written(set: &Set, id: Id) -> Result<()> {
     let mut whole = Whole::new(folder);
     whole.file(&id.path(), |out| {
         let mut archive = tar::Builder::new(out);
-        for image in images.values() {
+        for image in &images {
             for path in native::in_order(image.files.keys().filter(|path| native::is_native(path))) {
                 let file = folder.join(path);
                 let bytes = crate::input::contents(&file).map_err(Error::io(&file))?;
@@ -117,10 +120,10 @@ fn written(set: &Set, id: Id) -> Result<()> {
 
 /// Removes the folders of images that a pack holds.
 fn clear(folder: &Path, record: &PackRecord) -> Result<()> {
-    for index in record.images.keys() {
+    for index in record.images.iter().map(|image| image.index) {
         // First what says that it is whole.
-        remove(&ChecksumRecord::path(folder, *index), |path| std::fs::remove_file(path))?;
-        remove(&folder.join(native::folder(&Set::name(*index))), |path| std::fs::remove_dir_all(path))?;
+        remove(&ChecksumRecord::path(folder, index), |path| std::fs::remove_file(path))?;
+        remove(&folder.join(native::folder(&Set::name(index))), |path| std::fs::remove_dir_all(path))?;
     }
     Ok(())
 }
@@ -135,8 +138,8 @@ fn remove(path: &Path, by: impl Fn(&Path) -> std::io::Result<()>) -> Result<()> 
 /// Takes a pack apart: what is whole of it lies in folders again.
 fn take_apart(set: &Set, id: Id, record: &PackRecord) -> Result<()> {
     let Set { folder, packs, .. } = set;
-    for (index, image) in &record.images {
-        if ChecksumRecord::read(folder, *index).is_some() {
+    for image in &record.images {
+        if ChecksumRecord::read(folder, image.index).is_some() {
             continue;
         }
         let native = image.files.iter().filter(|(path, _)| native::is_native(path));

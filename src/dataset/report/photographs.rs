@@ -1,8 +1,8 @@
 //! How bright the photographs are and of what colour, measured on some of them.
 
+use crate::Result;
 use crate::dataset::{Set, native};
 use crate::report::Tally;
-use crate::Result;
 use rayon::prelude::*;
 
 /// Most images that are measured, spread over the dataset: to decode a hundred thousand would take an hour.

@@ -3,8 +3,8 @@
 use super::example::{Example, Shape};
 use super::select::{Pick, Selection};
 use crate::Result;
-use crate::dataset::classes::{Classes, Map};
 use crate::dataset::Set;
+use crate::dataset::classes::{Classes, Map};
 use std::borrow::Cow;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -44,7 +44,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let files = threads.install(|| {
         let files = finish::finish(&set, args.shards)?;
         tell_left_out(&set)?;
-        Ok(files)
+        Ok::<_, furrow::Error>(files)
     })?;
     if let Some(push) = &push {
         push::whole(&set, push, signals.heed())?;

@@ -112,7 +112,9 @@ pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
             let all = furrow::dataset::generate::Shard::ALL;
             render::generate_and_push(&set, &cli.make.work, all, memory, push.as_ref(), signals)?;
             if cli.make.push.frees() {
-                furrow::tell!("all images are pushed: `trace dataset finish` is for the folder that they were pushed to");
+                furrow::tell!(
+                    "all images are pushed: `trace dataset finish` is for the folder that they were pushed to"
+                );
                 return Ok(Vec::new());
             }
             let files = furrow::job::Threads::new(cli.make.work.threads)?.install(|| {

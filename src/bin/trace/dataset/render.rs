@@ -6,8 +6,8 @@ use crate::quality::threads;
 use furrow::Result;
 use furrow::cli::signal::Signals;
 use furrow::dataset::Set;
-use furrow::dataset::push::Push;
 use furrow::dataset::generate::{self, Callbacks, Shard, Work};
+use furrow::dataset::push::Push;
 use std::path::PathBuf;
 use std::time::Instant;
 
