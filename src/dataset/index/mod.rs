@@ -126,7 +126,7 @@ fn of_image(set: &Set, record: &Record) -> Row {
         ("moisture", soil.map(|soil| soil.moisture.mean).into()),
         ("roughness_mm", soil.map(|soil| soil.relief.rms_mm).into()),
         ("clods_per_m2", soil.map(|soil| soil.clods.over_5mm_per_m2).into()),
-        ("stones_cover", soil.map(|soil| soil.stones_cover.iter().sum::<f32>()).into()),
+        ("stones_cover", soil.map(|soil| soil.stones_cover.iter().fold(0.0, |sum, cover| sum + cover)).into()),
         ("straw_cover", soil.map(|soil| soil.litter.straw_cover).into()),
         ("soil_layer", layer.map(|layer| layer.name.as_str()).into()),
         ("camera_height_m", camera.map(|camera| camera.position_m[2]).into()),
