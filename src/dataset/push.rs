@@ -203,7 +203,7 @@ fn hashed(folder: &Path, files: Vec<String>) -> Result<(Vec<String>, String)> {
     for file in &files {
         let path = folder.join(file);
         let bytes = crate::input::contents(&path).map_err(Error::io(&path))?;
-        words += &format!("{} {file}\n", Checksum::of(&bytes).sha256);
+        words.extend([Checksum::of(&bytes).sha256.as_str(), " ", file, "\n"]);
     }
     Ok((files, Checksum::of(words.as_bytes()).sha256))
 }
@@ -356,7 +356,7 @@ fn filled(command: &str, dir: &str) -> String {
     while let Some(c) = rest.chars().next() {
         if let Some(after) = rest.strip_prefix(DIR) {
             match quotes {
-                Quotes::None => out += &format!("'{}'", dir.replace('\'', r"'\''")),
+                Quotes::None => out.extend(["'", &dir.replace('\'', r"'\''"), "'"]),
                 Quotes::Single => out += &dir.replace('\'', r"'\''"),
                 Quotes::Double => {
                     for c in dir.chars() {
