@@ -468,7 +468,7 @@ fn triangles_stay_within_budget() {
             ("BEAVX", ..=19) => 17_000,
             // Twenty leaves and more, and every side shoot with leaves of its own.
             ("BEAVX", _) | ("STEME" | "ARHHY", 20..) => 40_000,
-            ("DAUCA" | "CIRAR" | "ARHHY" | "GLXMA", _) => 14_000,
+            ("DAUCA" | "CIRAR" | "ARHHY" | "GLXMA" | "SOLTU", _) => 14_000,
             ("TRZAX", 22..) => 24_000,
             _ => 9_000,
         };
