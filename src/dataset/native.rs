@@ -2,7 +2,7 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | `rgb.png`, `nir.png` | the photographs, 8 bit |
+//! | `rgb.png`, `nir.png` | the photographs, 8 bit; none where images are labels alone |
 //! | `semantics.png` | class, indexed: 0 soil, 1 crop, 2 weed, 255 no label |
 //! | `species.png` | number of the species in `dataset.json`, 8 bit, 0 for none |
 //! | `parts.png` | what is there, indexed: organs and things on the ground, as `parts/names.json` of the format parts; where classes need it |
@@ -49,7 +49,9 @@ pub fn files(recipe: &Recipe, sample: &Sample, text: &str) -> Result<Vec<File>> 
     let mut add = |name: &str, bytes: Vec<u8>| files.push(File { path: format!("{base}/{name}"), bytes });
     let png = |picture: &Picture<'_>| output::encode_png(w, h, picture, text);
     let colors = palette(sample.semantics.contains(&IGNORE));
-    add("rgb.png", png(&Picture::Rgb(&sample.rgb))?);
+    if !sample.rgb.is_empty() {
+        add("rgb.png", png(&Picture::Rgb(&sample.rgb))?);
+    }
     if !sample.nir.is_empty() {
         add("nir.png", png(&Picture::Gray(&sample.nir))?);
     }
@@ -79,8 +81,13 @@ pub fn read(dataset: &Path, name: &str) -> Result<Sample> {
     let at = |file: &str| -> PathBuf { dataset.join(folder(name)).join(file) };
     let record = read_record(dataset, name)?;
     let size = (record.width, record.height);
-    let (w, h, rgb) = output::read_rgb(&at("rgb.png"))?;
-    check(&at("rgb.png"), size, (w, h))?;
+    let rgb = if record.has_photograph() || at("rgb.png").is_file() {
+        let (w, h, rgb) = output::read_rgb(&at("rgb.png"))?;
+        check(&at("rgb.png"), size, (w, h))?;
+        rgb
+    } else {
+        Vec::new()
+    };
     let gray = |file: &str| -> Result<Vec<u8>> {
         let (w, h, values) = output::read_gray(&at(file))?;
         check(&at(file), size, (w, h))?;

@@ -22,6 +22,11 @@ pub(super) struct Taken {
 pub(super) trait OfFields: Sync {
     /// The files of a field of this name.
     fn field(&self, set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()>;
+
+    /// Whether they name the photographs.
+    fn names_photographs(&self) -> bool {
+        true
+    }
 }
 
 impl<T: OfFields> Format for T {
@@ -31,6 +36,10 @@ impl<T: OfFields> Format for T {
 
     fn needs_camera(&self) -> bool {
         true
+    }
+
+    fn needs_photograph(&self) -> bool {
+        self.names_photographs()
     }
 
     fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {

@@ -36,4 +36,8 @@ impl OfFields for Writer {
         }
         Ok(())
     }
+
+    fn names_photographs(&self) -> bool {
+        false
+    }
 }

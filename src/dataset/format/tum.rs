@@ -29,4 +29,8 @@ impl OfFields for Writer {
         }
         Ok(())
     }
+
+    fn names_photographs(&self) -> bool {
+        false
+    }
 }
