@@ -29,9 +29,9 @@ impl Perlin {
         let (fx, fy) = (x - left as f64, y - top as f64);
         let signed = |v: f64, negative: u8| f64::from_bits(v.to_bits() ^ (u64::from(negative) << 63));
         let slope = |right: i64, below: i64| {
-            let column = usize::from(self.order[(left + right & 0xff) as usize]);
-            let choice = self.order[column ^ (top + below & 0xff) as usize];
-            signed(fx - right as f64, choice & 1) + signed(fy - below as f64, choice >> 1 & 1)
+            let column = usize::from(self.order[((left + right) & 0xff) as usize]);
+            let choice = self.order[column ^ ((top + below) & 0xff) as usize];
+            signed(fx - right as f64, choice & 1) + signed(fy - below as f64, (choice >> 1) & 1)
         };
         let fade = |t: f64| {
             let t = t.clamp(0.0, 1.0);
