@@ -1,7 +1,6 @@
 //! The images of a field with their cameras: what formats of poses and tracks are made of.
 
 use super::{Format, Whole};
-use crate::dataset::native;
 use crate::dataset::recipe::Recipe;
 use crate::dataset::record::{CaptureRecord, Record};
 use crate::dataset::set::Set;
@@ -23,9 +22,9 @@ pub(super) trait OfFields: Sync {
     /// The files of a field of this name.
     fn field(&self, set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()>;
 
-    /// Whether they name the photographs.
+    /// As [`Format::names_photographs`].
     fn names_photographs(&self) -> bool {
-        true
+        false
     }
 }
 
@@ -39,7 +38,11 @@ impl<T: OfFields> Format for T {
     }
 
     fn needs_photograph(&self) -> bool {
-        self.names_photographs()
+        OfFields::names_photographs(self)
+    }
+
+    fn names_photographs(&self) -> bool {
+        OfFields::names_photographs(self)
     }
 
     fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
@@ -56,7 +59,7 @@ impl<T: OfFields> Format for T {
 fn images(set: &Set, field: u64) -> Result<Vec<Taken>> {
     let captures = set.recipe.captures();
     let (begin, end) = (field * captures, ((field + 1) * captures).min(set.recipe.count));
-    (begin..end).map(|index| taken(native::read_record(&set.folder, &Set::name(index))?)).collect()
+    (begin..end).map(|index| taken(set.record(index)?)).collect()
 }
 
 fn taken(mut record: Record) -> Result<Taken> {

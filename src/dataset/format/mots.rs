@@ -36,8 +36,4 @@ impl OfFields for Writer {
         }
         Ok(())
     }
-
-    fn names_photographs(&self) -> bool {
-        false
-    }
 }

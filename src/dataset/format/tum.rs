@@ -29,8 +29,4 @@ impl OfFields for Writer {
         }
         Ok(())
     }
-
-    fn names_photographs(&self) -> bool {
-        false
-    }
 }
