@@ -116,16 +116,16 @@ pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()>
     let all = Threads::new(work.threads)?;
     let threads = all.count();
     let shard = work.shard;
-    let held = |k: &u64| shard.holds(set.recipe.field_of(*k).0);
+    let held = |k: &u64| shard.holds(set.recipe.growing_of(*k));
     let wanted: Vec<u64> = (0..set.recipe.count).filter(held).collect();
     let tasks: Vec<(u64, Task)> =
         all.install(|| wanted.into_par_iter().map(|k| task(set, k).map(|t| (k, t))).collect::<Result<Vec<_>>>())?;
     let wanted = tasks.len();
     let tasks: Vec<(u64, Task)> = tasks.into_iter().filter(|(_, t)| *t != Task::Done).collect();
     (callbacks.begin)(tasks.len());
-    // Images of one field follow each other on one worker, which grows it once.
+    // Images of one field and day follow each other on one worker, which grows it once.
     let fields: Vec<&[(u64, Task)]> =
-        tasks.chunk_by(|a, b| set.recipe.field_of(a.0).0 == set.recipe.field_of(b.0).0).collect();
+        tasks.chunk_by(|a, b| set.recipe.growing_of(a.0) == set.recipe.growing_of(b.0)).collect();
     let rendered = tasks.iter().find(|(_, task)| *task == Task::All).map(|(index, _)| *index);
     let source = match (rendered, &renderer) {
         (Some(index), Some(renderer)) => {

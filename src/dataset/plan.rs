@@ -27,6 +27,8 @@ pub struct Order {
     pub seed: Option<u64>,
     /// How many images.
     pub count: u64,
+    /// Days on which they are taken, instead of the scene file's; none keeps them.
+    pub days: Vec<u32>,
     /// Image width, instead of the scene file's.
     pub width: Option<u32>,
     /// Image height.
@@ -56,6 +58,7 @@ impl Order {
             scene: scene.into(),
             seed: None,
             count,
+            days: Vec::new(),
             width: None,
             height: None,
             formats: Vec::new(),
@@ -130,6 +133,7 @@ pub(super) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
             scene_sha256,
             seed: field.seed,
             captures: source.captures(),
+            days: source.seen_days().to_vec(),
             width: camera.width(),
             height: camera.height(),
             engine: options.engine,
@@ -161,7 +165,7 @@ pub(super) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
 /// A scene file as an order asks for it.
 fn opened(scene: &Path, order: &Order) -> Result<SceneFile> {
     let scene = SceneFile::edited(scene, order.edit)?;
-    Ok(scene.seed(order.seed).width(order.width).height(order.height).memory(order.memory))
+    Ok(scene.seed(order.seed).days(&order.days).width(order.width).height(order.height).memory(order.memory))
 }
 
 /// SHA-256 of a scene whose copies may name other files than the originals do, found by growing the first field from them in

@@ -122,7 +122,7 @@ impl Status {
         let runs: Vec<Run<'_>> = logs.iter().map(Run::of).collect();
         let of = shards.unwrap_or_else(|| last_shards(&runs)).max(1);
         let there = there(set, stop)?;
-        let shard_of = |index: u64| set.recipe.field_of(index).0 % of;
+        let shard_of = |index: u64| set.recipe.growing_of(index) % of;
         let lacks = |index: u64| there.get(usize::try_from(index).unwrap_or(usize::MAX)) == Some(&false);
         let failures: Vec<FailedImage> = failures(&logs)
             .into_values()
