@@ -130,10 +130,11 @@ pub(super) fn age(desc: &PlantDesc, stage: Stage) -> f32 {
         Stage::Age(days) => return days,
         Stage::Bbch(code) => code,
     };
-    covering(desc, code).map(|(_, days)| days).unwrap_or_else(|| {
-        Between::find(&desc.stages, stage)
-            .map_or(0.0, |Between { from, to, u }| lerp(from.days.f32(), to.days.f32(), u))
-    })
+    let between = || {
+        let between = Between::find(&desc.stages, stage);
+        between.map_or(0.0, |Between { from, to, u }| lerp(from.days.f32(), to.days.f32(), u))
+    };
+    covering(desc, code).map_or_else(between, |(_, days)| days)
 }
 
 /// When the leaves of the plant of `stream` come out, and how large they become, all sizes times `vigour`.
