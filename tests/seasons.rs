@@ -51,9 +51,9 @@ const FLAWLESS: &str = "(holes: 0, shot_holes: 0, bites: 0, tears: 0, spots: 0, 
 #[test]
 fn one_field_grows() {
     let text = bare(FLAWLESS);
-    let days = [4, 8, 14, 20, 28, 36];
+    let days = [4, 12, 24, 36];
     let fields: Vec<Field> = days.iter().map(|day| on(&text, *day)).collect();
-    let mut rates = Vec::new();
+    let (mut rates, mut leaves) = (Vec::new(), 0);
     for pair in fields.windows(2) {
         let (before, now) = (&pair[0], &pair[1]);
         let (had, have) = (Traits::of(before), Traits::of(now));
@@ -65,35 +65,39 @@ fn one_field_grows() {
             rates.push(
                 (grown.age_days - plant.age_days) / f32::from(now.day.unwrap() as u16 - before.day.unwrap() as u16),
             );
-            for leaf in &plant.leaf_axes {
+            // Seed leaves narrow and fall where the species file says so.
+            for leaf in plant.leaf_axes.iter().filter(|leaf| leaf.leaf > 2) {
                 let later = grown.leaf_axes.iter().find(|other| other.leaf == leaf.leaf).expect("no leaf goes");
-                // Seed leaves of beet have narrowed by a few per cent by the time that they fall; the species file says so.
-                let least = if leaf.leaf <= 2 { 0.9 } else { 1.0 - 1e-5 };
                 let area = |of: furrow::plant::LeafSize| of.length * of.width;
-                assert!(area(later.size) >= least * area(leaf.size), "{} leaf {}", plant.species, leaf.leaf);
+                assert!(area(later.size) >= (1.0 - 1e-5) * area(leaf.size), "{} leaf {}", plant.species, leaf.leaf);
+                leaves += 1;
             }
             let (a, b) = (had.plants[&plant.number].leaf_area_m2, have.plants[&plant.number].leaf_area_m2);
             assert!(b >= a * (1.0 - 1e-4), "{} {}: {a} {b}", plant.species, plant.number);
         }
         assert!(have.canopy.unwrap().lai > had.canopy.unwrap().lai);
     }
+    assert!(leaves > 50, "{leaves}");
     // Every plant has a pace of its own, and keeps it.
     let (lo, hi) = rates.iter().fold((f32::MAX, 0.0_f32), |(lo, hi), r| (lo.min(*r), hi.max(*r)));
     assert!(lo > 0.7 && hi < 1.31 && hi - lo > 0.05, "{lo} {hi}");
 }
 
-/// Expected: the first flush is there from its day on, the second not before its own.
+/// Expected: the first flush, of days 0 to 4, is there on day 17, and nothing that is younger; on day 30 the second is, of days 18 to 22, with
+/// plants that were not there before. No plant ages faster than 1.3 or slower than 0.7 days a day.
 #[test]
 fn weeds_emerge_in_flushes() {
     let text = bare(FLAWLESS);
-    let young = |field: &Field| field.plants.iter().filter(|p| p.species.contains("hen") && p.age_days < 18.0).count();
-    let all = |field: &Field| field.plants.iter().filter(|p| p.species.contains("hen")).count();
-    let [before, early, late] = [0, 17, 30].map(|day| on(&text, day));
-    assert!(all(&before) < all(&early) && all(&early) < all(&late));
-    assert!(young(&early) > 0 && young(&late) > 0);
-    let first: Vec<u32> = early.plants.iter().map(|p| p.id).collect();
-    let new: Vec<_> = late.plants.iter().filter(|p| !first.contains(&p.id)).collect();
-    assert!(new.iter().all(|p| p.species.contains("hen") && p.age_days < 18.0) && !new.is_empty());
+    let weeds = |day| -> BTreeMap<u32, f32> {
+        let hens = on(&text, day).plants.into_iter().filter(|p| p.species.contains("hen"));
+        hens.map(|p| (p.id, p.age_days)).collect()
+    };
+    let [before, early, late] = [2, 17, 30].map(weeds);
+    assert!(before.values().all(|age| *age <= 2.0 * 1.3) && before.len() < early.len());
+    assert!(early.values().all(|age| *age >= 13.0 * 0.7) && !early.is_empty());
+    let (young, old): (Vec<_>, Vec<_>) = late.iter().partition(|(_, age)| **age <= 12.0 * 1.3);
+    assert!(young.len() > 2 && young.iter().all(|(id, _)| !early.contains_key(id)));
+    assert!(old.iter().all(|(_, age)| **age >= 26.0 * 0.7) && old.len() >= early.len());
 }
 
 /// Where leaves are cut, on a raster of each leaf's own image.
@@ -112,11 +116,15 @@ fn cut(field: &Field) -> BTreeMap<(u32, u16), Vec<bool>> {
 #[test]
 fn damage_never_heals_and_stays_where_it_was() {
     let text = bare("(holes: 4, shot_holes: 6, bites: 1, tears: 0.5)");
-    let days = [6, 14, 24, 36].map(|day| cut(&on(&text, day)));
+    let days = [6, 20, 36].map(|day| cut(&on(&text, day)));
     let mut gained = 0;
     for pair in days.windows(2) {
         for (leaf, gone) in &pair[0] {
-            let later = &pair[1][leaf];
+            // Seed leaves fall.
+            let Some(later) = pair[1].get(leaf) else {
+                assert!(leaf.1 <= 2, "leaf {leaf:?} is gone");
+                continue;
+            };
             assert!(gone.iter().zip(later).all(|(before, now)| !before || *now), "leaf {leaf:?} has healed");
             gained += usize::from(gone != later);
         }
@@ -190,10 +198,11 @@ fn a_scene_file_without_days_is_of_the_day_that_its_crop_says() {
     let (written, other) = (text("AgeDays(Uniform(15, 25))"), text("Bbch(14)"));
     let undated = field_of(&written.replace("days: (to: 1, pace: 1),", ""), &Options::default()).unwrap();
     let (now, week) = (ages(&written, 20), ages(&written, 13));
+    assert!(undated.plants.len() > 1 && now.len() == undated.plants.len() && !week.is_empty());
     for plant in &undated.plants {
-        assert!(
-            (now[&plant.id] - plant.age_days).abs() < 1e-4 && (week[&plant.id] - plant.age_days + 7.0).abs() < 1e-4
-        );
+        assert!((now[&plant.id] - plant.age_days).abs() < 1e-4);
+        // A smaller plant may not reach into the view.
+        assert!(week.get(&plant.id).is_none_or(|age| (age - plant.age_days + 7.0).abs() < 1e-4));
     }
     // The fourth leaf unfolds on day 23 by the species file; the drawn plants are all of that day.
     assert!(ages(&other, 23).values().all(|age| (age - 23.0).abs() < 1e-4));
