@@ -24,6 +24,10 @@ impl OfFields for Writer {
         true
     }
 
+    fn names_photographs(&self) -> bool {
+        true
+    }
+
     fn field(&self, _set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
         let folder = format!("{FOLDER}/{name}");
         out.file(&format!("{folder}/cameras.txt"), |w| w.put(cameras(images)))?;

@@ -24,6 +24,10 @@ impl OfFields for Writer {
         true
     }
 
+    fn names_photographs(&self) -> bool {
+        true
+    }
+
     fn field(&self, _set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
         let mut all = images.first().map(intrinsics).unwrap_or_default();
         all.insert("frames".into(), images.iter().map(frame).collect());
