@@ -107,9 +107,9 @@ pub fn bill(order: &Order, threads: &Threads, stop: &Arc<AtomicBool>) -> Result<
     let peak = meter::peak_memory().unwrap_or(0);
     let mean = |of: &dyn Fn(&Probe) -> f64| probes.iter().map(of).sum::<f64>() / probes.len().max(1) as f64;
     let all = threads.install(|| Together::of(&recipe, &files, &probes))?;
-    let fields = recipe.count.div_ceil(recipe.captures()) as f64;
+    let growings = recipe.count.div_ceil(recipe.captures_a_day()) as f64;
     let (count, spp) = (recipe.count as f64, f64::from(images.spp));
-    let (grow_s, sample_s) = (fields * mean(&|p| p.grow_s), count * spp * mean(&|p| p.sample_s));
+    let (grow_s, sample_s) = (growings * mean(&|p| p.grow_s), count * spp * mean(&|p| p.sample_s));
     let rest_s = start + count * mean(&|p| p.fixed_s) + all.core_s;
     let packs = Packing::of(&recipe).map_or(0, |packing| packing.all().count() as u64);
     // An archive and its record.
@@ -367,6 +367,7 @@ impl<'a> Small<'a> {
         if let Made::Rendered(rendering) = &mut small.made {
             // One frame of a drive.
             rendering.captures = rendering.captures.min(cameras as u64);
+            rendering.days.truncate(1);
         }
         Self { recipe: small, probes }
     }

@@ -141,9 +141,9 @@ pub fn generate(set: &Set, work: &Work<'_>, callbacks: &Callbacks<'_>) -> Result
             .into_iter()
             .try_for_each(|unit| if callbacks.soon.load(Ordering::Relaxed) { Ok(()) } else { sent(unit) })?;
     }
-    // Images of one field follow each other on one worker, which grows it once.
+    // Images of one field and day follow each other on one worker, which grows it once.
     let fields: Vec<&[(u64, Task)]> =
-        tasks.chunk_by(|a, b| set.recipe.field_of(a.0).0 == set.recipe.field_of(b.0).0).collect();
+        tasks.chunk_by(|a, b| set.recipe.growing_of(a.0) == set.recipe.growing_of(b.0)).collect();
     let rendered = tasks.iter().find(|(_, task)| *task == Task::All).map(|(index, _)| *index);
     let source = match (rendered, &renderer) {
         (Some(index), Some(renderer)) => {

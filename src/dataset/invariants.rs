@@ -110,7 +110,9 @@ fn numbers(recipe: &Recipe, sample: &Sample) -> Vec<String> {
     let (field, capture) = recipe.field_of(record.index);
     let told = record.capture.as_ref().map(|capture| (capture.field, capture.time_s.is_finite()));
     let frames = record.capture.as_ref().is_none_or(|told| u64::from(told.frame) <= capture);
-    if told != (recipe.captures() > 1).then_some((field, true)) || !frames {
+    let day = record.capture.as_ref().and_then(|capture| capture.day);
+    let of_day = recipe.days().get((capture / recipe.captures_a_day()) as usize).copied();
+    if told != recipe.has_sequences().then_some((field, true)) || !frames || day != of_day {
         all.push("it is not the image of its field that its number says".into());
     }
     let points = record

@@ -27,6 +27,8 @@ pub struct Order {
     pub seed: Option<u64>,
     /// How many images.
     pub count: u64,
+    /// Days on which they are taken, instead of the scene file's; none keeps them.
+    pub days: Vec<u32>,
     /// Image width, instead of the scene file's.
     pub width: Option<u32>,
     /// Image height.
@@ -60,6 +62,7 @@ impl Order {
             scene: scene.into(),
             seed: None,
             count,
+            days: Vec::new(),
             width: None,
             height: None,
             formats: Vec::new(),
@@ -137,6 +140,7 @@ pub(super) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
             scene_sha256,
             seed: field.seed,
             captures: source.captures(),
+            days: source.seen_days().to_vec(),
             width: camera.width(),
             height: camera.height(),
             engine: options.engine,
@@ -183,7 +187,7 @@ fn labels_alone(order: &Order, options: &RenderOptions) -> Result<Vec<Kept>> {
 /// A scene file as an order asks for it.
 fn opened(scene: &Path, order: &Order) -> Result<SceneFile> {
     let scene = SceneFile::edited(scene, order.edit)?;
-    let scene = scene.seed(order.seed).width(order.width).height(order.height).memory(order.memory);
+    let scene = scene.seed(order.seed).days(&order.days).width(order.width).height(order.height).memory(order.memory);
     Ok(scene.unlit(order.labels_only))
 }
 

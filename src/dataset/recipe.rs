@@ -69,6 +69,9 @@ pub struct Rendering {
     /// How many images are taken of each field, one after another.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub captures: u64,
+    /// The days on which they are taken: all images of a day, then those of the next. Left out of fields that are seen as they are written.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub days: Vec<u32>,
     /// Pixels across.
     pub width: u32,
     /// Pixels down.
@@ -218,11 +221,31 @@ impl Recipe {
         (index / self.captures(), index % self.captures())
     }
 
-    /// What the shards of a run share out, by number: fields, or packs where images lie in such.
+    /// How many images are taken of each field on a day.
+    pub fn captures_a_day(&self) -> u64 {
+        (self.captures() / self.days().len().max(1) as u64).max(1)
+    }
+
+    /// The days on which images are taken; none where fields are seen as they are written.
+    pub fn days(&self) -> &[u32] {
+        self.rendering().map_or(&[], |rendering| &rendering.days)
+    }
+
+    /// Number of the growing, among all, of the field that an image shows: fields grow anew for each of their days.
+    pub fn growing_of(&self, index: u64) -> u64 {
+        index / self.captures_a_day()
+    }
+
+    /// Whether images tell which of their field they are.
+    pub fn has_sequences(&self) -> bool {
+        self.captures() > 1 || !self.days().is_empty()
+    }
+
+    /// What the shards of a run share out, by number: fields on a day, or packs where images lie in such.
     pub fn unit_of(&self, index: u64) -> u64 {
         match Packing::of(self) {
             Some(packing) => packing.place(packing.id(index)),
-            None => self.field_of(index).0,
+            None => self.growing_of(index),
         }
     }
 

@@ -72,12 +72,15 @@ fn is_zero(n: &u64) -> bool {
     *n == 0
 }
 
-/// One image of a drive or of a rig.
+/// One image of a drive, of a rig or of a day.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CaptureRecord {
     /// Number of the field.
     pub field: u64,
-    /// How many images its camera took before.
+    /// The day on which it was taken, counted from the emergence of the field's first crop; left out of fields that have no days.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub day: Option<u32>,
+    /// How many images its camera took before, on all days.
     pub frame: u32,
     /// Name of the camera.
     pub camera: String,

@@ -18,6 +18,9 @@ use crate::{Error, Result};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
+/// What its name says.
+const SECONDS_A_DAY: f64 = 86_400.0;
+
 /// Where an image's time went.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Times {
@@ -90,19 +93,26 @@ impl LastField {
         let Set { folder, recipe, .. } = set;
         let rendering = recipe.rendering()?;
         let (number, capture) = recipe.field_of(index);
-        let known = self.0.take().filter(|field| field.grown().index == number);
+        let (of_day, day) = of_day(recipe, capture);
+        let known = self.0.take().filter(|field| field.grown().index == number && field.grown().day == day);
         let new = known.is_none();
-        let mut field = known.map_or_else(|| scene_file.field(number), Ok)?;
+        let mut field = known.map_or_else(|| scene_file.clone().day(day).field(number), Ok)?;
         if field.grown().hash != rendering.scene_sha256 {
             let help = format!("restore {}/scene/, or begin another dataset", folder.display());
             let words = "the scene file or something that it names was changed since the dataset was begun";
             return Err(Error::misuse(words).help(help).in_file(folder.join(&rendering.scene)));
         }
-        field.take(capture)?;
+        field.take(of_day)?;
         field.geometry()?;
         let (grow, build) = field.times();
         Ok((self.0.insert(field), if new { grow + build } else { Duration::ZERO }))
     }
+}
+
+/// Of an image of a field: which of its day it is, and the day.
+fn of_day(recipe: &Recipe, capture: u64) -> (u64, Option<u32>) {
+    let a_day = recipe.captures_a_day();
+    (capture % a_day, recipe.days().get((capture / a_day) as usize).copied())
 }
 
 /// Makes image `index` of a dataset from its [`scene_file`], whose threads do the work.
@@ -181,10 +191,7 @@ fn labelled(recipe: &Recipe, index: u64, of: &Field, labels: LabelMap) -> Result
             name: Set::name(index),
             source: None,
             split: recipe.split_of(index),
-            capture: (recipe.captures() > 1).then(|| {
-                let Capture { name, frame, time_s, .. } = &field.captures[field.capture];
-                CaptureRecord { field: field.index, frame: *frame, camera: name.clone(), time_s: *time_s }
-            }),
+            capture: recipe.has_sequences().then(|| taken(recipe, field)),
             width: labels.window.width(),
             height: labels.window.height(),
             classes: Vec::new(),
@@ -223,6 +230,21 @@ fn labelled(recipe: &Recipe, index: u64, of: &Field, labels: LabelMap) -> Result
         flows,
     });
     Ok(sample)
+}
+
+/// Which image of its field this is.
+fn taken(recipe: &Recipe, field: &scene::Field) -> CaptureRecord {
+    let Capture { name, frame, time_s, .. } = &field.captures[field.capture];
+    let (first, place) = (recipe.days().first(), recipe.days().iter().position(|day| Some(*day) == field.day));
+    let frames = field.captures.last().map_or(1, |last| last.frame + 1);
+    let later = field.day.zip(first).map_or(0, |(day, first)| day - first);
+    CaptureRecord {
+        field: field.index,
+        day: field.day,
+        frame: place.unwrap_or(0) as u32 * frames + frame,
+        camera: name.clone(),
+        time_s: time_s + f64::from(later) * SECONDS_A_DAY,
+    }
 }
 
 /// The plants of a field that its image shows or hides, in the order of their numbers.

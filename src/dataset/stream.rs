@@ -148,7 +148,7 @@ impl ImageStream {
 
     /// The indices of a shard.
     fn wanted(&self, shard: Shard) -> impl Iterator<Item = u64> + Send + use<> {
-        let captures = self.set.recipe.captures();
+        let captures = self.set.recipe.captures_a_day();
         self.indices.clone().filter(move |k| shard.holds(k / captures))
     }
 

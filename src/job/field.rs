@@ -38,7 +38,8 @@ impl Field {
         &self.grown
     }
 
-    /// The same field as another of its images has it: `capture` counts from 0, all cameras of a frame and then those of the next. What was
+    /// The same field as another of its images has it: `capture` counts from 0, all cameras of a frame and then those of the next, on
+    /// the field's day. What was
     /// grown and built is kept.
     ///
     /// # Errors

@@ -18,6 +18,8 @@ pub struct SceneFile {
     source: Arc<Source>,
     edit: &'static Edit,
     options: Options,
+    /// Days instead of the scene file's.
+    days: Vec<u32>,
     threads: Threads,
 }
 
@@ -36,7 +38,7 @@ impl SceneFile {
     #[doc(hidden)]
     pub fn open_within(path: impl AsRef<Path>, edit: &'static Edit, scope: Scope) -> Result<Self> {
         let source = Arc::new(edit.open(path.as_ref(), scope)?);
-        Ok(Self { source, edit, options: Options::default(), threads: Threads::all()? })
+        Ok(Self { source, edit, options: Options::default(), days: Vec::new(), threads: Threads::all()? })
     }
 
     /// The scene file as it is now on the disk, or with this text in its place. Species, textures and models that did not change since are
@@ -55,6 +57,21 @@ impl SceneFile {
     #[must_use]
     pub fn seed(mut self, seed: impl Into<Option<u64>>) -> Self {
         self.options.seed = seed.into();
+        self
+    }
+
+    /// With images taken on these days instead of the scene file's; none keeps them.
+    #[must_use]
+    pub fn days(mut self, days: &[u32]) -> Self {
+        self.days = days.to_vec();
+        self
+    }
+
+    /// With fields as they are on this day, counted from the emergence of their first crop; `None`: on the first of its days, or as its
+    /// plants are written where it has none.
+    #[must_use]
+    pub fn day(mut self, day: impl Into<Option<u32>>) -> Self {
+        self.options.day = day.into();
         self
     }
 
@@ -108,7 +125,9 @@ impl SceneFile {
     /// About what field `index` will take, before it grows.
     #[doc(hidden)]
     pub fn estimate(&self, index: u64) -> Result<Estimate> {
-        let options = Options { index, ..self.options.clone() };
+        // The last day is the largest.
+        let day = self.options.day.or(self.seen_days().last().copied());
+        let options = Options { index, day, ..self.options.clone() };
         self.threads.install(|| self.source.estimate(&options))
     }
 
@@ -125,9 +144,14 @@ impl SceneFile {
         self.source.foretold(&Options { index, ..self.options.clone() })
     }
 
-    /// How many images are taken of each field.
+    /// The days on which each field is seen; none where it is seen as it is written.
+    pub fn seen_days(&self) -> &[u32] {
+        if self.days.is_empty() { self.source.days() } else { &self.days }
+    }
+
+    /// How many images are taken of each field, on all its days.
     pub fn captures(&self) -> u64 {
-        self.source.captures()
+        self.source.captures() * self.seen_days().len().max(1) as u64
     }
 
     /// About how many plants stand in view of field `index`.
@@ -135,10 +159,11 @@ impl SceneFile {
         self.source.expected_plants(&Options { index, ..self.options.clone() })
     }
 
-    /// Grows field `index`: always the same for the same file, seed and index, and without growing those before it.
+    /// Grows field `index` as it is on its [day](Self::day): always the same for the same file, seed and index, and without growing those before it.
     pub fn field(&self, index: u64) -> Result<Field> {
         let begin = Instant::now();
-        let options = Options { index, ..self.options.clone() };
+        let day = self.options.day.or(self.seen_days().first().copied());
+        let options = Options { index, day, ..self.options.clone() };
         let grown = self.threads.install(|| self.edit.field(&self.source, &options))?;
         Ok(Field::new(grown, self.edit, self.threads.clone(), options, begin.elapsed()))
     }

@@ -242,6 +242,7 @@ mod tests {
 
     fn optics(condition: &Condition, seed: u64) -> ConditionOptics {
         let bearer = Bearer {
+            met: None,
             age: 1.0,
             cotyledon: false,
             share: 1.0,

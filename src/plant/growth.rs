@@ -9,6 +9,7 @@ use super::stage::{BUD, StageDesc};
 use crate::math::lerp;
 use crate::ron_file::{Bound, Vary};
 use crate::sampling::{Purpose, Stream};
+use std::collections::BTreeMap;
 use std::f32::consts::PI;
 
 /// Shortest cell of a blade's mesh unless coarser ones are asked for, metres: about what four pixels of a field camera see.
@@ -40,6 +41,17 @@ pub(super) struct LeafNow<'a> {
     pub(super) cell: f32,
     /// This leaf's own numbers.
     pub(super) stream: Stream,
+}
+
+/// A leaf over time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LeafLife {
+    /// Age of the plant when it comes out of the bud, days.
+    pub appears_days: f32,
+    /// Length of its blade when it is largest, metres.
+    pub blade: f32,
+    /// The blade's width then, metres.
+    pub width: f32,
 }
 
 /// The plant as it is today, before anything has a shape.
@@ -110,6 +122,36 @@ fn covering(desc: &PlantDesc, code: u32) -> Option<(u32, f32)> {
     let Some((after, late)) = desc.cover_days.range(code..).next() else { return Some((*before, early.f32())) };
     let u = (code - before) as f32 / (after - before).max(1) as f32;
     Some((code, lerp(early.f32(), late.f32(), u)))
+}
+
+/// Days after emergence at which a plant has this stage.
+pub(super) fn age(desc: &PlantDesc, stage: Stage) -> f32 {
+    let code = match stage {
+        Stage::Age(days) => return days,
+        Stage::Bbch(code) => code,
+    };
+    let between = || {
+        let between = Between::find(&desc.stages, stage);
+        between.map_or(0.0, |Between { from, to, u }| lerp(from.days.f32(), to.days.f32(), u))
+    };
+    covering(desc, code).map_or_else(between, |(_, days)| days)
+}
+
+/// When the leaves of the plant of `stream` come out, and how large they become, all sizes times `vigour`.
+pub(super) fn leaf_lives(desc: &PlantDesc, stream: &Stream, vigour: f32) -> BTreeMap<u16, LeafLife> {
+    let mut lives: BTreeMap<u16, LeafLife> = BTreeMap::new();
+    let mut before = 0.0;
+    for stage in &desc.stages {
+        let days = stage.days.f32();
+        for leaf in growth(desc, Stage::Age(days), stream, vigour).map_or(Vec::new(), |growth| growth.leaves) {
+            let appears_days = lerp(before, days, BUD / leaf.blade);
+            let life = lives.entry(leaf.number).or_insert(LeafLife { appears_days, blade: 0.0, width: 0.0 });
+            life.blade = life.blade.max(leaf.blade);
+            life.width = life.width.max(leaf.width);
+        }
+        before = days;
+    }
+    lives
 }
 
 /// Azimuth from which the leaves of the plant of `stream` count, radians clockwise from north.

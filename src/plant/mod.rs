@@ -54,6 +54,8 @@ pub use stage::{BUD, LayerDesc, StageDesc};
 
 use crate::sampling::Stream;
 use growth::Growth;
+pub use growth::LeafLife;
+use std::collections::BTreeMap;
 
 /// One plant: its organs in plant coordinates (metres, growth axis +z, origin where the stem meets the soil).
 #[derive(Clone, Debug, PartialEq)]
@@ -80,6 +82,16 @@ impl Plant {
 /// By how much a plant of this stream is turned about its axis, radians clockwise from above: its leaves' azimuths count from there.
 pub fn turn(stream: &Stream) -> f32 {
     growth::turn(stream)
+}
+
+/// Days after emergence at which a plant has this stage.
+pub fn age_days(desc: &PlantDesc, stage: Stage) -> f32 {
+    growth::age(desc, stage)
+}
+
+/// When the leaves of the plant of `stream` come out, and how large they become, by their numbers; `vigour` is a factor on its sizes.
+pub fn leaf_lives(desc: &PlantDesc, stream: &Stream, vigour: f32) -> BTreeMap<u16, LeafLife> {
+    growth::leaf_lives(desc, stream, vigour)
 }
 
 /// What a plant is grown with beyond its species, stage and stream.

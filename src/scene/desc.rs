@@ -8,6 +8,7 @@ use crate::plant::{ConditionDesc, PlantDesc, Stage};
 use crate::ron_file::{self, Finite, Fraction, NonNegative, Num, Pick, Positive, PositiveCount, Vary};
 use crate::sampling::Stream;
 use crate::scatter::{RowsDesc, WeedsDesc};
+use crate::scene::days::DaysDesc;
 use crate::scene::drive::{DriveDesc, MountedDesc};
 use crate::scene::tag::Class;
 use crate::sensor::{CameraDesc, SensorDesc};
@@ -43,6 +44,10 @@ pub struct FieldDesc {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-example" = "(frames: 20, path: AlongRows(speed_m_s: 0.5))"))]
     pub drive: Option<DriveDesc>,
+    /// Days on which all images are taken again, while the field grows; as the growth of its plants says unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "(from: 8, to: 40, every: 4)"))]
+    pub days: Option<DaysDesc>,
     /// How the film becomes a picture.
     #[serde(default)]
     pub sensor: SensorDesc,
@@ -122,6 +127,7 @@ fn point_spread() -> Filter {
 /// use furrow::scene::desc::Growth;
 /// let g: Growth = ron::from_str("AgeDays(Normal(mean: 24, sd: 2))").unwrap();
 /// let g: Growth = ron::from_str("Bbch(Choice([12, 14]))").unwrap();
+/// let g: Growth = ron::from_str("EmergesOn(Normal(mean: 12, sd: 2))").unwrap();
 /// // A field that was photographed in its first weeks or a month later: this crop and its weeds are all young or all old.
 /// let g: Growth = ron::from_str("Either([AgeDays(Uniform(8, 14)), AgeDays(Uniform(30, 40))])").unwrap();
 /// ```
@@ -133,12 +139,16 @@ pub enum Growth {
     /// Growth stage, BBCH scale (Meier 2001).
     #[schemars(extend("x-example" = "(Choice([12, 14]))"))]
     Bbch(Vary<PositiveCount>),
+    /// The day on which it emerges, where the field has `days`; they count from the emergence of the first crop.
+    #[schemars(extend("x-example" = "(Normal(mean: 12, sd: 2))"))]
+    EmergesOn(Vary<Finite>),
     /// One of these, drawn once a field: the same place in every such list of the scene file, so all of them have the same length.
     Either(Vec<Growth>),
 }
 
 impl Growth {
-    /// Draws one plant's stage; `place` is the one that the field has drawn for every list.
+    /// Draws one plant's stage; `place` is the one that the field has drawn for every list. A plant that emerges on a day is just emerging: how
+    /// old it is then, the field's day tells.
     ///
     /// # Panics
     /// Where a list is not that long, which [`super::assemble`] refuses before anything grows.
@@ -146,7 +156,25 @@ impl Growth {
         match self {
             Self::AgeDays(days) => Stage::Age(days.draw32(stream)),
             Self::Bbch(code) => Stage::Bbch(code.draw(stream) as u32),
+            Self::EmergesOn(_) => Stage::Age(0.0),
             Self::Either(of) => of[place].draw(place, stream),
+        }
+    }
+
+    /// The growth itself, or of a list the one at `place`.
+    ///
+    /// # Panics
+    /// As [`Self::draw`].
+    pub fn at(&self, place: usize) -> &Self {
+        if let Self::Either(of) = self { &of[place] } else { self }
+    }
+
+    /// Whether it is told by the day on which the plant emerges, or may be.
+    pub fn emerges(&self) -> bool {
+        match self {
+            Self::EmergesOn(_) => true,
+            Self::Either(of) => of.iter().any(Self::emerges),
+            Self::AgeDays(_) | Self::Bbch(_) => false,
         }
     }
 }

@@ -1,6 +1,7 @@
 //! What is out there: parts, materials, lights, a camera.
 
 pub mod assemble;
+pub mod days;
 pub mod desc;
 pub mod drive;
 pub mod estimate;

@@ -29,6 +29,8 @@ pub(super) struct Blend {
 struct Tile {
     noise: Perlin,
     log_share: f32,
+    /// Logarithm of how much of its share it has by now.
+    log_grown: f32,
     // Each ground lays its tiles another way round, so that no two show the same clod.
     rotation: Vec2,
     offset: Vec2,
@@ -54,6 +56,7 @@ impl Blend {
                     rotation: Vec2::from_angle(s.range32(0.0, std::f32::consts::TAU)) / layer.size_m.f32(),
                     offset: vec2(s.uniform32(), s.uniform32()),
                     log_share: layer.share.draw32(&mut s).ln(),
+                    log_grown: 0.0,
                     low,
                     relief: high - low,
                     clods: layer.clods.f32(),
@@ -67,6 +70,14 @@ impl Blend {
             sharpness: desc.sharpness.draw32(&mut child(1)),
             height: desc.height.f32(),
         }
+    }
+
+    /// The same where crusts have so much of their share, above 0: layers that hold fewer than half of the clods.
+    pub(super) fn with_crust(mut self, crust: f32) -> Self {
+        for tile in self.tiles.iter_mut().filter(|tile| tile.clods < 0.5) {
+            tile.log_grown = crust.ln();
+        }
+        self
     }
 
     /// The noise of layer `i`; slow to change over the ground, so it may be interpolated between vertices.
@@ -90,7 +101,11 @@ impl Blend {
             w[0] = 1.0;
             return w;
         }
-        let score = |i: usize| self.sharpness * (noise[i] + self.height * (heights[i] - 0.5)) + self.tiles[i].log_share;
+        let score = |i: usize| {
+            self.sharpness * (noise[i] + self.height * (heights[i] - 0.5))
+                + self.tiles[i].log_share
+                + self.tiles[i].log_grown
+        };
         let top = (0..n).map(score).fold(f32::MIN, f32::max);
         for (i, w) in w.iter_mut().enumerate().take(n) {
             *w = (score(i) - top).exp();
@@ -127,15 +142,23 @@ impl Blend {
         sum
     }
 
-    /// Share of the clods that lie here.
-    pub(super) fn clods(&self, weights: Weights) -> f32 {
+    /// Share of the clods that lie here. They do not move while crusts grow: none lies where a crust will be.
+    pub(super) fn clods(&self, mut weights: Weights) -> f32 {
+        if self.tiles.iter().any(|tile| tile.log_grown != 0.0) {
+            for (w, tile) in weights.iter_mut().zip(&self.tiles) {
+                *w *= (-tile.log_grown).exp();
+            }
+            let sum: f32 = weights.iter().sum();
+            weights = weights.map(|w| w / sum);
+        }
         self.tiles.iter().zip(weights).map(|(t, w)| t.clods * w).sum()
     }
 
     /// What was drawn for each layer, sharing the ground before noise decides who lies where.
     pub(super) fn shares(&self) -> Vec<f32> {
-        let sum: f32 = self.tiles.iter().map(|t| t.log_share.exp()).sum();
-        self.tiles.iter().map(|t| t.log_share.exp() / sum).collect()
+        let share = |t: &Tile| (t.log_share + t.log_grown).exp();
+        let sum: f32 = self.tiles.iter().map(share).sum();
+        self.tiles.iter().map(|t| share(t) / sum).collect()
     }
 
     /// Size of the largest patches, metres, and how hard their borders are.

@@ -70,6 +70,13 @@ pub struct SoilDesc {
     /// only lower or higher. Scene files do not say so, experiments do.
     #[serde(skip)]
     pub flat: bool,
+    /// How much of their share layers with `clods` below 0.5 have, 0 to 1: the days of a field say it.
+    #[serde(skip, default = "grown")]
+    pub crust: f32,
+}
+
+fn grown() -> f32 {
+    1.0
 }
 
 /// One layer of soil.

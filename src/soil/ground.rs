@@ -81,7 +81,7 @@ impl Ground {
     ) -> Result<Self> {
         check(desc, maps.len(), site)?;
         let relief = Relief::new(&desc.relief, site.rows, stream);
-        let blend = Blend::new(&desc.blend, &desc.layers, stream);
+        let blend = Blend::new(&desc.blend, &desc.layers, stream).with_crust(desc.crust);
         let law = Law::new(&desc.clods, stream);
         let grid = Grid::new(site.area, site.grid_m, site.margin_m);
         let mut ground = Self {

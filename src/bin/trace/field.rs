@@ -67,6 +67,10 @@ pub(crate) struct FieldArgs {
     /// Which field of the distribution.
     #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
     index: u64,
+    /// On which day, counted from the emergence of the first crop; on the first of the scene file's days, or as its plants are written,
+    /// unless given.
+    #[arg(long, value_name = "DAY", value_parser = clap::value_parser!(u32).range(0..=1000))]
+    day: Option<u32>,
     /// Which frame of a drive, from 0.
     #[arg(long, value_name = "N", default_value_t = 0)]
     frame: u32,
@@ -91,7 +95,7 @@ impl FieldArgs {
         let tell = |warning: &String| tell(&format!("warning: {warning}"));
         let SceneArgs { seed, width, height, .. } = self.scene;
         let scene = SceneFile::edited(self.path(), edit)?.seed(seed).width(width).height(height);
-        let scene = scene.memory(self.memory.bytes).threads(threads);
+        let scene = scene.day(self.day).memory(self.memory.bytes).threads(threads);
         let foretold = scene.foretold(self.index)?;
         foretold.iter().for_each(tell);
         let mut field = scene.field(self.index)?;

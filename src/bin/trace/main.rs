@@ -56,6 +56,7 @@ Examples:
   trace dataset --scene scenes/field.ron --count 100 --out data   a hundred of them, labelled, resumable
   trace stream --scene scenes/field.ron | python3 train.py        fields as a program asks for them, without files
   trace sequence --scene scenes/09-drive.ron --out drive          a stereo pair that drives along a row
+  trace sequence --scene scenes/03-one-row.ron --days 8..32/8 --out row    one field while it grows
   trace ablate --scene scenes/field.ron --count 100 --out ab      the same hundred with one thing changed at a time
   trace export --scene scenes/field.ron --format gltf   the same field for another program
   trace compare out/field out/noisy                     how far one image is from another: PSNR, SSIM, FLIP, by class
@@ -77,7 +78,7 @@ Files of an image:
   *_denoised.png, denoised.exr   with --denoise
 
 More samples make less noise: twice the --spp takes twice the time and leaves 0.7 of it.
-The scene files scenes/01-one-leaf.ron to 09 teach how a scene is written. From any folder, --scene field finds what ships.
+The scene files scenes/01-one-leaf.ron to 10 teach how a scene is written. From any folder, --scene field finds what ships.
 Paths go to stdout, everything else to stderr.
 Exit codes: 0 done, 1 failed, 2 wrong input, 75 stopped cleanly (Ctrl-C, TERM, HUP, USR1).";
 
@@ -91,7 +92,7 @@ enum Verb {
     Dataset(Box<dataset::Cli>),
     /// Write images with their labels to stdout as they are made, as a tar archive for a program that reads them.
     Stream(Box<stream::Args>),
-    /// Drive through a field and take all images of its cameras: poses, optical flow, tracks.
+    /// Drive through a field, or come back to it on several days, and take all images of its cameras: poses, optical flow, tracks.
     Sequence(Box<sequence::Args>),
     /// Make a dataset, and the same again with one thing changed at a time: what does each matter to a network?
     Ablate(Box<ablate::Args>),

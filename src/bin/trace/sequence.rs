@@ -1,4 +1,4 @@
-//! `trace sequence`: all images of a drive through one field or several, as a dataset.
+//! `trace sequence`: all images of a drive through one field or several, or of their days, as a dataset.
 
 use crate::dataset::order::{begin, formats};
 use crate::dataset::render::{WorkArgs, generate};
@@ -9,6 +9,7 @@ use furrow::dataset::finish;
 use furrow::dataset::generate::Shard;
 use furrow::dataset::plan::Order;
 use furrow::job::SceneFile;
+use furrow::scene::days::DaysDesc;
 use furrow::settings::Quality;
 use furrow::{Error, Result};
 use std::path::PathBuf;
@@ -18,7 +19,11 @@ use std::path::PathBuf;
 pub(crate) struct Args {
     #[command(flatten)]
     scene: SceneArgs,
-    /// How many fields are driven through, from number 0.
+    /// Days on which all images are taken, instead of the scene file's: `8..40/4` for every fourth from 8 to 40, `8,12,20` one by one. They
+    /// count from the emergence of the first crop.
+    #[arg(long, value_name = "DAYS", value_parser = days)]
+    days: Option<Days>,
+    /// How many fields are seen, from number 0.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     fields: u64,
     /// Folder of the dataset.
@@ -41,17 +46,28 @@ pub(crate) struct Args {
     work: WorkArgs,
 }
 
+/// Days, in order.
+#[derive(Clone)]
+struct Days(Vec<u32>);
+
+fn days(text: &str) -> Result<Days, String> {
+    DaysDesc::read(text).map(Days).map_err(|e| e.to_string())
+}
+
 /// Makes what is missing of the dataset.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     args.scene.check()?;
-    let captures = SceneFile::open(args.scene.path())?.captures();
-    if captures == 1 {
+    let days = args.days.as_ref().map_or(&[][..], |days| &days.0);
+    let scene = SceneFile::open(args.scene.path())?.days(days);
+    let captures = scene.captures();
+    if captures == 1 && scene.seen_days().is_empty() {
         return Err(Error::input("it takes one image of each field, which is no sequence")
-            .help("add `drive: (frames: 20, path: AlongRows())` to it, or further `cameras`; see: trace explain drive")
+            .help("add `drive: (frames: 20, path: AlongRows())` to it, further `cameras`, or days with --days 8..40/4; see: trace explain drive")
             .in_file(args.scene.path()));
     }
     let mut order = Order::new(args.scene.path(), args.fields * captures);
     (order.seed, order.width, order.height) = (args.scene.seed, args.scene.width, args.scene.height);
+    order.days = days.to_vec();
     order.memory = args.memory.bytes;
     order.formats.clone_from(&args.format);
     order.formats.sort();

@@ -19,6 +19,11 @@ pub(super) struct Taken {
 
 /// A format that is written field by field, of its images' cameras and records alone.
 pub(super) trait OfFields: Sync {
+    /// Whether each day of a field is one of its own: images that show one and the same thing.
+    fn by_day(&self) -> bool {
+        false
+    }
+
     /// The files of a field of this name.
     fn field(&self, set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()>;
 
@@ -47,7 +52,18 @@ impl<T: OfFields> Format for T {
 
     fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
         let fields = set.recipe.count.div_ceil(set.recipe.captures());
-        (0..fields).try_for_each(|field| self.field(set, &Set::name(field), &images(set, field)?, out))
+        for field in 0..fields {
+            let (name, images) = (Set::name(field), images(set, field)?);
+            if !self.by_day() || set.recipe.days().is_empty() {
+                self.field(set, &name, &images, out)?;
+                continue;
+            }
+            for of_day in images.chunk_by(|a, b| a.capture.day == b.capture.day) {
+                let day = of_day.first().and_then(|image| image.capture.day).unwrap_or(0);
+                self.field(set, &format!("{name}-day{day:03}"), of_day, out)?;
+            }
+        }
+        Ok(())
     }
 
     fn warnings(&self, recipe: &Recipe) -> Vec<String> {
@@ -69,6 +85,7 @@ fn taken(mut record: Record) -> Result<Taken> {
     })?;
     let capture = record.capture.clone().unwrap_or_else(|| CaptureRecord {
         field: record.index,
+        day: None,
         frame: 0,
         camera: FIRST.into(),
         time_s: 0.0,
@@ -103,8 +120,11 @@ pub(super) fn quaternion(axes: &DMat3) -> [f64; 4] {
 
 /// What formats of poses cannot hold of a scene's images.
 pub(super) fn warnings(recipe: &Recipe) -> Vec<String> {
-    let alone = recipe.captures() == 1;
-    alone.then(|| "each field has one image; `drive` in a scene file takes several".to_owned()).into_iter().collect()
+    let alone = recipe.captures_a_day() == 1;
+    alone
+        .then(|| "each field has one image a day; `drive` in a scene file takes several".to_owned())
+        .into_iter()
+        .collect()
 }
 
 #[cfg(test)]

@@ -20,6 +20,10 @@ pub(super) struct Writer;
 const FOLDER: &str = "nerf";
 
 impl OfFields for Writer {
+    fn by_day(&self) -> bool {
+        true
+    }
+
     fn names_photographs(&self) -> bool {
         true
     }

@@ -3,6 +3,8 @@
 //! Places are mm on the flat leaf's image, x to the right of the midrib, y up from the image's lower edge, so that a hole of
 //! 2 mm is one on a leaf of any size. Nothing is stored as a picture: a few discs, cuts and noises answer for any place.
 
+mod until;
+
 use super::Condition;
 use crate::geometry::{AlphaMask, Margin};
 use crate::math::{Vec2, lerp, smoothstep, vec2};
@@ -47,6 +49,9 @@ pub struct Bearer<'a> {
     pub share: f32,
     /// Height of its middle over the soil, metres.
     pub height: f32,
+    /// Share of its marks that it has met by now, of a leaf that is seen on several days; its image is then as large as it ever is, so
+    /// that marks keep their places and grow with it.
+    pub met: Option<f32>,
     /// Width and height of its image on it, mm.
     pub image_mm: Vec2,
     /// What there is of it before anything is eaten; everything without one.
@@ -156,7 +161,7 @@ impl Marks {
     /// Draws the marks of a leaf; `stream` is the leaf's, see [`super::leaf_stream`].
     pub fn draw(desc: &ConditionDesc, condition: &Condition, bearer: &Bearer<'_>, stream: &Stream) -> Self {
         let of = |k: u64| stream.child(Purpose::Condition, k);
-        let worn = lerp(YOUNG, 1.0, bearer.age);
+        let worn = if bearer.met.is_some() { 1.0 } else { lerp(YOUNG, 1.0, bearer.age) };
         let often = worn * bearer.share;
         let on_leaf = |radii: &Vary<Positive>, mean: f32, k: u64| {
             let mut s = of(k);
@@ -183,7 +188,7 @@ impl Marks {
         let scorch_mm = scorch_mm(condition, bearer, &mut of(10)) * uneven(&mut s);
         let dust = (condition.dust * lerp(HIGH_DUST, 1.0, low) * uneven(&mut s)).min(0.9);
         let splash = condition.splash * low * SPECK_MM * SPECK_MM / 100.0;
-        Self {
+        let marks = Self {
             image_mm: bearer.image_mm,
             seed: of(8).seed32(),
             bites: holes.len() - whole,
@@ -196,6 +201,10 @@ impl Marks {
             dust,
             splash,
             margin: bearer.margin.cloned(),
+        };
+        match bearer.met {
+            Some(share) => marks.until(share, stream),
+            None => marks,
         }
     }
 
@@ -448,7 +457,16 @@ mod tests {
     }
 
     fn leaf(mask: &AlphaMask) -> Bearer<'_> {
-        Bearer { age: 1.0, cotyledon: false, share: 1.0, height: 0.0, image_mm: IMAGE, mask: Some(mask), margin: None }
+        Bearer {
+            age: 1.0,
+            cotyledon: false,
+            share: 1.0,
+            height: 0.0,
+            met: None,
+            image_mm: IMAGE,
+            mask: Some(mask),
+            margin: None,
+        }
     }
 
     fn stream(k: u64) -> Stream {

@@ -3,6 +3,7 @@
 use super::lighting::Lighting;
 use super::options::Options;
 use super::season::Season;
+use super::today::Today;
 use crate::light::LightRecord;
 use crate::plant::OrganKind;
 use crate::ron_file::RonFile;
@@ -26,6 +27,8 @@ pub(super) struct Builder<'a> {
     pub(super) seed: u64,
     pub(super) index: u64,
     pub(super) season: Season,
+    /// Its day, where it has days.
+    pub(super) today: Option<Today>,
     /// Places of the crops that this field has.
     pub(super) sown: std::ops::Range<usize>,
     /// The lights as they were drawn.

@@ -6,13 +6,17 @@ use crate::material::ConditionOptics;
 use crate::math::{Spectrum, Vec2};
 use crate::optics::Pigments;
 use crate::plant::condition::{Bearer, Marks, leaf_stream};
-use crate::plant::{Condition, ConditionDesc, OrganKind};
+use crate::plant::{Condition, ConditionDesc, LeafLife, OrganKind};
 use crate::sampling::{Purpose, Stream};
 use crate::scene::library::Choice;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Size of the image of a blade that has none, mm: what varies over it does so too little to be seen.
 const NO_IMAGE_MM: Vec2 = Vec2::splat(30.0);
+
+/// Days in which a leaf meets as much as a scene file says of the oldest: young ones are eaten for about three weeks, until they are tough.
+const MARKED_DAYS: f32 = 21.0;
 
 /// A plant's condition as it was drawn.
 pub(super) struct Ailing<'a> {
@@ -22,6 +26,8 @@ pub(super) struct Ailing<'a> {
     stream: &'a Stream,
     /// Reflectance of the soil that lies on leaves.
     soil: Spectrum,
+    /// Of a plant that is seen on several days: its age in days, and its leaves over time.
+    over_days: Option<(f32, BTreeMap<u16, LeafLife>)>,
 }
 
 /// An organ before its condition.
@@ -43,7 +49,20 @@ pub(super) struct Bare<'a> {
 impl<'a> Ailing<'a> {
     /// Draws the condition of the plant of `stream`.
     pub(super) fn new(desc: &'a ConditionDesc, stream: &'a Stream, soil: Spectrum) -> Self {
-        Self { desc, drawn: desc.draw(stream), stream, soil }
+        Self { desc, drawn: desc.draw(stream), stream, soil, over_days: None }
+    }
+
+    /// From now on with the marks that it has at an age of so many days: those that it had before, where they were, and more.
+    pub(super) fn over_days(&mut self, lives: BTreeMap<u16, LeafLife>, days: f32) {
+        self.over_days = Some((days, lives));
+    }
+
+    /// The share of its marks that a leaf has met by now, and the size that marks are measured on, mm.
+    fn met(&self, leaf: u16, share: f32) -> Option<(f32, Vec2)> {
+        let (days, lives) = self.over_days.as_ref()?;
+        let life = lives.get(&leaf)?;
+        let met = ((days - life.appears_days) / MARKED_DAYS).clamp(0.0, 1.0);
+        Some((met, Vec2::new(life.width, life.blade) * 1e3 * share.sqrt()))
     }
 
     /// As growing asks for it.
@@ -78,7 +97,7 @@ impl<'a> Ailing<'a> {
         let mut dressed = Vec::with_capacity(pieces.len());
         for (k, mesh) in pieces.into_iter().enumerate() {
             let of_piece = stream.child(Purpose::Condition, 100 + k as u64);
-            let marks = blade.then(|| self.marks(&mesh, (age, share), bare, &of_piece));
+            let marks = blade.then(|| self.marks(leaf, &mesh, (age, share), bare, &of_piece));
             let mut one = Grown { material: own.clone(), ..grown.with(mesh) };
             if let Some(marks) = marks.as_ref().filter(|m| m.cuts()) {
                 one.part.mask = Some(Arc::new(marks.cut(one.part.mask.as_deref())));
@@ -95,15 +114,17 @@ impl<'a> Ailing<'a> {
         dressed
     }
 
-    fn marks(&self, mesh: &Mesh, (age, share): (f32, f32), bare: &Bare<'_>, stream: &Stream) -> Marks {
+    fn marks(&self, leaf: u16, mesh: &Mesh, (age, share): (f32, f32), bare: &Bare<'_>, stream: &Stream) -> Marks {
         let middle = mesh.positions.iter().map(|p| p.z).sum::<f32>() / mesh.positions.len().max(1) as f32;
         let image = mesh.image_size().filter(|_| bare.choice.pictured);
+        let met = self.met(leaf, share);
         let bearer = Bearer {
             age,
             cotyledon: bare.kind == OrganKind::Cotyledon,
             share,
             height: middle - bare.ground,
-            image_mm: image.map_or(NO_IMAGE_MM, |size| (size * 1e3).max(Vec2::splat(0.1))),
+            met: met.map(|(share, _)| share),
+            image_mm: image.map_or(NO_IMAGE_MM, |size| met.map_or(size * 1e3, |(_, mm)| mm).max(Vec2::splat(0.1))),
             mask: bare.choice.mask.as_deref(),
             margin: bare.choice.margin.as_ref(),
         };

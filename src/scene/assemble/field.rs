@@ -15,8 +15,10 @@ use std::path::PathBuf;
 pub struct Field {
     /// What is out there.
     pub scene: Scene,
-    /// The images that are taken of it, one at least.
+    /// The images that are taken of it as it is, one at least.
     pub captures: Vec<Capture>,
+    /// The day on which it is as it is, where it has days.
+    pub day: Option<u32>,
     /// Place of the one whose camera the scene has.
     pub capture: usize,
     /// What the scene's parts are, in their order.
@@ -56,7 +58,12 @@ impl Field {
     /// Seed of the samples: a field of its own noise for every image.
     pub fn sample_seed(&self) -> u64 {
         let first = mix(mix(self.seed) ^ self.index);
-        if self.capture == 0 { first } else { mix(first ^ self.capture as u64) }
+        if self.shot() == 0 { first } else { mix(first ^ self.shot()) }
+    }
+
+    /// Number of the image among all that may be taken of the field, on any day.
+    fn shot(&self) -> u64 {
+        self.day.map_or(0, |day| (1 + u64::from(day)) << 32) + self.capture as u64
     }
 
     /// Where the field came from, one `key: value` a line: program, scene files, seed, index.
@@ -69,7 +76,7 @@ impl Field {
     pub fn photograph(&self, film: &Film) -> Photograph {
         let stream = |k| Stream::of(self.seed, self.index, Purpose::Sensor, k);
         // One sensor for all images of a field, noise of its own for each.
-        let noise = 1 + self.capture as u64;
+        let noise = 1 + self.shot();
         let illuminant = self.scene.lights.iter().fold(Spectrum::ZERO, |sum, l| sum + l.horizontal_irradiance());
         let pixels: Vec<Spectrum> = film.pixels.iter().map(|p| p.mean).collect();
         let window = film.window;

@@ -9,7 +9,7 @@ use crate::bsdf::{Bsdf, OrenNayar};
 use crate::geometry::{Cost, Mesh};
 use crate::material::{BakedGround, Ground as GroundMaterial, Material, Solid};
 use crate::math::Spectrum;
-use crate::ron_file::Step;
+use crate::ron_file::{Step, Vary};
 use crate::sampling::Purpose;
 use crate::sampling::rng::mix;
 use crate::scatter::{Disc, Rows};
@@ -106,7 +106,18 @@ impl Builder<'_> {
         let mut read = |file: &str| self.library.soil_spectrum(self.page, file);
         let colors = desc.colors.iter().map(|color| color.reflectance(&mut read)).collect::<Result<Vec<Spectrum>>>()?;
         let (site, texel, of) = (self.site(view, open), self.texel(view), (self.seed, self.index));
-        Ok(Soil { desc: desc.clone(), colors, maps, site, texel, of })
+        Ok(Soil { desc: self.weathered(desc), colors, maps, site, texel, of })
+    }
+
+    /// The soil of the field's day: as moist as is drawn for it, with what it has of crusts.
+    fn weathered(&self, desc: &SoilDesc) -> SoilDesc {
+        let mut desc = desc.clone();
+        if let Some(today) = &self.today {
+            let mean = desc.moisture.mean.draw(&mut today.stream(&self.stream(Purpose::Soil, 0)));
+            desc.moisture.mean = Vary::fixed(mean);
+            desc.crust = today.crust;
+        }
+        desc
     }
 
     /// The ground and the stones in it: what must be known before plants can be placed.

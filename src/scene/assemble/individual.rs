@@ -1,10 +1,10 @@
 //! Plants that are all alike: one shape and age for a whole species.
 
 use crate::math::{Mat3, Vec3};
-use crate::plant::{self, GrowOptions, Plant};
+use crate::plant::{self, GrowOptions, Plant, Stage};
 use crate::sampling::rng::mix;
 use crate::sampling::{Purpose, Stream};
-use crate::scene::desc::{Growth, SpeciesDesc};
+use crate::scene::desc::SpeciesDesc;
 
 /// The one plant that all of a species are.
 #[derive(Clone, PartialEq)]
@@ -24,20 +24,18 @@ impl Individual {
         desc.alike.then(|| Self { age: stream(index).child(Purpose::Page, 0), shape: stream(0) })
     }
 
+    /// What its growth is drawn from.
+    pub(super) fn age(&self) -> Stream {
+        self.age.clone()
+    }
+
     /// Its shape.
     pub(super) fn shape(&self) -> &Stream {
         &self.shape
     }
 
-    /// Grows it to the age that the field draws, with these options, turned as the plant of `own` would be.
-    pub(super) fn plant(
-        &self,
-        desc: &SpeciesDesc,
-        (growth, season): (&Growth, usize),
-        own: &Stream,
-        options: &GrowOptions<'_>,
-    ) -> Plant {
-        let stage = growth.draw(season, &mut self.age.clone());
+    /// Grows it to this stage, with these options, turned as the plant of `own` would be.
+    pub(super) fn plant(&self, desc: &SpeciesDesc, stage: Stage, own: &Stream, options: &GrowOptions<'_>) -> Plant {
         let mut plant = plant::grow_with(&desc.plant, stage, &self.shape, options);
         // Azimuths run clockwise seen from above.
         let turn = Mat3::from_rotation_z(plant::turn(&self.shape) - plant::turn(own));

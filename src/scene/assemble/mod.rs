@@ -19,6 +19,7 @@ mod preview;
 mod rig;
 mod season;
 mod seedling;
+mod today;
 mod unlikely;
 mod view;
 
@@ -55,6 +56,7 @@ pub use season::Season;
 use seedling::{Place, Seedling, grow};
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
+use today::Today;
 use view::View;
 
 /// Room around the view in which plants are grown: they lean in and throw shadows.
@@ -86,6 +88,7 @@ pub fn field_of(text: &str, options: &Options) -> Result<Field> {
 pub struct Source {
     page: RonFile,
     desc: FieldDesc,
+    days: Vec<u32>,
     library: Mutex<Library>,
 }
 
@@ -121,7 +124,11 @@ impl Source {
 
     fn of(page: RonFile, library: Library) -> Result<Self> {
         let desc: FieldDesc = page.parse_all()?;
-        Ok(Self { page, desc, library: Mutex::new(library) })
+        let days = match &desc.days {
+            Some(days) => days.list().map_err(|e| page.blame(&[Step::Field("days")], e))?,
+            None => Vec::new(),
+        };
+        Ok(Self { page, desc, days, library: Mutex::new(library) })
     }
 
     /// The same scene file with its fields grown otherwise.
@@ -134,7 +141,12 @@ impl Source {
         self
     }
 
-    /// How many images are taken of each field.
+    /// The days on which its fields are seen; none where it has no `days`.
+    pub fn days(&self) -> &[u32] {
+        &self.days
+    }
+
+    /// How many images are taken of each field on a day.
     pub fn captures(&self) -> u64 {
         let frames = self.desc.drive.as_ref().map_or(1, |drive| drive.frames.get() as u64);
         frames * (1 + self.desc.cameras.len() as u64)
@@ -164,8 +176,15 @@ impl<'a> Builder<'a> {
         let (seed, index) = (options.seed.unwrap_or(desc.seed), options.index);
         let mut stream = Stream::of(seed, index, Purpose::Page, 0);
         let camera = rig::first(page, desc, (options.width, options.height), &mut stream)?;
+        let season = Season::draw(page, desc, &mut Stream::of(seed, index, Purpose::Page, SEASON))?;
+        let sown = desc.sown.draw(desc.crops.len(), &mut Stream::of(seed, index, Purpose::Page, SOWN));
+        let today = Today::of((page, desc), &mut library, options.day, (sown.clone(), season.place()))?;
+        let daily = |address| {
+            let stream = Stream::of(seed, index, Purpose::Page, address);
+            today.as_ref().map_or_else(|| stream.clone(), |today| today.stream(&stream))
+        };
         let (mut lights, mut light_records) = (Vec::new(), Vec::new());
-        let lists = |place| Stream::of(seed, index, Purpose::Page, LIGHTING + place as u64);
+        let lists = |place| daily(LIGHTING + place as u64);
         let (lighting, listed) = Lighting::draw(page, &desc.lights, lists)?;
         if listed.len() > MOST_LIGHTS {
             let fault = Error::input(format!("{} lights: a field may have {MOST_LIGHTS}", listed.len()))
@@ -178,7 +197,7 @@ impl<'a> Builder<'a> {
         }
         for (i, Listed { desc: light, at }) in listed.into_iter().enumerate() {
             let mut open = |file: &str, infrared| library.environment_map(page, file, infrared);
-            let drawn = light.draw(&mut Stream::of(seed, index, Purpose::Page, 1 + i as u64), &mut open);
+            let drawn = light.draw(&mut daily(1 + i as u64), &mut open);
             let (record, drawn) = drawn.map_err(|e| page.blame(&at, e))?;
             light_records.push(record);
             lights.extend(drawn);
@@ -188,8 +207,6 @@ impl<'a> Builder<'a> {
             warnings.push("no light in the scene: the image will be black".into());
         }
         let scene = Scene { parts: Vec::new(), materials: Vec::new(), lights, camera, filter: desc.filter.footprint() };
-        let season = Season::draw(page, desc, &mut Stream::of(seed, index, Purpose::Page, SEASON))?;
-        let sown = desc.sown.draw(desc.crops.len(), &mut Stream::of(seed, index, Purpose::Page, SOWN));
         let captures = rig::captures(page, desc, &mut library, camera, sown.clone(), &|purpose, k| {
             Stream::of(seed, index, purpose, k)
         })?;
@@ -202,6 +219,7 @@ impl<'a> Builder<'a> {
             seed,
             index,
             season,
+            today,
             sown,
             lights: light_records,
             lighting,
@@ -279,6 +297,7 @@ impl<'a> Builder<'a> {
         let field = Field {
             scene: self.scene,
             captures: self.captures,
+            day: self.today.map(|today| today.day),
             capture: 0,
             kinds,
             plants,
@@ -355,6 +374,7 @@ impl<'a> Builder<'a> {
                 species: species.clone(),
                 growth: placed.growth.clone(),
                 season: self.season.place(),
+                today: self.today.clone(),
                 position,
                 turn: placed.turn_deg.draw32(&mut stream).to_radians(),
                 only_leaf: placed.only_leaf.map(|l| l.get() as u16),
@@ -376,6 +396,7 @@ impl<'a> Builder<'a> {
             species: species.clone(),
             growth: growth.clone(),
             season: self.season.place(),
+            today: self.today.clone(),
             position: spot.at,
             turn: 0.0,
             only_leaf: None,

@@ -12,6 +12,8 @@ pub struct Options {
     pub seed: Option<u64>,
     /// Which field.
     pub index: u64,
+    /// On which day it is grown; on the scene file's first, or as its plants are written, unless given.
+    pub day: Option<u32>,
     /// Image width; the field of view stays.
     pub width: Option<u32>,
     /// Image height.

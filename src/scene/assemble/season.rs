@@ -49,7 +49,7 @@ impl Season {
 }
 
 /// Every growth of a scene file, with the list that it stands in and its place there.
-fn growths(desc: &FieldDesc) -> impl Iterator<Item = (&'static str, usize, &Growth)> {
+pub(super) fn growths(desc: &FieldDesc) -> impl Iterator<Item = (&'static str, usize, &Growth)> {
     let crops = desc.crops.iter().enumerate().map(|(k, c)| ("crops", k, &c.growth));
     let weeds = desc.weeds.iter().enumerate().map(|(k, w)| ("weeds", k, &w.growth));
     let plants = desc.plants.iter().enumerate().map(|(k, p)| ("plants", k, &p.growth));

@@ -3,8 +3,9 @@
 use super::condition::{Ailing, Bare};
 use super::grown::Grown;
 use super::individual::Individual;
+use super::today::{Today, emerging};
 use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3};
-use crate::plant::{self, ConditionDesc, GrowOptions, LeafAxis, OrganKind};
+use crate::plant::{self, ConditionDesc, GrowOptions, LeafAxis, OrganKind, Stage};
 use crate::ron_file::{Positive, Vary};
 use crate::sampling::{Purpose, Stream};
 use crate::scatter;
@@ -26,6 +27,8 @@ pub(super) struct Seedling {
     pub(super) growth: Growth,
     /// Place of the field's season in a list of growths.
     pub(super) season: usize,
+    /// The field's day, where it has days.
+    pub(super) today: Option<Today>,
     pub(super) position: Vec2,
     pub(super) turn: f32,
     pub(super) only_leaf: Option<u16>,
@@ -69,15 +72,24 @@ pub(super) fn grow(
     let Place { height: z, normal, dust, cell } = *place;
     let desc: &SpeciesDesc = &s.species.desc;
     let mut stream = s.stream.clone();
-    let stage = s.growth.draw(s.season, &mut stream);
+    let drawn = stage(s, &mut stream);
     let green = (1.0 + desc.chlorophyll_sd.get() * stream.normal()).clamp(0.6, 1.5) as f32;
     let axis = scatter::axis(normal, AXIS_NOISE_DEG, &mut stream);
     let shape = s.individual.as_ref().map_or(&stream, Individual::shape);
-    let ailing = s.condition.as_ref().map(|condition| Ailing::new(condition, shape, dust));
-    let vigour = s.vigour.draw32(&mut shape.child(Purpose::Plant, VIGOUR));
+    let Some(stage) = s.individual.as_ref().map_or(drawn, |individual| stage(s, &mut individual.age())) else {
+        return (unborn(s, normal, z), None);
+    };
+    let mut ailing = s.condition.as_ref().map(|condition| Ailing::new(condition, shape, dust));
+    let mut vigour = s.vigour.draw32(&mut shape.child(Purpose::Plant, VIGOUR));
+    if let (Some(_), Stage::Age(days)) = (&s.today, stage) {
+        if let Some(ailing) = &mut ailing {
+            ailing.over_days(plant::leaf_lives(&desc.plant, shape, vigour), days);
+        }
+        vigour *= emerging(&desc.plant, days);
+    }
     let options = GrowOptions { vigour, condition: ailing.as_ref().map(Ailing::posture), cell };
     let plant = match &s.individual {
-        Some(individual) => individual.plant(desc, (&s.growth, s.season), &stream, &options),
+        Some(individual) => individual.plant(desc, stage, &stream, &options),
         None => plant::grow_with(&desc.plant, stage, &stream, &options),
     };
     let foot = s.position.extend(z);
@@ -142,4 +154,38 @@ pub(super) fn grow(
     });
     let organs = organs.collect();
     (record, Some(organs))
+}
+
+/// The stage that a plant has reached, as its growth is drawn from a stream; none before it emerges.
+fn stage(s: &Seedling, stream: &mut Stream) -> Option<Stage> {
+    match &s.today {
+        None => Some(s.growth.draw(s.season, stream)),
+        Some(today) => {
+            let shape = s.individual.as_ref().map_or(&s.stream, Individual::shape);
+            today.stage((&s.growth, s.season), &s.species.desc.plant, stream, shape)
+        }
+    }
+}
+
+/// What is known of a plant that has not emerged.
+fn unborn(s: &Seedling, normal: Vec3, height: f32) -> PlantRecord {
+    let desc: &SpeciesDesc = &s.species.desc;
+    PlantRecord {
+        number: 0,
+        id: s.id,
+        leaf_ids: Vec::new(),
+        species: desc.name.clone(),
+        eppo: desc.eppo.clone(),
+        kind: 0,
+        class: desc.role.class(),
+        position: s.position.extend(height),
+        axis: normal,
+        bbch: 0,
+        age_days: 0.0,
+        height: 0.0,
+        radius: 0.0,
+        leaves: 0,
+        leaf_axes: Vec::new(),
+        condition: None,
+    }
 }

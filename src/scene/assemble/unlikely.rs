@@ -76,7 +76,8 @@ impl Builder<'_> {
 
     /// Warnings about what stands in view.
     pub(super) fn warn_of_view(&mut self, plants: &[PlantRecord], shown: Option<Rect>) {
-        let (Some(view), false) = (shown, self.sown.is_empty()) else { return };
+        // On some days nothing has emerged yet.
+        let (Some(view), false) = (shown, self.sown.is_empty() || self.today.is_some()) else { return };
         let near = |plant: &&PlantRecord| view.grown(plant.radius).contains(plant.position.truncate());
         if plants.iter().filter(near).any(|plant| plant.class == Class::Crop) {
             return;
@@ -93,6 +94,7 @@ fn beyond(species: &SpeciesDesc, growth: &Growth, season: usize) -> Option<Strin
     let (first, last) = (stages.first()?, stages.last()?);
     match growth {
         Growth::Either(of) => beyond(species, of.get(season)?, season),
+        Growth::EmergesOn(_) => None,
         Growth::Bbch(code) => {
             let (lo, hi) = code.usual();
             let top = species.plant.cover_days.keys().max().map_or(0, |code| *code).max(last.bbch);

@@ -1,0 +1,120 @@
+//! The days on which a field is seen: a scene file that has them describes one field that grows.
+//!
+//! Days count from the emergence of the field's first crop. A scene file without days describes its field on one day; the same field on
+//! another is younger or older by the days between.
+
+use crate::ron_file::{Count, Num, Positive, Vary};
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+/// Latest day.
+const LATEST: u32 = 1000;
+
+/// Days on which the images of a field are taken: all images of the first day, then of the next.
+///
+/// ```
+/// use furrow::scene::days::DaysDesc;
+/// let weekly: DaysDesc = ron::from_str("(from: 8, to: 40, every: 16)").unwrap();
+/// assert_eq!(weekly.list().unwrap(), [8, 24, 40]);
+/// let some: DaysDesc = ron::from_str("(on: [8, 9, 30], pace: Normal(mean: 1, sd: 0.1))").unwrap();
+/// assert_eq!(some.list().unwrap(), [8, 9, 30]);
+/// assert!(ron::from_str::<DaysDesc>("(from: 40, to: 8)").unwrap().list().is_err());
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields, default, rename = "Days")]
+pub struct DaysDesc {
+    /// The first day, counted from the emergence of the field's first crop.
+    #[schemars(extend("x-example" = "8"))]
+    pub from: Num<Count>,
+    /// The last day.
+    #[schemars(extend("x-example" = "40"))]
+    pub to: Num<Count>,
+    /// From one day to the next.
+    #[schemars(extend("x-example" = "4"))]
+    pub every: Num<Count>,
+    /// The days one by one, in place of `from`, `to` and `every`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(extend("x-example" = "[8, 9, 30]"))]
+    pub on: Vec<Num<Count>>,
+    /// How many days' growth a plant makes in a day, drawn for each plant: some are ahead of others, and more so from day to day.
+    pub pace: Vary<Positive>,
+    /// Days in which rain makes 63 % of the crusts: of the soil's layers with `clods` below 0.5. It begins ten days before emergence, with
+    /// sowing.
+    pub crust_days: Num<Positive>,
+}
+
+impl Default for DaysDesc {
+    fn default() -> Self {
+        let pace = Vary::Drawn(crate::ron_file::Distribution::Normal { mean: 1.0, sd: 0.06, min: 0.7, max: 1.3 });
+        let none = Num::new(0.0);
+        Self { from: none, to: none, every: Num::new(1.0), on: Vec::new(), pace, crust_days: Num::new(15.0) }
+    }
+}
+
+impl DaysDesc {
+    /// The days, each later than the one before.
+    pub fn list(&self) -> Result<Vec<u32>> {
+        let Self { from, to, every, on, .. } = self;
+        let whole = |of: &Num<Count>| of.get() as u32;
+        if on.is_empty() {
+            return spaced(whole(from), whole(to), whole(every));
+        }
+        if [from, to].iter().any(|of| !of.is_zero()) {
+            return Err(
+                Error::input("days are given twice: by `on`, and by `from` and `to`").help("leave one of them out")
+            );
+        }
+        ordered(on.iter().map(whole).collect())
+    }
+
+    /// Days as a command line says them: `8..40/4` for every fourth from 8 to 40, `8,12,20` one by one.
+    pub fn read(text: &str) -> Result<Vec<u32>> {
+        let number = |text: &str| {
+            text.trim().parse::<u32>().map_err(|_| {
+                Error::misuse(format!("`{text}` is no day"))
+                    .help("write 8..40/4 for every fourth day from 8 to 40, or 8,12,20")
+            })
+        };
+        match text.split_once("..") {
+            None => ordered(text.split(',').map(number).collect::<Result<_>>()?),
+            Some((from, rest)) => {
+                let (to, every) = rest.split_once('/').unwrap_or((rest, "1"));
+                spaced(number(from)?, number(to)?, number(every)?)
+            }
+        }
+    }
+
+    /// How much of their final share crusts have on a day: all of it at last.
+    pub(super) fn crust(&self, day: u32) -> f32 {
+        const SOWN_BEFORE: f32 = 10.0;
+        -(-(day as f32 + SOWN_BEFORE) / self.crust_days.f32()).exp_m1()
+    }
+}
+
+fn spaced(from: u32, to: u32, every: u32) -> Result<Vec<u32>> {
+    if every == 0 || to < from {
+        let words = format!("no days lie between {from} and {to} in steps of {every}");
+        return Err(
+            Error::input(words).help("write the first day, a last one that is no earlier, and a step of 1 or more")
+        );
+    }
+    if to > LATEST {
+        return too_late(to);
+    }
+    Ok((from..=to).step_by(every as usize).collect())
+}
+
+fn ordered(days: Vec<u32>) -> Result<Vec<u32>> {
+    if days.windows(2).any(|pair| pair[1] <= pair[0]) {
+        return Err(Error::input("days must be in order, and none twice").help("write the earliest first: 8, 12, 20"));
+    }
+    match days.last() {
+        Some(last) if *last > LATEST => too_late(*last),
+        _ => Ok(days),
+    }
+}
+
+fn too_late<T>(day: u32) -> Result<T> {
+    Err(Error::input(format!("day {day} is later than {LATEST}"))
+        .help("days count from the emergence of the first crop"))
+}
