@@ -2,17 +2,18 @@
 //! itself be small.
 
 use super::PlantDesc;
+use super::inflorescence;
 use super::kind::{LeafKind, Shape};
 
 /// Corners around stems and stalks, twice: triangles of one ring of them.
-const RING: f64 = 32.0;
+pub(super) const RING: f64 = 32.0;
 /// Triangles of a divided blade; its ribbons are bounded.
 const DIVIDED: f64 = 2e4;
 /// The main shoot and the side shoots that growth forms stop at.
 const SHOOTS: f64 = 25.0;
 
 /// That of a leaf.
-fn of_leaf(kind: &LeafKind) -> f64 {
+pub(super) fn of_leaf(kind: &LeafKind) -> f64 {
     let sheet = 2.0 * kind.rows.get() * (kind.columns.get() + 1.0);
     let blade = match &kind.shape {
         Shape::Sheet { .. } => sheet,
@@ -29,6 +30,7 @@ pub fn most_triangles(desc: &PlantDesc) -> f64 {
     let stages = desc.stages.iter().map(|stage| {
         let side = if stage.tillers.usual().1 > 0.0 { SHOOTS } else { 1.0 };
         side * leaves(stage.layers.iter().map(|layer| layer.leaves.get()).sum())
+            + inflorescence::most_triangles(desc, stage)
     });
     stages.fold(0.0, f64::max)
 }
