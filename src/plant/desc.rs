@@ -1,7 +1,7 @@
 //! A species' plant as it is written, and how old one of it is.
 
-use super::flower::FlowerDesc;
-use super::inflorescence;
+use super::flower::desc::FlowerDesc;
+use super::inflorescence::check;
 use super::kind::LeafKind;
 use super::stage::StageDesc;
 use crate::ron_file::{self, Finite, NonNegative, Num, Positive, Step, Vary};
@@ -212,7 +212,7 @@ impl PlantDesc {
                 .check()
                 .map_err(|(message, help)| (vec![Field("flowers")], format!("\"{name}\": {message}"), help))?;
         }
-        (0..self.stages.len()).try_for_each(|i| inflorescence::check_stage(self, i))?;
+        (0..self.stages.len()).try_for_each(|i| check::stage((&self.flowers, &self.kinds), &self.stages, i))?;
         let days: Vec<f64> = self.cover_days.values().map(|d| d.get()).collect();
         if days.windows(2).any(|pair| pair[1] <= pair[0]) {
             let message = "a higher BBCH code of ground cover must be reached later".into();

@@ -6,7 +6,7 @@
 //! detection", IROS, §III-B. Stages are numbered by the BBCH scale (Meier 2001, "Growth stages of mono- and
 //! dicotyledonous plants").
 
-use super::inflorescence::InflorescenceDesc;
+use super::inflorescence::desc::InflorescenceDesc;
 use crate::ron_file::{Bound, Finite, NonNegative, Num, PositiveCount, Vary};
 use serde::{Deserialize, Serialize};
 

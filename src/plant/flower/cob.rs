@@ -1,8 +1,8 @@
 //! A maize ear: husk leaves wrapped round a spindle, out of whose tip the silks hang.
 
+use super::desc::{Bloom, FlowerDesc};
 use super::head::GOLDEN;
 use super::pen::{Pen, Sheet, Solid};
-use super::{Bloom, FlowerDesc};
 use crate::geometry::outline::Outline;
 use crate::math::{Vec3, lerp};
 use crate::plant::organ::OrganKind;

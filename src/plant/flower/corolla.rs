@@ -1,7 +1,8 @@
 //! A single flower: rings of sepals and petals, in their middle the ovary and the stamens round it.
 
+use super::desc::{Bloom, FlowerDesc};
 use super::pen::{Pen, ROUND, Solid};
-use super::{Bloom, FlowerDesc, ring};
+use super::ring;
 use crate::plant::organ::OrganKind;
 use crate::sampling::Stream;
 use std::f32::consts::TAU;

@@ -1,7 +1,7 @@
 //! Fruits: pods, silicles and capsules are solids within an outline; berries are round, with a calyx.
 
+use super::desc::{Bloom, FlowerDesc};
 use super::pen::{Pen, ROUND, Sheet, Solid};
-use super::{Bloom, FlowerDesc};
 use crate::geometry::outline::Outline;
 use crate::plant::organ::OrganKind;
 use crate::sampling::Stream;

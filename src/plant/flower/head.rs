@@ -3,8 +3,9 @@
 //! Floret k of n stands at the radius R √((k + ½)/n) and the azimuth k · 137.508°. Source: Vogel 1979, "A better way to construct the
 //! sunflower head", Mathematical Biosciences 44. The dome is a paraboloid.
 
+use super::desc::{Bloom, FlowerDesc};
 use super::pen::{Pen, Solid};
-use super::{Bloom, FlowerDesc, corolla, ring};
+use super::{corolla, ring};
 use crate::geometry::outline::Outline;
 use crate::math::{Frame, Vec3, lerp};
 use crate::plant::organ::OrganKind;
@@ -12,8 +13,6 @@ use crate::sampling::Stream;
 
 /// The golden angle, radians.
 pub(in crate::plant) const GOLDEN: f32 = 2.399_963;
-/// The most triangles of a dome.
-pub(super) const DOME: f64 = 240.0;
 
 /// Draws one.
 pub(super) fn grow(flower: &FlowerDesc, bloom: &Bloom, pen: &mut Pen, stream: &mut Stream) {

@@ -1,8 +1,8 @@
 //! A tassel: a rachis with a central spike and branches below it, all set with spikelets.
 
+use super::desc::{Bloom, FlowerDesc};
 use super::head::GOLDEN;
 use super::pen::{Pen, Solid};
-use super::{Bloom, FlowerDesc};
 use crate::geometry::outline::Outline;
 use crate::math::{Frame, Vec3, lerp};
 use crate::plant::organ::OrganKind;

@@ -12,13 +12,6 @@ use crate::plant::skeleton::Weights;
 use crate::plant::tube::{self, Profile};
 use std::f32::consts::TAU;
 
-/// The most triangles of a sheet.
-pub(super) const SHEET: f64 = 2.0 * 10.0 * 8.0;
-/// The most triangles of a solid.
-pub(super) const SOLID: f64 = 2.0 * 10.0 * 12.0;
-/// The most triangles of a strand.
-pub(super) const STRAND: f64 = 2.0 * 12.0 * 10.0;
-
 /// Draws a plant's flowers.
 pub(in crate::plant) struct Pen {
     organs: Vec<Organ>,
@@ -155,7 +148,8 @@ impl Pen {
             let first = rest.positions.len() as u32;
             for k in 0..=sides {
                 let (sin, cos) = (TAU * k as f32 / sides as f32).sin_cos();
-                let along = solid.length * t * (1.0 - solid.notch * notch(cos) * t);
+                let across = cos * 2.0 * solid.outline.half_width(t);
+                let along = solid.length * t * (1.0 - solid.notch * notch(across) * t);
                 let f = &solid.frame;
                 let p = solid.base + f.z * along + f.x * (half * cos) + f.y * (half * solid.flat * sin);
                 rest.corner(p, vec2(k as f32 / sides as f32, 1.0 - t), Weights::default());

@@ -1,77 +1,14 @@
 //! Rings of sheets round a flower's axis: sepals, petals, bracts, rays.
 
-use super::pen::{self, Pen, Sheet};
-use super::{Bloom, num, vary};
-use crate::geometry::outline::Outline;
+use super::desc::{Bloom, RingDesc};
+use super::pen::{Pen, Sheet};
 use crate::math::lerp;
 use crate::plant::organ::OrganKind;
-use crate::ron_file::{Finite, Fraction, NonNegative, Num, Positive, PositiveCount, Vary};
 use crate::sampling::Stream;
-use serde::{Deserialize, Serialize};
 use std::f32::consts::{PI, TAU};
 
 /// How far the sheets of a closed flower rise at their base and tip, radians: they bulge and meet over its middle.
 const CLOSED: (f32, f32) = (0.75, 2.3);
-
-/// Sheets round a flower's axis.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct RingDesc {
-    /// Sheets.
-    #[schemars(extend("x-example" = "5"))]
-    pub count: Vary<PositiveCount>,
-    /// Length of a sheet, of the way from where it begins to the flower's outline.
-    #[serde(default = "num::<Positive, 100>")]
-    pub length: Num<Positive>,
-    /// Width over length.
-    #[schemars(extend("x-example" = "0.6"))]
-    pub aspect: Num<Positive>,
-    /// Its outline.
-    #[serde(default = "outline")]
-    pub outline: Outline,
-    /// Depth of the notch at its tip, of its length.
-    #[serde(default = "num::<Fraction, 0>")]
-    pub notch: Num<Fraction>,
-    /// Angle above the plane across the flower's axis when open, at the base.
-    #[serde(default = "vary::<Finite, 15>")]
-    pub cup_deg: Vary<Finite>,
-    /// How far it bends back from base to tip when open.
-    #[serde(default = "vary::<Finite, 10>")]
-    pub bend_deg: Vary<Finite>,
-    /// How far its margins rise, of its half-width; negative: bulging like the rays of a daisy.
-    #[serde(default = "num::<Finite, 15>")]
-    pub hollow: Num<Finite>,
-    /// Arc over which the sheets are spread; 360 for a whole ring. Less for flowers with two like halves: pansy.
-    #[serde(default = "whole")]
-    pub arc_deg: Num<Positive>,
-    /// Middle of that arc, from the flower's uppermost point.
-    #[serde(default = "num::<Finite, 0>")]
-    pub turn_deg: Num<Finite>,
-    /// Length in the bud over that when open: petals grow, sepals do not.
-    #[serde(default = "num::<NonNegative, 60>")]
-    pub bud: Num<NonNegative>,
-    /// Its material.
-    #[schemars(extend("x-example" = "\"petal\""))]
-    pub material: String,
-}
-
-fn outline() -> Outline {
-    Outline::Power { a: 0.8, b: 0.45 }
-}
-
-fn whole() -> Num<Positive> {
-    Num::new(360.0)
-}
-
-/// Keys of the rings' materials.
-pub(super) fn materials(rings: &[RingDesc]) -> impl Iterator<Item = &str> {
-    rings.iter().map(|ring| ring.material.as_str())
-}
-
-/// The most triangles that they have.
-pub(super) fn most_triangles(rings: &[RingDesc]) -> f64 {
-    rings.iter().map(|ring| ring.count.largest() * pen::SHEET).sum()
-}
 
 /// Draws rings that begin at `start` from the axis, metres, in the plane of the bloom's base.
 pub(super) fn grow(rings: &[RingDesc], bloom: &Bloom, start: f32, kind: OrganKind, pen: &mut Pen, stream: &mut Stream) {

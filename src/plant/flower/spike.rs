@@ -1,8 +1,8 @@
 //! An ear: spikelets in two ranks or a spiral along a rachis, each of one or more florets, some with an awn.
 
+use super::desc::{Bloom, FlowerDesc};
 use super::head::GOLDEN;
 use super::pen::{Pen, Solid};
-use super::{Bloom, FlowerDesc};
 use crate::geometry::outline::Outline;
 use crate::math::{Frame, Vec3, lerp};
 use crate::plant::organ::OrganKind;

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::geometry::Mesh;
+use crate::math::{Frame, Vec3};
 use crate::plant::organ::{Organ, OrganKind};
 use crate::sampling::Purpose;
 
@@ -13,7 +14,7 @@ fn draw(text: &str, opening: f32, seed: u64) -> (FlowerDesc, Vec<Organ>) {
     assert_eq!(desc.check(), Ok(()));
     let mut pen = Pen::new(0.9e-3);
     let bloom = Bloom { base: Vec3::ZERO, frame: Frame::about(Vec3::Z), size: SIZE, opening };
-    desc.grow(&bloom, &mut pen, &mut Stream::of(seed, 0, Purpose::Test, 1));
+    grow(&desc, &bloom, &mut pen, &mut Stream::of(seed, 0, Purpose::Test, 1));
     let organs = pen.finish();
     for organ in &organs {
         assert_eq!(organ.mesh.fault(), None);
@@ -112,7 +113,7 @@ fn fruits_have_their_measures() {
         mesh.positions.iter().filter(inside).fold(0.0_f32, |z, p| z.max(p.z))
     };
     assert!(high(true) < 0.95 * SIZE && high(false) <= 1.001 * SIZE, "{} {}", high(true), high(false));
-    let (_, organs) = draw(r#"Berry(aspect: 1.1, sepals: 5)"#, 1.0, 0);
+    let (_, organs) = draw("Berry(aspect: 1.1, sepals: 5)", 1.0, 0);
     assert!(organs.iter().all(|o| o.kind == OrganKind::Berry));
     let (lo, hi) = of(&organs, "berry").bounds().unwrap();
     assert!(((hi - lo).x / SIZE - 1.0).abs() < 0.02 && ((hi - lo).z / SIZE - 1.1).abs() < 0.02);
@@ -122,10 +123,10 @@ fn fruits_have_their_measures() {
 /// Expected: silks and husks as many as written; a tassel has its rachis and branches, and all is set with spikelets.
 #[test]
 fn maize_has_its_silks_and_its_tassel() {
-    let (_, organs) = draw(r#"Cob(width: 0.25, husks: 5, silks: 40)"#, 1.0, 1);
+    let (_, organs) = draw("Cob(width: 0.25, husks: 5, silks: 40)", 1.0, 1);
     assert_eq!(of(&organs, "silk").pieces().len(), 40);
     assert_eq!(of(&organs, "husk").pieces().len(), 6);
-    let tassel = r#"Panicle(branches: 8, branch: 0.5, angle_deg: 40, bend_deg: 60, spikelets: 50, spikelet: 0.03)"#;
+    let tassel = "Panicle(branches: 8, branch: 0.5, angle_deg: 40, bend_deg: 60, spikelets: 50, spikelet: 0.03)";
     let (_, organs) = draw(tassel, 1.0, 1);
     assert!(organs.iter().all(|o| o.kind == OrganKind::Tassel));
     let pieces = of(&organs, "husk").pieces().len();
@@ -136,7 +137,7 @@ fn maize_has_its_silks_and_its_tassel() {
 /// What cannot be drawn is refused in words.
 #[test]
 fn a_flower_that_is_too_large_is_refused() {
-    let rays = r#"Head(disc: 0.4, florets: 900000, rings: [])"#;
+    let rays = "Head(disc: 0.4, florets: 900000, rings: [])";
     let desc: FlowerDesc = ron::from_str(rays).unwrap();
     assert!(desc.check().unwrap_err().0.contains("triangles"));
 }

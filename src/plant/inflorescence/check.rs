@@ -1,9 +1,8 @@
-//! What must fit together about flowering axes, and how many triangles they can have.
+//! What must fit together about flowering axes.
 
-use super::desc::{InflorescenceDesc, Seat};
-use super::{MOST_AXES, MOST_FLOWERS};
-use crate::plant::PlantDesc;
-use crate::plant::bound::{RING, of_leaf};
+use super::desc::{InflorescenceDesc, MOST_AXES, MOST_FLOWERS, Seat};
+use crate::plant::flower::desc::FlowerDesc;
+use crate::plant::kind::LeafKind;
 use crate::plant::stage::StageDesc;
 use crate::ron_file::{Step, choose};
 use std::collections::BTreeMap;
@@ -12,9 +11,14 @@ use std::collections::BTreeMap;
 type Wrong = (Vec<Step<'static>>, String, String);
 
 /// What is wrong with the flowering axes of stage `i`.
-pub(in crate::plant) fn stage(plant: &PlantDesc, i: usize) -> Result<(), Wrong> {
+pub(in crate::plant) fn stage(
+    (flowers, kinds): (&BTreeMap<String, FlowerDesc>, &BTreeMap<String, LeafKind>),
+    stages: &[StageDesc],
+    i: usize,
+) -> Result<(), Wrong> {
     use Step::{Field, Item};
-    let stage = &plant.stages[i];
+    let before = i.checked_sub(1).map(|b| &stages[b].inflorescences);
+    let stage = &stages[i];
     let place = |k: usize| vec![Field("stages"), Item(i), Field("inflorescences"), Item(k)];
     let names = |all: Vec<&String>| all.into_iter().map(|s| format!("\"{s}\"")).collect::<Vec<_>>();
     for (k, axis) in stage.inflorescences.iter().enumerate() {
@@ -32,16 +36,16 @@ pub(in crate::plant) fn stage(plant: &PlantDesc, i: usize) -> Result<(), Wrong> 
             let message = format!("leaves {first} to {last}: leaves count from 1, the lowest first");
             return Err((at, message, "write Axils(first: 5, last: 9)".into()));
         }
-        if let Some(j) = axis.flowers.iter().position(|f| !plant.flowers.contains_key(&f.kind)) {
+        if let Some(j) = axis.flowers.iter().position(|f| !flowers.contains_key(&f.kind)) {
             let at = [place(k), vec![Field("flowers"), Item(j), Field("kind")]].concat();
             let kind = &axis.flowers[j].kind;
-            let known: Vec<&str> = plant.flowers.keys().map(String::as_str).collect();
+            let known: Vec<&str> = flowers.keys().map(String::as_str).collect();
             return Err((at, format!("no flower is called \"{kind}\""), choose("flowers", &known, kind)));
         }
-        if let Some(j) = axis.leaves.iter().position(|l| !plant.kinds.contains_key(&l.kind)) {
+        if let Some(j) = axis.leaves.iter().position(|l| !kinds.contains_key(&l.kind)) {
             let at = [place(k), vec![Field("leaves"), Item(j), Field("kind")]].concat();
             let kind = &axis.leaves[j].kind;
-            let known: Vec<&str> = plant.kinds.keys().map(String::as_str).collect();
+            let known: Vec<&str> = kinds.keys().map(String::as_str).collect();
             return Err((at, format!("no kind of leaf is called \"{kind}\""), choose("kinds", &known, kind)));
         }
     }
@@ -56,14 +60,14 @@ pub(in crate::plant) fn stage(plant: &PlantDesc, i: usize) -> Result<(), Wrong> 
         let message = format!("{leaves} leaves at BBCH {}: labels number at most 1000 of a plant", stage.bbch);
         return Err((at, message, "write fewer axes, or fewer leaves on each".into()));
     }
-    let flowers = count(|axis| axis.flowers.iter().map(|f| f.count.largest().ceil()).sum());
-    if flowers > MOST_FLOWERS as f64 || numbers.iter().sum::<f64>() > MOST_AXES as f64 {
+    let number = count(|axis| axis.flowers.iter().map(|f| f.count.largest().ceil()).sum());
+    if number > MOST_FLOWERS as f64 || numbers.iter().sum::<f64>() > MOST_AXES as f64 {
         let axes: f64 = numbers.iter().sum();
-        let message = format!("up to {axes} flowering axes with {flowers} flowers at BBCH {}", stage.bbch);
+        let message = format!("up to {axes} flowering axes with {number} flowers at BBCH {}", stage.bbch);
         let help = format!("a plant has at most {MOST_AXES} flowering axes and {MOST_FLOWERS} flowers");
         return Err((at, message, help));
     }
-    if let Some(before) = i.checked_sub(1).map(|b| &plant.stages[b].inflorescences) {
+    if let Some(before) = before {
         if before.len() > stage.inflorescences.len() {
             let message = format!("at BBCH {}: flowering axes are lost", stage.bbch);
             return Err((at, message, "write count: 0 for one that is gone".into()));
@@ -87,7 +91,7 @@ pub(in crate::plant) fn stage(plant: &PlantDesc, i: usize) -> Result<(), Wrong> 
 }
 
 /// The most axes of each sort that a plant can have at a stage.
-fn axes(stage: &StageDesc) -> Vec<f64> {
+pub(in crate::plant) fn axes(stage: &StageDesc) -> Vec<f64> {
     let mut by_name: BTreeMap<&str, f64> = BTreeMap::new();
     let mut all = Vec::with_capacity(stage.inflorescences.len());
     for axis in &stage.inflorescences {
@@ -102,19 +106,4 @@ fn axes(stage: &StageDesc) -> Vec<f64> {
         all.push(number);
     }
     all
-}
-
-/// The most triangles of a plant's flowering axes at a stage, and all that they bear.
-pub(in crate::plant) fn most_triangles(plant: &PlantDesc, stage: &StageDesc) -> f64 {
-    // A blend of two counts lies between them, so between two stages there are no more than at the larger.
-    let each = |axis: &InflorescenceDesc| {
-        let leaves =
-            axis.leaves.iter().map(|l| l.count.largest().ceil() * plant.kinds.get(&l.kind).map_or(0.0, of_leaf));
-        let flowers = axis.flowers.iter().map(|f| {
-            let one = plant.flowers.get(&f.kind).map_or(0.0, crate::plant::FlowerDesc::most_triangles);
-            f.count.largest().ceil() * (one + 8.0 * RING)
-        });
-        32.0 * RING + leaves.sum::<f64>() + flowers.sum::<f64>()
-    };
-    axes(stage).iter().zip(&stage.inflorescences).map(|(n, axis)| n * each(axis)).sum()
 }

@@ -3,6 +3,11 @@
 use crate::ron_file::{Bound, Finite, Fraction, NonNegative, Num, Positive, Vary};
 use serde::{Deserialize, Serialize};
 
+/// Flowering axes of a plant stop here.
+pub(in crate::plant) const MOST_AXES: usize = 400;
+/// Flowers of a plant stop here.
+pub(in crate::plant) const MOST_FLOWERS: usize = 4000;
+
 /// Where a flowering axis begins.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -10,14 +10,14 @@
 //! | `check` | what must fit together; how many triangles there can be |
 //! | `seat` | tips and axils |
 
-mod check;
-mod desc;
+pub(super) mod check;
+pub(super) mod desc;
 mod seat;
 
-pub(super) use check::{most_triangles, stage as check_stage};
-pub use desc::{FlowersDesc, InflorescenceDesc, Seat, StemLeafDesc};
-
-use super::flower::{Bloom, GOLDEN, Pen};
+use super::flower;
+use super::flower::desc::Bloom;
+use super::flower::head::GOLDEN;
+use super::flower::pen::Pen;
 use super::growth::{Between, Growth, LeafNow};
 use super::leaf::{self, Lower};
 use super::organ::{Organ, OrganKind};
@@ -25,12 +25,9 @@ use super::stage::BUD;
 use crate::math::{Frame, Vec3, lerp};
 use crate::ron_file::{Bound, Vary};
 use crate::sampling::{Purpose, Stream};
+use desc::{FlowersDesc, InflorescenceDesc, MOST_AXES, MOST_FLOWERS, Seat, StemLeafDesc};
 use seat::Place;
 
-/// Flowering axes of a plant stop here.
-const MOST_AXES: usize = 400;
-/// Flowers of a plant stop here.
-const MOST_FLOWERS: usize = 4000;
 /// Which of a plant's streams its flowering axes are drawn from.
 const STREAM: u64 = 1 << 22;
 /// What is smaller is not there yet, metres.
@@ -302,7 +299,7 @@ impl<'a> Grower<'a, '_> {
                 size,
                 opening: self.draw(ends, None, (&own, 5), |d| &d.opening).clamp(0.0, 1.0),
             };
-            flower.grow(&bloom, &mut self.pen, &mut stream);
+            flower::grow(flower, &bloom, &mut self.pen, &mut stream);
         }
     }
 }

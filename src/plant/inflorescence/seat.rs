@@ -28,7 +28,8 @@ pub(super) fn tips(organs: &[Organ], growth: &Growth<'_>) -> Vec<Place> {
 /// The end of a stem: the mesh of one is rings from its base to its tip, and v tells them apart.
 fn end_of(mesh: &Mesh) -> Option<Place> {
     let middle_of = |v: f32| {
-        let ring = || mesh.positions.iter().zip(&mesh.uvs).filter(|(_, uv)| uv.y == v).map(|(p, _)| *p);
+        // The corner that closes a ring stands where its first does.
+        let ring = || mesh.positions.iter().zip(&mesh.uvs).filter(|(_, uv)| uv.y == v && uv.x < 1.0).map(|(p, _)| *p);
         ring().sum::<Vec3>() / ring().count().max(1) as f32
     };
     let last = mesh.uvs.last()?.y;
