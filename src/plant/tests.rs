@@ -76,8 +76,11 @@ fn every_species_grows_valid_meshes_at_every_stage() {
             assert_eq!(organ.mesh.fault(), None, "{at}");
             assert!(!organ.mesh.triangles.is_empty(), "{at}");
             assert!(page.materials.contains_key(&organ.material), "{at}: no material {}", organ.material);
-            use OrganKind::{Blade, Cotyledon, Petiole, Sheath};
-            assert_eq!(organ.leaf > 0, matches!(organ.kind, Blade | Cotyledon | Petiole | Sheath), "{at}");
+            assert_eq!(
+                organ.leaf > 0,
+                matches!(organ.kind, OrganKind::Blade | OrganKind::Cotyledon | OrganKind::Petiole | OrganKind::Sheath),
+                "{at}"
+            );
         }
     });
 }

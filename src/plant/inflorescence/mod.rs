@@ -90,7 +90,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, cell: f32) {
 type Ends<'a, T> = (Option<&'a T>, &'a T);
 
 /// What cannot be blended is as at the earlier stage.
-fn held<'a, T>(ends: Ends<'a, T>) -> &'a T {
+fn held<T>(ends: Ends<'_, T>) -> &T {
     ends.0.unwrap_or(ends.1)
 }
 
@@ -112,7 +112,9 @@ impl<'a> Grower<'a, '_> {
         match &held(ends).at {
             Seat::Tip => tips.iter().take(1).for_each(|tip| base(*tip, stream, &mut places)),
             Seat::Tips => {
-                (0..).zip(tips).for_each(|(k, tip)| base(*tip, &stream.child(Purpose::Plant, k), &mut places))
+                for (k, tip) in (0..).zip(tips) {
+                    base(*tip, &stream.child(Purpose::Plant, k), &mut places);
+                }
             }
             Seat::Axils { first, last } => {
                 for number in *first..=*last {
