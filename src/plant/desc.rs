@@ -150,7 +150,8 @@ fn lean() -> Vary<Finite> {
 fn kept(mut stages: Vec<StageDesc>) -> Vec<StageDesc> {
     for i in 1..stages.len() {
         if stages[i].layers.is_empty() {
-            stages[i].layers = stages[i - 1].layers.clone();
+            let (before, later) = stages.split_at_mut(i);
+            later[0].layers.clone_from(&before[i - 1].layers);
         }
     }
     stages
