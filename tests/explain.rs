@@ -141,8 +141,8 @@ fn what_was_hardly_meant_is_told() {
     let rows = "rows: (spacing_m: 0.75, in_row_m: 0.05)";
     let low = "JaiAd130(height_m: 3)";
     assert_eq!(warnings(low, &format!("growth: Bbch(14), {rows}")), "");
-    let words = warnings(low, &format!("growth: Bbch(45), {rows}"));
-    assert!(words.contains("its plants end at BBCH 18, so BBCH 45 looks like that"), "{words}");
+    let words = warnings(low, &format!("growth: Bbch(85), {rows}"));
+    assert!(words.contains("its plants end at BBCH 69, so BBCH 85 looks like that"), "{words}");
     let words = warnings(low, "growth: Bbch(14), rows: (spacing_m: 75)");
     assert!(words.contains("rows of") && words.contains("stand 75 m apart"), "{words}");
     let words = warnings(low, "growth: Bbch(14), rows: (spacing_m: 0.75, in_row_m: 16)");

@@ -303,13 +303,39 @@ fn every_pixel_of_the_teaching_scenes_shows_the_nearest_of_all_triangles() {
     check_every_pixel("small", &open(Path::new(SMALL), &Options::default()).scene);
     let mut pages: Vec<_> = std::fs::read_dir("scenes").unwrap().map(|e| e.unwrap().path()).collect();
     pages.retain(|p| {
-        p.extension().is_some_and(|e| e == "ron") && p.file_name().unwrap().to_string_lossy().starts_with('0')
+        p.extension().is_some_and(|e| e == "ron") && p.file_name().unwrap().to_string_lossy().starts_with(['0', '1'])
     });
     pages.sort();
     for page in pages {
         let field = open(&page, &Options { width: Some(120), ..Options::default() });
         check_every_pixel(&page.file_stem().unwrap().to_string_lossy(), &field.scene);
     }
+}
+
+/// Rationale: flowers are told from leaves by the kind of the part that a pixel shows. Expected: at BBCH 65 the lesson's pixels show
+/// flowers, buds, heads and pods, all of them of a plant and of no leaf; at 19 none of these.
+#[test]
+fn flowers_are_labelled_as_the_organs_that_they_are() {
+    use furrow::plant::OrganKind::{Bud, Flower, Head, Pod};
+    let kinds = [Flower, Bud, Head, Pod];
+    let counts = |text: &str| {
+        let field = program::field(text, &Options { width: Some(480), ..Options::default() });
+        let map = labels_of(&field.scene);
+        let mut counts = [0; 4];
+        for (part, tag) in map.parts.iter().zip(&map.tags).filter(|(part, _)| **part != NONE) {
+            let Some(kind) = field.kinds[*part as usize].organ() else { continue };
+            let Some(i) = kinds.iter().position(|k| *k == kind) else { continue };
+            assert!(tag.plant > 0 && tag.leaf == 0, "{kind:?} {tag:?}");
+            counts[i] += 1;
+        }
+        counts
+    };
+    let root = env!("CARGO_MANIFEST_DIR");
+    let text = std::fs::read_to_string("scenes/flowering.ron").unwrap();
+    let text = text.replace("\"species/", &format!("\"{root}/scenes/species/")).replace("\"../", &format!("\"{root}/"));
+    let flowering = counts(&text);
+    assert!(flowering.iter().all(|count| *count > 30), "{flowering:?}");
+    assert_eq!(counts(&text.replace("Bbch(65)", "Bbch(19)")), [0; 4]);
 }
 
 /// Rationale: a test that cannot fail proves nothing. Expected: the field half a pixel aside is another label map.

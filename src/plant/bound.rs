@@ -2,7 +2,11 @@
 //! itself be small.
 
 use super::PlantDesc;
+use super::flower::desc::FlowerDesc;
+use super::inflorescence::check::axes;
+use super::inflorescence::desc::InflorescenceDesc;
 use super::kind::{LeafKind, Shape};
+use super::stage::StageDesc;
 
 /// Corners around stems and stalks, twice: triangles of one ring of them.
 const RING: f64 = 32.0;
@@ -22,13 +26,28 @@ fn of_leaf(kind: &LeafKind) -> f64 {
     blade + RING * (kind.rows.get() + kind.joints.get() + 16.0)
 }
 
+/// The most triangles of a plant's flowering axes at a stage, and all that they bear.
+fn of_axes(plant: &PlantDesc, stage: &StageDesc) -> f64 {
+    // A blend of two counts lies between them, so between two stages there are no more than at the larger.
+    let each = |axis: &InflorescenceDesc| {
+        let leaves =
+            axis.leaves.iter().map(|l| l.count.largest().ceil() * plant.kinds.get(&l.kind).map_or(0.0, of_leaf));
+        let flowers = axis.flowers.iter().map(|f| {
+            let one = plant.flowers.get(&f.kind).map_or(0.0, FlowerDesc::most_triangles);
+            f.count.largest().ceil() * (one + 8.0 * RING)
+        });
+        32.0 * RING + leaves.sum::<f64>() + flowers.sum::<f64>()
+    };
+    axes(stage).iter().zip(&stage.inflorescences).map(|(n, axis)| n * each(axis)).sum()
+}
+
 /// That of a plant.
 pub fn most_triangles(desc: &PlantDesc) -> f64 {
     let largest = desc.kinds.values().map(of_leaf).fold(0.0, f64::max);
     let leaves = |layers: f64| layers * largest + RING * 64.0;
     let stages = desc.stages.iter().map(|stage| {
         let side = if stage.tillers.usual().1 > 0.0 { SHOOTS } else { 1.0 };
-        side * leaves(stage.layers.iter().map(|layer| layer.leaves.get()).sum())
+        side * leaves(stage.layers.iter().map(|layer| layer.leaves.get()).sum()) + of_axes(desc, stage)
     });
     stages.fold(0.0, f64::max)
 }

@@ -1,5 +1,7 @@
 //! A species' plant as it is written, and how old one of it is.
 
+use super::flower::desc::FlowerDesc;
+use super::inflorescence::check;
 use super::kind::LeafKind;
 use super::stage::StageDesc;
 use crate::ron_file::{self, Finite, NonNegative, Num, Positive, Step, Vary};
@@ -66,6 +68,11 @@ pub struct PlantDesc {
     pub form: Form,
     /// Its kinds of leaves. A kind's name is also its blades' key among the species' materials.
     pub kinds: BTreeMap<String, LeafKind>,
+    /// What its flowers and fruits are made like, by names that its stages' `inflorescences` use.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    #[schemars(default)]
+    #[schemars(extend("x-example" = "{\"daisy\": Head(disc: 0.4, florets: 200, rings: [])}"))]
+    pub flowers: BTreeMap<String, FlowerDesc>,
     /// Its stages, youngest first.
     pub stages: Vec<StageDesc>,
     /// A CSV file with the leaves of all stages, beside the species file: then stages have no `layers`. Its first line names the columns `leaf` (1
@@ -112,6 +119,8 @@ struct Written {
     form: Form,
     #[serde(deserialize_with = "ron_file::entries")]
     kinds: BTreeMap<String, LeafKind>,
+    #[serde(default, deserialize_with = "ron_file::entries")]
+    flowers: BTreeMap<String, FlowerDesc>,
     stages: Vec<StageDesc>,
     #[serde(default)]
     leaves: String,
@@ -147,6 +156,17 @@ fn lean() -> Vary<Finite> {
     Vary::uniform(0.0, 5.0)
 }
 
+/// Stages of which those without layers keep the layers of the one before.
+fn kept(mut stages: Vec<StageDesc>) -> Vec<StageDesc> {
+    for i in 1..stages.len() {
+        if stages[i].layers.is_empty() {
+            let (before, later) = stages.split_at_mut(i);
+            later[0].layers.clone_from(&before[i - 1].layers);
+        }
+    }
+    stages
+}
+
 impl<'de> Deserialize<'de> for PlantDesc {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         ron_file::from_raw(deserializer, |raw| {
@@ -154,7 +174,8 @@ impl<'de> Deserialize<'de> for PlantDesc {
             let desc = Self {
                 form: w.form,
                 kinds: w.kinds,
-                stages: w.stages,
+                flowers: w.flowers,
+                stages: kept(w.stages),
                 leaves: w.leaves,
                 cover_days: w.cover_days,
                 vigour: w.vigour,
@@ -198,6 +219,12 @@ impl PlantDesc {
                 return Err((at, message, ron_file::choose("kinds", &known, kind)));
             }
         }
+        for (name, flower) in &self.flowers {
+            flower
+                .check()
+                .map_err(|(message, help)| (vec![Field("flowers")], format!("\"{name}\": {message}"), help))?;
+        }
+        (0..self.stages.len()).try_for_each(|i| check::stage((&self.flowers, &self.kinds), &self.stages, i))?;
         let days: Vec<f64> = self.cover_days.values().map(|d| d.get()).collect();
         if days.windows(2).any(|pair| pair[1] <= pair[0]) {
             let message = "a higher BBCH code of ground cover must be reached later".into();
@@ -246,6 +273,9 @@ impl PlantDesc {
             keys.push(if kind.material.is_empty() { name.clone() } else { kind.material.clone() });
             keys.push(kind.stalk_material.clone());
         }
+        keys.extend(self.flowers.values().flat_map(FlowerDesc::materials).map(str::to_owned));
+        let axes = self.stages.iter().flat_map(|stage| &stage.inflorescences);
+        keys.extend(axes.map(|axis| axis.material.clone()).filter(|material| !material.is_empty()));
         keys.sort();
         keys.dedup();
         keys

@@ -68,15 +68,21 @@ pub(super) struct Growth<'a> {
     /// Height of each layer over the first, metres.
     pub(super) rise: Vec<f32>,
     pub(super) leaves: Vec<LeafNow<'a>>,
+    /// Factor on all of this plant's sizes.
+    pub(super) vigour: f32,
+    /// Its stages, for what grows on it later.
+    pub(super) between: Between<'a>,
     /// The plant's own numbers.
     pub(super) stream: &'a Stream,
 }
 
 /// Two neighbouring stages and the way from the first to the second.
-struct Between<'a> {
-    from: &'a StageDesc,
-    to: &'a StageDesc,
-    u: f32,
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Between<'a> {
+    pub(super) from: &'a StageDesc,
+    pub(super) to: &'a StageDesc,
+    /// 0 at the first, 1 at the second.
+    pub(super) u: f32,
 }
 
 impl<'a> Between<'a> {
@@ -99,7 +105,7 @@ impl<'a> Between<'a> {
 
     /// A number on the way: both ends are drawn from the same random numbers, so a plant that is large at one stage is
     /// large at the next. `absent` stands for a layer that the earlier stage does not have.
-    fn draw<B: Bound, T>(
+    pub(super) fn draw<B: Bound, T>(
         &self,
         ends: (Option<&T>, &T),
         absent: Option<f32>,
@@ -118,6 +124,10 @@ impl<'a> Between<'a> {
 
 /// The code of ground cover that `code` stands for and the age in days at which a crop has it; `None` for a code of the stages.
 fn covering(desc: &PlantDesc, code: u32) -> Option<(u32, f32)> {
+    // Codes of later principal stages are those of a stage that the species file has.
+    if code >= 40 && desc.stages.last().is_some_and(|last| last.bbch >= 40) {
+        return None;
+    }
     let (before, early) = desc.cover_days.range(..=code).next_back()?;
     let Some((after, late)) = desc.cover_days.range(code..).next() else { return Some((*before, early.f32())) };
     let u = (code - before) as f32 / (after - before).max(1) as f32;
@@ -234,6 +244,8 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
         tillers,
         rise,
         leaves,
+        vigour,
+        between,
         stream,
     })
 }

@@ -14,6 +14,8 @@
 //! | `skin` | relief, linear blend skinning |
 //! | `tube`, `axis`, `leaf` | stems and stalks; the growth axis; one whole leaf |
 //! | `leaflets`, `dissected`, `fern` | compound and divided blades |
+//! | `flower` | flowers, heads, ears, tassels, pods, berries |
+//! | `inflorescence` | the axes that bear them, and where these begin |
 //! | `condition` | age, health and damage of a plant and its leaves |
 //! | `rosette`, `whorl`, `erect`, `dissected`, `tuft`, `cane`, `runner` | growth forms |
 //!
@@ -28,7 +30,9 @@ mod desc;
 mod dissected;
 mod erect;
 mod fern;
+mod flower;
 mod growth;
+mod inflorescence;
 mod kind;
 mod leaf;
 mod leaflets;
@@ -47,6 +51,8 @@ mod whorl;
 pub use bound::most_triangles;
 pub use condition::{Condition, ConditionDesc};
 pub use desc::{Form, PlantDesc, Stage};
+pub use flower::desc::{FlowerDesc, RingDesc};
+pub use inflorescence::desc::{FlowersDesc, InflorescenceDesc, Seat, StemLeafDesc};
 pub use kind::{LeafKind, Shape};
 pub use organ::{LeafAxis, LeafSize, Organ, OrganKind};
 pub use skeleton::PlacedJoint;
@@ -60,7 +66,7 @@ use std::collections::BTreeMap;
 /// One plant: its organs in plant coordinates (metres, growth axis +z, origin where the stem meets the soil).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plant {
-    /// Its organs: axis first, then leaf by leaf.
+    /// Its organs: axis first, then leaf by leaf, then what bears flowers, and these by their sort.
     pub organs: Vec<Organ>,
     /// The stage it has reached.
     pub bbch: u32,
@@ -128,7 +134,8 @@ pub fn grow_with(desc: &PlantDesc, stage: Stage, stream: &Stream, options: &Grow
     for leaf in &mut growth.leaves {
         leaf.cell = options.cell.max(leaf.cell);
     }
-    let organs = organs_of(desc.form, &growth);
+    let mut organs = organs_of(desc.form, &growth);
+    inflorescence::grow(&mut organs, &growth, options.cell);
     let corners = || organs.iter().flat_map(|o| &o.mesh.positions);
     let height = corners().fold(0.0_f32, |h, p| h.max(p.z));
     let radius = corners().fold(0.0_f32, |r, p| r.max(p.x.hypot(p.y)));

@@ -15,10 +15,24 @@ pub enum OrganKind {
     Cotyledon,
     /// The stem below the seed leaves, with the crown that a rosette carries on it.
     Hypocotyl,
-    /// The stem above the seed leaves.
+    /// The stem above the seed leaves, scapes and the stalks of flowers too.
     Stem,
     /// The lower part of a grass leaf, rolled round the stem.
     Sheath,
+    /// A single flower that is open, stamens and sepals too.
+    Flower,
+    /// A flower or head that is closed.
+    Bud,
+    /// The head of a composite: disc, rays, bracts.
+    Head,
+    /// An ear or spike: wheat, maize with its husks and silks.
+    Ear,
+    /// A tassel.
+    Tassel,
+    /// A pod, silicle, silique or capsule.
+    Pod,
+    /// A berry.
+    Berry,
 }
 
 impl OrganKind {
@@ -31,6 +45,13 @@ impl OrganKind {
             Self::Hypocotyl => "hypocotyl",
             Self::Stem => "stem",
             Self::Sheath => "sheath",
+            Self::Flower => "flower",
+            Self::Bud => "bud",
+            Self::Head => "head",
+            Self::Ear => "ear",
+            Self::Tassel => "tassel",
+            Self::Pod => "pod",
+            Self::Berry => "berry",
         }
     }
 }
@@ -78,7 +99,8 @@ impl LeafAxis {
 pub struct Organ {
     /// What it is.
     pub kind: OrganKind,
-    /// The leaf it belongs to, counted from 1 in order of appearance, seed leaves first; 0 for stem and hypocotyl.
+    /// The leaf it belongs to, counted from 1 in order of appearance, seed leaves first; 0 for what belongs to no leaf: stem,
+    /// hypocotyl, flowers and fruits.
     pub leaf: u16,
     /// Its key in the species file's `materials`.
     pub material: String,

@@ -6,6 +6,7 @@
 //! detection", IROS, §III-B. Stages are numbered by the BBCH scale (Meier 2001, "Growth stages of mono- and
 //! dicotyledonous plants").
 
+use super::inflorescence::desc::InflorescenceDesc;
 use crate::ron_file::{Bound, Finite, NonNegative, Num, PositiveCount, Vary};
 use serde::{Deserialize, Serialize};
 
@@ -70,8 +71,13 @@ pub struct StageDesc {
     /// Side shoots, each a smaller copy of the main one.
     #[serde(default = "vary::<NonNegative>")]
     pub tillers: Vary<NonNegative>,
-    /// Layers from the oldest to the youngest, seed leaves first. A later stage may only add layers at the end.
+    /// Layers from the oldest to the youngest, seed leaves first. A later stage may only add layers at the end; one that names none keeps
+    /// those of the stage before.
+    #[serde(default)]
     pub layers: Vec<LayerDesc>,
+    /// Its flowering axes, those before which others stand first. A later stage may only add some at the end.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub inflorescences: Vec<InflorescenceDesc>,
 }
 
 fn one() -> Num<PositiveCount> {

@@ -139,6 +139,16 @@ impl<B: Bound> Vary<B> {
         (lo.max(B::MIN), hi.min(B::MAX))
     }
 
+    /// The largest value that is drawn; where there is no end, six standard deviations above the centre, which one of 10⁹ exceeds.
+    pub fn largest(&self) -> f64 {
+        let most = match self {
+            Self::Drawn(Distribution::Normal { mean, sd, max, .. }) => (mean + 6.0 * sd).min(*max),
+            Self::Drawn(Distribution::LogNormal { median, sigma, max, .. }) => (median * (6.0 * sigma).exp()).min(*max),
+            _ => self.usual().1,
+        };
+        most.min(B::MAX)
+    }
+
     /// What is wrong with a distribution: where in it, what, and what to do.
     fn check(distribution: &Distribution) -> Result<(), Wrong> {
         use Step::{Field, Item};

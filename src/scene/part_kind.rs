@@ -19,7 +19,7 @@ pub enum PartKind {
 impl PartKind {
     /// All of them with their numbers in label maps, their names, and their colours there: soils brown, organs green, others apart. 0 is nothing at
     /// all, such as the sky.
-    pub const NUMBERED: [(u8, &'static str, [u8; 3], Self); 12] = [
+    pub const NUMBERED: [(u8, &'static str, [u8; 3], Self); 19] = [
         (1, "soil", [94, 72, 52], Self::Soil),
         (2, "stone", [150, 150, 160], Self::Debris(DebrisKind::Stone)),
         (3, "straw", [214, 190, 110], Self::Debris(DebrisKind::Straw)),
@@ -32,6 +32,13 @@ impl PartKind {
         (14, "hypocotyl", [200, 90, 120], Self::Organ(OrganKind::Hypocotyl)),
         (15, "stem", [170, 60, 200], Self::Organ(OrganKind::Stem)),
         (16, "sheath", [0, 150, 150], Self::Organ(OrganKind::Sheath)),
+        (17, "flower", [250, 250, 250], Self::Organ(OrganKind::Flower)),
+        (18, "bud", [150, 255, 200], Self::Organ(OrganKind::Bud)),
+        (19, "head", [255, 210, 0], Self::Organ(OrganKind::Head)),
+        (20, "ear", [255, 140, 40], Self::Organ(OrganKind::Ear)),
+        (21, "tassel", [180, 120, 255], Self::Organ(OrganKind::Tassel)),
+        (22, "pod", [120, 180, 230], Self::Organ(OrganKind::Pod)),
+        (23, "berry", [230, 30, 60], Self::Organ(OrganKind::Berry)),
     ];
 
     /// Colours of the numbers in label maps, from 0; black where there is none.
@@ -72,6 +79,13 @@ mod tests {
             OrganKind::Hypocotyl,
             OrganKind::Stem,
             OrganKind::Sheath,
+            OrganKind::Flower,
+            OrganKind::Bud,
+            OrganKind::Head,
+            OrganKind::Ear,
+            OrganKind::Tassel,
+            OrganKind::Pod,
+            OrganKind::Berry,
         ];
         let debris = [DebrisKind::Stone, DebrisKind::Stick, DebrisKind::Straw, DebrisKind::Bit];
         let all = organs.map(PartKind::Organ).into_iter().chain(debris.map(PartKind::Debris));

@@ -12,7 +12,8 @@ import native
 dataset = Path(sys.argv[1])
 root = dataset / "parts"
 names = {int(number): name for number, name in json.loads((root / "names.json").read_text()).items()}
-ORGANS = {"blade", "petiole", "cotyledon", "hypocotyl", "stem", "sheath"}
+LEAVES = {"blade", "petiole", "cotyledon", "sheath"}
+ORGANS = LEAVES | {"hypocotyl", "stem", "flower", "bud", "head", "ear", "tassel", "pod", "berry"}
 organs = [number for number, name in names.items() if name in ORGANS]
 seen = set()
 for name, image in native.read(dataset).items():
@@ -22,11 +23,11 @@ for name, image in native.read(dataset).items():
     assert parts.shape == image.semantics.shape
     assert set(np.unique(parts)) - {0} <= set(names)
     assert (np.isin(parts, organs) == (image.plants > 0)).all()
-    # What belongs to no leaf is stem or hypocotyl, and a leaf is none of them.
+    # What belongs to no leaf is stem, hypocotyl, flower or fruit, and a leaf is none of them.
     of = lambda *kinds: np.isin(parts, [number for number, name in names.items() if name in kinds])
     plants, leaves = image.plants > 0, image.leaves > 0
-    assert (of("stem", "hypocotyl")[plants] == ~leaves[plants]).all()
-    assert of("blade", "petiole", "cotyledon", "sheath")[leaves].all()
+    assert (of(*(ORGANS - LEAVES))[plants] == ~leaves[plants]).all()
+    assert of(*LEAVES)[leaves].all()
     assert ((image.semantics == 0) == ~plants).all()
     seen |= {names[number] for number in np.unique(parts) if number}
 assert "soil" in seen

@@ -1,0 +1,187 @@
+//! What flowers are drawn with: bent sheets (petals), solids of elliptic rings (ovaries, spikelets, pods) and strands (stalks, awns).
+//!
+//! One flower has many small parts, so a plant's parts of one kind and material are one mesh: one organ, one label.
+
+use crate::geometry::Mesh;
+use crate::geometry::outline::{self, Outline};
+use crate::math::{Frame, Vec3, vec2};
+use crate::plant::axis;
+use crate::plant::blade::Rest;
+use crate::plant::organ::{Organ, OrganKind};
+use crate::plant::skeleton::Weights;
+use crate::plant::tube::{self, Profile};
+use std::f32::consts::TAU;
+
+/// Draws a plant's flowers.
+pub(in crate::plant) struct Pen {
+    organs: Vec<Organ>,
+    /// Shortest cell of its meshes, metres.
+    pub(in crate::plant) cell: f32,
+}
+
+/// A sheet that leaves its base, bends along its length and across it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sheet {
+    /// Where it begins, metres.
+    pub(super) base: Vec3,
+    /// Outward, unit, across the flower's axis.
+    pub(super) out: Vec3,
+    /// The flower's axis, unit.
+    pub(super) up: Vec3,
+    /// Metres.
+    pub(super) length: f32,
+    /// Metres.
+    pub(super) width: f32,
+    /// Widths along it.
+    pub(super) outline: Outline,
+    /// Depth of the notch at its tip, of its length.
+    pub(super) notch: f32,
+    /// Angle above the plane across the axis at its base and its tip, radians.
+    pub(super) rise: (f32, f32),
+    /// How far its margins rise towards the axis, of its half-width.
+    pub(super) hollow: f32,
+}
+
+impl Sheet {
+    /// The place on its midline at `t` of its length, and the normal of its inner side there.
+    fn middle(&self, t: f32) -> (Vec3, Vec3) {
+        let (from, to) = self.rise;
+        let (now, turn) = (from + (to - from) * t, to - from);
+        // The integral of (cos, sin) of an angle that grows evenly.
+        let (x, z) = if turn.abs() < 1e-3 {
+            (t * now.cos(), t * now.sin())
+        } else {
+            ((now.sin() - from.sin()) / turn, (from.cos() - now.cos()) / turn)
+        };
+        let place = self.base + (self.out * x + self.up * z) * self.length;
+        (place, self.up * now.cos() - self.out * now.sin())
+    }
+}
+
+/// A closed body of elliptic rings.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Solid {
+    /// Where it begins, metres.
+    pub(super) base: Vec3,
+    /// z runs along it, x across its width.
+    pub(super) frame: Frame,
+    /// Metres.
+    pub(super) length: f32,
+    /// Metres.
+    pub(super) width: f32,
+    /// Thickness over width.
+    pub(super) flat: f32,
+    /// Widths along it.
+    pub(super) outline: Outline,
+    /// Depth of the notch at its tip, of its length.
+    pub(super) notch: f32,
+}
+
+/// The outline of an ellipsoid.
+pub(super) const ROUND: Outline = Outline::Power { a: 0.5, b: 0.5 };
+
+impl Pen {
+    /// One that draws no cell shorter than this, metres.
+    pub(in crate::plant) fn new(cell: f32) -> Self {
+        Self { organs: Vec::new(), cell }
+    }
+
+    /// What was drawn.
+    pub(in crate::plant) fn finish(self) -> Vec<Organ> {
+        self.organs
+    }
+
+    /// Adds a mesh to the organ of this kind and material.
+    pub(in crate::plant) fn add(&mut self, kind: OrganKind, material: &str, mesh: &Mesh) {
+        if mesh.triangles.is_empty() {
+            return;
+        }
+        if let Some(organ) = self.organs.iter_mut().find(|o| o.kind == kind && o.material == material) {
+            organ.mesh.append(mesh);
+        } else {
+            let (material, mesh) = (material.to_owned(), mesh.clone());
+            self.organs.push(Organ { kind, leaf: 0, material, mesh, axis: None });
+        }
+    }
+
+    /// Cells along something of this length: between `least` and `most`.
+    fn cells(&self, length: f32, least: f32, most: f32) -> u32 {
+        (length / self.cell).round().clamp(least, most) as u32
+    }
+
+    /// Draws a sheet; its texture coordinates are those of a leaf's image.
+    pub(super) fn sheet(&mut self, kind: OrganKind, material: &str, sheet: &Sheet) {
+        let rows = self.cells(sheet.length, 4.0, 10.0);
+        // A notch needs corners beside its ground.
+        let columns = if sheet.notch > 0.0 || sheet.width > 4.0 * self.cell { 8 } else { 4 };
+        let side = sheet.out.cross(sheet.up);
+        let mut rest = Rest::default();
+        let mut near = None;
+        for i in 0..=rows {
+            let t = 0.02 + 0.965 * i as f32 / rows as f32;
+            let half = (sheet.outline.half_width(t) * sheet.width).max(0.04 * sheet.width);
+            let first = rest.positions.len() as u32;
+            for j in 0..=columns {
+                let q = 2.0 * j as f32 / columns as f32 - 1.0;
+                let reach = t * (1.0 - sheet.notch * notch(q));
+                let (place, normal) = sheet.middle(reach);
+                let p = place + side * (q * half) + normal * (sheet.hollow * q * q * half);
+                rest.corner(p, outline::uv(q * half / sheet.width, t), Weights::default());
+            }
+            if let Some(near) = near {
+                rest.stitch(near, first, columns);
+            }
+            near = Some(first);
+        }
+        self.add(kind, material, &Mesh::smooth(rest.positions, rest.uvs, rest.triangles));
+    }
+
+    /// Draws a solid.
+    pub(super) fn solid(&mut self, kind: OrganKind, material: &str, solid: &Solid) {
+        let rows = self.cells(solid.length, 3.0, 10.0);
+        let sides = self.cells(3.0 * solid.width, 5.0, 12.0);
+        let mut rest = Rest::default();
+        let mut near = None;
+        for i in 0..=rows {
+            let t = 0.5 - 0.5 * (std::f32::consts::PI * i as f32 / rows as f32).cos();
+            let half = (solid.outline.half_width(t) * solid.width).max(0.01 * solid.width);
+            let first = rest.positions.len() as u32;
+            for k in 0..=sides {
+                let (sin, cos) = (TAU * k as f32 / sides as f32).sin_cos();
+                let across = cos * 2.0 * solid.outline.half_width(t);
+                let along = solid.length * t * (1.0 - solid.notch * notch(across) * t);
+                let f = &solid.frame;
+                let p = solid.base + f.z * along + f.x * (half * cos) + f.y * (half * solid.flat * sin);
+                rest.corner(p, vec2(k as f32 / sides as f32, 1.0 - t), Weights::default());
+            }
+            if let Some(near) = near {
+                rest.stitch(near, first, sides);
+            }
+            near = Some(first);
+        }
+        let mut mesh = Mesh::smooth(rest.positions, rest.uvs, rest.triangles);
+        tube::close_seams(&mut mesh, sides, 0);
+        self.add(kind, material, &mesh);
+    }
+
+    /// Draws a round strand through points, of these radii at its base and tip, metres.
+    pub(in crate::plant) fn strand(&mut self, kind: OrganKind, material: &str, points: &[Vec3], radii: (f32, f32)) {
+        let sides = self.cells(6.0 * radii.0, 3.0, 10.0);
+        let last = points.len().saturating_sub(1).max(1) as f32;
+        let mut rings = Vec::with_capacity(points.len() + 3);
+        let mut along = Vec3::Z;
+        for (i, point) in points.iter().enumerate() {
+            let (before, after) = (points[i.saturating_sub(1)], points[(i + 1).min(points.len() - 1)]);
+            along = (after - before).normalize_or(along);
+            let radius = radii.0 + (radii.1 - radii.0) * i as f32 / last;
+            rings.push(axis::ring(*point, along, radius, Profile::Channelled(1.0)));
+        }
+        axis::dome(&mut rings, along, radii.1, 1.0);
+        self.add(kind, material, &tube::rigid(&rings, sides));
+    }
+}
+
+/// 1 in the middle of a tip, 0 at both of its sides.
+fn notch(q: f32) -> f32 {
+    (1.0 - q.abs()).max(0.0).powf(1.5)
+}

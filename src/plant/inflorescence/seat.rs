@@ -1,0 +1,83 @@
+//! Where flowering axes begin: tips of shoots and axils of leaves, as the grown organs have them.
+
+use crate::geometry::Mesh;
+use crate::math::{Vec3, direction};
+use crate::plant::growth::Growth;
+use crate::plant::organ::{LeafAxis, Organ, OrganKind};
+use crate::sampling::Purpose;
+use std::f32::consts::{FRAC_PI_2, TAU};
+
+/// A place that can bear an axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    /// Metres.
+    pub(super) point: Vec3,
+    /// Direction of what bears it, unit.
+    pub(super) along: Vec3,
+    /// Direction across it in which the axil opens, unit; of a tip: none in particular.
+    pub(super) out: Option<Vec3>,
+}
+
+/// The tips of all shoots, the main one's first.
+pub(super) fn tips(organs: &[Organ], growth: &Growth<'_>) -> Vec<Place> {
+    let stems: Vec<Place> =
+        organs.iter().filter(|o| o.kind == OrganKind::Stem).filter_map(|o| end_of(&o.mesh)).collect();
+    if stems.is_empty() { culms(organs, growth) } else { stems }
+}
+
+/// The end of a stem: the mesh of one is rings from its base to its tip, and v tells them apart.
+fn end_of(mesh: &Mesh) -> Option<Place> {
+    let middle_of = |v: f32| {
+        // The corner that closes a ring stands where its first does.
+        let ring = || mesh.positions.iter().zip(&mesh.uvs).filter(|(_, uv)| uv.y == v && uv.x < 1.0).map(|(p, _)| *p);
+        ring().sum::<Vec3>() / ring().count().max(1) as f32
+    };
+    let last = mesh.uvs.last()?.y;
+    let before = mesh.uvs.iter().rev().find(|uv| uv.y != last)?.y;
+    let (point, below) = (middle_of(last), middle_of(before));
+    Some(Place { point, along: (point - below).normalize_or(Vec3::Z), out: None })
+}
+
+/// The feet of a grass' shoots, whose culms are hidden in their sheaths: leaves whose sheaths begin at one place belong to one shoot,
+/// and its youngest sheath leads along it.
+fn culms(organs: &[Organ], growth: &Growth<'_>) -> Vec<Place> {
+    let mut shoots: Vec<(Vec3, &LeafAxis)> = Vec::new();
+    // Sheaths of a stout grass stand side by side within its stem.
+    let near = 0.6 * growth.stem + 1e-4;
+    for axis in organs.iter().filter_map(|o| o.axis.as_ref()) {
+        let Some(foot) = axis.joints.first().map(|joint| joint.at) else { continue };
+        match shoots.iter_mut().find(|(of, _)| of.distance(foot) < near) {
+            Some(shoot) => shoot.1 = axis,
+            None => shoots.push((foot, axis)),
+        }
+    }
+    let mut stream = growth.stream.child(Purpose::Plant, 1);
+    let lean = growth.desc.lean_deg.draw32(&mut stream).to_radians();
+    let upright = direction(lean, stream.range32(0.0, TAU));
+    let culm = |(k, (foot, axis)): (usize, &(Vec3, &LeafAxis))| {
+        let along = if k == 0 { upright } else { (axis.base - *foot).normalize_or(upright) };
+        let foot = if k == 0 { Vec3::ZERO } else { *foot };
+        Place { point: foot, along, out: None }
+    };
+    shoots.iter().enumerate().map(culm).collect()
+}
+
+/// The axil of leaf `number`, if the leaf is there.
+pub(super) fn axil(organs: &[Organ], number: u32) -> Option<Place> {
+    let of = |organ: &&Organ| u32::from(organ.leaf) == number;
+    let axis = organs.iter().filter(of).find_map(|o| o.axis.as_ref())?;
+    let sheathed = organs.iter().filter(of).any(|o| o.kind == OrganKind::Sheath);
+    let foot = axis.joints.first().map_or(axis.base, |joint| joint.at);
+    let ahead = (axis.tip - axis.base).with_z(0.0).normalize_or(Vec3::X);
+    let along = if sheathed { (axis.base - foot).normalize_or(Vec3::Z) } else { Vec3::Z };
+    let point = if sheathed { axis.base - along * 0.004 } else { foot };
+    Some(Place { point, along, out: Some(ahead) })
+}
+
+/// A unit vector across `along`, at this azimuth about it.
+pub(super) fn across(along: Vec3, azimuth: f32) -> Vec3 {
+    let level = direction(FRAC_PI_2, azimuth);
+    let across = level - along * level.dot(along);
+    // A level axis bears to its sides and above.
+    if across.length() < 0.2 { along.cross(Vec3::Z).normalize_or(Vec3::X) } else { across.normalize() }
+}
