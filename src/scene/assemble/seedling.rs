@@ -3,8 +3,10 @@
 use super::condition::{Ailing, Bare};
 use super::grown::Grown;
 use super::individual::Individual;
+use crate::material::LeafMaterial;
 use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3};
-use crate::plant::{self, ConditionDesc, GrowOptions, LeafAxis, OrganKind};
+use crate::optics::{Pigments, ageing};
+use crate::plant::{self, ConditionDesc, GrowOptions, LeafAge, LeafAxis, OrganKind};
 use crate::ron_file::{Positive, Vary};
 use crate::sampling::{Purpose, Stream};
 use crate::scatter;
@@ -121,7 +123,9 @@ pub(super) fn grow(
         let chosen = &choices[choice];
         let pigments = &desc.materials[&organ.material].pigments;
         let cut = matches!(organ.kind, OrganKind::Blade | OrganKind::Cotyledon);
-        let bare = Bare { kind: organ.kind, choice: chosen, pigments, green, ground: z, last };
+        let age = plant.ages.get(&organ.leaf).filter(|_| cut);
+        let material = aged(&chosen.material, pigments, age);
+        let bare = Bare { kind: organ.kind, material: &material, choice: chosen, pigments, green, ground: z, last };
         let grown = Grown {
             part: Part {
                 mesh: Arc::new(mesh),
@@ -132,8 +136,8 @@ pub(super) fn grow(
             kind: organ.kind,
             key: organ.material,
             choice,
-            material: chosen.material.with_chlorophyll(pigments.chlorophyll.f32(), green),
-            own: false,
+            material: material.with_chlorophyll(pigments.chlorophyll.f32(), green),
+            own: age.is_some(),
         };
         match &ailing {
             Some(ailing) => ailing.dress(&grown, &bare),
@@ -142,4 +146,9 @@ pub(super) fn grow(
     });
     let organs = organs.collect();
     (record, Some(organs))
+}
+
+/// A blade as old as it is; what is no blade of the main shoot has the species file's colour.
+fn aged(material: &LeafMaterial, pigments: &Pigments, age: Option<&LeafAge>) -> LeafMaterial {
+    age.map_or_else(|| material.clone(), |age| material.tinted(ageing::tint(pigments, age.unfolded, age.days)))
 }
