@@ -12,13 +12,20 @@ use crate::sampling::Purpose;
 use serde::{Deserialize, Serialize};
 
 /// How a kind's stipules look.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Stipules {
     /// Length of the end lobe, of the blade's length; 0 for no stipules.
     pub length: Num<NonNegative>,
     /// Lobes on each side of it; the outer side has one more.
     pub lobes: Num<Count>,
+}
+
+impl Default for Stipules {
+    /// None.
+    fn default() -> Self {
+        Self { length: Num::new(0.0), lobes: Num::new(2.0) }
+    }
 }
 
 impl Stipules {

@@ -594,7 +594,13 @@ fn beets_are_as_high_and_wide_as_their_stage() {
         // By the stage of the file, whatever code of ground cover it bears.
         let plants: Vec<Plant> = (0..10).map(|seed| grow(&beet, Stage::Age(stage.days.f32()), &stream(seed))).collect();
         let mean = |pick: fn(&Plant) -> f32| plants.iter().map(pick).sum::<f32>() / plants.len() as f32 * 1e3;
-        for (what, value) in [("height", mean(|p| p.height)), ("span", mean(|p| 2.0 * p.radius))] {
+        let span = |plant: &Plant| {
+            let corners = || plant.organs.iter().filter_map(|o| o.mesh.bounds());
+            let low = corners().fold(Vec3::MAX, |low, b| low.min(b.0));
+            let high = corners().fold(Vec3::MIN, |high, b| high.max(b.1));
+            0.5 * (high.x - low.x + high.y - low.y)
+        };
+        for (what, value) in [("height", mean(|p| p.height)), ("span", mean(span))] {
             let [least, most] = ["least", "most"].map(|end| number(&row, &format!("{what}_{end}")).unwrap());
             assert!((0.9 * least..1.1 * most).contains(&value), "BBCH {bbch}: {what} {value:.0} of {least} to {most}");
         }
