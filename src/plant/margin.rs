@@ -15,7 +15,7 @@ const PERIODS: f64 = 2.3;
 /// Standard deviation of the noise.
 const NOISE_SD: f32 = 0.26;
 /// How far the margin is moved along the midrib, lengths, for each half-width that it is moved across.
-const ALONG: f32 = 0.45;
+const ALONG: f32 = 0.25;
 /// Most that a margin is moved across, of the half-width.
 const MOST: f32 = 0.45;
 

