@@ -36,6 +36,16 @@ pub trait Format: Sync {
         &[]
     }
 
+    /// Whether it holds photographs, or names them, so that images which are labels alone cannot be written in it.
+    fn needs_photograph(&self) -> bool {
+        true
+    }
+
+    /// Whether it names the photographs in `images/`, which it does not copy.
+    fn names_photographs(&self) -> bool {
+        false
+    }
+
     /// Whether it tells of cameras, which imported images do not.
     fn needs_camera(&self) -> bool {
         false
@@ -111,6 +121,8 @@ formats! {
         r#"pandas.read_csv("traits/leaves.csv")"#;
     "tum" => tum: "TUM RGB-D trajectories: time, position and quaternion of each camera's images",
         r#"numpy.loadtxt("tum/000000-camera.txt")"#;
+    "voc" => voc: "Pascal VOC: boxes as XML, masks of classes and objects, for `torchvision` and `supervision`",
+        r#"torchvision.datasets.VOCSegmentation("voc", year="2012", image_set="train")[0]"#;
     "yolo" => yolo: "YOLO segmentation: a polygon a plant, with what is lost by it, for Ultralytics and `supervision`",
         r#"supervision.DetectionDataset.from_yolo("yolo/images/train", "yolo/labels/train", "yolo/data.yaml", force_masks=True)"#;
     "yolo-detect" => yolo_detect: "YOLO detection: a box a plant, for Ultralytics and `supervision`",
@@ -136,6 +148,17 @@ pub fn all(recipe: &Recipe) -> Result<Vec<(&str, &'static dyn Format)>> {
 /// An error where a format, or a class of its labels, needs a map that the images of this recipe do not have.
 pub fn check_maps(recipe: &Recipe) -> Result<()> {
     for (format, writer) in all(recipe)? {
+        if recipe.labels_only() && writer.needs_photograph() {
+            let known = NAMES.iter().filter(|(name, _)| named(name).is_some_and(|format| !format.needs_photograph()));
+            let known: Vec<&str> = known.map(|(name, _)| *name).collect();
+            return Err(Error::misuse(format!(
+                "--format {format} holds photographs, and these images are labels alone"
+            ))
+            .help(format!(
+                "leave --labels-only or this format out; without photographs there are {}",
+                known.join(", ")
+            )));
+        }
         let lacks = writer.needs_maps().iter().find(|map| !recipe.keeps(**map));
         if let Some((name, ..)) = lacks.and_then(|map| Kept::NAMED.iter().find(|(_, kept, _)| kept == map)) {
             return Err(Error::misuse(format!("--format {format} holds {name}, which these images do not keep"))

@@ -8,7 +8,7 @@ use furrow::dataset::keep::{self, Kept};
 use furrow::dataset::labelling::Labelling;
 use furrow::dataset::plan::{self, Order};
 use furrow::dataset::split::Shares;
-use furrow::dataset::{self, Set, format};
+use furrow::dataset::{self, Set, format, pack};
 use furrow::settings::{Quality, RenderOptions};
 use furrow::{Result, cli};
 use std::path::{Path, PathBuf};
@@ -21,6 +21,9 @@ pub(crate) struct Args {
     /// Change one thing of every field, by its name; `trace ablate --list` tells them.
     #[arg(long, value_name = "NAME")]
     edit: Option<String>,
+    /// Put so many images into a tar archive (WebDataset) instead of a folder each; also those of a dataset that has folders.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=pack::MOST))]
+    pack: Option<u64>,
 }
 
 /// Which images, in what form.
@@ -67,6 +70,10 @@ pub(crate) struct LookArgs {
     /// Samples a pixel.
     #[arg(long, default_value_t = Quality::SPP, value_parser = samples())]
     spp: u32,
+    /// Draw no photographs: labels and records alone, of the same fields. Nothing is lit, and no sensor is asked; of --keep only depth and
+    /// normals can be had, and unless they are named, nothing.
+    #[arg(long, conflicts_with_all = ["spp", "denoise", "engine", "without", "max_depth", "clamp"])]
+    pub(crate) labels_only: bool,
     /// Take the noise of few samples out of the photographs; needs Open Image Denoise.
     #[arg(long)]
     denoise: bool,
@@ -121,7 +128,8 @@ pub(crate) fn formats() -> clap::builder::PossibleValuesParser {
 impl Args {
     /// The dataset that is asked for.
     pub(crate) fn order(&self) -> Result<Order> {
-        self.images.order(self.edit.as_deref().map_or(Ok(&FULL), Edit::named)?)
+        let order = self.images.order(self.edit.as_deref().map_or(Ok(&FULL), Edit::named)?)?;
+        Ok(Order { pack: self.pack, ..order })
     }
 }
 
@@ -152,7 +160,8 @@ pub(crate) fn begin(folder: &Path, order: &Order) -> Result<Set> {
 impl LookArgs {
     /// How images are rendered without an edit.
     pub(crate) fn options(&self) -> RenderOptions {
-        self.technique.options(Quality { denoise: self.denoise, ..Quality::spp(self.spp) })
+        let spp = if self.labels_only { 1 } else { self.spp };
+        self.technique.options(Quality { denoise: self.denoise, ..Quality::spp(spp) })
     }
 }
 
@@ -191,6 +200,7 @@ impl ImageArgs {
             labelling: self.labels.labelling(),
             licence: self.licence.clone(),
             options: self.options(),
+            labels_only: self.look.labels_only,
             edit,
             memory: self.memory.bytes,
             ..Order::new(self.scene.path(), self.count.unwrap_or(0))
