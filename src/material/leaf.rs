@@ -156,7 +156,13 @@ impl LeafMaterial {
     #[must_use]
     pub fn with_chlorophyll(&self, base: f32, factor: f32) -> Self {
         let rgb = |c: f32| self.optics.with_chlorophyll(c).reflectance.0.truncate().max(Vec3::splat(1e-3));
-        Self { tint: rgb(base * factor) / rgb(base), ..self.clone() }
+        self.tinted(rgb(base * factor) / rgb(base))
+    }
+
+    /// The same leaf of another colour, as a factor on R, G and B.
+    #[must_use]
+    pub fn tinted(&self, factor: Vec3) -> Self {
+        Self { tint: self.tint * factor, ..self.clone() }
     }
 
     /// The same leaf in a condition; `gloss` is a factor on the roughness of its upper side.

@@ -4,6 +4,7 @@
 //! spectra ([`bands`]); [`LeafOptics`] turns a texel's colour into both sides of the leaf; [`soil`] darkens soil by moisture. Soils of
 //! one's own come as spectra ([`measured`]) or by [`Munsell`] notation.
 
+pub mod ageing;
 pub mod bands;
 pub mod interface;
 mod leaf;

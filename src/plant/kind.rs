@@ -1,6 +1,7 @@
 //! Kinds of leaves: what all leaves of a kind share in the species file, whatever their size.
 
 use super::organ::OrganKind;
+use super::stipules::Stipules;
 use crate::geometry::outline::Outline;
 use crate::ron_file::{Finite, Fraction, NonNegative, Num, Positive, PositiveCount, Vary};
 use serde::{Deserialize, Serialize};
@@ -22,6 +23,9 @@ pub enum Shape {
         lobes: Vary<PositiveCount>,
         /// Width of a segment.
         segment_mm: Vary<Positive>,
+        /// Share of the rachis, from its base, without pinnae; where it is long some pinnae are missing and the tip is a small blade.
+        #[serde(default = "num::<Fraction, 0>", skip_serializing_if = "Num::is_zero")]
+        bare: Num<Fraction>,
     },
     /// Pinnate to the third order in one plane, widest near its base: carrot. Of ribbons, like [`Shape::Pinnate`].
     Fern {
@@ -103,6 +107,10 @@ pub struct LeafKind {
     /// Difference between the halves' widths, of the half-width.
     #[serde(default = "asymmetry")]
     pub asymmetry: Vary<Finite>,
+    /// How far each leaf's outline departs from the picture's, each margin in its own way: one standard deviation, of the half-width. Teeth and
+    /// lobes then stand elsewhere on every leaf.
+    #[serde(default = "margin_sd")]
+    pub margin_sd: Num<Fraction>,
     /// Sideways bow of the midrib, of the blade's length.
     #[serde(default = "sway")]
     pub sway: Vary<Finite>,
@@ -127,6 +135,10 @@ pub struct LeafKind {
     /// How far the raised midrib reaches under the blade, of its length.
     #[serde(default = "rib")]
     pub rib: Num<Fraction>,
+    /// A pair of lobed stipules at the foot of the stalk.
+    #[serde(default, skip_serializing_if = "Stipules::none")]
+    #[schemars(extend("x-example" = "(length: 0.75, lobes: 2)"))]
+    pub stipules: Stipules,
     /// How far the stalk of a full-sized leaf arches outward.
     #[serde(default = "vary::<Finite, 15>")]
     pub stalk_bend_deg: Vary<Finite>,
@@ -163,6 +175,10 @@ fn period() -> Vary<Positive> {
 
 fn asymmetry() -> Vary<Finite> {
     normal(0.06)
+}
+
+fn margin_sd() -> Num<Fraction> {
+    Num::new(0.06)
 }
 
 fn sway() -> Vary<Finite> {

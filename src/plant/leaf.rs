@@ -5,10 +5,12 @@ use super::fern;
 use super::growth::{CELL, LeafNow};
 use super::kind::Shape;
 use super::leaflets;
+use super::margin::LeafOutline;
 use super::organ::{LeafAxis, LeafSize, Organ, OrganKind};
-use super::ribbons;
+use super::ribbons::{self, Division};
 use super::skeleton::{Measures, Pose, Skeleton};
 use super::skin::{self, BladeRelief};
+use super::stipules;
 use super::tube::{self, Profile, Ring};
 use crate::geometry::outline::Outline;
 use crate::math::{Mat3, Vec3, direction, lerp, smoothstep, vec3};
@@ -62,13 +64,16 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
         Shape::Sheet { outline } => {
             let (rows, columns) = cells(leaf);
             let mut sheet = blade::sheet(*outline, leaf.width, rows, columns, &skeleton);
+            let mut own = leaf.stream.child(crate::sampling::Purpose::Leaf, 102);
+            LeafOutline::draw(leaf.kind.margin_sd.f32(), &mut own).apply(&mut sheet, leaf.blade);
             relief.apply(&mut sheet, leaf.blade);
             sheet.rest
         }
-        Shape::Pinnate { pairs, lobes, segment_mm } => {
-            let counts = (pairs.draw(&mut stream) as usize, lobes.draw(&mut stream) as usize);
+        Shape::Pinnate { pairs, lobes, segment_mm, bare } => {
+            let (pairs, lobes) = (pairs.draw(&mut stream) as usize, lobes.draw(&mut stream) as usize);
             let segment = segment_mm.draw32(&mut stream) * 1e-3;
-            pressed(leaf, ribbons::blade(counts, segment, leaf.width, &skeleton, &mut stream))
+            let division = Division { pairs, lobes, bare: bare.f32().min(0.9), segment };
+            pressed(leaf, ribbons::blade(division, leaf.width, &skeleton, &mut stream))
         }
         Shape::Fern { pairs, pinnules, segment_mm } => {
             let counts = (pairs.draw(&mut stream) as usize, pinnules.draw(&mut stream) as usize);
@@ -103,6 +108,9 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
     }
     let mut mesh = skin::skin(rest, &motions);
     tube::close_seams(&mut mesh, sides(leaf), 0);
+    if !leaf.kind.stipules.none() {
+        mesh.append(&skin::skin(stipules::pair(&leaf.kind.stipules, leaf, &skeleton), &motions));
+    }
     let kind = if lower == Lower::Petiole { OrganKind::Petiole } else { OrganKind::Sheath };
     organs.push(Organ { kind, leaf: leaf.number, material: leaf.kind.stalk_material.clone(), mesh, axis: None });
 }

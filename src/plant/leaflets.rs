@@ -6,10 +6,11 @@
 use super::blade::{self, Rest};
 use super::growth::LeafNow;
 use super::kind::Shape;
+use super::margin::LeafOutline;
 use super::skeleton::{Measures, Pose, Skeleton};
 use super::skin::{self, BladeRelief};
 use crate::math::{Mat3, lerp, vec3};
-use crate::sampling::Stream;
+use crate::sampling::{Purpose, Stream};
 
 /// Vein joints of a leaflet.
 const JOINTS: usize = 4;
@@ -49,6 +50,8 @@ pub(super) fn blade(
             joint.bend = -leaf.bend / (JOINTS as f32 + 1.0) + 0.02 * stream.normal() as f32;
         }
         let mut sheet = blade::sheet(*outline, width, rows, columns, &skeleton);
+        let mut own = leaf.stream.child(Purpose::Leaf, 102).child(Purpose::Leaf, rest.positions.len() as u64);
+        LeafOutline::draw(leaf.kind.margin_sd.f32(), &mut own).apply(&mut sheet, along);
         let seed = stream.seed32();
         BladeRelief { fold: 0.5 * leaf.fold, fold_tip: 0.3 * leaf.fold, seed, ..*relief }.apply(&mut sheet, along);
         let foot = Pose { rotation: stance(side, turn, rise), origin: vec3(0.0, reach * share, 0.0) };

@@ -11,16 +11,20 @@
 //! | `kind` | what all leaves of a kind share |
 //! | `skeleton` | the leaf's kinematic tree, Denavit–Hartenberg |
 //! | `blade` | outline → flat rest mesh with skin weights |
+//! | `margin` | how one leaf's outline departs from its kind's |
+//! | `age` | how old each leaf is |
 //! | `skin` | relief, linear blend skinning |
 //! | `tube`, `axis`, `leaf` | stems and stalks; the growth axis; one whole leaf |
-//! | `leaflets`, `dissected`, `fern` | compound and divided blades |
+//! | `leaflets`, `ribbons`, `fern` | compound and divided blades |
 //! | `flower` | flowers, heads, ears, tassels, pods, berries |
 //! | `inflorescence` | the axes that bear them, and where these begin |
+//! | `stipules` | what stands at the foot of a stalk |
 //! | `condition` | age, health and damage of a plant and its leaves |
 //! | `rosette`, `whorl`, `erect`, `dissected`, `tuft`, `cane`, `runner` | growth forms |
 //!
 //! A new growth form is a file with a `grow(&Growth) -> Vec<Organ>` and one line in `forms!` (`desc.rs`).
 
+mod age;
 mod axis;
 pub mod blade;
 mod bound;
@@ -36,6 +40,7 @@ mod inflorescence;
 mod kind;
 mod leaf;
 mod leaflets;
+mod margin;
 mod organ;
 mod ribbons;
 mod rosette;
@@ -43,11 +48,13 @@ mod runner;
 pub mod skeleton;
 pub mod skin;
 mod stage;
+mod stipules;
 pub mod table;
 mod tube;
 mod tuft;
 mod whorl;
 
+pub use age::LeafAge;
 pub use bound::most_triangles;
 pub use condition::{Condition, ConditionDesc};
 pub use desc::{Form, PlantDesc, Stage};
@@ -57,6 +64,7 @@ pub use kind::{LeafKind, Shape};
 pub use organ::{LeafAxis, LeafSize, Organ, OrganKind};
 pub use skeleton::PlacedJoint;
 pub use stage::{BUD, LayerDesc, StageDesc};
+pub use stipules::Stipules;
 
 use crate::sampling::Stream;
 use growth::Growth;
@@ -72,6 +80,8 @@ pub struct Plant {
     pub bbch: u32,
     /// Days after emergence.
     pub age_days: f32,
+    /// How old the leaves of its main shoot are, by number.
+    pub ages: BTreeMap<u16, LeafAge>,
     /// Its highest point, metres.
     pub height: f32,
     /// Radius of the upright cylinder about the origin that holds it, metres.
@@ -126,7 +136,7 @@ pub fn grow(desc: &PlantDesc, stage: Stage, stream: &Stream) -> Plant {
 /// Grows one plant with options.
 pub fn grow_with(desc: &PlantDesc, stage: Stage, stream: &Stream, options: &GrowOptions<'_>) -> Plant {
     let Some(mut growth) = growth::growth(desc, stage, stream, options.vigour) else {
-        return Plant { organs: Vec::new(), bbch: 0, age_days: 0.0, height: 0.0, radius: 0.0 };
+        return Plant { organs: Vec::new(), ages: BTreeMap::new(), bbch: 0, age_days: 0.0, height: 0.0, radius: 0.0 };
     };
     if let Some((desc, condition)) = options.condition {
         condition::Posture::new(desc, condition, stream).apply(&mut growth.leaves);
@@ -139,7 +149,7 @@ pub fn grow_with(desc: &PlantDesc, stage: Stage, stream: &Stream, options: &Grow
     let corners = || organs.iter().flat_map(|o| &o.mesh.positions);
     let height = corners().fold(0.0_f32, |h, p| h.max(p.z));
     let radius = corners().fold(0.0_f32, |r, p| r.max(p.x.hypot(p.y)));
-    Plant { organs, bbch: growth.bbch, age_days: growth.age_days, height, radius }
+    Plant { organs, ages: age::ages(&growth), bbch: growth.bbch, age_days: growth.age_days, height, radius }
 }
 
 macro_rules! grow_by_form {

@@ -7,7 +7,7 @@
 
 use super::blade::Rest;
 use super::skeleton::Skeleton;
-use crate::math::{Vec3, lerp, vec2, vec3};
+use crate::math::{Vec3, lerp, smoothstep, vec2, vec3};
 use crate::sampling::Stream;
 use std::f32::consts::PI;
 
@@ -29,6 +29,18 @@ pub(super) struct Ribbons<'a> {
 impl Ribbons<'_> {
     /// Adds a strip from `start` along `along` (metres), bowed towards `bow`, tapering at both ends.
     pub(super) fn strip(&mut self, start: Vec3, along: Vec3, up: Vec3, bow: Vec3, width: f32, pieces: u32) {
+        self.band((start, along, up, bow), pieces, |s| {
+            width * (1.0 - 0.8 * s * s * s) * if s == 0.0 { 0.7 } else { 1.0 }
+        });
+    }
+
+    /// Adds a strip of a width for each share of its length; `place` is its start, its direction and length, its upper side and its bow.
+    pub(super) fn band(
+        &mut self,
+        (start, along, up, bow): (Vec3, Vec3, Vec3, Vec3),
+        pieces: u32,
+        width: impl Fn(f32) -> f32,
+    ) {
         self.count += 1;
         if self.count > MOST {
             return;
@@ -38,7 +50,7 @@ impl Ribbons<'_> {
         for i in 0..=pieces {
             let s = i as f32 / pieces as f32;
             let centre = start + along * s + bow * (s * s);
-            let half = 0.5 * width * (1.0 - 0.8 * s * s * s) * if i == 0 { 0.7 } else { 1.0 };
+            let half = 0.5 * width(s);
             let tie = self.skeleton.weights_on_chain(centre.y);
             let first = self.rest.positions.len() as u32;
             for (k, side) in [-1.0_f32, 0.0, 1.0].into_iter().enumerate() {
@@ -75,39 +87,100 @@ impl Ribbons<'_> {
                 .normalize_or(ahead);
                 let from = start + along * s + bow * (s * s);
                 self.strip(from, lobe * reach, up, Vec3::ZERO, 0.85 * self.width, 1);
+                // A long lobe bears a tooth on its outer side: three times pinnate.
+                if reach > 4.5 * self.width {
+                    let tooth =
+                        (lobe * 0.8 - right * (side * 0.25) + up * stream.range32(-0.5, 0.6)).normalize_or(lobe);
+                    let tooth = if k % 2 == 0 { tooth } else { (lobe + right * (side * 0.7)).normalize_or(lobe) };
+                    self.strip(
+                        from + lobe * (0.45 * reach),
+                        tooth * (0.45 * reach),
+                        up,
+                        Vec3::ZERO,
+                        0.75 * self.width,
+                        1,
+                    );
+                }
             }
         }
     }
 }
 
-/// The rest mesh of a blade with `pairs` of pinnae and `lobes` pairs of lobes on each, within `width`.
-pub(super) fn blade(
-    (pairs, lobes): (usize, usize),
-    segment: f32,
-    width: f32,
-    skeleton: &Skeleton,
-    stream: &mut Stream,
-) -> Rest {
+/// How a twice pinnate blade is divided.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Division {
+    /// Pairs of pinnae.
+    pub(super) pairs: usize,
+    /// Pairs of lobes on the longest.
+    pub(super) lobes: usize,
+    /// Share of the rachis, from its base, that bears none.
+    pub(super) bare: f32,
+    /// Width of a segment, metres.
+    pub(super) segment: f32,
+}
+
+/// Share of the pinnae that a leaf with a long bare rachis lacks.
+const LACKING: f32 = 0.5;
+
+/// The rest mesh of a divided blade within `width`.
+pub(super) fn blade(division: Division, width: f32, skeleton: &Skeleton, stream: &mut Stream) -> Rest {
     let length = skeleton.length();
+    let Division { pairs, lobes, bare, segment } = division;
     // Small leaves have fewer, not finer, segments.
-    let pairs = pairs.min(MOST).min((length / (2.2 * segment)) as usize).max(1);
+    let pairs = pairs.min(MOST).min((length * (1.0 - bare) / (1.6 * segment)) as usize).max(1);
     let lobes = lobes.min(MOST).min((0.5 * width / (3.0 * segment)) as usize);
     let mut ribbons = Ribbons { rest: Rest::default(), skeleton, width: segment, count: 0 };
-    ribbons.strip(Vec3::ZERO, vec3(0.0, length, 0.0), Vec3::Z, Vec3::ZERO, 1.25 * segment, 2 * pairs.min(12) as u32);
+    let rachis = (Vec3::ZERO, vec3(0.0, length, 0.0), Vec3::Z, Vec3::ZERO);
+    ribbons.band(rachis, (2 * pairs.min(12) as u32).max(8), |s| {
+        // A thread that widens where the pinnae stand; with few of them the tip is a little blade itself.
+        let blade = 1.4 * bare * smoothstep(bare, 0.9, s);
+        segment * (lerp(0.8, 0.95, s) + blade) * (1.0 - 0.8 * smoothstep(0.88, 1.0, s))
+    });
     for k in 0..pairs {
-        let t = lerp(0.12, 0.93, (k as f32 + 0.5) / pairs as f32);
+        let u = (k as f32 + 0.5) / pairs as f32;
         for side in [-1.0_f32, 1.0] {
-            let t = (t + stream.range32(-0.3, 0.3) / (pairs as f32 + 1.0)).clamp(0.05, 0.97);
-            let reach = 0.5 * width * (PI * t.powf(0.8)).sin().max(0.05).powf(0.7) * stream.range32(0.85, 1.15);
-            let spread = lerp(1.2, 0.6, t) + stream.range32(-0.12, 0.12);
-            let tilt = stream.range32(-0.25, 0.75);
+            let stray = stream.range32(-0.3, 0.3) / (pairs as f32 + 1.0);
+            let u = (u + stray).clamp(0.03, 0.97);
+            let t = lerp(lerp(0.08, 1.0, bare), 0.96, u);
+            let reach = 0.5 * width * (PI * u.powf(0.8)).sin().max(0.05).powf(0.7) * stream.range32(0.8, 1.15);
+            let spread = lerp(lerp(1.1, 0.75, bare), 0.5, u) + stream.range32(-0.14, 0.14);
+            let tilt = stream.range32(-0.35, 0.85) * (1.0 - 0.6 * bare);
+            let lacking = stream.chance(f64::from(LACKING * bare));
             let along = vec3(side * spread.sin() * tilt.cos(), spread.cos(), spread.sin() * tilt.sin());
             let up = vec3(-side * tilt.sin(), 0.0, tilt.cos());
             let up = (up - along * up.dot(along)).normalize_or(Vec3::Z);
             // The outline's width is that of the projection: a steeper pinna is as long as a level one.
             let lobes = if reach > 5.0 * segment { lobes } else { 0 };
-            ribbons.pinna(vec3(0.0, t * length, 0.0), along * (reach / spread.sin()), up, lobes, stream);
+            if !lacking {
+                ribbons.pinna(vec3(0.0, t * length, 0.0), along * (reach / spread.sin()), up, lobes, stream);
+            }
         }
     }
     ribbons.rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::skeleton::Measures;
+    use super::*;
+    use crate::sampling::Purpose;
+
+    /// Expected: below its first pinna a rachis is a thread no wider than a segment; with a long bare part the pinnae stand near the tip; without
+    /// one they begin near the base.
+    #[test]
+    fn a_bare_rachis_is_a_thread() {
+        let skeleton =
+            Skeleton::new(&Measures { stalk: 0.0, stalk_joints: 1, length: 0.02, veins: vec![0.5], secondaries: None });
+        for seed in 0..20 {
+            for (bare, from) in [(0.5, 0.5), (0.0, 0.05)] {
+                let division = Division { pairs: 3, lobes: 1, bare, segment: 0.001 };
+                let mut stream = Stream::of(seed, 0, Purpose::Leaf, 0);
+                let rest = blade(division, 0.008, &skeleton, &mut stream);
+                let wide = rest.positions.iter().filter(|p| p.x.abs() > 0.00051);
+                let lowest = wide.map(|p| p.y / 0.02).fold(1.0, f32::min);
+                assert!(lowest > from, "seed {seed}, {bare}: {lowest}");
+                assert!(bare > 0.0 || lowest < 0.4, "seed {seed}: {lowest}");
+            }
+        }
+    }
 }

@@ -310,7 +310,8 @@ fn blades_fill_as_much_of_their_length_and_width_as_the_table_says() {
             let Shape::Sheet { outline: of @ outline::Outline::Power { .. } } = leaf.kind.shape else { continue };
             let blade = plant.organs.iter().find(|o| o.leaf == leaf.number && o.axis.is_some()).unwrap();
             let share = blade.mesh.area() / (leaf.blade * leaf.width) / ratio(of);
-            assert!((0.85..1.25).contains(&share), "{} leaf {}: {share}", page.eppo, leaf.number);
+            // The mesh has a rim, waves fold it, and no two leaves share an outline.
+            assert!((0.8..1.4).contains(&share), "{} leaf {}: {share}", page.eppo, leaf.number);
         }
     }
 }
@@ -477,7 +478,7 @@ fn triangles_stay_within_budget() {
             ("BEAVX", ..=19) => 17_000,
             // Twenty leaves and more, and every side shoot with leaves of its own.
             ("BEAVX", _) | ("STEME" | "ARHHY", 20..) => 40_000,
-            ("DAUCA" | "CIRAR" | "ARHHY" | "GLXMA" | "SOLTU", _) => 14_000,
+            ("DAUCA" | "CIRAR" | "ARHHY" | "GLXMA" | "SOLTU" | "MATIN", _) => 14_000,
             ("TRZAX", 22..) => 24_000,
             _ => 9_000,
         };
@@ -600,4 +601,80 @@ fn the_keypoints_of_a_leaf_lie_on_its_blade_and_point_outward() {
             }
         }
     });
+}
+
+/// Expected: the mean of ten plants lies within the table's ranges, give or take a tenth. Source: `tests/ref/beet_stages.csv`.
+#[test]
+fn beets_are_as_high_and_wide_as_their_stage() {
+    let beet = page("BEAVX");
+    for row in table("beet_stages.csv") {
+        let bbch: u32 = row["bbch"].parse().unwrap();
+        let stage = beet.stages.iter().find(|s| s.bbch == bbch).unwrap();
+        // By the stage of the file, whatever code of ground cover it bears.
+        let plants: Vec<Plant> = (0..10).map(|seed| grow(&beet, Stage::Age(stage.days.f32()), &stream(seed))).collect();
+        let mean = |pick: fn(&Plant) -> f32| plants.iter().map(pick).sum::<f32>() / plants.len() as f32 * 1e3;
+        let span = |plant: &Plant| {
+            let corners = || plant.organs.iter().filter_map(|o| o.mesh.bounds());
+            let low = corners().fold(Vec3::MAX, |low, b| low.min(b.0));
+            let high = corners().fold(Vec3::MIN, |high, b| high.max(b.1));
+            0.5 * (high.x - low.x + high.y - low.y)
+        };
+        for (what, value) in [("height", mean(|p| p.height)), ("span", mean(span))] {
+            let [least, most] = ["least", "most"].map(|end| number(&row, &format!("{what}_{end}")).unwrap());
+            assert!((0.9 * least..1.1 * most).contains(&value), "BBCH {bbch}: {what} {value:.0} of {least} to {most}");
+        }
+    }
+}
+
+/// Expected: shepherd's purse and cauliflower have the proportions of pictures of them: the first leaves of the one, and all grown leaves of the
+/// other above their winged foot; the rosette of the one lies on the ground. Source: cut-outs, see docs/results.md.
+#[test]
+fn rosettes_have_the_proportions_of_their_pictures() {
+    for seed in 0..10 {
+        let stream = stream(seed);
+        let purse = page("CAPBP");
+        let grown = growth::growth(&purse, Stage::Bbch(16), &stream, 1.0).unwrap();
+        for leaf in grown.leaves.iter().filter(|l| l.kind_name == "leaf_entire") {
+            let ratio = leaf.blade / leaf.width;
+            assert!((1.3..=1.6).contains(&ratio), "leaf {}: {ratio}", leaf.number);
+        }
+        let plant = grow(&purse, Stage::Bbch(19), &stream);
+        assert!(plant.height < 0.5 * plant.radius, "seed {seed}: {} of {}", plant.height, plant.radius);
+        let cauliflower = page("BRSOB");
+        let grown = growth::growth(&cauliflower, Stage::Bbch(16), &stream, 1.0).unwrap();
+        let longest = grown.leaves.iter().map(|l| l.blade).fold(0.0, f32::max);
+        for leaf in grown.leaves.iter().filter(|l| l.kind_name == "leaf" && l.blade > 0.5 * longest) {
+            let ratio = 0.86 * leaf.blade / leaf.width;
+            assert!((1.05..1.45).contains(&ratio), "leaf {}: {ratio}", leaf.number);
+            assert!(leaf.stalk < 0.25 * leaf.blade, "leaf {}", leaf.number);
+        }
+    }
+}
+
+/// Rationale: pansies are known by their stipules. Expected: with them the stalk's organ has more surface, most of it in its lower half; blades
+/// do not move.
+#[test]
+fn pansies_have_stipules_at_the_foot_of_their_stalks() {
+    let viola = page("VIOAR");
+    let mut without = viola.clone();
+    without.kinds.values_mut().for_each(|kind| kind.stipules = Stipules::default());
+    for seed in 0..10 {
+        let [with, bare] = [&viola, &without].map(|desc| grow(desc, Stage::Bbch(16), &stream(seed)));
+        assert_eq!(with.organs.len(), bare.organs.len());
+        let mut stalks = 0;
+        for (a, b) in with.organs.iter().zip(&bare.organs) {
+            if a.kind != OrganKind::Petiole {
+                assert_eq!(a, b);
+            } else if a.mesh.triangles.len() > b.mesh.triangles.len() {
+                stalks += 1;
+                assert!(a.mesh.area() > b.mesh.area());
+                let base = b.mesh.positions[0];
+                let reach = b.mesh.positions.iter().map(|p| p.distance(base)).fold(0.0, f32::max);
+                let added = &a.mesh.positions[b.mesh.positions.len()..];
+                let near = added.iter().filter(|p| p.distance(base) < 0.75 * reach).count();
+                assert!(near > added.len() / 2, "seed {seed} leaf {}", a.leaf);
+            }
+        }
+        assert!(stalks >= 6, "{stalks}");
+    }
 }

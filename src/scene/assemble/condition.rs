@@ -2,7 +2,7 @@
 
 use super::grown::Grown;
 use crate::geometry::Mesh;
-use crate::material::ConditionOptics;
+use crate::material::{ConditionOptics, LeafMaterial};
 use crate::math::{Spectrum, Vec2};
 use crate::optics::Pigments;
 use crate::plant::condition::{Bearer, Marks, leaf_stream};
@@ -36,6 +36,8 @@ pub(super) struct Bare<'a> {
     pub(super) kind: OrganKind,
     /// Its material.
     pub(super) choice: &'a Choice,
+    /// That material at the organ's age.
+    pub(super) material: &'a LeafMaterial,
     /// What its material is made of.
     pub(super) pigments: &'a Pigments,
     /// Factor on its chlorophyll.
@@ -86,7 +88,7 @@ impl<'a> Ailing<'a> {
         let green = if leaf == 0 { self.drawn.greenness } else { self.desc.green(&self.drawn, age, &stream) };
         let gloss = if leaf == 0 { 1.0 } else { self.desc.gloss(&stream) };
         let base = bare.pigments.chlorophyll.f32();
-        let own = bare.choice.material.with_chlorophyll(base, bare.green * green);
+        let own = bare.material.with_chlorophyll(base, bare.green * green);
         let blade = matches!(bare.kind, OrganKind::Blade | OrganKind::Cotyledon);
         // What stands apart is eaten apart: leaflets share a picture, not their holes.
         let pieces = match grown.part.mesh.image_size() {
@@ -104,7 +106,7 @@ impl<'a> Ailing<'a> {
             }
             let marked = marks.as_ref().is_some_and(|m| !m.nothing());
             let wears = marked || self.drawn.reddening > 0.0 || gloss != 1.0;
-            one.own = wears || green != 1.0;
+            one.own |= wears || green != 1.0;
             if wears {
                 let of = (bare.pigments, bare.choice.tones(bare.pigments));
                 one.material = own.worn(ConditionOptics::new(of, marks, self.drawn.reddening, self.soil), gloss);

@@ -4,8 +4,10 @@ use super::condition::{Ailing, Bare};
 use super::grown::Grown;
 use super::individual::Individual;
 use super::today::{Today, emerging};
+use crate::material::LeafMaterial;
 use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3};
-use crate::plant::{self, ConditionDesc, GrowOptions, LeafAxis, OrganKind, Stage};
+use crate::optics::{Pigments, ageing};
+use crate::plant::{self, ConditionDesc, GrowOptions, LeafAge, LeafAxis, OrganKind, Stage};
 use crate::ron_file::{Positive, Vary};
 use crate::sampling::{Purpose, Stream};
 use crate::scatter;
@@ -133,7 +135,9 @@ pub(super) fn grow(
         let chosen = &choices[choice];
         let pigments = &desc.materials[&organ.material].pigments;
         let cut = matches!(organ.kind, OrganKind::Blade | OrganKind::Cotyledon);
-        let bare = Bare { kind: organ.kind, choice: chosen, pigments, green, ground: z, last };
+        let age = plant.ages.get(&organ.leaf).filter(|_| cut);
+        let material = aged(&chosen.material, pigments, age);
+        let bare = Bare { kind: organ.kind, material: &material, choice: chosen, pigments, green, ground: z, last };
         let grown = Grown {
             part: Part {
                 mesh: Arc::new(mesh),
@@ -144,8 +148,8 @@ pub(super) fn grow(
             kind: organ.kind,
             key: organ.material,
             choice,
-            material: chosen.material.with_chlorophyll(pigments.chlorophyll.f32(), green),
-            own: false,
+            material: material.with_chlorophyll(pigments.chlorophyll.f32(), green),
+            own: age.is_some(),
         };
         match &ailing {
             Some(ailing) => ailing.dress(&grown, &bare),
@@ -188,4 +192,9 @@ fn unborn(s: &Seedling, normal: Vec3, height: f32) -> PlantRecord {
         leaf_axes: Vec::new(),
         condition: None,
     }
+}
+
+/// A blade as old as it is; what is no blade of the main shoot has the species file's colour.
+fn aged(material: &LeafMaterial, pigments: &Pigments, age: Option<&LeafAge>) -> LeafMaterial {
+    age.map_or_else(|| material.clone(), |age| material.tinted(ageing::tint(pigments, age.unfolded, age.days)))
 }

@@ -39,6 +39,7 @@ pub(super) fn draw(recipe: &LeafRecipe) -> Result<Drawn> {
         Margin::Toothed { count, .. } => count.get(),
         Margin::Lobed { pairs, .. } => pairs.get(),
         Margin::Spined { lobes, .. } => lobes.get(),
+        Margin::Lyrate(plan) => plan.pairs.get().max(plan.teeth.0.get()),
     };
     let marks = recipe.look.blotches.get().max(recipe.look.spots.get());
     for (what, asked, most) in [
@@ -76,8 +77,8 @@ impl<'a> Painter<'a> {
         let notch = recipe.notch.map_or(0.0, Num::f32);
         let shape = Shape::new(recipe.outline, recipe.aspect, recipe.margin, notch, seed).with_sinus(recipe.sinus);
         let scale = height as f32 / (1.0 + 2.0 * MARGIN);
-        let lobed = matches!(recipe.margin, Margin::Lobed { .. });
-        let segments = veins::grow(&recipe.veins, &shape, recipe.aspect.f32(), lobed, &stream);
+
+        let segments = veins::grow(&recipe.veins, &shape, recipe.aspect.f32(), recipe.margin, &stream);
         let mut painter = Self {
             recipe,
             width,

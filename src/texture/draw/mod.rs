@@ -8,6 +8,7 @@ mod crust;
 mod drawn;
 mod leaf;
 mod leaf_recipe;
+mod lyrate;
 mod shape;
 mod soil;
 mod soil_recipe;
@@ -19,6 +20,7 @@ mod write;
 
 pub use drawn::{Drawn, Grey};
 pub use leaf_recipe::{LeafRecipe, LeafRelief, Look};
+pub use lyrate::Lyrate;
 pub use shape::{Margin, Sinus};
 pub use soil_recipe::{Crumbs, Ground, Litter, SoilRecipe};
 pub use veins::Veins;

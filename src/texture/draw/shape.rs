@@ -3,6 +3,7 @@
 //! Coordinates are in lengths of the leaf: Y along the midrib, 0 at the base and 1 at the tip, X to the right.
 
 use super::cells::unit;
+use super::lyrate::{Lyrate, Silhouette};
 use crate::geometry::outline::Outline;
 use crate::math::{Vec2, lerp, smoothstep, vec2};
 use crate::ron_file::{Count, Fraction, Num, Positive, PositiveCount};
@@ -35,6 +36,8 @@ pub enum Margin {
         /// How far the lobes lean to the tip, degrees.
         lean_deg: Num<Count>,
     },
+    /// A large blade at the end, rounded lobes below it on a winged midrib. The outline is then `Full`.
+    Lyrate(Lyrate),
     /// Shallow lobes that end in pale spines, with smaller spines between them: thistles.
     Spined {
         /// Lobes on each side.
@@ -68,6 +71,7 @@ pub(super) struct Shape {
     lobes: Vec<Lobe>,
     spines: Vec<Spine>,
     teeth: [Vec<(f32, f32)>; 2],
+    lyrate: Option<Silhouette>,
 }
 
 /// One spine: a slender triangle.
@@ -103,10 +107,12 @@ impl Shape {
             lobes: Vec::new(),
             spines: Vec::new(),
             teeth: [Vec::new(), Vec::new()],
+            lyrate: None,
         };
         let random = |i: usize, k: u64| unit(mix(mix(seed ^ (k << 40)) ^ i as u64)) - 0.5;
         match margin {
             Margin::Entire => {}
+            Margin::Lyrate(plan) => shape.lyrate = Some(Silhouette::new(&plan, aspect, seed)),
             Margin::Toothed { count, .. } => {
                 let n = count.get() as usize;
                 for side in 0..2 {
@@ -202,12 +208,16 @@ impl Shape {
 
     /// Half-width of the uncut outline at Y, in lengths.
     pub(super) fn half_width(&self, y: f32) -> f32 {
-        self.aspect * self.outline.half_width(y)
+        match &self.lyrate {
+            Some(lyrate) => lyrate.half_width(y),
+            None => self.aspect * self.outline.half_width(y),
+        }
     }
 
     /// The axes of the lobes: where their veins run.
     pub(super) fn lobe_axes(&self) -> impl Iterator<Item = (Vec2, Vec2)> + '_ {
-        self.lobes.iter().map(|l| (l.foot, l.foot + l.axis * l.length * 0.92))
+        let pinnate = self.lobes.iter().map(|l| (l.foot, l.foot + l.axis * l.length * 0.92));
+        pinnate.chain(self.lyrate.iter().flat_map(Silhouette::lobe_axes))
     }
 
     /// About the distance to the margin, positive inside.
@@ -219,6 +229,7 @@ impl Shape {
             0.0
         };
         let whole = match self.margin {
+            Margin::Lyrate(_) => self.lyrate.as_ref().map_or(-1.0, |lyrate| lyrate.inside(p)),
             Margin::Entire => self.within(p.x, p.y + cut, 1.0),
             Margin::Spined { lobes, spine, .. } => {
                 // Sheared coordinates make the lobes point to the tip.
@@ -312,7 +323,7 @@ impl Spine {
 }
 
 /// A union without a crease: the larger, rounded over `k`.
-fn smooth_max(a: f32, b: f32, k: f32) -> f32 {
+pub(super) fn smooth_max(a: f32, b: f32, k: f32) -> f32 {
     let h = (k - (a - b).abs()).max(0.0) / k;
     a.max(b) + h * h * k * 0.25
 }

@@ -4,7 +4,7 @@
 //!
 //! Coordinates as in [`super::shape`].
 
-use super::shape::Shape;
+use super::shape::{Margin, Shape};
 use crate::math::{Vec2, lerp, smoothstep, vec2};
 use crate::ron_file::{Count, Fraction, NonNegative, Num, PositiveCount};
 use crate::sampling::rng::{Purpose, Stream};
@@ -51,14 +51,20 @@ pub(super) struct Segment {
 }
 
 /// All veins of a leaf.
-pub(super) fn grow(veins: &Veins, shape: &Shape, aspect: f32, lobed: bool, stream: &Stream) -> Vec<Segment> {
+pub(super) fn grow(veins: &Veins, shape: &Shape, aspect: f32, margin: Margin, stream: &Stream) -> Vec<Segment> {
     match *veins {
         Veins::Pinnate { pairs, angle_deg, midrib, fine } => {
             let mut segments = midvein(midrib.f32() * aspect, stream);
-            if lobed {
-                along_lobes(&mut segments, shape, midrib.f32() * aspect);
-            } else {
-                secondaries(&mut segments, shape, pairs.get() as usize, angle_deg.f32(), midrib.f32() * aspect, stream);
+            along_lobes(&mut segments, shape, midrib.f32() * aspect);
+            // Secondaries stand on the blade that ends a lyrate leaf, on all of one without lobes, on no pinnate one.
+            let foot = match margin {
+                Margin::Lobed { .. } => None,
+                Margin::Lyrate(plan) => Some(1.0 - plan.terminal.f32()),
+                _ => Some(shape.sinus_depth()),
+            };
+            if let Some(foot) = foot {
+                let pairs = pairs.get() as usize;
+                secondaries(&mut segments, shape, (pairs, foot), angle_deg.f32(), midrib.f32() * aspect, stream);
             }
             let tree = branch(&segments, shape, fine.get() as usize, stream);
             segments.extend(tree);
@@ -118,7 +124,14 @@ fn along_lobes(segments: &mut Vec<Segment>, shape: &Shape, midrib: f32) {
     }
 }
 
-fn secondaries(out: &mut Vec<Segment>, shape: &Shape, pairs: usize, angle_deg: f32, midrib: f32, stream: &Stream) {
+fn secondaries(
+    out: &mut Vec<Segment>,
+    shape: &Shape,
+    (pairs, foot): (usize, f32),
+    angle_deg: f32,
+    midrib: f32,
+    stream: &Stream,
+) {
     for pair in 0..pairs {
         for side in 0..2 {
             let mut s = stream.child(Purpose::Texture, 100 + pair as u64 * 2 + side);
@@ -126,7 +139,7 @@ fn secondaries(out: &mut Vec<Segment>, shape: &Shape, pairs: usize, angle_deg: f
             // Feet stand closer toward the tip; left and right alternate by up to half a pitch.
             let even = (pair as f32 + 0.35 + 0.22 * sign + s.range32(-0.16, 0.16)) / pairs as f32;
             let base = shape.sinus_depth();
-            let y = lerp(0.015_f32.max(base), 0.9, even.clamp(0.0, 1.0).powf(1.12));
+            let y = lerp(0.015_f32.max(foot), 0.9, even.clamp(0.0, 1.0).powf(1.12));
             // The lowest pair runs back into the lobes of a heart-shaped base.
             let back = if pair == 0 { 260.0 * base } else { 0.0 };
             let angle = (angle_deg * lerp(1.12, 0.8, y) + back + s.range32(-5.0, 5.0)).to_radians();

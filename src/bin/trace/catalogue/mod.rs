@@ -2,8 +2,11 @@
 //!
 //! A species is one sheet, one column a stage: above, the camera looks straight down; below, from some 30° above the ground. It is
 //! the same plant in all of them. A sheet holds the pictures alone, and says in its comment what it was made of; asked again, one that
-//! would come out the same is kept. Words and scales stand on the page.
+//! would come out the same is kept. Words and scales stand on the page. With a folder of photographs they stand beside the stages, and the
+//! outlines of cut-outs and of rendered plants are measured alike.
 
+mod beside;
+mod outline;
 mod page;
 mod sheet;
 
@@ -20,6 +23,7 @@ use furrow::sampling::Points;
 use furrow::scene::species_file::SpeciesFile;
 use furrow::scene::{Field, PlantRecord, assemble};
 use furrow::{Error, Result};
+use outline::{Measures, Silhouette};
 use page::{Entry, Look, Stage};
 use sheet::{Sheet, Shot, View};
 use std::path::{Path, PathBuf};
@@ -34,6 +38,9 @@ const SIDE_DEG: f32 = 30.0;
 const ROOM: f32 = 1.15;
 /// The smallest half-width of a view, metres.
 const LEAST: f32 = 0.004;
+
+/// Plants of a stage whose outlines are measured.
+const MEASURED: u64 = 10;
 
 /// Where species files lie in a working directory that has some.
 const SPECIES: &str = "scenes/species";
@@ -50,6 +57,10 @@ pub(crate) struct Args {
     /// Folder of the species files; scenes/species unless given, or those that ship where there is no such folder.
     #[arg(long, alias = "pages", value_name = "DIR")]
     species_dir: Option<PathBuf>,
+    /// Folder of photographs to show beside the stages: PNG or JPEG, named sugar_beet.png, sugar_beet-2.png, sugar_beet-bbch16.jpg. Of PNGs with
+    /// transparent parts the outlines are measured, and so are those of ten rendered plants a stage.
+    #[arg(long, value_name = "DIR")]
+    beside: Option<PathBuf>,
     /// Samples a pixel.
     #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..=4096))]
     spp: u32,
@@ -123,7 +134,7 @@ impl Args {
         let desc = file.parse()?;
         let mut stages = Vec::new();
         for stage in &desc.plant.stages {
-            let bare = self.field(page, stage.bbch, None)?;
+            let bare = self.field((page, self.seed), stage.bbch, None)?;
             let plant = bare.plants.first().cloned();
             let plant = plant.ok_or_else(|| Error::input("nothing grows").in_file(page))?;
             stages.push((plant, bare.provenance()));
@@ -146,6 +157,17 @@ impl Args {
         if !self.quiet {
             furrow::tell!("{}: {} stages{}", page.display(), stages.len(), if kept { ", kept" } else { "" });
         }
+        let name = page.file_stem().unwrap_or_default().to_string_lossy();
+        let photographs = match &self.beside {
+            Some(folder) => beside::photographs(folder, &name)?,
+            None => Vec::new(),
+        };
+        let measures = if photographs.iter().any(|p| p.measures.is_some()) {
+            let of = |plant: &PlantRecord| self.measures(page, plant.bbch);
+            stages.iter().map(|(plant, _)| of(plant)).collect::<Result<Vec<_>>>()?
+        } else {
+            vec![None; stages.len()]
+        };
         let (width, height, pixels) = output::read_rgb(&path)?;
         let sheet = Sheet { width: width as usize, height: height as usize, pixels };
         let stages = stages.into_iter().enumerate().map(|(i, (plant, _))| {
@@ -155,14 +177,14 @@ impl Args {
                 Ok(Look { jpeg: output::encode_jpeg(size, size, &shot, 88)?, width_mm: view.width_mm() })
             };
             let looks = views.iter().enumerate().map(look).collect::<Result<Vec<Look>>>()?;
-            Ok(Stage { plant, looks })
+            Ok(Stage { plant, looks, measures: measures[i] })
         });
         let stages = stages.collect::<Result<Vec<Stage>>>()?;
-        Ok((path, Entry { desc, stages }))
+        Ok((path, Entry { desc, stages, photographs }))
     }
 
     /// The field with one plant, on bare ground where somebody looks, else on none.
-    fn field(&self, page: &Path, bbch: u32, view: Option<&View>) -> Result<Field> {
+    fn field(&self, (page, seed): (&Path, u64), bbch: u32, view: Option<&View>) -> Result<Field> {
         let text = |path: &Path| format!("{:?}", path.to_string_lossy());
         let (angle, pose, soil) = view.map_or((VIEW_DEG, "Nadir(height_m: 1)".to_owned(), String::new()), |view| {
             // One that ships: a species file may lie anywhere.
@@ -181,12 +203,28 @@ impl Args {
             )",
             text(page)
         );
-        assemble::field_of(&scene, &assemble::Options { seed: Some(self.seed), ..Default::default() })
+        assemble::field_of(&scene, &assemble::Options { seed: Some(seed), ..Default::default() })
+    }
+
+    /// Mean measures of a stage's outline from above, of [`MEASURED`] plants.
+    fn measures(&self, page: &Path, bbch: u32) -> Result<Option<Measures>> {
+        let mut all = Vec::new();
+        for seed in self.seed..self.seed + MEASURED {
+            let Some(plant) = self.field((page, seed), bbch, None)?.plants.first().cloned() else { continue };
+            let field = self.field((page, seed), bbch, Some(&View::above(&plant)))?;
+            let geometry = EmbreeAccel::build(&field.scene.surfaces(), self.threads.max(1) as u32)?;
+            let window = Window::full(self.size, self.size);
+            let labels = render::label(&geometry, &field.scene.parts, &field.scene.camera, window);
+            let inside = labels.tags.iter().map(|tag| tag.plant > 0).collect();
+            let whole = Silhouette { width: self.size as usize, height: self.size as usize, inside };
+            all.extend(Measures::of(&whole.shrunk(beside::LONGEST)));
+        }
+        Ok(Measures::mean(&all))
     }
 
     /// One picture.
     fn shoot(&self, page: &Path, bbch: u32, view: &View, signals: &Signals) -> Result<Shot> {
-        let field = self.field(page, bbch, Some(view))?;
+        let field = self.field((page, self.seed), bbch, Some(view))?;
         let geometry = EmbreeAccel::build(&field.scene.surfaces(), self.threads.max(1) as u32)?;
         let world = World { scene: &field.scene, geometry: &geometry };
         let window = Window::full(self.size, self.size);

@@ -1,5 +1,7 @@
 //! The HTML page that shows all species at all stages, in one file.
 
+use super::beside::Photograph;
+use super::outline::Measures;
 use furrow::report::{Cell, Page, Table, data_url, number, section};
 use furrow::scene::PlantRecord;
 use furrow::scene::desc::{Role, SpeciesDesc};
@@ -18,6 +20,8 @@ pub(super) struct Entry {
     pub(super) desc: SpeciesDesc,
     /// Its stages, youngest first.
     pub(super) stages: Vec<Stage>,
+    /// Photographs of it.
+    pub(super) photographs: Vec<Photograph>,
 }
 
 /// One stage.
@@ -26,6 +30,8 @@ pub(super) struct Stage {
     pub(super) plant: PlantRecord,
     /// Its pictures, from above down.
     pub(super) looks: Vec<Look>,
+    /// Of its outline from above, where there are photographs to compare with.
+    pub(super) measures: Option<Measures>,
 }
 
 /// A picture, as wide as high.
@@ -43,8 +49,8 @@ pub(super) fn html(entries: &[Entry]) -> String {
             @let SpeciesDesc { name, eppo, role, .. } = &entry.desc;
             @let role = if *role == Role::Crop { "crop" } else { "weed" };
             (section(&format!("{name} · {eppo} · {role}"), html! {
-                div.stages { @for stage in &entry.stages { (figure(name, stage)) } }
-                div.wide { (table(&entry.stages).html()) }
+                div.stages { @for stage in &entry.stages { (figure(name, stage)) (photographs(entry, Some(stage.plant.bbch))) } (photographs(entry, None)) }
+                div.wide { (table(&entry.stages).html()) @if let Some(table) = outlines(entry) { (table.html()) } }
             }))
         }
     };
@@ -74,6 +80,39 @@ fn figure(name: &str, stage: &Stage) -> Markup {
             }
         }
     }
+}
+
+/// The photographs of a stage, or those that tell none.
+fn photographs(entry: &Entry, bbch: Option<u32>) -> Markup {
+    html! {
+        @for photo in entry.photographs.iter().filter(|p| p.bbch == bbch) {
+            figure.stage {
+                figcaption { "photograph " (photo.name) }
+                img src=(data_url("jpeg", &photo.jpeg)) alt=(photo.name) width=(photo.size.0) height=(photo.size.1) {}
+            }
+        }
+    }
+}
+
+/// The measures of the outlines of stages and of cut-outs.
+fn outlines(entry: &Entry) -> Option<Table> {
+    let head = ["outline from above", "blade L/W", "blade solidity", "solidity", "arms", "share of circle"];
+    let mut table = Table::new("", head);
+    let mut push = |name: String, m: &Measures| {
+        let cell = |x: f64| Cell::Shown(format!("{x:.2}"));
+        let shares = [m.blade_ratio, m.blade_solidity, m.solidity, m.arms, m.circle_share].map(cell);
+        let [a, b, c, d, e] = shares;
+        table.push([Cell::text(name), a, b, c, d, e]);
+    };
+    let photographs: Vec<Measures> = entry.photographs.iter().filter_map(|p| p.measures).collect();
+    let mean = Measures::mean(&photographs)?;
+    push(format!("{} cut-outs", photographs.len()), &mean);
+    for stage in &entry.stages {
+        if let Some(measures) = &stage.measures {
+            push(format!("BBCH {}", stage.plant.bbch), measures);
+        }
+    }
+    Some(table)
 }
 
 /// The longest of 1, 2, 5, 10, 20, … that is not above `most`.

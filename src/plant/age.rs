@@ -1,0 +1,38 @@
+//! How old each leaf of a plant is: what its colour follows from.
+
+use super::growth::Growth;
+use super::stage::BUD;
+use std::collections::BTreeMap;
+
+/// How old one leaf is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LeafAge {
+    /// Length of the longest of it and all younger blades over that of the plant's longest: near 0 in the heart, 1 of all leaves that have
+    /// grown as long as they will.
+    pub unfolded: f32,
+    /// Days since it could first be seen.
+    pub days: f32,
+}
+
+/// The ages of all leaves of the main shoot, by their numbers.
+pub(super) fn ages(growth: &Growth<'_>) -> BTreeMap<u16, LeafAge> {
+    let longest = growth.leaves.iter().map(|l| l.blade).fold(BUD, f32::max);
+    let mut younger = 0.0_f32;
+    let mut ages = BTreeMap::new();
+    for leaf in growth.leaves.iter().rev() {
+        younger = younger.max(leaf.blade);
+        let days = (growth.age_days - born(growth, leaf.layer)).max(0.0);
+        ages.insert(leaf.number, LeafAge { unfolded: younger / longest, days });
+    }
+    ages
+}
+
+/// Day on which a layer could first be seen: half-way to the first stage that has it.
+fn born(growth: &Growth<'_>, layer: usize) -> f32 {
+    let stages = &growth.desc.stages;
+    let Some(first) = stages.iter().position(|s| s.layers.len() > layer) else { return growth.age_days };
+    match first.checked_sub(1) {
+        Some(before) => 0.5 * (stages[before].days.f32() + stages[first].days.f32()),
+        None => 0.0,
+    }
+}

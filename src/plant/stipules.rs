@@ -1,0 +1,67 @@
+//! Stipules: a pair at the foot of the stalk, each a narrow blade with finger-like lobes at its base. Pansies are known by them.
+//!
+//! They are ribbons, of the stalk's material and part of its organ.
+
+use super::blade::Rest;
+use super::growth::LeafNow;
+use super::ribbons::Ribbons;
+use super::skeleton::Skeleton;
+use crate::math::{Vec3, lerp, vec3};
+use crate::ron_file::{Count, NonNegative, Num};
+use crate::sampling::Purpose;
+use serde::{Deserialize, Serialize};
+
+/// How a kind's stipules look.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Stipules {
+    /// Length of the end lobe, of the blade's length; 0 for no stipules.
+    pub length: Num<NonNegative>,
+    /// Lobes on each side of it; the outer side has one more.
+    pub lobes: Num<Count>,
+}
+
+impl Default for Stipules {
+    /// None.
+    fn default() -> Self {
+        Self { length: Num::new(0.0), lobes: Num::new(2.0) }
+    }
+}
+
+impl Stipules {
+    /// Whether there are none.
+    pub(super) fn none(&self) -> bool {
+        self.length.get() == 0.0
+    }
+}
+
+/// Angle between stalk and end lobe, radians.
+const SPREAD: f32 = 0.55;
+
+/// Both stipules of a leaf, in the flat leaf's coordinates.
+pub(super) fn pair(plan: &Stipules, leaf: &LeafNow<'_>, skeleton: &Skeleton) -> Rest {
+    let mut stream = leaf.stream.child(Purpose::Leaf, 103);
+    let long = plan.length.f32() * leaf.blade;
+    let mut ribbons = Ribbons { rest: Rest::default(), skeleton, width: 0.2 * long, count: 0 };
+    let lobes = plan.lobes.get().min(12.0) as usize;
+    for side in [-1.0_f32, 1.0] {
+        let heading = |angle: f32, rise: f32| vec3(side * angle.sin(), angle.cos(), rise).normalize_or(Vec3::Y);
+        let foot = vec3(side * 0.3 * leaf.kind.stalk_width.f32() * leaf.blade, -0.96 * leaf.stalk, 0.0);
+        let ahead = heading(SPREAD + stream.range32(-0.12, 0.12), stream.range32(0.0, 0.3));
+        let out = ahead * long;
+        let broad = 0.24 * long * stream.range32(0.85, 1.15);
+        ribbons.band((foot, out, Vec3::Z, Vec3::Z * (-0.1 * long)), 5, |s| {
+            broad * lerp(0.45, 1.0, (2.2 * s).min(1.0)) * (1.0 - s * s * s).max(0.12)
+        });
+        for (inner, count) in [(false, lobes + 1), (true, lobes)] {
+            for k in 0..count {
+                let share = (k as f32 + 0.5) / count as f32;
+                let reach = long * lerp(0.3, 0.5, share) * stream.range32(0.8, 1.2);
+                let turn = lerp(1.0, 0.4, share) + stream.range32(-0.12, 0.12);
+                let lobe = heading(SPREAD + if inner { -turn } else { turn }, stream.range32(-0.1, 0.3));
+                ribbons.strip(foot + out * (0.4 * share), lobe * reach, Vec3::Z, Vec3::ZERO, 0.09 * long, 2);
+            }
+        }
+    }
+    ribbons.rest
+}

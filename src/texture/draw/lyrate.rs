@@ -1,0 +1,178 @@
+//! Lyrate leaves: a large blade at the end, below it rounded lobes on a winged midrib that grow smaller to the base. With few lobes this
+//! is a blade on a winged, eared stalk, as of cabbages; with many a leaf of shepherd's purse.
+//!
+//! Coordinates as in [`super::shape`].
+
+use super::cells::unit;
+use super::shape::smooth_max;
+use crate::geometry::outline::Outline;
+use crate::math::{Vec2, lerp, smoothstep, vec2};
+use crate::ron_file::{Fraction, NonNegative, Num, Positive};
+use crate::sampling::rng::mix;
+use serde::{Deserialize, Serialize};
+
+/// The plan of a lyrate leaf.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields, rename = "Lyrate")]
+pub struct Lyrate {
+    /// Length of the blade at the end, of the leaf's length.
+    pub terminal: Num<Fraction>,
+    /// Exponents of that blade's outline at its base and tip, as in `Power(a, b)`.
+    pub outline: (Num<Positive>, Num<Positive>),
+    /// Pairs of lobes below it; each lobe is left out with a chance of 15 %.
+    pub pairs: Num<NonNegative>,
+    /// Length of the uppermost lobes, of the half-width.
+    pub lobe: Num<Fraction>,
+    /// Width of the winged midrib, of the leaf's width.
+    pub rachis: Num<Fraction>,
+    /// Blunt, uneven teeth on each side of the blade, and their depth, of the half-width.
+    pub teeth: (Num<NonNegative>, Num<Fraction>),
+}
+
+/// The shortest blade at the end, of the leaf's length.
+const LEAST: f32 = 0.05;
+
+/// A lobe: a blunt cone from its foot to its end, with the half-widths there.
+struct Lobe {
+    foot: Vec2,
+    end: Vec2,
+    radius: (f32, f32),
+}
+
+/// The silhouette of one.
+pub(super) struct Silhouette {
+    terminal: f32,
+    outline: Outline,
+    half: f32,
+    rachis: f32,
+    lobes: Vec<Lobe>,
+    /// Place along the blade and depth of each sinus between two teeth, by side.
+    sinuses: [Vec<(f32, f32, f32)>; 2],
+    /// Phases and heights of the slow waves of both margins.
+    waves: [[f32; 6]; 2],
+}
+
+impl Silhouette {
+    /// Of a leaf whose width is `aspect` of its length.
+    pub(super) fn new(plan: &Lyrate, aspect: f32, seed: u64) -> Self {
+        let random = |i: u64, k: u64| unit(mix(mix(seed ^ (k << 40)) ^ i)) - 0.5;
+        let half = 0.5 * aspect;
+        let terminal = plan.terminal.f32().max(LEAST);
+        let foot = 1.0 - terminal;
+        let pairs = plan.pairs.f32() as u64;
+        let pitch = 0.9 * foot / pairs.max(1) as f32;
+        let mut lobes = Vec::new();
+        for i in 0..pairs {
+            for (k, side) in [-1.0_f32, 1.0].into_iter().enumerate() {
+                let k = 10 * k as u64;
+                if random(i, k + 1) < -0.35 {
+                    continue;
+                }
+                let share = (i as f32 + 0.75) / pairs as f32;
+                let y = 0.1 * foot + pitch * (i as f32 + 0.6 + 0.5 * random(i, k + 2));
+                let long = half * plan.lobe.f32() * lerp(0.35, 1.0, share) * (1.0 + 0.6 * random(i, k + 3));
+                let lean = 0.32 + 0.5 * random(i, k + 4);
+                let thick = (0.46 * pitch * (1.0 + 0.4 * random(i, k + 5))).min(0.5 * long);
+                let axis = vec2(side * lean.cos(), lean.sin());
+                let end = vec2(0.0, y) + axis * (long - 0.7 * thick);
+                lobes.push(Lobe { foot: vec2(0.0, y - 0.15 * pitch), end, radius: (1.1 * thick, 0.7 * thick) });
+            }
+        }
+        let count = plan.teeth.0.f32().min(200.0) as u64;
+        let sinuses = [0_u64, 1].map(|side| {
+            (0..count)
+                .map(|i| {
+                    let place = lerp(0.08, 0.94, (i as f32 + 0.5 + 0.75 * random(i, 30 + side)) / count as f32);
+                    let deep = (random(i, 32 + side) + 0.62).max(0.12) * plan.teeth.1.f32();
+                    (place, deep, 0.3 / count as f32 * (1.0 + 0.8 * random(i, 34 + side)))
+                })
+                .collect()
+        });
+        let waves = [40, 50].map(|k| std::array::from_fn(|i| random(i as u64, k)));
+        let (a, b) = (plan.outline.0.f32(), plan.outline.1.f32());
+        Self {
+            terminal,
+            outline: Outline::Power { a, b },
+            half,
+            rachis: half * plan.rachis.f32(),
+            lobes,
+            sinuses,
+            waves,
+        }
+    }
+
+    /// Half-width of the blade or of the midrib's wing at Y, teeth and lobes left out.
+    pub(super) fn half_width(&self, y: f32) -> f32 {
+        self.terminal_half(y).max(self.wing(y))
+    }
+
+    fn terminal_half(&self, y: f32) -> f32 {
+        let t = (y - 1.0 + self.terminal) / self.terminal;
+        if (0.0..=1.0).contains(&t) { 2.0 * self.half * self.outline.half_width(t) } else { 0.0 }
+    }
+
+    fn wing(&self, y: f32) -> f32 {
+        let inside = smoothstep(0.0, 0.02, y) * f32::from(u8::from(y < 1.0 - 0.6 * self.terminal));
+        self.rachis * lerp(0.35, 1.0, (y / (1.0 - self.terminal).max(1e-3)).clamp(0.0, 1.0)) * inside
+    }
+
+    /// Foot and end of the lobes: where their veins run.
+    pub(super) fn lobe_axes(&self) -> impl Iterator<Item = (Vec2, Vec2)> + '_ {
+        self.lobes.iter().map(|l| (l.foot, l.end))
+    }
+
+    /// About the distance to the margin, positive inside.
+    pub(super) fn inside(&self, p: Vec2) -> f32 {
+        let side = usize::from(p.x > 0.0);
+        let t = (p.y - 1.0 + self.terminal) / self.terminal;
+        let wing = self.wing(p.y);
+        let mut d = if wing > 0.0 { (wing - p.x.abs()).min(p.y) } else { -1.0 };
+        if (-0.2..1.2).contains(&t) {
+            // Sheared coordinates make the teeth point to the tip.
+            let s = t - 0.25 * p.x.abs() / self.terminal;
+            let kept = self.wave(side, t) * (1.0 - self.bite(side, s));
+            d = smooth_max(d, self.blade(p.x.abs(), t, kept), 0.02);
+        }
+        for lobe in &self.lobes {
+            d = smooth_max(d, lobe.inside(p), 0.025);
+        }
+        d.min(self.half - p.x.abs())
+    }
+
+    fn blade(&self, x: f32, t: f32, kept: f32) -> f32 {
+        if !(0.0..=1.0).contains(&t) {
+            return -((t - t.clamp(0.0, 1.0)) * self.terminal).hypot(x);
+        }
+        let at = |t: f32| 2.0 * self.half * kept * self.outline.half_width(t.clamp(0.0, 1.0));
+        let slope = (at(t + 1e-3) - at(t - 1e-3)) / (2e-3 * self.terminal);
+        (at(t) - x) / (1.0 + slope * slope).sqrt()
+    }
+
+    /// The margin's slow waves: a factor on the half-width, 1 at most.
+    fn wave(&self, side: usize, t: f32) -> f32 {
+        let w = &self.waves[side];
+        let wave = |k: f32, i: usize| (w[i] + 0.5) * (k * t + 6.3 * w[i + 1]).sin();
+        0.955 + 0.045 * (0.6 * wave(6.0, 0) + 0.4 * wave(13.0, 2))
+    }
+
+    /// What the sinuses between teeth take of the half-width.
+    fn bite(&self, side: usize, s: f32) -> f32 {
+        self.sinuses[side]
+            .iter()
+            .map(|(place, deep, wide)| {
+                let u = (s - place) / wide;
+                // Steep below a tooth's tip, slow up to the next.
+                let u = if u < 0.0 { 1.3 * u } else { 0.8 * u };
+                deep * (-u * u).exp()
+            })
+            .fold(0.0, f32::max)
+    }
+}
+
+impl Lobe {
+    fn inside(&self, p: Vec2) -> f32 {
+        let axis = self.end - self.foot;
+        let s = ((p - self.foot).dot(axis) / axis.length_squared().max(1e-9)).clamp(0.0, 1.0);
+        lerp(self.radius.0, self.radius.1, s) - p.distance(self.foot + axis * s)
+    }
+}
