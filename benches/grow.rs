@@ -4,7 +4,6 @@ use criterion::{Criterion, Throughput};
 use furrow::accel::EmbreeAccel;
 use furrow::plant::{self, Stage};
 use furrow::render;
-use furrow::ron_file::RonFile;
 use furrow::sampling::{Purpose, Stream};
 use furrow::scene::assemble;
 use furrow::scene::desc::SpeciesDesc;
@@ -31,7 +30,7 @@ fn main() {
     let mut group = criterion.benchmark_group("plants");
     group.throughput(Throughput::Elements(PLANTS));
     for page in species() {
-        let desc: SpeciesDesc = RonFile::read(&page).and_then(|p| p.parse()).expect("a species");
+        let desc = SpeciesDesc::read(&page).expect("a species");
         let name = page.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         group.bench_function(name, |b| {
             b.iter(|| {

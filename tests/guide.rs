@@ -56,7 +56,7 @@ fn run(page: &str) {
     let text = read(&format!("docs/{page}"));
     let mut called = 0;
     for block in blocks(&text) {
-        if let ("ron", Some(path)) = (block.language.as_str(), block.note.strip_prefix("file=")) {
+        if let ("ron" | "csv", Some(path)) = (block.language.as_str(), block.note.strip_prefix("file=")) {
             let path = folder.join(path);
             assert!(
                 path.parent().is_some_and(Path::is_dir),

@@ -72,6 +72,24 @@ fn a_dataset_holds_the_soil_that_its_scene_file_leaves_out() {
     holds(&[&BY_NAME[..start], BY_NAME[end..].trim_start_matches(',')].concat());
 }
 
+/// The same of a species of one's own that is like one that ships, whose leaves stand in a table.
+#[test]
+fn a_dataset_holds_what_a_species_is_like() {
+    let (_keep, folder) = scratch();
+    std::fs::create_dir(&folder).unwrap();
+    let own = r#"Species(name: "sinapis", eppo: "OWNSP", role: Weed, like: "sinapis.ron")"#;
+    std::fs::write(folder.join("own.ron"), own).unwrap();
+    std::fs::write(folder.join("mine.ron"), BY_NAME.replace("thistle", "own.ron")).unwrap();
+    let scene = ["--scene", "mine.ron", "--spp", "1", "--quiet"];
+    done(&run(&folder, repository(), &[&["dataset"], &scene[..], &["--count", "1", "--out", "data"]].concat()));
+    let held = |path: &str| std::fs::read_to_string(folder.join("data/scene").join(path)).unwrap_or_default();
+    assert_eq!(held("own.ron"), own.replace("sinapis.ron", "external/scenes/species/sinapis.ron"));
+    for file in ["species/sinapis.ron", "species/rape.ron", "species/sinapis.csv"] {
+        assert!(!held(&format!("external/scenes/{file}")).is_empty(), "{file}");
+    }
+    done(&run(&folder, Path::new("/nowhere"), &["dataset", "verify", "data", "--rerender", "1"]));
+}
+
 fn holds(text: &str) {
     let (_keep, folder) = scratch();
     std::fs::create_dir(&folder).unwrap();

@@ -27,9 +27,12 @@ pub(super) struct Gathered {
 pub(super) fn gather(paths: &[PathBuf], shipped: &BTreeMap<String, PathBuf>, scene: &Path) -> Result<Gathered> {
     let places = places(paths, scene)?;
     let scene = absolute(scene)?;
-    let none = BTreeMap::new();
+    // A species file names others by their files' names alone: `name` and the keys of tables stand in quotes too.
+    let is_file = |name: &str| Path::new(name).extension().is_some_and(|e| e == "ron");
+    let files: BTreeMap<String, PathBuf> =
+        shipped.iter().filter(|(name, _)| is_file(name)).map(|(name, file)| (name.clone(), file.clone())).collect();
     let mut rewritten = false;
-    let mut files = Vec::new();
+    let mut gathered = Vec::new();
     for (from, to) in &places {
         let mut bytes = crate::input::contents(from).map_err(Error::reading(from))?;
         if from.extension().is_some_and(|e| e == "ron")
@@ -41,15 +44,15 @@ pub(super) fn gather(paths: &[PathBuf], shipped: &BTreeMap<String, PathBuf>, sce
             let whole = is_scene.then(|| page.written_out("soil", "layers", LAYERS)).flatten();
             let text = whole.as_ref().unwrap_or(&page.text);
             if let Some(text) =
-                renamed(text, from, to, &places, if is_scene { shipped } else { &none }).or(whole.clone())
+                renamed(text, from, to, &places, if is_scene { shipped } else { &files }).or(whole.clone())
             {
                 bytes = text.into_bytes();
                 rewritten = true;
             }
         }
-        files.push(File { path: slashed(to), bytes });
+        gathered.push(File { path: slashed(to), bytes });
     }
-    Ok(Gathered { files, scene: slashed(&places[&scene]), rewritten })
+    Ok(Gathered { files: gathered, scene: slashed(&places[&scene]), rewritten })
 }
 
 /// Where each file goes, by its absolute path; places are relative to the dataset's folder.

@@ -20,7 +20,7 @@ fn of_leaf(kind: &LeafKind) -> f64 {
     let sheet = 2.0 * kind.rows.get() * (kind.columns.get() + 1.0);
     let blade = match &kind.shape {
         Shape::Sheet { .. } => sheet,
-        Shape::Leaflets { pairs, .. } => (2.0 * pairs.get() + 1.0) * sheet,
+        Shape::Leaflets { pairs, .. } => (4.0 * pairs.get() + 1.0) * sheet,
         _ => DIVIDED,
     };
     blade + RING * (kind.rows.get() + kind.joints.get() + 16.0)

@@ -75,6 +75,14 @@ pub struct PlantDesc {
     pub flowers: BTreeMap<String, FlowerDesc>,
     /// Its stages, youngest first.
     pub stages: Vec<StageDesc>,
+    /// A CSV file with the leaves of all stages, beside the species file: then stages have no `layers`. Its first line names the columns `leaf` (1
+    /// for the oldest), `stage` (a BBCH code of `stages`), `kind`, `blade_mm`, `width_mm`, `angle_deg`, and, as they are needed, `petiole_mm` (of a
+    /// grass: the sheath), `leaves`, `alpha`, `pitch_deg`, `bend_deg`, `fold_deg` and `internode_mm`. A cell holds a number or a range, `10..15`;
+    /// an empty one what the leaf had at the stage before. Lines that begin with `#` are notes. Empty: the stages have layers.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    #[schemars(default)]
+    #[schemars(extend("x-example" = "\"capsella.csv\""))]
+    pub leaves: String,
     /// Age in days at which the crop covers as much of the ground, at its ordinary spacing, as a BBCH code of principal stage 3 says: 31
     /// for 10 %, 33 for 30 %, 39 for 90 %. Such a code then stands for this age, and leaves are counted by the stages as before: the two
     /// run side by side. Source of the codes: Meier 2001. Empty: all codes are those of the stages.
@@ -114,6 +122,8 @@ struct Written {
     #[serde(default, deserialize_with = "ron_file::entries")]
     flowers: BTreeMap<String, FlowerDesc>,
     stages: Vec<StageDesc>,
+    #[serde(default)]
+    leaves: String,
     #[serde(default)]
     cover_days: BTreeMap<u32, Num<NonNegative>>,
     #[serde(default = "vigour")]
@@ -166,6 +176,7 @@ impl<'de> Deserialize<'de> for PlantDesc {
                 kinds: w.kinds,
                 flowers: w.flowers,
                 stages: kept(w.stages),
+                leaves: w.leaves,
                 cover_days: w.cover_days,
                 vigour: w.vigour,
                 size: w.size,

@@ -46,6 +46,9 @@ pub enum Shape {
         /// Length of a leaflet at the rachis' tip over that of those beside it; 0 for none. With one, the pairs stand below the tip.
         #[serde(default = "num::<NonNegative, 0>", skip_serializing_if = "Num::is_zero")]
         terminal: Num<NonNegative>,
+        /// Length of small leaflets that stand between the pairs over that of the others: potato; 0 for none.
+        #[serde(default = "num::<NonNegative, 0>", skip_serializing_if = "Num::is_zero")]
+        interjected: Num<NonNegative>,
     },
 }
 

@@ -1,4 +1,4 @@
-//! Compound blades: leaflets on a rachis. Peanut has two pairs, soybean one pair and a leaflet at the tip.
+//! Compound blades: leaflets on a rachis. Peanut has two pairs, soybean one pair and a leaflet at the tip, potato small ones between its pairs.
 //!
 //! A leaflet is a sheet like a whole blade, with relief, fold and bend of its own; its joints bend it once in the flat leaf's
 //! coordinates, then it goes rigidly where the rachis carries its foot. Young leaflets stand up and lie against each other.
@@ -23,7 +23,9 @@ pub(super) fn blade(
     stream: &mut Stream,
 ) -> Rest {
     let mut rest = Rest::default();
-    let Shape::Leaflets { outline, pairs, aspect, spread_deg, terminal } = &leaf.kind.shape else { return rest };
+    let Shape::Leaflets { outline, pairs, aspect, spread_deg, terminal, interjected } = &leaf.kind.shape else {
+        return rest;
+    };
     let pairs = pairs.get() as usize;
     let reach = leaf.kind.rib.f32() * leaf.blade;
     let spread = [spread_deg.0, spread_deg.1].map(|s| s.f32().to_radians());
@@ -61,6 +63,15 @@ pub(super) fn blade(
         let share = if steps > 0 { pair as f32 / steps as f32 } else { 1.0 };
         for side in [-1.0_f32, 1.0] {
             add(share, side, lerp(0.92, 1.0, share), lerp(spread[0], spread[1], share), stream);
+        }
+    }
+    let interjected = interjected.f32();
+    for pair in 0..if interjected > 0.0 { pairs } else { 0 } {
+        // Between each pair and what comes next on the rachis, each of its own size.
+        let share = (pair as f32 + 0.5) / pairs as f32;
+        for side in [-1.0_f32, 1.0] {
+            let size = interjected * stream.range32(0.6, 1.2);
+            add(share, side, size, spread[0], stream);
         }
     }
     if terminal > 0.0 {

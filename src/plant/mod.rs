@@ -7,6 +7,7 @@
 //! | file | idea |
 //! |---|---|
 //! | `stage` | stages and layers; what lies between two stages |
+//! | `table` | the layers of all stages as a CSV file |
 //! | `kind` | what all leaves of a kind share |
 //! | `skeleton` | the leaf's kinematic tree, Denavit–Hartenberg |
 //! | `blade` | outline → flat rest mesh with skin weights |
@@ -42,6 +43,7 @@ mod runner;
 pub mod skeleton;
 pub mod skin;
 mod stage;
+pub mod table;
 mod tube;
 mod tuft;
 mod whorl;

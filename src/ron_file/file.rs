@@ -32,25 +32,33 @@ pub struct RonFile {
 impl RonFile {
     /// Reads a file.
     pub fn read(path: &Path) -> Result<Self> {
+        Self::read_as(path, ".ron")
+    }
+
+    /// The same of a text file whose name ends otherwise, such as a table that the file names.
+    pub fn read_as(path: &Path, ending: &str) -> Result<Self> {
         let refuse = |what: &str, help: &str| Err(Error::input(what).help(help).in_file(path));
         let bytes = match input::read(path, LARGEST) {
             Ok(bytes) => bytes,
-            Err(Refusal::Folder) => return refuse("this is a folder", "name a file in it that ends in .ron"),
+            Err(Refusal::Folder) => {
+                return refuse("this is a folder", &format!("name a file in it that ends in {ending}"));
+            }
             Err(Refusal::NotRegular) => {
                 return refuse(
                     "this is a pipe, a socket or a device, not a file",
-                    "write the text to a file that ends in .ron, and name that",
+                    &format!("write the text to a file that ends in {ending}, and name that"),
                 );
             }
             Err(Refusal::TooLarge(_)) => {
-                return refuse("this file is too large", "RON files are text of at most 4 MiB that ends in .ron");
+                let help = format!("such files are text of at most 4 MiB that ends in {ending}");
+                return refuse("this file is too large", &help);
             }
             Err(other) => return Err(other.into_error(path)),
         };
         // Some editors begin a file with a byte order mark.
         let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
         if bytes.contains(&0) {
-            return refuse("this is not a text file", "name a text file that ends in .ron");
+            return refuse("this is not a text file", &format!("name a text file that ends in {ending}"));
         }
         match std::str::from_utf8(bytes) {
             Ok(text) => Ok(Self { path: path.into(), text: text.to_owned() }),
@@ -67,6 +75,22 @@ impl RonFile {
     /// A file that lies nowhere, for tests and tools; its paths are relative to the working directory.
     pub fn of(text: &str) -> Self {
         Self { path: "page.ron".into(), text: text.to_owned() }
+    }
+
+    /// Refuses a text that is no RON at all, whatever it says.
+    pub fn check_syntax(&self) -> Result<()> {
+        self.parse::<Box<ron::value::RawValue>>().map(drop)
+    }
+
+    /// An error about bytes of the text.
+    pub fn about_bytes(
+        &self,
+        at: std::ops::Range<usize>,
+        message: impl Into<String>,
+        help: impl Into<String>,
+    ) -> Error {
+        let (message, help) = (message.into(), help.into());
+        self.fault(&Fault { raw_len: self.text.len(), start: at.start, end: at.end, message, help }).lasting()
     }
 
     /// Reads the text as `T`.
@@ -211,24 +235,30 @@ impl RonFile {
     }
 
     fn fault(&self, fault: &Fault) -> Error {
+        let place = self.place_of(fault.start, fault.end);
+        let told = Error::input(fault.message.as_str()).help(fault.help.as_str()).at(place);
+        told.see(more(&path_at(&self.text, fault.start)))
+    }
+
+    /// Where bytes of the text stand; of several lines only the first.
+    pub(super) fn place_of(&self, from: usize, to: usize) -> Place {
         let text = &self.text;
-        let mut start = fault.start.min(text.len());
+        let mut start = from.min(text.len());
         while !text.is_char_boundary(start) {
             start -= 1;
         }
         // What is missing at the end of a line is shown there, not on an empty line below.
-        if fault.start == fault.end && text[start..].trim().is_empty() {
+        if from == to && text[start..].trim().is_empty() {
             start = text.trim_end().len();
         }
         let line = text[..start].matches('\n').count() + 1;
         let line_start = offset_of(text, line, 1);
         let line_text = text[line_start..].lines().next().unwrap_or("");
         let column = text[line_start..start].chars().count() + 1;
-        let end = fault.end.clamp(start, line_start + line_text.len()).max(start);
+        let end = to.clamp(start, line_start + line_text.len()).max(start);
         let width = text.get(start..end).map_or(1, |t| t.trim_end().chars().count()).max(1);
         let span = Some(Span { line, column, width, text: line_text.to_owned() });
-        let place = Place { file: self.path.clone(), span };
-        Error::input(fault.message.as_str()).help(fault.help.as_str()).at(place).see(more(&path_at(text, fault.start)))
+        Place { file: self.path.clone(), span }
     }
 }
 

@@ -4,6 +4,8 @@
 //! value, `blame` puts an error at the place that a path of fields and items ([`Step`]) leads to. [`Num`] and [`Vary`] are
 //! the numbers of such files: fixed, or drawn for every field from a distribution, within the [`Bound`] that their type says.
 //!
+//! [`Spliced`] is a text put together from several files, whose errors are shown where their words were written.
+//!
 //! `quantities` lists the numbers and distributions of a text with their places, for programs that show or replace one.
 //!
 //! Types that read themselves from raw text use [`from_raw`]; what they refuse is a [`Fault`], which keeps its place.
@@ -17,6 +19,7 @@ mod place;
 mod quantities;
 mod renamed;
 mod schema;
+mod spliced;
 mod suggest;
 mod vary;
 
@@ -29,5 +32,6 @@ pub use place::{Step, place};
 pub use quantities::{Quantity, Value, quantities};
 pub use renamed::{Keyword, RENAMED, Renamed};
 pub use schema::{DRAWN, FIXED, KIND, PICKED, RANGE};
+pub use spliced::Spliced;
 pub use suggest::{choose, nearest};
 pub use vary::{DISTRIBUTION_WORDS, Distribution, Pick, Vary};

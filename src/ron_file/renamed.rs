@@ -45,6 +45,11 @@ pub const RENAMED: &[Renamed] = &[
     Renamed::field("stem_skin", "stem_material"),
 ];
 
+/// What a field of this name is called now.
+pub(super) fn now(name: &str) -> &str {
+    RENAMED.iter().find(|r| r.keyword == Keyword::Field && r.old == name).map_or(name, |r| r.new)
+}
+
 /// Whether a name is an old one, of fields or of values.
 pub(super) fn is_old(keyword: Keyword, name: &str) -> bool {
     RENAMED.iter().any(|r| r.keyword == keyword && r.old == name)

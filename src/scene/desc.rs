@@ -305,6 +305,11 @@ pub struct SpeciesDesc {
     pub eppo: String,
     /// Crop or weed.
     pub role: Role,
+    /// Another species file from which all is taken that this one does not write, but `name`, `scientific`, `eppo` and `role`: fields, materials and
+    /// kinds of leaves one by one; lists, distributions and all other values whole. A path from this file's folder, or the name of a file that ships.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "\"capsella.ron\""))]
+    pub like: Option<String>,
     /// What its organs look like, by the names that the plant uses.
     #[serde(alias = "skins", deserialize_with = "ron_file::entries")]
     #[schemars(extend("x-example" = "{\"leaf\": Leaf(texture: \"../../textures/leaf/cirsium.png\", calibrated: true)}"))]

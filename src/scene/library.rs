@@ -4,6 +4,7 @@ use super::desc::{ModelDesc, SpeciesDesc};
 use super::drive;
 use super::growing::Growing;
 use super::shipped::species as shipped_species;
+use super::species_file::SpeciesFile;
 use crate::error::{Kind, Place};
 use crate::geometry::{AlphaMask, Margin};
 use crate::input::{self, Outside, Scope, shipped};
@@ -110,7 +111,7 @@ impl Library {
     }
 
     /// Where a file lies that `page` names; an error about the page where it is not there or may not be read.
-    fn need(&self, page: &RonFile, path: &str) -> Result<PathBuf> {
+    pub(super) fn need(&self, page: &RonFile, path: &str) -> Result<PathBuf> {
         let folder = page.path.parent().unwrap_or(Path::new(""));
         self.scope.resolve(folder, path).map_err(outside(page, path))?;
         page.need_file(path)
@@ -118,7 +119,7 @@ impl Library {
 
     /// The same where `path` may also be the name of something that ships, which `find` looks up: where no such file lies beside the
     /// page, and the page may name files anywhere.
-    fn need_or_shipped(
+    pub(super) fn need_or_shipped(
         &mut self,
         page: &RonFile,
         path: &str,
@@ -179,9 +180,17 @@ impl Library {
         if let Some(known) = self.species.get(&full) {
             return Ok(known.clone());
         }
-        let own = self.page(&full)?;
+        let file = self.species_file(&full)?;
+        let species = self.species_of(&full, &file).map_err(|error| file.locate(error))?;
+        self.species.insert(full, species.clone());
+        Ok(species)
+    }
+
+    /// The species of a file that was read from `full`; an error lies in the file's whole text.
+    fn species_of(&mut self, full: &Path, file: &SpeciesFile) -> Result<Arc<Species>> {
+        let own = file.page();
         let mut desc: SpeciesDesc = own.parse_all()?;
-        self.told.insert(full.clone(), own.renamed(RENAMED));
+        self.told.insert(full.into(), file.sources().iter().flat_map(|source| source.renamed(RENAMED)).collect());
         for key in desc.plant.materials() {
             if !desc.materials.contains_key(&key) {
                 let known: Vec<&str> = desc.materials.keys().map(String::as_str).collect();
@@ -204,10 +213,10 @@ impl Library {
             let range = leaf.relief_range.f32();
             let mut all = Vec::new();
             for path in paths {
-                let cut = self.picture(&own, path, range)?;
+                let cut = self.picture(own, path, range)?;
                 // Pictures that the program drew are sound.
                 if !leaf.calibrated {
-                    self.told.entry(full.clone()).or_default().extend(unlikely(path, cut.mask.as_deref()));
+                    self.told.entry(full.into()).or_default().extend(unlikely(path, cut.mask.as_deref()));
                 }
                 all.push(cut);
             }
@@ -215,10 +224,10 @@ impl Library {
         }
         let known = |before: &Self| {
             let held = |cut: &Cut| before.pictures.values().any(|c| Arc::ptr_eq(&c.picture, &cut.picture));
-            cuts.iter().flatten().all(held).then(|| before.species.get(&full).cloned())?
+            cuts.iter().flatten().all(held).then(|| before.species.get(full).cloned())?
         };
-        if let Some(known) = self.kept(&[&full], known) {
-            self.species.insert(full, known.clone());
+        let files: Vec<&Path> = file.sources().iter().map(|source| source.path.as_path()).collect();
+        if let Some(known) = self.kept(&files, known) {
             return Ok(known);
         }
         let mut materials = BTreeMap::new();
@@ -237,9 +246,7 @@ impl Library {
         if let Some(change) = self.growing.species {
             change(&mut desc);
         }
-        let species = Arc::new(Species { desc, materials });
-        self.species.insert(full, species.clone());
-        Ok(species)
+        Ok(Arc::new(Species { desc, materials }))
     }
 
     fn picture(&mut self, page: &RonFile, path: &str, relief_range: f32) -> Result<Cut> {

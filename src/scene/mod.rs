@@ -9,6 +9,7 @@ mod library;
 mod part_kind;
 pub mod record;
 pub mod shipped;
+pub mod species_file;
 pub mod tag;
 pub mod traits;
 

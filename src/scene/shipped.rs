@@ -2,7 +2,7 @@
 
 use super::desc::SpeciesDesc;
 use crate::input::shipped;
-use crate::ron_file::{RonFile, nearest};
+use crate::ron_file::nearest;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
@@ -39,7 +39,7 @@ type Faults = Vec<(PathBuf, Error)>;
 pub fn all_species() -> Result<(Vec<Shipped>, Faults)> {
     let (mut all, mut faults) = (Vec::new(), Vec::new());
     for file in shipped::species_files()? {
-        match RonFile::read(&file).and_then(|page| page.parse()) {
+        match SpeciesDesc::read(&file) {
             Ok(desc) => all.push(Shipped { file, desc }),
             Err(fault) => faults.push((file, fault)),
         }

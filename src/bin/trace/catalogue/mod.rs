@@ -15,9 +15,9 @@ use furrow::input::shipped;
 use furrow::integrator::{PathTracer, World};
 use furrow::output::{self, Picture};
 use furrow::render::{self, Settings, Watch};
-use furrow::ron_file::{RENAMED, RonFile};
+use furrow::ron_file::RENAMED;
 use furrow::sampling::Points;
-use furrow::scene::desc::SpeciesDesc;
+use furrow::scene::species_file::SpeciesFile;
 use furrow::scene::{Field, PlantRecord, assemble};
 use furrow::{Error, Result};
 use page::{Entry, Look, Stage};
@@ -116,11 +116,11 @@ impl Args {
 
     /// One species: its sheet's path, and its entry on the page.
     fn species(&self, page: &Path, signals: &Signals) -> Result<(PathBuf, Entry)> {
-        let file = RonFile::read(page)?;
-        for warning in file.renamed(RENAMED) {
+        let file = SpeciesFile::read(page)?;
+        for warning in file.sources().iter().flat_map(|source| source.renamed(RENAMED)) {
             furrow::tell!("warning: {warning}");
         }
-        let desc: SpeciesDesc = file.parse()?;
+        let desc = file.parse()?;
         let mut stages = Vec::new();
         for stage in &desc.plant.stages {
             let bare = self.field(page, stage.bbch, None)?;

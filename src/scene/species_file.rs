@@ -1,0 +1,331 @@
+//! Species files: read with the file that they are like and with their table of leaves, as one text.
+
+use super::desc::SpeciesDesc;
+use super::library::Library;
+use crate::plant::table::{LeafTable, NoRows};
+use crate::ron_file::{RonFile, Spliced, Step};
+use crate::{Error, Result};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// What a species says of itself, whatever it is like.
+const OWN: [&str; 5] = ["name", "scientific", "eppo", "role", "like"];
+
+/// Fields whose texts are paths.
+const PATHS: [&str; 2] = ["texture", "leaves"];
+
+/// Most files of which one is like the next.
+const MOST: usize = 8;
+
+impl SpeciesDesc {
+    /// Reads a species file, with the file that it is like and its table of leaves.
+    pub fn read(path: &Path) -> Result<Self> {
+        let file = SpeciesFile::read(path)?;
+        file.parse()
+    }
+}
+
+/// A species file's text, with what other files add to it.
+pub struct SpeciesFile(Spliced);
+
+impl SpeciesFile {
+    /// Reads it. What it names may lie anywhere.
+    pub fn read(path: &Path) -> Result<Self> {
+        Library::default().species_file(path)
+    }
+
+    /// What stands in it.
+    pub fn parse(&self) -> Result<SpeciesDesc> {
+        self.0.page.parse_all().map_err(|error| self.locate(error))
+    }
+
+    /// The whole text, as one file in the place of the one that was asked for.
+    pub fn page(&self) -> &RonFile {
+        &self.0.page
+    }
+
+    /// The files that it was read from, that which was asked for first.
+    pub fn sources(&self) -> &[RonFile] {
+        self.0.sources()
+    }
+
+    /// An error about the whole text, shown in the file where the words at fault were written.
+    #[must_use]
+    pub fn locate(&self, error: Error) -> Error {
+        self.0.locate(error)
+    }
+}
+
+impl Library {
+    /// The species file at a path.
+    pub(super) fn species_file(&mut self, path: &Path) -> Result<SpeciesFile> {
+        let own = self.inherited(path, &mut Vec::new())?;
+        Ok(SpeciesFile(self.with_table(own)?))
+    }
+
+    /// A species file with what it takes from the one that it is like; `heirs` are the files that came to it.
+    fn inherited(&mut self, path: &Path, heirs: &mut Vec<PathBuf>) -> Result<Spliced> {
+        let page = self.page(path)?;
+        let own = Spliced::of(page.clone());
+        let Some(at) = own.find(&[Step::Field("like")]) else { return Ok(own) };
+        page.check_syntax()?;
+        let like = literal(&page, &at, "like: \"capsella.ron\"")?;
+        let full = self.need_or_shipped_file(&page, &like)?;
+        heirs.push(real(path));
+        if heirs.contains(&real(&full)) {
+            let message = format!("`{like}` is like this file, so neither says what it is");
+            return Err(page.about_bytes(at, message, "leave `like` out of one of them"));
+        }
+        if heirs.len() >= MOST {
+            let message = format!("more than {MOST} files are each like the next");
+            return Err(page.about_bytes(at, message, "name the file that says most of it"));
+        }
+        let base = self.inherited(&full, heirs)?;
+        base.page.check_syntax().map_err(|error| base.locate(error))?;
+        if !base.page.text[base.find(&[]).unwrap_or(0..0)].starts_with("Species") {
+            let help = "name a species file: it begins with Species(";
+            return Err(page.about_bytes(at, format!("`{like}` is no species file"), help));
+        }
+        // Where its file lies as this one's folder names it, so that it is held to the same scope.
+        let beside = Path::new(&like).parent().unwrap_or(Path::new("")).to_path_buf();
+        let folder = if full == page.resolve(&like) { beside } else { folder_of(&full)? };
+        let base = base.moved(&folder, &PATHS);
+        let base = if writes_layers(&own) { base.without(&plant(&base), "leaves") } else { base };
+        let all = own.over(&base, &OWN);
+        let whole = all.find(&[]).unwrap_or(0..0);
+        Ok(all.without(&whole, "like"))
+    }
+
+    /// The text with the layers of its table of leaves.
+    fn with_table(&mut self, own: Spliced) -> Result<Spliced> {
+        let Some(at) = own.find(&[Step::Field("plant"), Step::Field("leaves")]) else { return Ok(own) };
+        let told = |error| own.locate(error);
+        own.page.check_syntax().map_err(told)?;
+        let name = literal(&own.page, &at, "leaves: \"capsella.csv\"").map_err(told)?;
+        let full = self.need(&own.page, &name).map_err(told)?;
+        let page = RonFile::read_as(&full, ".csv")?;
+        self.page_of(&full, &page.text);
+        let table = LeafTable::read(&page)?;
+        let stages = stages(&own).map_err(told)?;
+        let codes: Vec<u32> = stages.iter().map(|(code, _)| *code).collect();
+        let layers = table.layers(&codes)?.map_err(|NoRows(code)| {
+            let place = stages.iter().find(|(known, _)| *known == code).map_or(0..1, |(_, place)| place.clone());
+            let message = format!("the table of leaves has no row of BBCH {code}");
+            told(own.page.about_bytes(place.start..place.start + 1, message, "add its rows, or leave the stage out"))
+        })?;
+        let mut out = own.clone();
+        // From the end, so that places before stay where they are.
+        for ((_, place), parts) in stages.iter().zip(layers).rev() {
+            let parts: Vec<_> = parts.into_iter().map(|(text, at)| (text, &page, at)).collect();
+            out = with_layers(&out, place, &at, &parts)?;
+        }
+        let plant = plant(&out);
+        Ok(out.without(&plant, "leaves"))
+    }
+
+    /// The species file that another names: beside it, or one that ships.
+    fn need_or_shipped_file(&mut self, page: &RonFile, like: &str) -> Result<PathBuf> {
+        self.need_or_shipped(
+            page,
+            like,
+            |name| {
+                if name.ends_with(".ron") { super::shipped::species(name) } else { Ok(None) }
+            },
+        )
+    }
+}
+
+/// A stage with layers of the table; `table` is where the table is named.
+fn with_layers(
+    own: &Spliced,
+    stage: &Range<usize>,
+    table: &Range<usize>,
+    parts: &[(String, &RonFile, Range<usize>)],
+) -> Result<Spliced> {
+    let text = &own.page.text;
+    let inside = |field| own.value_in(stage, field);
+    if let Some(layers) = inside("layers") {
+        // Those of a file that this one is like give way.
+        if own.source_at(layers.start).path == own.source_at(table.start).path {
+            let error = own.page.about_bytes(
+                layers.start..layers.start + 1,
+                "this stage has layers, and the table of leaves has them too",
+                "leave the layers out, or the table",
+            );
+            return Err(own.locate(error));
+        }
+        return Ok(own.with(layers, parts));
+    }
+    // Behind the bracket that opens the stage.
+    let open = stage.start + text[stage.clone()].find('(').map_or(0, |open| open + 1);
+    let (_, page, at) = &parts[0];
+    let mut all = vec![("layers: ".to_owned(), *page, at.clone())];
+    all.extend_from_slice(parts);
+    all.push((", ".to_owned(), *page, at.clone()));
+    Ok(own.with(open..open, &all))
+}
+
+/// The stages of a text: their BBCH codes, and where they stand.
+fn stages(own: &Spliced) -> Result<Vec<(u32, Range<usize>)>> {
+    let mut all = Vec::new();
+    while let Some(place) = own.find(&[Step::Field("plant"), Step::Field("stages"), Step::Item(all.len())]) {
+        let code = own.value_in(&place, "bbch").and_then(|at| own.page.text[at].trim().parse().ok());
+        let Some(code) = code else {
+            let help = "write (bbch: 10, days: 4, hypocotyl_mm: 8, stem_mm: 1)";
+            return Err(own.page.about_bytes(place.start..place.start + 1, "this stage has no BBCH code", help));
+        };
+        all.push((code, place));
+    }
+    Ok(all)
+}
+
+/// Where the plant of a text stands; nowhere where it has none.
+fn plant(own: &Spliced) -> Range<usize> {
+    own.find(&[Step::Field("plant")]).unwrap_or(0..0)
+}
+
+/// Whether a file lists leaves itself.
+fn writes_layers(own: &Spliced) -> bool {
+    let at = |step| own.find(&[Step::Field("plant"), step]);
+    let Some(stages) = at(Step::Field("stages")) else { return false };
+    at(Step::Field("leaves")).is_none() && own.page.text[stages].contains("layers")
+}
+
+/// The text in quotes that stands at these bytes.
+fn literal(page: &RonFile, at: &Range<usize>, example: &str) -> Result<String> {
+    ron::from_str(&page.text[at.clone()])
+        .map_err(|_| page.about_bytes(at.clone(), "the name of a file is expected here", format!("write {example}")))
+}
+
+/// The folder of a file, from anywhere.
+fn folder_of(file: &Path) -> Result<PathBuf> {
+    let full = std::path::absolute(file).map_err(Error::reading(file))?;
+    Ok(full.parent().unwrap_or(Path::new("")).to_path_buf())
+}
+
+/// A file as the system tells it from others.
+fn real(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_path_buf())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::Scope;
+    use crate::ron_file::{NonNegative, Vary};
+
+    const BASE: &str = r#"Species(name: "base", scientific: "Basis", eppo: "BASIS", role: Crop,
+    materials: {
+        "leaf": Leaf(texture: "../pictures/leaf.png", pigments: (chlorophyll: 40)),
+        "stalk": Leaf(),
+    },
+    plant: (
+        form: Rosette,
+        kinds: {"leaf": (shape: Sheet(outline: Power(a: 0.5, b: 1)))},
+        stages: [(bbch: 10, days: 3, hypocotyl_mm: 5, stem_mm: 1), (bbch: 12, days: 9, hypocotyl_mm: 5, stem_mm: 2)],
+        leaves: "base.csv",
+    ),
+)"#;
+    const TABLE: &str = "leaf,stage,kind,blade_mm,width_mm,petiole_mm,angle_deg\n1,10,leaf,10,5,2,60..70\n1,12,,20,9,4,\n2,12,leaf,12,6,3,40\n";
+
+    /// A folder with the base, its table and these files.
+    fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("a")).unwrap();
+        for (name, text) in [("a/base.ron", BASE), ("a/base.csv", TABLE)].iter().chain(files) {
+            std::fs::write(folder.path().join(name), text).unwrap();
+        }
+        folder
+    }
+
+    fn told(files: &[(&str, &str)]) -> String {
+        let folder = folder(files);
+        let error = SpeciesDesc::read(&folder.path().join("own.ron")).unwrap_err();
+        error.to_string().replace(&format!("{}/", folder.path().display()), "")
+    }
+
+    const OWN: &str = r#"Species(name: "own", eppo: "OWNSP", role: Weed, like: "a/base.ron", "#;
+
+    /// Rationale: a species that is like another says what differs. Expected: names and role of its own, the rest of the other file, with paths that
+    /// lead where they led; layers of the other's table.
+    #[test]
+    fn a_species_takes_what_it_does_not_write() {
+        let own = format!("{OWN}materials: {{\"leaf\": Leaf(pigments: (chlorophyll: 30))}}, plant: (form: Erect))");
+        let folder = folder(&[("own.ron", &own)]);
+        let desc = SpeciesDesc::read(&folder.path().join("own.ron")).unwrap();
+        assert_eq!(
+            (desc.name.as_str(), desc.scientific.as_str(), desc.role),
+            ("own", "", super::super::desc::Role::Weed)
+        );
+        assert_eq!(desc.textures().collect::<Vec<_>>(), ["a/../pictures/leaf.png"]);
+        assert_eq!(desc.plant.form, crate::plant::Form::Erect);
+        let sizes: Vec<Vec<Vary<NonNegative>>> =
+            desc.plant.stages.iter().map(|s| s.layers.iter().map(|l| l.blade_mm.clone()).collect()).collect();
+        let fixed = Vary::<NonNegative>::fixed;
+        assert_eq!(sizes, [vec![fixed(10.0)], vec![fixed(20.0), fixed(12.0)]]);
+        assert_eq!((desc.like, desc.plant.leaves), (None, String::new()));
+        assert!((desc.materials["leaf"].pigments.chlorophyll.get() - 30.0).abs() < 1e-9);
+    }
+
+    /// Layers that a file writes itself stand instead of an inherited table; a table of its own instead of inherited layers.
+    #[test]
+    fn layers_and_tables_of_the_heir_come_first() {
+        let stages = "stages: [(bbch: 10, days: 3, hypocotyl_mm: 5, stem_mm: 1, layers: [(kind: \"leaf\", blade_mm: 7, width_mm: 3, angle_deg: 50)])]";
+        let first = format!("{OWN}plant: ({stages}))");
+        let second = r#"Species(name: "two", eppo: "TWOSP", role: Weed, like: "own.ron", plant: (leaves: "two.csv"))"#;
+        let table = "leaf,stage,kind,blade_mm,width_mm,angle_deg\n1,10,leaf,8,5,60\n";
+        let folder = folder(&[("own.ron", &first), ("two.ron", second), ("two.csv", table)]);
+        let blade = |name: &str| {
+            let desc = SpeciesDesc::read(&folder.path().join(name)).unwrap();
+            desc.plant.stages[0].layers[0].blade_mm.clone()
+        };
+        assert_eq!((blade("own.ron"), blade("two.ron")), (Vary::fixed(7.0), Vary::fixed(8.0)));
+    }
+
+    /// Rationale: an error is shown where the words at fault stand, whichever file holds them. Expected: file, line and column.
+    #[test]
+    fn mistakes_are_told_in_the_file_that_makes_them() {
+        let own = format!("{OWN})");
+        let other = BASE.replace("chlorophyll: 40", "chlorophyll: -40");
+        for (files, begin) in [
+            (vec![("own.ron", own.as_str()), ("a/base.ron", &other)], "a/base.ron:3:79: "),
+            (vec![("own.ron", &own), ("a/base.csv", &TABLE.replace("20,9", "20,-9"))], "a/base.csv:3:10: "),
+            (vec![("own.ron", &own), ("a/base.csv", &TABLE.replace("2,12,leaf", "2,12,leav"))], "a/base.csv:4:6: "),
+            (vec![("own.ron", &own), ("a/base.csv", &TABLE.replace("12", "14"))], "a/base.csv:3:3: "),
+            (
+                vec![
+                    ("own.ron", &own),
+                    ("a/base.csv", "leaf,stage,kind,blade_mm,width_mm,angle_deg\n1,10,leaf,8,5,60\n"),
+                ],
+                "a/base.ron:9:",
+            ),
+            (vec![("own.ron", &own), ("a/base.ron", "Species(name: 3")], "a/base.ron:1:"),
+            (vec![("own.ron", &own), ("a/base.ron", "Field()")], "own.ron:1:55: `a/base.ron` is no species file"),
+            (vec![("own.ron", &OWN.replace("a/base", "a/bse"))], "own.ron:1:"),
+            (vec![("own.ron", &format!("{OWN}plant: (forn: Erect))"))], "own.ron:1:77: unknown field `forn`"),
+            (
+                vec![("own.ron", "Species(like: \"a/base.ron\")")],
+                "own.ron:1:27: fields `name`, `eppo`, `role` of Species are missing",
+            ),
+            (
+                vec![("own.ron", &own), ("a/base.ron", r#"Species(like: "../own.ron")"#)],
+                "a/base.ron:1:15: `../own.ron` is like this file",
+            ),
+        ] {
+            let words = told(&files);
+            assert!(words.starts_with(begin), "{begin}: {words}");
+        }
+    }
+
+    /// Rationale: what comes from elsewhere reads nothing outside its folder. Expected: a refusal of a file that is like one outside.
+    #[test]
+    fn a_file_from_elsewhere_is_like_none_outside_its_folder() {
+        let folder = folder(&[
+            ("a/own.ron", r#"Species(name: "own", eppo: "OWNSP", role: Weed, like: "../out.ron")"#),
+            ("out.ron", BASE),
+        ]);
+        let scope = Scope::Below { folder: folder.path().join("a"), help: "stay" };
+        let error = Library::within(scope).species_file(&folder.path().join("a/own.ron")).err().unwrap();
+        assert!(error.message().contains("does not lie in the folder"), "{error}");
+    }
+}
