@@ -3,6 +3,7 @@
 use super::*;
 use crate::geometry::Mesh;
 use crate::plant::{Plant, PlantDesc, Stage, grow as grow_plant, most_triangles};
+use crate::scene::species_file::SpeciesFile;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
@@ -23,7 +24,10 @@ fn flowering() -> Vec<Page> {
     let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().path()).collect();
     files.retain(|f| f.extension().is_some_and(|e| e == "ron"));
     files.sort();
-    let read = |f: &std::path::PathBuf| ron::from_str::<Page>(&std::fs::read_to_string(f).unwrap()).unwrap();
+    let read = |f: &std::path::PathBuf| {
+        let file = SpeciesFile::read(f).unwrap_or_else(|e| panic!("{e}"));
+        ron::from_str::<Page>(&file.page().text).unwrap_or_else(|e| panic!("{}: {e}", f.display()))
+    };
     files.iter().map(read).filter(|page| !page.plant.flowers.is_empty()).collect()
 }
 
