@@ -13,6 +13,7 @@
 //! | `skin` | relief, linear blend skinning |
 //! | `tube`, `axis`, `leaf` | stems and stalks; the growth axis; one whole leaf |
 //! | `leaflets`, `dissected`, `fern` | compound and divided blades |
+//! | `spines` | spines on a blade's margin |
 //! | `condition` | age, health and damage of a plant and its leaves |
 //! | `rosette`, `whorl`, `erect`, `dissected`, `tuft`, `cane`, `runner` | growth forms |
 //!
@@ -37,6 +38,7 @@ mod rosette;
 mod runner;
 pub mod skeleton;
 pub mod skin;
+mod spines;
 mod stage;
 mod tube;
 mod tuft;
@@ -45,7 +47,7 @@ mod whorl;
 pub use bound::most_triangles;
 pub use condition::{Condition, ConditionDesc};
 pub use desc::{Form, PlantDesc, Stage};
-pub use kind::{LeafKind, Shape};
+pub use kind::{LeafKind, Shape, Spines};
 pub use organ::{LeafAxis, LeafSize, Organ, OrganKind};
 pub use skeleton::PlacedJoint;
 pub use stage::{BUD, LayerDesc, StageDesc};
