@@ -136,7 +136,7 @@ pub(super) fn hypocotyl(organs: &mut Vec<Organ>, growth: &Growth<'_>, along: Vec
         let s = i as f32 / HYPOCOTYL as f32;
         let centre = along * (growth.hypocotyl * s) + side * (slender * bow * (PI * s).sin());
         let direction = (along + side * (slender * PI * bow / growth.hypocotyl.max(1e-4) * (PI * s).cos())).normalize();
-        let thick = 1.0 - 0.18 * slender * (PI * s).sin().powf(0.7);
+        let thick = 1.0 - 0.18 * slender * (PI * s).sin().max(0.0).powf(0.7);
         rings.push(ring(centre, direction, thick * radius, Profile::Channelled(1.0)));
     }
     dome(&mut rings, along, radius, 0.5);

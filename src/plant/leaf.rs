@@ -65,7 +65,8 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
             let mut sheet = blade::sheet(*outline, leaf.width, rows, columns, &skeleton);
             relief.apply(&mut sheet, leaf.blade);
             if let Some(spines) = &leaf.kind.spines {
-                spined = spines::grow(&sheet, spines, leaf.blade, &mut stream);
+                let mut own = leaf.stream.child(crate::sampling::Purpose::Leaf, 104);
+                spined = spines::grow(&sheet, spines, leaf.blade, &mut own);
             }
             sheet.rest
         }

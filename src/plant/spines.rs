@@ -11,12 +11,17 @@ use std::f32::consts::TAU;
 const SLENDER: f32 = 0.16;
 /// Length of a blade whose spines are full-grown, metres.
 const GROWN: f32 = 0.05;
+/// Shorter blades are soft yet, metres.
+const LEAST: f32 = 0.008;
 /// Where the tissue ends at the tip of a lobe and on its shoulders, of the half-width.
 const FOOT: (f32, f32) = (0.82, 0.66);
 
 /// The spines of a sheet that bears its relief already, `blade` metres long, tied to its joints.
 pub(super) fn grow(sheet: &Sheet, spines: &Spines, blade: f32, stream: &mut Stream) -> Rest {
     let mut rest = Rest::default();
+    if blade < LEAST {
+        return rest;
+    }
     let lobes = spines.lobes.get() as usize;
     let grown = 1e-3 * (blade / GROWN).min(1.0);
     let (stride, half) = (sheet.columns + 1, sheet.columns / 2);
