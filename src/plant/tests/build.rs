@@ -4,7 +4,7 @@ use super::*;
 use crate::math::vec2;
 
 /// Rationale: sheaths that leave the ground side by side look like straws; grasses have one stem of nested ones. Expected: what a main
-/// shoot's sheaths cover a centimetre above the soil, or below its lowest collar, is no wider than the oldest of them. Source: Clifford &
+/// shoot's sheaths cover near the soil, below its lowest collar, is the stem's width, and a quarter for its lean. Source: Clifford &
 /// McLean 1962.
 #[test]
 fn sheaths_of_a_shoot_are_nested() {
@@ -22,7 +22,7 @@ fn sheaths_of_a_shoot_are_nested() {
             };
             let all: Vec<Vec3> = sheaths().flat_map(corners).collect();
             let widest = sheaths().map(|o| width(&corners(o))).fold(0.0, f32::max);
-            let most = 1.1 * growth::growth(&desc, Stage::Bbch(bbch), &stream(seed), 1.0).unwrap().stem;
+            let most = 1.25 * growth::growth(&desc, Stage::Bbch(bbch), &stream(seed), 1.0).unwrap().stem;
             assert!(
                 !all.is_empty() && width(&all) < most.max(1.05 * widest),
                 "{eppo} {seed}: {} over {most}",
