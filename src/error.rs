@@ -191,6 +191,11 @@ impl Error {
         self.0.kind
     }
 
+    /// Whether the system said that a file is not there.
+    pub fn is_not_found(&self) -> bool {
+        self.0.source.as_ref().is_some_and(|source| source.kind() == ErrorKind::NotFound)
+    }
+
     /// What is wrong, without the place and without the help.
     pub fn message(&self) -> &str {
         &self.0.message

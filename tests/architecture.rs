@@ -91,6 +91,8 @@ const ALLOWED: &[(&str, &str)] = &[
     ("palette", "compare/color.rs"),
     // Labels need bits that stay, drawn textures need 16 bits and words inside.
     ("png", "output/png.rs texture/draw/"),
+    // Tables of a dataset.
+    ("parquet", "dataset/index/table.rs"),
     ("pollster", "raster/gpu.rs"),
     // ONNX files.
     ("prost", "train/deploy/onnx/ train/fit/log/events.rs"),
@@ -127,7 +129,7 @@ const ALLOWED: &[(&str, &str)] = &[
     // How far a misspelt name is from those that are known.
     ("strsim", "ron_file/suggest.rs"),
     // Images as one archive, for programs that read them as they are made.
-    ("tar", "dataset/stream.rs"),
+    ("tar", "dataset/archive.rs dataset/pack/ dataset/stream.rs"),
     // libtorch: networks and how they learn.
     (
         "tch",
@@ -137,7 +139,7 @@ const ALLOWED: &[(&str, &str)] = &[
     // and so do a scene that is taken into a dataset or a stream, and the small dataset that a bill is made of.
     (
         "tempfile",
-        "cli/mod.rs dataset/bill.rs dataset/plan.rs dataset/stream.rs output/atomic.rs output/denoise.rs texture/draw/write.rs",
+        "cli/mod.rs dataset/bill.rs dataset/plan.rs dataset/push.rs dataset/stream.rs output/atomic.rs output/denoise.rs texture/draw/write.rs",
     ),
     // Another program that shows pictures.
     ("tev_client", "bin/trace/watch/tev.rs"),

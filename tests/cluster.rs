@@ -18,21 +18,14 @@ use std::time::{Duration, Instant};
 
 /// Begins a dataset of `count` images, each of which takes about a second.
 fn plan(folder: &Path, count: u64) {
+    plan_with(folder, count, &[]);
+}
+
+/// The same with further arguments.
+fn plan_with(folder: &Path, count: u64, more: &[&str]) {
     let count = count.to_string();
-    succeed(trace(&[
-        "dataset",
-        "plan",
-        "--scene",
-        SMALL,
-        "--width",
-        "96",
-        "--spp",
-        "32",
-        "--count",
-        &count,
-        "--out",
-        path(folder),
-    ]));
+    let order = ["dataset", "plan", "--scene", SMALL, "--width", "96", "--spp", "32", "--count", &count];
+    succeed(trace(&[&order[..], &["--out", path(folder)], more].concat()));
 }
 
 /// Job files of a dataset.
@@ -45,15 +38,20 @@ fn emit(folder: &Path, engine: &str, shards: u64, more: &[&str]) -> PathBuf {
     folder.join("jobs")
 }
 
-/// The files of a dataset, its job files left out.
+/// The files of a dataset, its job files and what tells which were pushed left out.
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    tree(folder).into_iter().filter(|(name, _)| !name.starts_with("jobs/")).collect()
+    tree(folder).into_iter().filter(|(name, _)| !name.starts_with("jobs/") && !name.starts_with("pushed/")).collect()
 }
 
 /// The same dataset made by one run.
 fn whole(count: u64) -> BTreeMap<String, Vec<u8>> {
+    whole_with(count, &[])
+}
+
+/// The same with further arguments.
+fn whole_with(count: u64, more: &[&str]) -> BTreeMap<String, Vec<u8>> {
     let (_keep, folder) = scratch();
-    plan(&folder, count);
+    plan_with(&folder, count, more);
     succeed(verb("render", &folder, &["--quiet"]));
     succeed(verb("finish", &folder, &["--quiet"]));
     files(&folder)
@@ -392,6 +390,9 @@ fn logs(jobs: &Path) -> String {
     paths.iter().map(text).collect()
 }
 
+/// Images in archives of three: seven for training, one for each other split.
+const PACKS: [&str; 2] = ["--pack", "3"];
+
 #[test]
 fn slurm_makes_the_same_dataset_although_a_node_loses_power_and_a_task_its_time() {
     const COUNT: u64 = 24;
@@ -400,8 +401,14 @@ fn slurm_makes_the_same_dataset_although_a_node_loses_power_and_a_task_its_time(
     }
     let (_keep, folder) = scratch();
     let folder = folder.join("a set");
-    plan(&folder, COUNT);
-    let jobs = emit(&folder, "slurm", 4, &["--memory", "1", "--time", "10m", "--grace", "1m", "--rerender", "1"]);
+    plan_with(&folder, COUNT, &PACKS);
+    let elsewhere = folder.with_file_name("it's elsewhere");
+    std::fs::create_dir_all(&elsewhere).unwrap();
+    let push = format!("cp -r {{dir}}/. \"{}\"/", path(&elsewhere));
+    let check = format!("cd {{dir}} && find . -type f -exec cmp {{}} \"{}\"/{{}} \\;", path(&elsewhere));
+    let pushing = ["--push", &push, "--push-check", &check];
+    let hours = ["--memory", "1", "--time", "10m", "--grace", "1m", "--rerender", "1"];
+    let jobs = emit(&folder, "slurm", 4, &[&hours[..], &pushing].concat());
     let slurm = Slurm::up(folder.parent().unwrap());
     slurm.say("bash", &[path(&jobs.join("submit.sh"))]);
     // Both nodes are at work.
@@ -424,8 +431,11 @@ fn slurm_makes_the_same_dataset_although_a_node_loses_power_and_a_task_its_time(
     assert!(logs.contains("ended with 75"), "no task was stopped:\n{logs}");
     assert!(logs.matches("start 2").count() >= 2, "two tasks must have been started again:\n{logs}");
     assert!(logs.contains("24 of 24 images checked, 1 rendered again and the same; 0 faults"), "{logs}");
-    same(&files(&folder), &whole(COUNT));
-    succeed(verb("verify", &folder, &["--quiet"]));
+    let expected = whole_with(COUNT, &PACKS);
+    assert!(expected.keys().filter(|name| name.starts_with("packs/")).count() == 9);
+    same(&files(&folder), &expected);
+    same(&files(&elsewhere), &expected);
+    succeed(verb("verify", &elsewhere, &["--quiet"]));
 }
 
 /// A folder with the programs that the script needs, GNU parallel not among them.

@@ -87,6 +87,11 @@ fn ultralytics_reads_what_we_wrote() {
 }
 
 #[test]
+fn torchvision_reads_what_we_wrote() {
+    ask_with(torch_with("torchvision, PIL"), "check_voc.py");
+}
+
+#[test]
 fn datumaro_reads_what_we_wrote() {
     ask("check_datumaro.py", "import datumaro");
 }

@@ -132,22 +132,58 @@ class Dataset:
             raise Error(f"{self.path} is no dataset: {error}") from error
         if split is not None and split not in SPLITS:
             raise ValueError(f"split is one of {', '.join(SPLITS)}, not {split!r}")
-        # Of any so many images in a row, the first are for training, then validation, then test.
+        # Of any so many fields in a row, the first are for training, then validation, then test.
         try:
-            pattern = [name for name, share in zip(SPLITS, self.recipe["split"]) for _ in range(share)]
+            self._pattern = [name for name, share in zip(SPLITS, self.recipe["split"]) for _ in range(share)]
+            self._captures = int(self.recipe["made"].get("rendered", {}).get("captures", 1))
             every = range(self.recipe["count"])
-            self.indices = [k for k in every if split is None or pattern[k % len(pattern)] == split]
-        except (KeyError, TypeError, ZeroDivisionError) as error:
+            self.indices = [k for k in every if split is None or self._split(k) == split]
+        except (AttributeError, KeyError, TypeError, ValueError, ZeroDivisionError) as error:
             raise Error(f"{self.path}/dataset.json is damaged: {error!r}") from error
+        # Of packs that were read from: where each file lies.
+        self._members: Dict[str, Dict[str, Tuple[int, int]]] = {}
 
     def __len__(self) -> int:
         return len(self.indices)
 
     def __getitem__(self, item: SupportsIndex) -> Any:
-        folder = self.path / "images" / f"{self.indices[operator.index(item)]:06d}"
-        sample = _sample(folder)
-        sample["record"] = _json(folder / "record.json")
+        index = self.indices[operator.index(item)]
+        folder = self.path / "images" / f"{index:06d}"
+        if self.recipe.get("pack") and not folder.is_dir():
+            sample = self._packed(index)
+        else:
+            sample = _sample(folder)
+            sample["record"] = _json(folder / "record.json")
         return sample if self.transform is None else self.transform(sample)
+
+    def _split(self, index: int) -> str:
+        """The split of an image: all images of a field are in one."""
+        return self._pattern[index // self._captures % len(self._pattern)]
+
+    def _pack(self, index: int) -> str:
+        """The name of the pack of an image: packs hold so many images of a split, in order."""
+        split, (rounds, place) = self._split(index), divmod(index // self._captures, len(self._pattern))
+        rank = rounds * self._pattern.count(split) + place - self._pattern.index(split)
+        return f"{split}-{rank // max(self.recipe['pack'] // self._captures, 1):06d}"
+
+    def _packed(self, index: int) -> Sample:
+        """An image that lies in an archive with others."""
+        pack = self._pack(index)
+        if pack not in self._members:
+            self._members[pack] = _json(self.path / "seals" / f"{pack}.json").get("members", {})
+        members, archive = self._members[pack], self.path / "packs" / f"{pack}.tar"
+        files: Dict[str, bytes] = {}
+        try:
+            with open(archive, "rb") as tar:
+                for name in [f"{file}.png" for _, file, _ in _MAPS] + ["record.json"]:
+                    if place := members.get(f"{index:06d}.{name}"):
+                        tar.seek(place[0])
+                        files[name] = tar.read(place[1])
+        except OSError as error:
+            raise Error(f"{archive}: {error}") from error
+        if "record.json" not in files:
+            raise Error(f"{archive}: image {index:06d} is not there yet")
+        return _from_files(files, f"{archive}: {index:06d}")
 
     def __iter__(self) -> Iterator[Any]:
         return (self[k] for k in range(len(self)))
@@ -218,6 +254,16 @@ def _entries(archive: IO[bytes]) -> Iterator[Tuple[str, bytes]]:
         yield entry.name, content
 
 
+def _from_files(files: Dict[str, bytes], key: str) -> Sample:
+    """A sample from the contents of its files, by their names; errors call it `key`."""
+    sample = Sample()
+    for of, file, kind in _MAPS:
+        if f"{file}.png" in files:
+            sample[of] = _read(io.BytesIO(files[f"{file}.png"]), kind, f"{key}.{file}.png")
+    sample["record"] = _object(files["record.json"], f"{key}.record.json")
+    return sample
+
+
 def _samples(archive: IO[bytes]) -> Iterator[Sample]:
     """The samples of an archive; of each image, the record is the last file."""
     files: Dict[str, bytes] = {}
@@ -225,13 +271,8 @@ def _samples(archive: IO[bytes]) -> Iterator[Sample]:
         key, name = path.split(".", 1)
         files[name] = content
         if name == "record.json":
-            sample = Sample()
-            for of, file, kind in _MAPS:
-                if f"{file}.png" in files:
-                    sample[of] = _read(io.BytesIO(files[f"{file}.png"]), kind, f"{key}.{file}.png")
-            sample["record"] = _object(content, path)
+            yield _from_files(files, key)
             files = {}
-            yield sample
 
 
 def stream(

@@ -2,9 +2,9 @@
 
 use super::File;
 use super::checksum_record::write_files;
-use super::format;
 use super::keep::Kept;
 use super::recipe::{FILE, Made, Recipe};
+use super::{format, pack};
 use crate::output::{create_atomically, is_unfinished};
 use crate::{Error, Result};
 use std::path::Path;
@@ -28,6 +28,7 @@ fn go_on(folder: &Path, mut recipe: Recipe, files: &[File]) -> Result<Recipe> {
     if recipe.labelling.is_usual() {
         recipe.labelling.clone_from(&before.labelling);
     }
+    recipe.pack = recipe.pack.or(before.pack);
     if let (Made::Rendered(now), Made::Rendered(then)) = (&mut recipe.made, &before.made) {
         now.parts = then.parts;
         if now.keep == Kept::USUAL {
@@ -40,7 +41,7 @@ fn go_on(folder: &Path, mut recipe: Recipe, files: &[File]) -> Result<Recipe> {
     // In whatever order they were asked for, it is one dataset.
     recipe.formats.sort();
     recipe.formats.dedup();
-    format::check_maps(&recipe).map_err(|e| e.in_file(folder))?;
+    format::check_maps(&recipe).and_then(|()| pack::check(&recipe)).map_err(|e| e.in_file(folder))?;
     write_changed(folder, files)?;
     write_changed(folder, &[File { path: FILE.into(), bytes: recipe.text()? }])?;
     Ok(recipe)

@@ -9,6 +9,8 @@
 use super::checksum_record::{BLOCK, ChecksumRecord, write_files};
 use super::finish::finish;
 use super::generate::{MOST_AT_ONCE, formatted};
+use super::native::is_native;
+use super::pack::Packing;
 use super::plan::{Draft, Order, draft};
 use super::recipe::{FILE, Made, Recipe, compact};
 use super::record::{CaptureRecord, Record};
@@ -21,7 +23,7 @@ use crate::render::Watch;
 use crate::settings::{Quality, RenderOptions};
 use crate::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -33,6 +35,8 @@ const FEWEST: u32 = 8;
 const STEP: u32 = 4;
 /// About the length of an image's row in the timing log.
 const LOG_ROW: u64 = 270;
+/// Bytes of an image's file in an archive, beside its own.
+const MEMBER: u64 = 512 + 256 + 40;
 /// Lengths of the hash and its key that a file of checksums holds beside them.
 const SEAL_HASH: u64 = 81;
 /// Images that the work on what belongs to all is done for; of further ones records alone are read.
@@ -107,11 +111,13 @@ pub fn bill(order: &Order, threads: &Threads, stop: &Arc<AtomicBool>) -> Result<
     let (count, spp) = (recipe.count as f64, f64::from(images.spp));
     let (grow_s, sample_s) = (fields * mean(&|p| p.grow_s), count * spp * mean(&|p| p.sample_s));
     let rest_s = start + count * mean(&|p| p.fixed_s) + all.core_s;
-    let (mut bytes, mut number) = (all.bytes + count * LOG_ROW as f64, all.files + 1);
+    let packs = Packing::of(&recipe).map_or(0, |packing| packing.all().count() as u64);
+    // An archive and its record.
+    let (mut bytes, mut number) = (all.bytes + count * LOG_ROW as f64, all.files + 1 + 2 * packs);
     for (split, images) in Split::ALL.into_iter().zip(images_of_splits(&recipe)) {
         if images > 0 {
             bytes += images as f64 * mean(&|p| p.bytes(split));
-            number += images * probes.first().map_or(0, |p| p.files[&split].len() as u64 + 1);
+            number += images * probes.first().map_or(0, |p| p.lying(&p.files[&split]));
         }
     }
     let bill = Bill {
@@ -164,6 +170,8 @@ struct Images {
 /// One image that was drawn to know what all cost.
 struct Probe {
     record: Record,
+    /// Whether its own files go into an archive.
+    packed: bool,
     /// The cameras of its field, by their names.
     cameras: Vec<String>,
     /// Core seconds to grow its field.
@@ -183,7 +191,15 @@ impl Probe {
     fn bytes(&self, split: Split) -> f64 {
         let files = self.files.get(&split).map_or(&[][..], Vec::as_slice);
         let seal = files.iter().map(|file| file.path.len() as u64 + 100).sum::<u64>() + 2 * SEAL_HASH;
-        length(files) as f64 * self.longer + seal as f64
+        let in_archive = if self.packed { files.iter().filter(|file| is_native(&file.path)).count() as u64 } else { 0 };
+        // In an archive each has a header and ends with a block, half of which is empty; its record says where it lies.
+        length(files) as f64 * self.longer + (seal + in_archive * MEMBER) as f64
+    }
+
+    /// How many of its files, its checksums among them, lie in folders.
+    fn lying(&self, files: &[File]) -> u64 {
+        let in_archive = |file: &&File| self.packed && is_native(&file.path);
+        (files.len() - files.iter().filter(in_archive).count()) as u64 + u64::from(!self.packed)
     }
 }
 
@@ -202,7 +218,7 @@ impl Images {
         let splits = Split::ALL.into_iter().zip(images_of_splits(&recipe));
         let splits = splits.filter(|(_, images)| *images > 0).map(|(split, _)| split).collect();
         let renderers = [opened(drawn[0])?, opened(drawn[1])?];
-        let set = Set { folder: PathBuf::new(), recipe };
+        let set = Set::new(Path::new(""), recipe);
         Ok(Self { set, scene, spp, drawn, renderers, splits })
     }
 
@@ -263,6 +279,7 @@ impl Images {
         made.sample.record.split = own;
         Ok(Probe {
             record: made.sample.record,
+            packed: self.set.recipe.pack.is_some(),
             cameras,
             grow_s: grown - begin,
             sample_s,
@@ -390,7 +407,7 @@ impl<'a> Small<'a> {
     /// Writes what belongs to all of its first images.
     fn finished(&self, folder: &Path, images: u64) -> Result<Finished> {
         let recipe = Recipe { count: images, ..self.recipe.clone() };
-        let paths = finish(&Set { folder: folder.into(), recipe }, None)?;
+        let paths = finish(&Set::new(folder, recipe), None)?;
         let mut finished = Finished { files: paths.len() as u64, page: 0, lists: 0 };
         for path in paths {
             let bytes = std::fs::metadata(&path).map_err(Error::io(&path))?.len();

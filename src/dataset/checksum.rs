@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+use std::io;
 use std::path::Path;
 
 /// What tells a file.
@@ -26,22 +27,36 @@ impl Checksum {
 
     /// What is wrong with the file, in words.
     pub fn fault(&self, path: &Path) -> Option<String> {
-        match std::fs::metadata(path) {
+        self.fault_of(std::fs::metadata(path).map(|about| about.len()), || crate::input::contents(path))
+    }
+
+    /// Whether a file has these contents.
+    pub fn is_of(&self, bytes: &[u8]) -> bool {
+        Self::of(bytes) == *self
+    }
+
+    /// What is wrong with a file of this length and these contents, in words.
+    pub(super) fn fault_of(
+        &self,
+        length: io::Result<u64>,
+        contents: impl FnOnce() -> io::Result<Vec<u8>>,
+    ) -> Option<String> {
+        match length {
             Err(e) => {
-                return Some(if e.kind() == std::io::ErrorKind::NotFound {
+                return Some(if e.kind() == io::ErrorKind::NotFound {
                     "is missing".into()
                 } else {
                     format!("cannot be read: {e}")
                 });
             }
-            Ok(about) if about.len() != self.bytes => {
-                return Some(format!("has {} bytes instead of {}", about.len(), self.bytes));
+            Ok(length) if length != self.bytes => {
+                return Some(format!("has {length} bytes instead of {}", self.bytes));
             }
             Ok(_) => {}
         }
-        match crate::input::contents(path) {
+        match contents() {
             Err(e) => Some(format!("cannot be read: {e}")),
-            Ok(bytes) if Self::of(&bytes) != *self => Some("was changed: its SHA-256 differs".into()),
+            Ok(bytes) if !self.is_of(&bytes) => Some("was changed: its SHA-256 differs".into()),
             Ok(_) => None,
         }
     }

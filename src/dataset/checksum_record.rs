@@ -75,15 +75,6 @@ impl ChecksumRecord {
         own.labelling = None;
         own.hash()
     }
-
-    /// The files that are missing or changed, each with what is wrong with it.
-    pub fn faults(&self, folder: &Path) -> Vec<(String, String)> {
-        let fault = |(path, sum): (&String, &Checksum)| match below(folder, path) {
-            Ok(full) => Some((path.clone(), sum.fault(&full)?)),
-            Err(_) => Some((path.clone(), "does not lie in the dataset's folder".into())),
-        };
-        self.files.iter().filter_map(fault).collect()
-    }
 }
 
 /// Bytes from which on a file takes more than one block of a disk.

@@ -4,11 +4,14 @@ use super::checksum::Checksum;
 use super::checksum_record::ChecksumRecord;
 use super::generate::{self, Task};
 use super::labels::LeftOut;
+use super::native::is_native;
+use super::pack::{Id, Packing, store};
 use super::recipe::{FILE, Recipe};
 use super::set::{Set, Stream, Whole};
-use super::{format, report};
+use super::{format, index, push, report};
 use crate::output::{is_unfinished, remove_unfinished};
 use crate::{Error, Result};
+use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -19,10 +22,11 @@ pub const MANIFEST: &str = "manifest.json";
 /// Writes everything that belongs to all images. A [`Kind::Damaged`](crate::error::Kind::Damaged) names the images that are missing, and, of a dataset in so many
 /// `shards`, those.
 pub fn finish(set: &Set, shards: Option<u64>) -> Result<Vec<PathBuf>> {
-    let Set { folder, recipe } = set;
+    let Set { folder, recipe, .. } = set;
+    push::refuse_freed(set)?;
     let mut missing = Vec::new();
-    for index in 0..recipe.count {
-        match ChecksumRecord::read(folder, index) {
+    for (index, checksums) in (0..).zip(set.all_checksums()) {
+        match checksums {
             Some(checksums) if generate::remaining(set, &checksums)? == Task::Done => {}
             _ => missing.push(index),
         }
@@ -31,10 +35,17 @@ pub fn finish(set: &Set, shards: Option<u64>) -> Result<Vec<PathBuf>> {
         return Err(lacks(set, &missing, shards));
     }
     remove_unfinished(folder)?;
+    let packs: Vec<Id> = Packing::of(recipe).map(|packing| packing.all().collect()).unwrap_or_default();
+    packs.par_iter().try_for_each(|id| store::ensure(set, *id))?;
+    if !packs.is_empty() {
+        // Where nothing is in it.
+        let _ = std::fs::remove_dir(folder.join("images"));
+    }
     let mut whole = Whole::new(folder);
     for (_, format) in format::all(recipe)? {
         format.whole(set, &mut whole)?;
     }
+    index::write(set, &mut whole)?;
     report::write(set, &mut whole)?;
     let mut files = own_files(folder, recipe)?;
     files.append(&mut whole.files.clone());
@@ -50,7 +61,7 @@ pub fn lacks(set: &Set, missing: &[u64], shards: Option<u64>) -> Error {
     let again = match shards {
         None => "run `trace dataset render` again; it makes what is missing".to_owned(),
         Some(of) => {
-            let lacking: BTreeSet<u64> = missing.iter().map(|k| set.recipe.field_of(*k).0 % of).collect();
+            let lacking: BTreeSet<u64> = missing.iter().map(|k| set.recipe.unit_of(*k) % of).collect();
             let lacking: Vec<u64> = lacking.into_iter().collect();
             format!("run the shards again that have them: --array={}", ranges(&lacking))
         }
@@ -96,7 +107,7 @@ fn own_files(folder: &Path, recipe: &Recipe) -> Result<BTreeMap<String, Checksum
 
 /// The manifest, image by image: it may be larger than memory.
 fn manifest(set: &Set, files: &BTreeMap<String, Checksum>, out: &mut Stream<'_>) -> Result<()> {
-    let Set { folder, recipe } = set;
+    let Set { folder, recipe, .. } = set;
     let mut content = Sha256::new();
     out.put("{\n\"recipe\": ")?;
     out.json(recipe)?;
@@ -122,10 +133,13 @@ fn manifest(set: &Set, files: &BTreeMap<String, Checksum>, out: &mut Stream<'_>)
     for (path, sum) in files {
         add(out, path, sum)?;
     }
+    for (path, sum) in archives(set) {
+        add(out, &path, &sum)?;
+    }
     let mut seals = Vec::new();
-    for index in 0..recipe.count {
-        let Some(checksums) = ChecksumRecord::read(folder, index) else { continue };
-        for (path, sum) in &checksums.files {
+    for (index, checksums) in (0..).zip(set.all_checksums()) {
+        let Some(checksums) = checksums else { continue };
+        for (path, sum) in of_image(recipe, &checksums) {
             add(out, path, sum)?;
         }
         seals.push((index, checksums.hash()?));
@@ -139,6 +153,21 @@ fn manifest(set: &Set, files: &BTreeMap<String, Checksum>, out: &mut Stream<'_>)
     out.put("],\n\"content_sha256\": ")?;
     out.json(&hex::encode(content.finalize()))?;
     out.put("\n}\n")
+}
+
+/// The archives that images lie in.
+pub(super) fn archives(set: &Set) -> impl Iterator<Item = (String, Checksum)> + '_ {
+    let all = Packing::of(&set.recipe).map(Packing::all).into_iter().flatten();
+    all.filter_map(|id| Some((id.path(), set.packs.get(&set.folder, id)?.tar.clone())))
+}
+
+/// The files of an image that lie in the dataset's folder, and in no archive.
+pub(super) fn of_image<'a>(
+    recipe: &Recipe,
+    image: &'a ChecksumRecord,
+) -> impl Iterator<Item = (&'a String, &'a Checksum)> + use<'a> {
+    let packed = recipe.pack.is_some();
+    image.files.iter().filter(move |(path, _)| !(packed && is_native(path)))
 }
 
 #[cfg(test)]

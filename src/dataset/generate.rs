@@ -5,6 +5,8 @@
 //! a part of another, and may take up all of it.) Memory grows with the images at once, not with the dataset.
 
 use super::checksum_record::{ChecksumRecord, write_files};
+use super::pack::{Id, Packing, store};
+use super::push::{Push, Unit};
 use super::render::{LastField, Times, render, renderer, scene_file};
 use super::set::Set;
 use super::timing_log::{Began, End, Ended, ImageFailure, ImageTiming, Row, TimingLog, now};
@@ -15,13 +17,13 @@ use crate::render::Watch;
 use crate::scene::estimate::usual_memory;
 use crate::{Error, Result};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Which of the images a run is for: those of the fields whose number % of == number.
+/// Which of the images a run is for: those of the [units](super::Recipe::unit_of) whose number % of == number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
     /// From 0.
@@ -34,9 +36,9 @@ impl Shard {
     /// All images.
     pub const ALL: Self = Self { number: 0, of: 1 };
 
-    /// Whether it holds a field.
-    pub fn holds(self, field: u64) -> bool {
-        field % self.of == self.number
+    /// Whether it holds a unit.
+    pub fn holds(self, unit: u64) -> bool {
+        unit % self.of == self.number
     }
 
     /// Reads `k/N`, k from 0 to N − 1.
@@ -50,7 +52,7 @@ impl Shard {
 
 /// How a run works; none of it changes a byte.
 #[derive(Clone, Copy, Debug)]
-pub struct Work {
+pub struct Work<'a> {
     /// Which images.
     pub shard: Shard,
     /// Workers; 0 for one on each core.
@@ -59,12 +61,14 @@ pub struct Work {
     pub at_once: usize,
     /// Bytes of memory that a field may take; the usual share of the machine's unless given.
     pub memory: Option<u64>,
+    /// How what is finished is sent elsewhere.
+    pub push: Option<&'a Push>,
 }
 
-impl Default for Work {
+impl Default for Work<'_> {
     /// All images, on all cores.
     fn default() -> Self {
-        Self { shard: Shard::ALL, threads: 0, at_once: 0, memory: None }
+        Self { shard: Shard::ALL, threads: 0, at_once: 0, memory: None, push: None }
     }
 }
 
@@ -111,18 +115,32 @@ pub(super) fn share(threads: usize, workers: usize, worker: usize) -> usize {
 /// Makes what is missing of a shard. Stopped, it returns [`Kind::Interrupted`] with the number of images that are there, and the same
 /// call goes on later. A fault of one field ([`Error::is_of_one_field`]) is told when all others are made; a cause that lasts ends the
 /// run at once. What is made is kept in any case.
-pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()> {
+pub fn generate(set: &Set, work: &Work<'_>, callbacks: &Callbacks<'_>) -> Result<()> {
+    let sent = |unit: Unit| work.push.map_or(Ok(()), |push| push.unit(set, unit, callbacks.now));
+    sent(Unit::Recipe)?;
     let renderer = renderer(set)?;
     let all = Threads::new(work.threads)?;
     let threads = all.count();
     let shard = work.shard;
-    let held = |k: &u64| shard.holds(set.recipe.field_of(*k).0);
+    let held = |k: &u64| shard.holds(set.recipe.unit_of(*k));
     let wanted: Vec<u64> = (0..set.recipe.count).filter(held).collect();
-    let tasks: Vec<(u64, Task)> =
-        all.install(|| wanted.into_par_iter().map(|k| task(set, k).map(|t| (k, t))).collect::<Result<Vec<_>>>())?;
+    let open = all.install(|| OpenPacks::of(set, shard))?;
+    let is_freed = |k: u64| set.recipe.pack.is_none() && Unit::Image(k).is_freed(set);
+    let look = |k: u64| Ok((k, if open.is_settled(set, k) || is_freed(k) { Task::Done } else { task(set, k)? }));
+    let tasks: Vec<(u64, Task)> = all.install(|| wanted.into_par_iter().map(look).collect::<Result<Vec<_>>>())?;
     let wanted = tasks.len();
     let tasks: Vec<(u64, Task)> = tasks.into_iter().filter(|(_, t)| *t != Task::Done).collect();
     (callbacks.begin)(tasks.len());
+    open.expect(set, &tasks)?;
+    if work.push.is_some() {
+        // What is there and was not pushed: units that lack nothing.
+        let lacking: BTreeSet<String> = tasks.iter().map(|(index, _)| Unit::of(set, *index).name()).collect();
+        let mut units: Vec<Unit> = held_units(set, shard);
+        units.retain(|unit| !lacking.contains(&unit.name()));
+        units
+            .into_iter()
+            .try_for_each(|unit| if callbacks.soon.load(Ordering::Relaxed) { Ok(()) } else { sent(unit) })?;
+    }
     // Images of one field follow each other on one worker, which grows it once.
     let fields: Vec<&[(u64, Task)]> =
         tasks.chunk_by(|a, b| set.recipe.field_of(a.0).0 == set.recipe.field_of(b.0).0).collect();
@@ -170,7 +188,10 @@ pub fn generate(set: &Set, work: &Work, callbacks: &Callbacks<'_>) -> Result<()>
                 while let Some(field) = fields.get(next.fetch_add(1, Ordering::Relaxed)).filter(|_| !ended()) {
                     let mut kept = LastField::default();
                     for (index, task) in field.iter().take_while(|_| !ended()) {
-                        match worker.install(|| run.image(*index, *task, worker, &mut kept)) {
+                        match worker
+                            .install(|| run.image(*index, *task, worker, &mut kept))
+                            .and_then(|()| if open.made(set, *index)? { sent(Unit::of(set, *index)) } else { Ok(()) })
+                        {
                             Ok(()) => {
                                 made.fetch_add(1, Ordering::Relaxed);
                                 (callbacks.done)(*index);
@@ -236,13 +257,13 @@ pub(super) fn together(failures: BTreeMap<u64, Error>) -> Error {
 
 /// What remains to be done for an image, from what lies on the disk.
 pub fn task(set: &Set, index: u64) -> Result<Task> {
-    let Some(checksums) = ChecksumRecord::read(&set.folder, index) else { return Ok(Task::All) };
+    let Some(checksums) = set.checksums(index) else { return Ok(Task::All) };
     let task = remaining(set, &checksums)?;
     if task == Task::All {
         return Ok(task);
     }
     let formats = format::all(&set.recipe)?;
-    let broken = checksums.faults(&set.folder);
+    let broken = set.faults(&checksums);
     let lost = |(path, _): &(String, String)| {
         path.starts_with("images/") || formats.iter().any(|(name, f)| f.needs_film() && in_format(path, name))
     };
@@ -277,6 +298,54 @@ fn in_format(path: &str, format: &str) -> bool {
     path.strip_prefix(format).is_some_and(|rest| rest.starts_with('/'))
 }
 
+/// What a shard pushes, images or packs.
+fn held_units(set: &Set, shard: Shard) -> Vec<Unit> {
+    match Packing::of(&set.recipe) {
+        Some(packing) => packing.all().filter(|id| shard.holds(packing.place(*id))).map(Unit::Pack).collect(),
+        None => (0..set.recipe.count).filter(|k| shard.holds(set.recipe.unit_of(*k))).map(Unit::Image).collect(),
+    }
+}
+
+/// The packs of a shard that are not whole yet.
+struct OpenPacks(BTreeMap<Id, AtomicUsize>);
+
+impl OpenPacks {
+    /// Those of a shard, none where images lie in folders.
+    fn of(set: &Set, shard: Shard) -> Result<Self> {
+        let Some(packing) = Packing::of(&set.recipe) else { return Ok(Self(BTreeMap::new())) };
+        let held: Vec<Id> = packing.all().filter(|id| shard.holds(packing.place(*id))).collect();
+        let open = held.into_par_iter().map(|id| Ok((id, store::settle(set, id)?))).collect::<Result<Vec<_>>>()?;
+        Ok(Self(open.into_iter().filter(|(_, whole)| !whole).map(|(id, _)| (id, AtomicUsize::new(0))).collect()))
+    }
+
+    /// Whether an image lies in a pack that is whole.
+    fn is_settled(&self, set: &Set, index: u64) -> bool {
+        Packing::of(&set.recipe).is_some_and(|packing| !self.0.contains_key(&packing.id(index)))
+    }
+
+    /// Is told what remains to be done; closes the packs of which nothing does.
+    fn expect(&self, set: &Set, tasks: &[(u64, Task)]) -> Result<()> {
+        let Some(packing) = Packing::of(&set.recipe) else { return Ok(()) };
+        for (index, _) in tasks {
+            if let Some(left) = self.0.get(&packing.id(*index)) {
+                left.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+        let ready = self.0.iter().filter(|(_, left)| left.load(Ordering::Relaxed) == 0);
+        ready.map(|(id, _)| *id).try_for_each(|id| store::close(set, id))
+    }
+
+    /// Is told of an image that is there; closes its pack after the last. Whether the unit that it belongs to is finished.
+    fn made(&self, set: &Set, index: u64) -> Result<bool> {
+        let Some(id) = Packing::of(&set.recipe).map(|packing| packing.id(index)) else { return Ok(true) };
+        let is_last = self.0.get(&id).is_some_and(|left| left.fetch_sub(1, Ordering::AcqRel) == 1);
+        if is_last {
+            store::close(set, id)?;
+        }
+        Ok(is_last)
+    }
+}
+
 /// A run of a shard.
 struct Run<'a> {
     set: &'a Set,
@@ -292,9 +361,9 @@ impl Run<'_> {
     /// Makes one image and writes its checksums.
     fn image(&self, index: u64, task: Task, threads: &Threads, kept: &mut LastField) -> Result<()> {
         let begin = Instant::now();
-        let Set { folder, recipe } = self.set;
+        let Set { folder, recipe, .. } = self.set;
         // Another run may have made it meanwhile.
-        if ChecksumRecord::path(folder, index).exists() && self::task(self.set, index)? == Task::Done {
+        if self::task(self.set, index)? == Task::Done {
             return Ok(());
         }
         let (files, times) = if task == Task::Formats {
@@ -351,7 +420,7 @@ pub(super) fn formatted(set: &Set, sample: &super::Sample) -> Result<Vec<File>> 
 
 /// The files of those formats that follow from the native files.
 fn derived(set: &Set, index: u64) -> Result<Vec<File>> {
-    let sample = native::read(&set.folder, &Set::name(index))?;
+    let sample = set.sample(index)?;
     let mut files = Vec::new();
     for (_, format) in format::all(&set.recipe)?.into_iter().filter(|(_, format)| !format.needs_film()) {
         files.extend(format.image(&set.recipe, &sample)?);

@@ -16,7 +16,7 @@ pub fn make(folder: impl AsRef<Path>, order: &Order) -> Result<Vec<PathBuf>> {
 }
 
 /// The same with a choice of threads, told of warnings and progress, and stopped when the callbacks say so. All shards are made.
-pub fn make_watched(folder: &Path, order: &Order, work: &Work, callbacks: &Callbacks<'_>) -> Result<Vec<PathBuf>> {
+pub fn make_watched(folder: &Path, order: &Order, work: &Work<'_>, callbacks: &Callbacks<'_>) -> Result<Vec<PathBuf>> {
     let set = begin(folder, order, callbacks)?;
     generate(&set, &Work { shard: Shard::ALL, ..*work }, callbacks)?;
     finish::finish(&set, None)

@@ -7,11 +7,13 @@
 //! dataset.json          the recipe: what decides every byte
 //! scene/                the scene file and everything that it reads, so that the folder stands alone
 //! images/000123/        one image: photographs, label maps, record.json
+//! packs/train-000000.tar  the same of a thousand images, where the recipe asks for it
 //! coco/ phenobench/ …   the same for other people's tools
 //! seals/000123.json     checksums: SHA-256 of each of its files; written last
 //! ledger/               timing log: when runs began and ended, how long each image took, which failed; one file a run: the only place with clock times
 //! jobs/                 what `emit` wrote for a scheduler, and its logs; belongs to no image
 //! manifest.json         everything above in one list, written when all images are there
+//! images.parquet, plants.parquet  what images and plants are chosen by
 //! report.html           what is in it, for people
 //! ```
 //!
@@ -24,6 +26,8 @@
 //! | `sample`, `record`, `annotate`, `rle` | one image and all that is known of it |
 //! | `native`, `format` | as files: ours (`images/`), and those of other tools |
 //! | `checksum`, `checksum_record`, `set` | SHA-256 of a file; those of an image's files; the dataset on disk |
+//! | `pack`, `archive` | images in archives instead of folders; names in them |
+//! | `push` | sends what is finished elsewhere, by a command of the user's |
 //! | `make` | all of it in one call |
 //! | `plan`, `gather`, `begin`, `generate`, `timing_log`, `finish` | from a scene file, copied with all that it names, to images and a manifest; what remains to be done is found by looking at the disk |
 //! | `bill`, `meter` | what a dataset will cost, from three of its images; what this process has taken |
@@ -32,10 +36,12 @@
 //! | `cluster` | the same on many machines: job files for schedulers |
 //! | `invariants`, `difference`, `verify` | what must hold of every image; how far two of them lie apart; whether all is so |
 //! | `import` | other people's images and labels |
+//! | `index` | what images and plants are chosen by, as tables |
 //! | `report` | all of it on one page, for people |
 
 #[doc(hidden)]
 pub mod annotate;
+mod archive;
 mod begin;
 #[doc(hidden)]
 pub mod bill;
@@ -61,6 +67,8 @@ pub mod generate;
 #[doc(hidden)]
 pub mod import;
 #[doc(hidden)]
+pub mod index;
+#[doc(hidden)]
 pub mod invariants;
 #[doc(hidden)]
 pub mod keep;
@@ -74,7 +82,11 @@ pub mod meter;
 #[doc(hidden)]
 pub mod native;
 #[doc(hidden)]
+pub mod pack;
+#[doc(hidden)]
 pub mod plan;
+#[doc(hidden)]
+pub mod push;
 #[doc(hidden)]
 pub mod recipe;
 pub mod record;

@@ -20,6 +20,7 @@ use crate::output::{self, Picture, Precision};
 use crate::scene::PartKind;
 use crate::scene::tag::Class;
 use crate::{Error, Result};
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// The name of an image: its number.
@@ -74,71 +75,172 @@ pub fn files(recipe: &Recipe, sample: &Sample, text: &str) -> Result<Vec<File>> 
     Ok(files)
 }
 
-/// Reads a sample from its files.
+/// Files that images are read from.
+pub trait Files {
+    /// Contents of a file by its path below the dataset's folder.
+    fn contents(&self, path: &str) -> io::Result<Vec<u8>>;
+
+    /// Where it lies, or would, for messages.
+    fn place(&self, path: &str) -> PathBuf;
+}
+
+impl Files for Path {
+    fn contents(&self, path: &str) -> io::Result<Vec<u8>> {
+        crate::input::contents(&self.join(path))
+    }
+
+    fn place(&self, path: &str) -> PathBuf {
+        self.join(path)
+    }
+}
+
+/// Reads an image of a dataset that lies in a folder of its own.
 pub fn read(dataset: &Path, name: &str) -> Result<Sample> {
-    let at = |file: &str| -> PathBuf { dataset.join(folder(name)).join(file) };
-    let record = read_record(dataset, name)?;
+    sample(dataset, name)
+}
+
+/// Reads what is known of an image that lies in a folder of its own, without its maps.
+pub fn read_record(dataset: &Path, name: &str) -> Result<Record> {
+    record(dataset, name)
+}
+
+/// The files of one image.
+pub(crate) struct Image<'a, F: Files + ?Sized> {
+    files: &'a F,
+    name: &'a str,
+}
+
+impl<'a, F: Files + ?Sized> Image<'a, F> {
+    pub(crate) fn of(files: &'a F, name: &'a str) -> Self {
+        Self { files, name }
+    }
+
+    fn path(&self, file: &str) -> String {
+        format!("{}/{file}", folder(self.name))
+    }
+
+    /// Where a file lies, or would, for messages.
+    pub(crate) fn place(&self, file: &str) -> PathBuf {
+        self.files.place(&self.path(file))
+    }
+
+    /// A file that may be left out, with what errors call it.
+    fn optional(&self, file: &str) -> Result<Option<(PathBuf, Vec<u8>)>> {
+        let place = self.place(file);
+        match self.files.contents(&self.path(file)) {
+            Ok(bytes) => Ok(Some((place, bytes))),
+            Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(None),
+            Err(e) => Err(Error::reading(&place)(e)),
+        }
+    }
+
+    fn needed(&self, file: &str) -> Result<(PathBuf, Vec<u8>)> {
+        let place = self.place(file);
+        let bytes = self.files.contents(&self.path(file)).map_err(Error::reading(&place))?;
+        Ok((place, bytes))
+    }
+
+    /// Whether there is such a file.
+    pub(crate) fn has(&self, file: &str) -> Result<bool> {
+        Ok(self.optional(file)?.is_some())
+    }
+
+    /// An 8-bit RGB picture: width, height, three numbers a pixel.
+    pub(crate) fn rgb(&self, file: &str) -> Result<(u32, u32, Vec<[u8; 3]>)> {
+        let (place, bytes) = self.needed(file)?;
+        output::decode_rgb(&place, &bytes)
+    }
+
+    /// An 8-bit gray picture.
+    pub(crate) fn gray(&self, file: &str) -> Result<(u32, u32, Vec<u8>)> {
+        let (place, bytes) = self.needed(file)?;
+        output::decode_gray(&place, &bytes)
+    }
+
+    /// The same, where there is one.
+    pub(crate) fn gray_if_there(&self, file: &str) -> Result<Option<(u32, u32, Vec<u8>)>> {
+        self.optional(file)?.map(|(place, bytes)| output::decode_gray(&place, &bytes)).transpose()
+    }
+
+    /// A 16-bit gray picture.
+    pub(crate) fn gray16(&self, file: &str) -> Result<(u32, u32, Vec<u16>)> {
+        let (place, bytes) = self.needed(file)?;
+        output::decode_gray16(&place, &bytes)
+    }
+
+    /// An 8-bit indexed picture.
+    pub(crate) fn indexed(&self, file: &str) -> Result<(u32, u32, Vec<u8>)> {
+        let (place, bytes) = self.needed(file)?;
+        output::decode_indexed(&place, &bytes)
+    }
+}
+
+/// Reads an image.
+pub(super) fn sample(files: &(impl Files + ?Sized), name: &str) -> Result<Sample> {
+    let image = Image::of(files, name);
+    let record = record(files, name)?;
     let size = (record.width, record.height);
-    let (w, h, rgb) = output::read_rgb(&at("rgb.png"))?;
-    check(&at("rgb.png"), size, (w, h))?;
-    let gray = |file: &str| -> Result<Vec<u8>> {
-        let (w, h, values) = output::read_gray(&at(file))?;
-        check(&at(file), size, (w, h))?;
-        Ok(values)
+    let rgb = sized(&image, "rgb.png", size, image.rgb("rgb.png")?)?;
+    let of_size =
+        |file: &str| image.gray_if_there(file)?.map_or(Ok(Vec::new()), |found| sized(&image, file, size, found));
+    let (nir, species) = (of_size("nir.png")?, of_size("species.png")?);
+    let coverage = match image.optional("coverage.png")? {
+        Some((place, bytes)) => sized(&image, "coverage.png", size, output::decode_rgb(&place, &bytes)?)?,
+        None => Vec::new(),
     };
-    let gray16 = |file: &str| -> Result<Vec<u16>> {
-        let (w, h, values) = output::read_gray16(&at(file))?;
-        check(&at(file), size, (w, h))?;
-        Ok(values)
+    let parts = match image.optional("parts.png")? {
+        Some((place, bytes)) => sized(&image, "parts.png", size, output::decode_indexed(&place, &bytes)?)?,
+        None => Vec::new(),
     };
-    let indexed = |file: &str| -> Result<Vec<u8>> {
-        let (w, h, values) = output::read_indexed(&at(file))?;
-        check(&at(file), size, (w, h))?;
-        Ok(values)
-    };
-    let coverage = if at("coverage.png").is_file() {
-        let (w, h, values) = output::read_rgb(&at("coverage.png"))?;
-        check(&at("coverage.png"), size, (w, h))?;
-        values
-    } else {
-        Vec::new()
-    };
-    let (depth, normals) = if at("geometry.exr").is_file() {
-        let (w, h, depth, normals) = output::read_geometry(&at("geometry.exr"))?;
-        check(&at("geometry.exr"), size, (w, h))?;
-        (depth, normals)
-    } else {
-        (Vec::new(), Vec::new())
+    let (depth, normals) = match image.optional("geometry.exr")? {
+        Some((place, bytes)) => {
+            let (w, h, depth, normals) = output::decode_geometry(&place, bytes)?;
+            check(&place, size, (w, h))?;
+            (depth, normals)
+        }
+        None => (Vec::new(), Vec::new()),
     };
     Ok(Sample {
-        record,
         rgb,
-        nir: if at("nir.png").is_file() { gray("nir.png")? } else { Vec::new() },
-        semantics: indexed("semantics.png")?,
-        species: if at("species.png").is_file() { gray("species.png")? } else { Vec::new() },
-        parts: if at("parts.png").is_file() { indexed("parts.png")? } else { Vec::new() },
-        plants: gray16("plants.png")?,
-        leaves: gray16("leaves.png")?,
+        nir,
+        semantics: sized(&image, "semantics.png", size, image.indexed("semantics.png")?)?,
+        species,
+        parts,
+        plants: sized(&image, "plants.png", size, image.gray16("plants.png")?)?,
+        leaves: sized(&image, "leaves.png", size, image.gray16("leaves.png")?)?,
         coverage,
         depth,
         normals,
         film: None,
+        record,
     })
 }
 
 /// Reads what is known of an image, without its maps.
-pub fn read_record(dataset: &Path, name: &str) -> Result<Record> {
-    let path = dataset.join(folder(name)).join("record.json");
-    let bytes = crate::input::contents(&path).map_err(Error::io(&path))?;
+pub(super) fn record(files: &(impl Files + ?Sized), name: &str) -> Result<Record> {
+    let path = format!("{}/record.json", folder(name));
+    let place = files.place(&path);
+    let bytes = files.contents(&path).map_err(Error::io(&place))?;
     let record: Record = serde_json::from_slice(&bytes)
-        .map_err(|e| Error::damaged(format!("this is no record: {e}")).in_file(path.clone()))?;
+        .map_err(|e| Error::damaged(format!("this is no record: {e}")).in_file(place.clone()))?;
     // Formats name their files by it.
     if record.name != name || image_name(record.index) != name {
         return Err(Error::damaged(format!("this is the record of image `{}`, number {}", record.name, record.index))
             .help(format!("restore the one of image {name}, or render it again"))
-            .in_file(path));
+            .in_file(place));
     }
     Ok(record)
+}
+
+/// The values of a picture that has its record's size.
+fn sized<T>(
+    image: &Image<'_, impl Files + ?Sized>,
+    file: &str,
+    size: (u32, u32),
+    (w, h, values): (u32, u32, Vec<T>),
+) -> Result<Vec<T>> {
+    check(&image.place(file), size, (w, h))?;
+    Ok(values)
 }
 
 fn check(path: &Path, expected: (u32, u32), found: (u32, u32)) -> Result<()> {
@@ -147,4 +249,30 @@ fn check(path: &Path, expected: (u32, u32), found: (u32, u32)) -> Result<()> {
     }
     let ((w, h), (x, y)) = (expected, found);
     Err(Error::damaged(format!("it has {x} × {y} pixels, its record says {w} × {h}")).in_file(path))
+}
+
+/// Names of an image's files, in the order in which [`files`] makes them and archives hold them: what is known of it comes last.
+const ORDER: [&str; 10] = [
+    "rgb.png",
+    "nir.png",
+    "semantics.png",
+    "species.png",
+    "parts.png",
+    "plants.png",
+    "leaves.png",
+    "coverage.png",
+    "geometry.exr",
+    "record.json",
+];
+
+/// Whether a file is an image's own, and of no format.
+pub(super) fn is_native(path: &str) -> bool {
+    path.starts_with("images/")
+}
+
+/// Paths of an image's own files in the order of archives.
+pub(super) fn in_order<'a>(paths: impl Iterator<Item = &'a String>) -> Vec<&'a String> {
+    let mut all: Vec<&String> = paths.collect();
+    all.sort_by_key(|path| ORDER.iter().position(|name| path.ends_with(&format!("/{name}"))));
+    all
 }

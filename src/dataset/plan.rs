@@ -9,7 +9,7 @@ use super::labels::Labels;
 use super::recipe::{FILE, Made, Recipe, Rendering};
 use super::set::Set;
 use super::split::Shares;
-use super::{File, checksum_record, format};
+use super::{File, checksum_record, format, pack};
 use crate::ablation::{Edit, FULL};
 use crate::job::{Renderer, SceneFile};
 use crate::settings::RenderOptions;
@@ -39,6 +39,8 @@ pub struct Order {
     pub keep: Vec<Kept>,
     /// How the images are split.
     pub split: Shares,
+    /// Images of an archive, instead of a folder each; a multiple of the images of a field.
+    pub pack: Option<u64>,
     /// What others may do with them.
     pub licence: String,
     /// How the images are rendered, before the edit; a fixed number of samples.
@@ -62,6 +64,7 @@ impl Order {
             labelling: Labelling::default(),
             keep: Kept::USUAL.to_vec(),
             split: Shares::default(),
+            pack: None,
             licence: Self::NO_LICENCE.into(),
             options: RenderOptions::default(),
             edit: &FULL,
@@ -81,7 +84,7 @@ const MOST_SPECIES: usize = u8::MAX as usize;
 pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
     let Draft { recipe, files, warnings, .. } = draft(order, &Arc::default())?;
     let recipe = begin(folder, recipe, &files)?;
-    Ok((Set { folder: folder.into(), recipe }, warnings))
+    Ok((Set::new(folder, recipe), warnings))
 }
 
 /// A dataset that was checked and not begun.
@@ -147,11 +150,13 @@ pub(super) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
         split: order.split,
         formats: order.formats.clone(),
         labelling: order.labelling.clone(),
+        pack: order.pack,
         licence: order.licence.clone(),
         species: field.species.clone(),
     };
     Labels::of(&recipe)?;
     format::check_maps(&recipe)?;
+    pack::check(&recipe)?;
     let mut told = field.warnings.clone();
     told.extend(warnings(&recipe)?);
     let scene_sha256 = field.hash.clone();
@@ -217,7 +222,7 @@ pub fn add_formats(set: &mut Set, names: &[String], labelling: &Labelling) -> Re
              added; `trace dataset finish --help` lists them",
         ));
     }
-    format::check_maps(&recipe).map_err(|e| e.in_file(&set.folder))?;
+    format::check_maps(&recipe).and_then(|()| pack::check(&recipe)).map_err(|e| e.in_file(&set.folder))?;
     let warnings = warnings(&recipe)?;
     checksum_record::write_files(&set.folder, &[File { path: FILE.into(), bytes: recipe.text()? }])?;
     set.recipe = recipe;

@@ -6,6 +6,7 @@
 use super::classes::Classes;
 use super::keep::Kept;
 use super::labelling::Labelling;
+use super::pack::Packing;
 use super::split::{Shares, Split};
 use crate::ablation::{self, Edit};
 use crate::input::{Scope, below};
@@ -32,6 +33,9 @@ pub struct Recipe {
     /// Classes of the formats, and what they leave out.
     #[serde(default, skip_serializing_if = "Labelling::is_usual")]
     pub labelling: Labelling,
+    /// Images of an archive, where they do not lie in folders of their own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pack: Option<u64>,
     /// What others may do with it, in its owner's words.
     pub licence: String,
     /// The species that `species.png` numbers from 1.
@@ -178,7 +182,7 @@ impl Recipe {
     /// What decides the bytes of an image's native files: SHA-256 of the recipe without its length, formats and words.
     pub fn fingerprint(&self) -> Result<String> {
         let (formats, labelling, licence) = (Vec::new(), Labelling::default(), String::new());
-        let same = Self { count: 0, formats, labelling, licence, ..self.clone() };
+        let same = Self { count: 0, formats, labelling, pack: None, licence, ..self.clone() };
         Ok(hex::encode(Sha256::digest(json(&same)?)))
     }
 
@@ -192,6 +196,7 @@ impl Recipe {
             split: Shares::default(),
             formats: Vec::new(),
             labelling: Labelling::default(),
+            pack: None,
             licence: String::new(),
             species,
         }
@@ -208,6 +213,19 @@ impl Recipe {
     /// The field that an image shows, and which image of it this is.
     pub fn field_of(&self, index: u64) -> (u64, u64) {
         (index / self.captures(), index % self.captures())
+    }
+
+    /// What the shards of a run share out, by number: fields, or packs where images lie in such.
+    pub fn unit_of(&self, index: u64) -> u64 {
+        match Packing::of(self) {
+            Some(packing) => packing.place(packing.id(index)),
+            None => self.field_of(index).0,
+        }
+    }
+
+    /// How many of them there are.
+    pub fn units(&self) -> u64 {
+        Packing::of(self).map_or(self.count, |packing| packing.all().count() as u64)
     }
 
     /// The split of an image: all images of a field are in one.
@@ -264,6 +282,8 @@ impl Recipe {
         let differs: Vec<String> = keys
             .into_iter()
             .filter(|key| !free.contains(&key.as_str()) && before.get(*key) != now.get(*key))
+            // Images that lie in folders may be packed later.
+            .filter(|key| *key != "pack" || self.pack.is_some())
             .map(|key| format!("{key} {} there, {} here", value(&before, key), value(&now, key)))
             .collect();
         if differs.is_empty() && other.count >= self.count {

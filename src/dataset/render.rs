@@ -86,7 +86,7 @@ pub struct LastField(Option<Field>);
 impl LastField {
     /// The field that an image of a dataset shows, as that image has it, and how long it took to grow and build it now.
     pub(super) fn at(&mut self, set: &Set, scene_file: &SceneFile, index: u64) -> Result<(&Field, Duration)> {
-        let Set { folder, recipe } = set;
+        let Set { folder, recipe, .. } = set;
         let rendering = recipe.rendering()?;
         let (number, capture) = recipe.field_of(index);
         let known = self.0.take().filter(|field| field.grown().index == number);

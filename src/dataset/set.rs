@@ -1,17 +1,23 @@
 //! A dataset that lies in a folder: its recipe, its images by name, the files that belong to all of them.
 
+use super::archive::entry_name;
 use super::checksum::Checksum;
-use super::native;
+use super::checksum_record::ChecksumRecord;
+use super::native::{self, Files};
+use super::pack::record::Packs;
+use super::pack::{Id, Packing};
 use super::recipe::Recipe;
 use super::record::Record;
+use super::sample::Sample;
 use super::split::Split;
 use crate::input::below;
 use crate::output::stream_atomically;
 use crate::{Error, Result};
+use rayon::prelude::*;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// A dataset on disk.
@@ -21,12 +27,19 @@ pub struct Set {
     pub folder: PathBuf,
     /// What makes it.
     pub recipe: Recipe,
+    /// Archives that images lie in.
+    pub(super) packs: Packs,
 }
 
 impl Set {
+    /// The dataset of this recipe in a folder.
+    pub fn new(folder: &Path, recipe: Recipe) -> Self {
+        Self { folder: folder.into(), recipe, packs: Packs::default() }
+    }
+
     /// Opens the dataset in a folder.
     pub fn open(folder: &Path) -> Result<Self> {
-        Ok(Self { folder: folder.into(), recipe: Recipe::read(folder)? })
+        Ok(Self::new(folder, Recipe::read(folder)?))
     }
 
     /// The name of an image: its number in six digits or more.
@@ -39,15 +52,120 @@ impl Set {
         (0..self.recipe.count).filter(|k| self.recipe.split_of(*k) == split).map(Self::name).collect()
     }
 
-    /// The records of a split's images, read one by one in the order of their numbers.
+    /// The records of a split's images, read in the order of their numbers.
     pub fn records(&self, split: Split) -> impl Iterator<Item = Result<Record>> + '_ {
-        self.names(split).into_iter().map(|name| native::read_record(&self.folder, &name))
+        in_parallel((0..self.recipe.count).filter(move |k| self.recipe.split_of(*k) == split), |k| self.record(k))
     }
 
-    /// The records of all images, read one by one in the order of their numbers.
+    /// The records of all images, read in the order of their numbers.
     pub fn all(&self) -> impl Iterator<Item = Result<Record>> + '_ {
-        (0..self.recipe.count).map(|k| native::read_record(&self.folder, &Self::name(k)))
+        in_parallel(0..self.recipe.count, |k| self.record(k))
     }
+
+    /// The checksums of all images in the order of their numbers; `None` for those that are not there.
+    pub(super) fn all_checksums(&self) -> impl Iterator<Item = Option<ChecksumRecord>> + '_ {
+        in_parallel(0..self.recipe.count, |k| self.checksums(k))
+    }
+
+    /// An image.
+    pub fn sample(&self, index: u64) -> Result<Sample> {
+        native::sample(self, &Self::name(index))
+    }
+
+    /// What is known of an image, without its maps.
+    pub fn record(&self, index: u64) -> Result<Record> {
+        native::record(self, &Self::name(index))
+    }
+
+    /// The checksums of an image, in its folder or in its pack; `None` where there are none or they are damaged.
+    pub fn checksums(&self, index: u64) -> Option<ChecksumRecord> {
+        ChecksumRecord::read(&self.folder, index).or_else(|| {
+            let id = Packing::of(&self.recipe)?.id(index);
+            self.packs.get(&self.folder, id)?.image(index).cloned()
+        })
+    }
+
+    /// The files of an image that are missing or changed, each with what is wrong with it.
+    pub fn faults(&self, image: &ChecksumRecord) -> Vec<(String, String)> {
+        self.faults_where(image, |_| true)
+    }
+
+    /// The same of the files that lie beside packs: those of formats.
+    pub(super) fn faults_beside_packs(&self, image: &ChecksumRecord) -> Vec<(String, String)> {
+        self.faults_where(image, |path| !native::is_native(path))
+    }
+
+    fn faults_where(&self, image: &ChecksumRecord, which: impl Fn(&str) -> bool) -> Vec<(String, String)> {
+        let fault = |(path, sum): (&String, &Checksum)| match below(&self.folder, path) {
+            Ok(_) => Some((path.clone(), sum.fault_of(self.length(path), || self.contents(path))?)),
+            Err(_) => Some((path.clone(), "does not lie in the dataset's folder".into())),
+        };
+        image.files.iter().filter(|(path, _)| which(path)).filter_map(fault).collect()
+    }
+
+    /// Length of a file of an image, which lies in the dataset's folder or in a pack.
+    pub(super) fn length(&self, path: &str) -> io::Result<u64> {
+        self.find(
+            path,
+            |full| {
+                let about = std::fs::metadata(full)?;
+                if about.is_file() { Ok(about.len()) } else { Err(io::ErrorKind::IsADirectory.into()) }
+            },
+            |packs, id| packs.length(&self.folder, id, path),
+        )
+    }
+
+    /// First in the folder, for what lies there is made anew; then in the pack.
+    fn find<T>(
+        &self,
+        path: &str,
+        in_folder: impl FnOnce(&Path) -> io::Result<T>,
+        in_pack: impl FnOnce(&Packs, Id) -> io::Result<T>,
+    ) -> io::Result<T> {
+        match in_folder(&self.folder.join(path)) {
+            Err(e) if e.kind() == io::ErrorKind::NotFound => match self.pack_of(path) {
+                Some(id) => in_pack(&self.packs, id),
+                None => Err(e),
+            },
+            other => other,
+        }
+    }
+
+    /// The pack that a file belongs into.
+    fn pack_of(&self, path: &str) -> Option<Id> {
+        let packing = Packing::of(&self.recipe)?;
+        let (name, _) = path.strip_prefix("images/")?.split_once('/')?;
+        Some(packing.id(name.parse().ok()?))
+    }
+}
+
+impl Files for Set {
+    fn contents(&self, path: &str) -> io::Result<Vec<u8>> {
+        self.find(path, crate::input::contents, |packs, id| packs.contents(&self.folder, id, path))
+    }
+
+    fn place(&self, path: &str) -> PathBuf {
+        let full = self.folder.join(path);
+        match self.pack_of(path) {
+            Some(id) if !full.exists() => self.folder.join(id.path()).join(entry_name(path)),
+            _ => full,
+        }
+    }
+}
+
+/// Images that are read at once: enough for all threads, and little memory.
+const AT_ONCE: usize = 256;
+
+/// What is read of each image, in the order of the numbers; several at once.
+fn in_parallel<'a, T: Send + 'a>(
+    mut numbers: impl Iterator<Item = u64> + 'a,
+    read: impl Fn(u64) -> T + Sync + 'a,
+) -> impl Iterator<Item = T> + 'a {
+    let next = move || {
+        let some: Vec<u64> = numbers.by_ref().take(AT_ONCE).collect();
+        (!some.is_empty()).then(|| some.into_par_iter().map(&read).collect::<Vec<T>>())
+    };
+    std::iter::from_fn(next).flatten()
 }
 
 /// Where the files that belong to all images go; keeps what tells them.
@@ -81,12 +199,17 @@ impl<'a> Whole<'a> {
 /// A file under way.
 pub struct Stream<'a> {
     path: &'a Path,
-    file: &'a mut dyn Write,
+    file: &'a mut (dyn Write + Send),
     hash: Sha256,
     bytes: u64,
 }
 
 impl Stream<'_> {
+    /// Bytes so far.
+    pub(super) fn written(&self) -> u64 {
+        self.bytes
+    }
+
     /// Adds text or bytes.
     pub fn put(&mut self, bytes: impl AsRef<[u8]>) -> Result<()> {
         self.write_all(bytes.as_ref()).map_err(Error::io(self.path))
@@ -109,14 +232,14 @@ impl Stream<'_> {
 }
 
 impl Write for Stream<'_> {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let n = self.file.write(bytes)?;
         self.hash.update(&bytes[..n]);
         self.bytes += n as u64;
         Ok(n)
     }
 
-    fn flush(&mut self) -> std::io::Result<()> {
+    fn flush(&mut self) -> io::Result<()> {
         self.file.flush()
     }
 }

@@ -5,7 +5,7 @@
 
 use super::checksum_record::ChecksumRecord;
 use super::generate::{Task, remaining};
-use super::native;
+use super::push::{self, Unit};
 use super::recipe::compact;
 use super::set::Set;
 use super::timing_log::{self, End, ImageFailure, ImageTiming, Row, RunLog};
@@ -122,7 +122,7 @@ impl Status {
         let runs: Vec<Run<'_>> = logs.iter().map(Run::of).collect();
         let of = shards.unwrap_or_else(|| last_shards(&runs)).max(1);
         let there = there(set, stop)?;
-        let shard_of = |index: u64| set.recipe.field_of(index).0 % of;
+        let shard_of = |index: u64| set.recipe.unit_of(index) % of;
         let lacks = |index: u64| there.get(usize::try_from(index).unwrap_or(usize::MAX)) == Some(&false);
         let failures: Vec<FailedImage> = failures(&logs)
             .into_values()
@@ -289,22 +289,24 @@ fn last_shards(runs: &[Run<'_>]) -> u64 {
 
 /// Of each image, whether it is there.
 fn there(set: &Set, stop: &AtomicBool) -> Result<Vec<bool>> {
+    let freed = push::freed(set);
     let look = |index: u64| {
         if stop.load(Ordering::Relaxed) {
             return Err(Error::stopped("stopped looking; nothing was changed"));
         }
-        let Some(checksums) = ChecksumRecord::read(&set.folder, index) else { return Ok(false) };
-        Ok(remaining(set, &checksums)? == Task::Done && has_files(set, &checksums))
+        let Some(checksums) = set.checksums(index) else { return Ok(false) };
+        let is_there = || has_files(set, &checksums) || freed.contains(&Unit::of(set, index).name());
+        Ok(remaining(set, &checksums)? == Task::Done && is_there())
     };
     (0..set.recipe.count).into_par_iter().map(look).collect()
 }
 
 /// Whether the files that checksums name are there, as long as they say.
 fn has_files(set: &Set, checksums: &ChecksumRecord) -> bool {
-    checksums.files.iter().all(|(path, sum)| {
-        let about = below(&set.folder, path).ok().and_then(|full| std::fs::metadata(full).ok());
-        about.is_some_and(|about| about.is_file() && about.len() == sum.bytes)
-    })
+    checksums
+        .files
+        .iter()
+        .all(|(path, sum)| below(&set.folder, path).is_ok() && set.length(path).is_ok_and(|length| length == sum.bytes))
 }
 
 /// What each image last failed of.
@@ -338,7 +340,7 @@ fn slowest(set: &Set, logs: &[RunLog]) -> Vec<SlowImage> {
         grow_s: image.grow_s,
         draw_s: image.draw_s,
         label_s: image.label_s,
-        plants: native::read_record(&set.folder, &Set::name(image.index)).ok().map(|record| record.plants.len()),
+        plants: set.record(image.index).ok().map(|record| record.plants.len()),
     });
     told.collect()
 }

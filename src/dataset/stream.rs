@@ -1,9 +1,10 @@
 //! The images of a dataset that is never written: as a tar archive, one after another, for a program that reads them as they are made.
 //!
-//! Files are named as the package `webdataset` groups them: `000123.rgb.png` is `images/000123/rgb.png` of the dataset, `000123` its key.
+//! Files are named as in a dataset's [packs](super::pack).
 //! Images are made by several workers and leave in the order of their indices. Those that are finished before their turn wait, and no
 //! worker begins another while so many are under way or waiting: the reader decides how fast.
 
+use super::archive::append;
 use super::generate::{Shard, Work, fitting, share, together};
 use super::plan::{Order, plan};
 use super::recipe::MOST_IMAGES;
@@ -62,7 +63,7 @@ impl ImageStream {
     /// Makes the images of a shard and writes them to `out`; returns how many were written. That nobody reads them any longer is no
     /// failure. Fields that cannot be made are left out: told when it happens, and as the error at the end. After
     /// [`MOST_LEFT_OUT`] in a row it ends. Stopped, it returns [`Kind::Interrupted`].
-    pub fn write(&self, work: &Work, out: impl Write + Send + 'static, listener: &Listener<'_>) -> Result<u64> {
+    pub fn write(&self, work: &Work<'_>, out: impl Write + Send + 'static, listener: &Listener<'_>) -> Result<u64> {
         let set = &self.set;
         let Some(renderer) = renderer(set)? else { return Ok(0) };
         let stop = Arc::<AtomicBool>::default();
@@ -105,7 +106,7 @@ impl ImageStream {
     }
 
     /// The threads, shared out among the images under way at once.
-    fn workers(&self, work: &Work, scene: &SceneFile) -> Result<Vec<Threads>> {
+    fn workers(&self, work: &Work<'_>, scene: &SceneFile) -> Result<Vec<Threads>> {
         let threads = Threads::new(work.threads)?.count();
         let (first, _) = self.set.recipe.field_of(self.indices.start);
         let at_once = match work.at_once {
@@ -341,31 +342,12 @@ fn archive(queue: &Queue, out: impl Write, tell: &Sender<Said>) -> io::Result<()
         };
         left_out = 0;
         for file in &files {
-            archive.append(&header(file)?, &*file.bytes)?;
+            append(&mut archive, &file.path, &file.bytes)?;
         }
         archive.get_mut().flush()?;
         let _ = tell.send(Said::Written(index));
     }
     archive.into_inner()?.flush()
-}
-
-/// A file's header, which tells nothing of this machine.
-fn header(file: &File) -> io::Result<tar::Header> {
-    let mut header = tar::Header::new_ustar();
-    header.set_path(entry_name(&file.path))?;
-    header.set_size(file.bytes.len() as u64);
-    header.set_entry_type(tar::EntryType::Regular);
-    header.set_mode(0o644);
-    header.set_uid(0);
-    header.set_gid(0);
-    header.set_mtime(0);
-    header.set_cksum();
-    Ok(header)
-}
-
-/// The name in the archive of a native file: `images/000123/rgb.png` is `000123.rgb.png`.
-fn entry_name(path: &str) -> String {
-    path.trim_start_matches("images/").replace('/', ".")
 }
 
 #[cfg(test)]
@@ -410,14 +392,5 @@ mod tests {
         archive(&queue, io::sink(), &tell).unwrap();
         drop(tell);
         assert_eq!(told.iter().count(), 1, "5 is written, 30 comes after more than twenty");
-    }
-
-    #[test]
-    fn an_archive_tells_nothing_of_its_machine() {
-        let header = header(&File { path: "images/000000/rgb.png".into(), bytes: vec![7; 3] }).unwrap();
-        assert_eq!(header.path().unwrap().to_str(), Some("000000.rgb.png"));
-        let numbers = (header.mtime().unwrap(), header.uid().unwrap(), header.gid().unwrap(), header.mode().unwrap());
-        assert_eq!(numbers, (0, 0, 0, 0o644));
-        assert_eq!((header.username().unwrap(), header.groupname().unwrap()), (Some(""), Some("")));
     }
 }

@@ -1,14 +1,15 @@
 //! Whether a dataset is whole and is what it says it is.
 
 use super::checksum::Checksum;
-use super::checksum_record::ChecksumRecord;
 use super::difference::Difference;
-use super::finish::{MANIFEST, lacks, ranges};
+use super::finish::{MANIFEST, lacks, of_image, ranges};
 use super::generate::Task;
+use super::native::Files;
+use super::pack::{Id, Packing};
 use super::render::{LastField, RenderedSample, render, scene_file};
 use super::set::Set;
 use super::split::Split;
-use super::{File, format, generate, invariants, native, timing_log};
+use super::{File, format, generate, invariants, native, push, timing_log};
 use crate::input::below;
 use crate::job::{Renderer, Threads};
 use crate::render::Watch;
@@ -86,6 +87,7 @@ pub fn verify(
     done: &(dyn Fn(u64) + Sync),
     stop: &AtomicBool,
 ) -> Result<Findings> {
+    push::refuse_freed(set)?;
     let count = set.recipe.count;
     let look_at = |index: u64| {
         if stop.load(std::sync::atomic::Ordering::Relaxed) {
@@ -105,6 +107,7 @@ pub fn verify(
         }
         found.faults.extend(looked.faults.iter().cloned());
     }
+    found.faults.extend(threads.install(|| in_archives(set)));
     found.faults.extend(shared_between_splits(set, &looked));
     found.faults.extend(made_differently(set)?);
     if found.missing.is_empty() {
@@ -141,18 +144,18 @@ struct Looked {
 
 fn look(set: &Set, index: u64) -> Result<Looked> {
     let name = Set::name(index);
-    let Some(checksums) = ChecksumRecord::read(&set.folder, index) else {
+    let Some(checksums) = set.checksums(index) else {
         return Ok(Looked { missing: true, faults: Vec::new(), photograph: None });
     };
     let mut faults: Vec<String> =
-        checksums.faults(&set.folder).into_iter().map(|(path, fault)| format!("{path} {fault}")).collect();
+        set.faults(&checksums).into_iter().map(|(path, fault)| format!("{path} {fault}")).collect();
     let mut missing = !faults.is_empty();
     if !missing && generate::remaining(set, &checksums)? != Task::Done {
         missing = true;
         faults.push(format!("image {name}: it was made by another recipe, or lacks a format"));
     }
     if !missing {
-        match native::read(&set.folder, &name) {
+        match set.sample(index) {
             Ok(sample) => {
                 let broken = invariants::faults(&set.recipe, &sample);
                 faults.extend(broken.into_iter().map(|fault| format!("image {name}: {fault}")));
@@ -162,6 +165,21 @@ fn look(set: &Set, index: u64) -> Result<Looked> {
     }
     let photograph = checksums.files.get(&format!("{}/rgb.png", native::folder(&name))).map(|p| p.sha256.clone());
     Ok(Looked { missing, faults, photograph })
+}
+
+/// Archives of images that were changed, or are not written yet.
+fn in_archives(set: &Set) -> Vec<String> {
+    let Some(packing) = Packing::of(&set.recipe) else { return Vec::new() };
+    let all: Vec<Id> = packing.all().collect();
+    let fault = |id: &Id| {
+        let path = id.path();
+        let fault = match set.packs.get(&set.folder, *id) {
+            Some(record) => record.tar.fault(&set.folder.join(&path))?,
+            None => "is not written yet, or its record in seals/ is damaged".into(),
+        };
+        Some(format!("{path} {fault}"))
+    };
+    all.par_iter().filter_map(fault).collect()
 }
 
 /// Photographs that are in two splits.
@@ -212,8 +230,8 @@ fn listed(set: &Set) -> Result<Vec<String>> {
         Err(e) => return Ok(vec![format!("{MANIFEST} is damaged: {e}")]),
     };
     let mut sealed: BTreeMap<String, Checksum> = BTreeMap::new();
-    for index in 0..set.recipe.count {
-        sealed.extend(ChecksumRecord::read(&set.folder, index).map(|s| s.files).unwrap_or_default());
+    for image in set.all_checksums().flatten() {
+        sealed.extend(of_image(&set.recipe, &image).map(|(path, sum)| (path.clone(), sum.clone())));
     }
     let mut faults = Vec::new();
     for (path, sum) in &listed.files {
@@ -248,7 +266,7 @@ fn other_bytes(set: &Set, made: &RenderedSample) -> Result<Option<String>> {
     for (_, format) in format::all(&set.recipe)? {
         files.extend(format.image(&set.recipe, &made.sample)?);
     }
-    let differs = |file: &&File| !Checksum::of(&file.bytes).holds(&set.folder.join(&file.path));
+    let differs = |file: &&File| set.contents(&file.path).ok().as_ref() != Some(&file.bytes);
     let wrong: Vec<&str> = files.iter().filter(differs).map(|f| f.path.as_str()).collect();
     Ok((!wrong.is_empty()).then(|| format!("rendered again, these come out otherwise: {}", wrong.join(", "))))
 }
@@ -256,7 +274,7 @@ fn other_bytes(set: &Set, made: &RenderedSample) -> Result<Option<String>> {
 /// That an image comes out further away than other kernels explain.
 fn too_far(set: &Set, made: &RenderedSample, kernels: &mut OtherKernels) -> Result<Option<String>> {
     let name = &made.sample.record.name;
-    let difference = Difference::between(&native::read(&set.folder, name)?, &made.sample);
+    let difference = Difference::between(&set.sample(made.sample.record.index)?, &made.sample);
     kernels.most = kernels.most.max(difference);
     let fault = || {
         format!(

@@ -26,7 +26,7 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
 }
 
 /// Writes a file piece by piece, whole or not at all, as [`write_atomically`] does.
-pub fn stream_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
+pub fn stream_atomically(path: &Path, write: impl FnOnce(&mut (dyn Write + Send)) -> Result<()>) -> Result<()> {
     let mut file = unfinished(path, write)?;
     for _ in 0..MOST_AGAIN {
         match file.persist(path) {
@@ -168,7 +168,7 @@ pub fn write_together(folder: &Path, add: impl Fn(&mut Together) -> Result<()>) 
 }
 
 /// A whole file under a temporary name beside its target.
-fn unfinished(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<NamedTempFile> {
+fn unfinished(path: &Path, write: impl FnOnce(&mut (dyn Write + Send)) -> Result<()>) -> Result<NamedTempFile> {
     let mut buffer = io::BufWriter::with_capacity(1 << 16, temporary(path)?);
     write(&mut buffer)?;
     let file = buffer.into_inner().map_err(|e| Error::io(path)(e.into_error()))?;

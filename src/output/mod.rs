@@ -21,8 +21,13 @@ pub use self::atomic::{
     Together, create_atomically, is_unfinished, place_atomically, remove_unfinished, remove_unfinished_in,
     stream_atomically, write_atomically, write_together,
 };
-pub use self::exr::{Geometry, Precision, encode_geometry, encode_layers, encode_planes, half, read_geometry};
-pub use self::png::{Map, Picture, encode as encode_png, read_gray, read_gray16, read_indexed, read_map, read_rgb};
+pub use self::exr::{
+    Geometry, Precision, decode_geometry, encode_geometry, encode_layers, encode_planes, half, read_geometry,
+};
+pub use self::png::{
+    Map, Picture, decode_gray, decode_gray16, decode_indexed, decode_rgb, encode as encode_png, read_gray, read_gray16,
+    read_indexed, read_map, read_rgb,
+};
 pub use denoise::Denoiser;
 pub use photo::{encode_jpeg, photo_size, read_color_photo, read_gray_photo, read_photo, resize_gray, shrink, shrunk};
 

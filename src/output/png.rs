@@ -73,21 +73,23 @@ pub fn encode(width: u32, height: u32, picture: &Picture<'_>, text: &str) -> Res
     Ok(bytes)
 }
 
-fn read(path: &Path, depth: BitDepth, color: ColorType, what: &str) -> Result<(u32, u32, Vec<u8>)> {
+fn decode(path: &Path, bytes: &[u8], depth: BitDepth, color: ColorType, what: &str) -> Result<(u32, u32, Vec<u8>)> {
     let wrong = |e: &dyn std::fmt::Display| Error::input(e.to_string()).in_file(path);
-    let file = input::open(path).map_err(|refusal| refusal.into_error(path))?;
-    let bytes = file.metadata().map_err(Error::reading(path))?.len();
-    let mut decoder = png::Decoder::new(std::io::BufReader::new(file));
+    let mut decoder = png::Decoder::new(std::io::Cursor::new(bytes));
     decoder.set_transformations(png::Transformations::IDENTITY);
     let mut reader = decoder.read_info().map_err(|e| wrong(&e))?;
     let (w, h) = (reader.info().width, reader.info().height);
     if reader.info().bit_depth != depth || reader.info().color_type != color {
         return Err(wrong(&format!("it is not {what}")));
     }
-    let size = plausible(reader.output_buffer_size(), (w, h), bytes).map_err(|what| wrong(&what))?;
+    let size = plausible(reader.output_buffer_size(), (w, h), bytes.len() as u64).map_err(|what| wrong(&what))?;
     let mut data = vec![0; size];
     reader.next_frame(&mut data).map_err(|e| wrong(&e))?;
     Ok((w, h, data))
+}
+
+fn whole(path: &Path) -> Result<Vec<u8>> {
+    input::read(path, input::LARGEST).map_err(|refusal| refusal.into_error(path))
 }
 
 /// Bytes that a byte of a PNG may stand for: deflate has at most 1032.
@@ -101,23 +103,43 @@ fn plausible(size: Option<usize>, (w, h): (u32, u32), bytes: u64) -> Result<usiz
 
 /// Reads an 8-bit indexed PNG: width, height, indices.
 pub fn read_indexed(path: &Path) -> Result<(u32, u32, Vec<u8>)> {
-    read(path, BitDepth::Eight, ColorType::Indexed, "an 8-bit indexed PNG")
+    decode_indexed(path, &whole(path)?)
+}
+
+/// The same from its bytes; errors name `path`.
+pub fn decode_indexed(path: &Path, bytes: &[u8]) -> Result<(u32, u32, Vec<u8>)> {
+    decode(path, bytes, BitDepth::Eight, ColorType::Indexed, "an 8-bit indexed PNG")
 }
 
 /// Reads an 8-bit gray PNG: width, height, numbers.
 pub fn read_gray(path: &Path) -> Result<(u32, u32, Vec<u8>)> {
-    read(path, BitDepth::Eight, ColorType::Grayscale, "an 8-bit gray PNG")
+    decode_gray(path, &whole(path)?)
+}
+
+/// The same from its bytes; errors name `path`.
+pub fn decode_gray(path: &Path, bytes: &[u8]) -> Result<(u32, u32, Vec<u8>)> {
+    decode(path, bytes, BitDepth::Eight, ColorType::Grayscale, "an 8-bit gray PNG")
 }
 
 /// Reads an 8-bit RGB PNG: width, height, three numbers a pixel.
 pub fn read_rgb(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
-    let (w, h, bytes) = read(path, BitDepth::Eight, ColorType::Rgb, "an 8-bit RGB PNG")?;
+    decode_rgb(path, &whole(path)?)
+}
+
+/// The same from its bytes; errors name `path`.
+pub fn decode_rgb(path: &Path, bytes: &[u8]) -> Result<(u32, u32, Vec<[u8; 3]>)> {
+    let (w, h, bytes) = decode(path, bytes, BitDepth::Eight, ColorType::Rgb, "an 8-bit RGB PNG")?;
     Ok((w, h, bytes.as_chunks::<3>().0.to_vec()))
 }
 
 /// Reads a 16-bit gray PNG: width, height, numbers.
 pub fn read_gray16(path: &Path) -> Result<(u32, u32, Vec<u16>)> {
-    let (w, h, bytes) = read(path, BitDepth::Sixteen, ColorType::Grayscale, "a 16-bit gray PNG")?;
+    decode_gray16(path, &whole(path)?)
+}
+
+/// The same from its bytes; errors name `path`.
+pub fn decode_gray16(path: &Path, bytes: &[u8]) -> Result<(u32, u32, Vec<u16>)> {
+    let (w, h, bytes) = decode(path, bytes, BitDepth::Sixteen, ColorType::Grayscale, "a 16-bit gray PNG")?;
     Ok((w, h, bytes.chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]])).collect()))
 }
 

@@ -59,12 +59,24 @@ pub fn emit(set: &Set, job: &Job, folder: &Path) -> Result<(Vec<PathBuf>, Vec<St
 fn check(set: &Set, job: &Job) -> Result<()> {
     set.recipe.rendering()?;
     let fault = |words: String, help: &str| Err(Error::misuse(words).help(help));
-    if job.shards > set.recipe.count {
-        let words = format!("{} shards of {} images: some would be empty", job.shards, set.recipe.count);
+    let units = set.recipe.units();
+    if job.shards > units {
+        let what = if set.recipe.pack.is_some() { "packs" } else { "images" };
+        let words = format!("{} shards of {units} {what}: some would be empty", job.shards);
         return fault(words, "give fewer --shards; a shard should last minutes");
     }
     if let Scheduler::Kubernetes(pod) = &job.scheduler {
         pod.check()?;
+    }
+    if let Some(push) = &job.push {
+        push.check()?;
+        if push.free {
+            return fault("--push-free leaves nothing for the job that finishes".into(), "leave it out here");
+        }
+        if matches!(job.scheduler, Scheduler::Kubernetes(_)) {
+            let help = "write --push into the command of render.yaml by hand";
+            return fault("--push is for slurm and parallel".into(), help);
+        }
     }
     if job.grace >= job.time {
         let words = format!("--grace {} leaves nothing of --time {} s", job.grace.as_secs(), job.time.as_secs());

@@ -1,5 +1,7 @@
 //! What is asked of a scheduler.
 
+use super::script::quoted;
+use crate::dataset::push::Push;
 use crate::{Error, Result};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -66,6 +68,21 @@ pub struct Job {
     pub again: u64,
     /// The program, as the machines see it.
     pub program: PathBuf,
+    /// How what is finished is sent elsewhere.
+    pub push: Option<Push>,
+}
+
+impl Job {
+    /// What scripts write behind `render` and `finish`: nothing where nothing is pushed.
+    pub(super) fn pushing(&self) -> String {
+        let Some(Push { command, check, free, tries }) = &self.push else { return String::new() };
+        let mut words = format!(" --push {} --push-tries {tries}", quoted(command));
+        words.extend(check.iter().map(|check| format!(" --push-check {}", quoted(check))));
+        if *free {
+            words += " --push-free";
+        }
+        words
+    }
 }
 
 #[cfg(test)]

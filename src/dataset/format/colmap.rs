@@ -20,6 +20,10 @@ pub(super) struct Writer;
 const FOLDER: &str = "colmap";
 
 impl OfFields for Writer {
+    fn names_photographs(&self) -> bool {
+        true
+    }
+
     fn field(&self, _set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
         let folder = format!("{FOLDER}/{name}");
         out.file(&format!("{folder}/cameras.txt"), |w| w.put(cameras(images)))?;

@@ -1,7 +1,6 @@
 //! The images of a field with their cameras: what formats of poses and tracks are made of.
 
 use super::{Format, Whole};
-use crate::dataset::native;
 use crate::dataset::recipe::Recipe;
 use crate::dataset::record::{CaptureRecord, Record};
 use crate::dataset::set::Set;
@@ -22,6 +21,11 @@ pub(super) struct Taken {
 pub(super) trait OfFields: Sync {
     /// The files of a field of this name.
     fn field(&self, set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()>;
+
+    /// As [`Format::names_photographs`].
+    fn names_photographs(&self) -> bool {
+        false
+    }
 }
 
 impl<T: OfFields> Format for T {
@@ -31,6 +35,10 @@ impl<T: OfFields> Format for T {
 
     fn needs_camera(&self) -> bool {
         true
+    }
+
+    fn names_photographs(&self) -> bool {
+        OfFields::names_photographs(self)
     }
 
     fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
@@ -47,7 +55,7 @@ impl<T: OfFields> Format for T {
 fn images(set: &Set, field: u64) -> Result<Vec<Taken>> {
     let captures = set.recipe.captures();
     let (begin, end) = (field * captures, ((field + 1) * captures).min(set.recipe.count));
-    (begin..end).map(|index| taken(native::read_record(&set.folder, &Set::name(index))?)).collect()
+    (begin..end).map(|index| taken(set.record(index)?)).collect()
 }
 
 fn taken(mut record: Record) -> Result<Taken> {

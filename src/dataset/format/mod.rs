@@ -36,6 +36,11 @@ pub trait Format: Sync {
         &[]
     }
 
+    /// Whether it names the photographs in `images/`, which it does not copy.
+    fn names_photographs(&self) -> bool {
+        false
+    }
+
     /// Whether it tells of cameras, which imported images do not.
     fn needs_camera(&self) -> bool {
         false
@@ -111,6 +116,8 @@ formats! {
         r#"pandas.read_csv("traits/leaves.csv")"#;
     "tum" => tum: "TUM RGB-D trajectories: time, position and quaternion of each camera's images",
         r#"numpy.loadtxt("tum/000000-camera.txt")"#;
+    "voc" => voc: "Pascal VOC: boxes as XML, masks of classes and objects, for `torchvision` and `supervision`",
+        r#"torchvision.datasets.VOCSegmentation("voc", year="2012", image_set="train")[0]"#;
     "yolo" => yolo: "YOLO segmentation: a polygon a plant, with what is lost by it, for Ultralytics and `supervision`",
         r#"supervision.DetectionDataset.from_yolo("yolo/images/train", "yolo/labels/train", "yolo/data.yaml", force_masks=True)"#;
     "yolo-detect" => yolo_detect: "YOLO detection: a box a plant, for Ultralytics and `supervision`",

@@ -20,6 +20,10 @@ pub(super) struct Writer;
 const FOLDER: &str = "nerf";
 
 impl OfFields for Writer {
+    fn names_photographs(&self) -> bool {
+        true
+    }
+
     fn field(&self, _set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
         let mut all = images.first().map(intrinsics).unwrap_or_default();
         all.insert("frames".into(), images.iter().map(frame).collect());

@@ -141,15 +141,16 @@ fn begin(folder: &Path, source: &dyn Source, order: &Order) -> Result<Set> {
         split,
         formats: Vec::new(),
         labelling: Labelling::default(),
+        pack: None,
         licence: order.licence.clone(),
         species: Vec::new(),
     };
-    Ok(Set { folder: folder.into(), recipe: begin::begin(folder, recipe, &[])? })
+    Ok(Set::new(folder, begin::begin(folder, recipe, &[])?))
 }
 
 /// Brings in one image, where it is not there yet.
 fn bring(set: &Set, source: &dyn Source, index: u64) -> Result<()> {
-    let Set { folder, recipe } = set;
+    let Set { folder, recipe, .. } = set;
     let files = match generate::task(set, index)? {
         Task::Done => return Ok(()),
         Task::Formats | Task::All => {

@@ -168,7 +168,7 @@ pub(super) fn reading(recipe: &Recipe, nir: bool) -> Markup {
     rows.push(("record.json", html! { (record) }));
     html! {
         (pairs(&rows))
-        pre { code { (EXAMPLE) } }
+        pre { code { (if recipe.pack.is_some() { PACKED } else { FOLDERS }) (EXAMPLE) } }
         p {
             code { "manifest.json" } " lists every file with its SHA-256; " code { "trace dataset verify DIR" }
             " checks them and every label."
@@ -186,12 +186,20 @@ fn told(name: &str) -> Markup {
     html! { (of(format::NAMES)) br; code { (of(format::READ)) } }
 }
 
-const EXAMPLE: &str = "import json, numpy as np
+const FOLDERS: &str = "import json, numpy as np
 from PIL import Image
-folder = \"images/000000\"
-semantics = np.array(Image.open(f\"{folder}/semantics.png\"))
-plants = np.array(Image.open(f\"{folder}/plants.png\"))
-record = json.load(open(f\"{folder}/record.json\"))
+read = lambda name: open(f\"images/000000/{name}\", \"rb\")
+";
+
+const PACKED: &str = "import json, tarfile, numpy as np
+from PIL import Image
+archive = tarfile.open(\"packs/train-000000.tar\")
+read = lambda name: archive.extractfile(f\"000000.{name}\")
+";
+
+const EXAMPLE: &str = "semantics = np.array(Image.open(read(\"semantics.png\")))
+plants = np.array(Image.open(read(\"plants.png\")))
+record = json.load(read(\"record.json\"))
 for plant in record[\"plants\"]:
     print(plant[\"number\"], plant[\"class\"], plant[\"seen\"][\"pixels\"], np.sum(plants == plant[\"number\"]))
 ";

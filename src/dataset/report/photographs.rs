@@ -1,8 +1,8 @@
 //! How bright the photographs are and of what colour, measured on some of them.
 
+use crate::Result;
 use crate::dataset::{Set, native};
 use crate::report::Tally;
-use crate::{Result, output};
 use rayon::prelude::*;
 
 /// Most images that are measured, spread over the dataset: to decode a hundred thousand would take an hour.
@@ -53,8 +53,8 @@ pub(super) fn measure(set: &Set) -> Result<Photographs> {
 }
 
 fn means(set: &Set, name: &str) -> Result<Means> {
-    let folder = set.folder.join(native::folder(name));
-    let (_, _, rgb) = output::read_rgb(&folder.join("rgb.png"))?;
+    let image = native::Image::of(set, name);
+    let (_, _, rgb) = image.rgb("rgb.png")?;
     let n = rgb.len().max(1) as f64;
     let mut sums = [0_u64; 3];
     let mut clipped = 0_u64;
@@ -64,12 +64,7 @@ fn means(set: &Set, name: &str) -> Result<Means> {
         }
         clipped += u64::from(pixel.contains(&255));
     }
-    let nir = folder.join("nir.png");
-    let nir = if nir.is_file() {
-        let (_, _, gray) = output::read_gray(&nir)?;
-        Some(gray.iter().map(|x| u64::from(*x)).sum::<u64>() as f64 / n)
-    } else {
-        None
-    };
+    let mean = |gray: &[u8]| gray.iter().map(|x| u64::from(*x)).sum::<u64>() as f64 / n;
+    let nir = image.gray_if_there("nir.png")?.map(|(_, _, gray)| mean(&gray));
     Ok(Means(sums.map(|s| s as f64 / n), clipped as f64 / n, nir))
 }

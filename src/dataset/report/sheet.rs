@@ -26,14 +26,14 @@ pub(super) fn sheet(set: &Set, names: &[Vec<String>; 3]) -> Result<Markup> {
         .zip(names)
         .flat_map(|(places, names)| places.into_iter().map(move |k| &names[k]))
         .collect();
-    let samples: Vec<Sample> = all.par_iter().map(|name| native::read(&set.folder, name)).collect::<Result<_>>()?;
+    let samples: Vec<Sample> = all.par_iter().map(|name| native::sample(set, name)).collect::<Result<_>>()?;
     let facts: Vec<Facts> = samples.iter().map(|sample| Facts::of(&sample.record, &set.recipe.species)).collect();
     let unusual = unusual(&facts);
     let cards: Vec<Markup> = samples
         .par_iter()
         .zip(&facts)
         .zip(&unusual)
-        .map(|((sample, facts), unusual)| card(sample, facts, *unusual))
+        .map(|((sample, facts), unusual)| card(sample, facts, *unusual, set.recipe.pack.is_none()))
         .collect::<Result<_>>()?;
     Ok(html! {
         (tools(&facts))
@@ -135,7 +135,7 @@ fn chosen(sizes: [usize; Split::ALL.len()]) -> [Vec<usize>; Split::ALL.len()] {
 }
 
 /// One image: photograph, labels, words.
-fn card(sample: &Sample, facts: &Facts, unusual: f64) -> Result<Markup> {
+fn card(sample: &Sample, facts: &Facts, unusual: f64, has_files: bool) -> Result<Markup> {
     let Record { name, source, split, width, height, .. } = &sample.record;
     let (w, h, rgb) = output::shrink(*width, *height, &sample.rgb, SIDE);
     let photograph = data_url("jpeg", &output::encode_jpeg(w, h, &rgb, QUALITY)?);
@@ -152,8 +152,10 @@ fn card(sample: &Sample, facts: &Facts, unusual: f64) -> Result<Markup> {
             }
             figcaption {
                 b { (name) } " " (split.name()) " · " (words(&sample.record)) " "
-                a.enlarge href={ (native::folder(name)) "/rgb.png" } { "full size" } " "
-                a href={ (native::folder(name)) "/record.json" } { "record" }
+                @if has_files {
+                    a.enlarge href={ (native::folder(name)) "/rgb.png" } { "full size" } " "
+                    a href={ (native::folder(name)) "/record.json" } { "record" }
+                }
             }
         }
     })

@@ -163,8 +163,12 @@ pub type Geometry = (u32, u32, Vec<f32>, Vec<[f32; 3]>);
 
 /// Reads what [`encode_geometry`] wrote.
 pub fn read_geometry(path: &Path) -> Result<Geometry> {
+    decode_geometry(path, crate::input::contents(path).map_err(Error::reading(path))?)
+}
+
+/// The same from its bytes; errors name `path`.
+pub fn decode_geometry(path: &Path, bytes: Vec<u8>) -> Result<Geometry> {
     let wrong = |what: String| Error::input(what).in_file(path);
-    let bytes = crate::input::contents(path).map_err(Error::reading(path))?;
     exr_size::check(&bytes).map_err(wrong)?;
     let reader = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
     let image = reader.from_buffered(std::io::Cursor::new(bytes)).map_err(|e| wrong(e.to_string()))?;

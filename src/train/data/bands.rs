@@ -1,9 +1,9 @@
 //! What a network sees of a pixel.
 
-use crate::output;
+use crate::dataset::Set;
+use crate::dataset::native::Image;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
-use std::path::Path;
 
 /// One band of a network's input.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -81,9 +81,9 @@ impl TryFrom<String> for Band {
     }
 }
 
-/// The planes of the bands, 8 bit, from the pictures in an image's folder: width, height, one plane a band.
-pub(super) fn read(folder: &Path, bands: &[Band]) -> Result<(u32, u32, Vec<Vec<u8>>)> {
-    let rgb = bands.iter().any(Band::is_color).then(|| output::read_rgb(&folder.join("rgb.png"))).transpose()?;
+/// The planes of the bands, 8 bit, from the pictures of an image: width, height, one plane a band.
+pub(super) fn read(image: &Image<'_, Set>, bands: &[Band]) -> Result<(u32, u32, Vec<Vec<u8>>)> {
+    let rgb = bands.iter().any(Band::is_color).then(|| image.rgb("rgb.png")).transpose()?;
     let mut size = rgb.as_ref().map(|(w, h, _)| (*w, *h));
     let mut planes = Vec::new();
     for band in bands {
@@ -96,15 +96,15 @@ pub(super) fn read(folder: &Path, bands: &[Band]) -> Result<(u32, u32, Vec<Vec<u
         planes.push(if let (Some(channel), Some((_, _, pixels))) = (channel, &rgb) {
             pixels.iter().map(|p| p[channel]).collect()
         } else {
-            let path = folder.join(format!("{}.png", band.name()));
-            if !path.is_file() {
+            let file = format!("{}.png", band.name());
+            let place = image.place(&file);
+            let Some((w, h, values)) = image.gray_if_there(&file)? else {
                 return Err(Error::input(format!("this image has no band `{}`", band.name()))
-                    .in_file(path)
+                    .in_file(place)
                     .help("choose bands that all sets have, such as --bands rgb"));
-            }
-            let (w, h, values) = output::read_gray(&path)?;
+            };
             if *size.get_or_insert((w, h)) != (w, h) {
-                return Err(Error::input(format!("it is {w} × {h} pixels, the others are not")).in_file(path));
+                return Err(Error::input(format!("it is {w} × {h} pixels, the others are not")).in_file(place));
             }
             values
         });

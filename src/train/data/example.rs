@@ -3,12 +3,12 @@
 use super::bands::{self, Band};
 use super::margin;
 use crate::dataset::classes::Map;
+use crate::dataset::native::Image;
 use crate::dataset::sample::IGNORE;
 use crate::dataset::{Set, native};
 use crate::output;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
-use std::path::Path;
 
 /// What a network takes in: bands and size.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -59,39 +59,39 @@ impl Example {
         with_plants: bool,
     ) -> Result<((u32, u32), Self)> {
         let name = Set::name(number);
-        let folder = set.folder.join(native::folder(&name));
-        if !folder.is_dir() {
+        let image = Image::of(set, &name);
+        if !image.has("record.json")? {
             return Err(Error::input("this image is not there yet")
-                .in_file(folder)
+                .in_file(set.folder.join(native::folder(&name)))
                 .help("`trace dataset verify` tells what the set lacks, the command that began it makes it"));
         }
-        let (w, h, planes) = bands::read(&folder, of)?;
-        let same = |path: &Path, found: (u32, u32)| {
+        let (w, h, planes) = bands::read(&image, of)?;
+        let same = |file: &str, found: (u32, u32)| {
             let what = || format!("it is {} × {} pixels, the photograph {w} × {h}", found.0, found.1);
-            if found == (w, h) { Ok(()) } else { Err(Error::input(what()).in_file(path)) }
+            if found == (w, h) { Ok(()) } else { Err(Error::input(what()).in_file(image.place(file))) }
         };
-        let path = folder.join("semantics.png");
-        let (lw, lh, semantics) = output::read_indexed(&path)?;
-        same(&path, (lw, lh))?;
+        let file = "semantics.png";
+        let (lw, lh, semantics) = image.indexed(file)?;
+        same(file, (lw, lh))?;
         let mut species = Vec::new();
         if map.needs_species() {
-            let path = folder.join("species.png");
-            let (lw, lh, numbers) = output::read_gray(&path)?;
-            same(&path, (lw, lh))?;
+            let file = "species.png";
+            let (lw, lh, numbers) = image.gray(file)?;
+            same(file, (lw, lh))?;
             species = numbers;
         }
         let mut parts = Vec::new();
         if map.needs_parts() {
-            let path = folder.join("parts.png");
-            let (lw, lh, numbers) = output::read_indexed(&path)?;
-            same(&path, (lw, lh))?;
+            let file = "parts.png";
+            let (lw, lh, numbers) = image.indexed(file)?;
+            same(file, (lw, lh))?;
             parts = numbers;
         }
         let mut plants = Vec::new();
         if with_plants {
-            let path = folder.join("plants.png");
-            let (lw, lh, numbers) = output::read_gray16(&path)?;
-            same(&path, (lw, lh))?;
+            let file = "plants.png";
+            let (lw, lh, numbers) = image.gray16(file)?;
+            same(file, (lw, lh))?;
             plants = numbers;
         }
         let mut labels = map.labels(&semantics, &species, &parts);

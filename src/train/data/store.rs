@@ -3,8 +3,8 @@
 use super::example::{Example, Shape};
 use super::select::{Pick, Selection};
 use crate::Result;
+use crate::dataset::Set;
 use crate::dataset::classes::{Classes, Map};
-use crate::dataset::{Set, native};
 use std::borrow::Cow;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -89,7 +89,7 @@ impl Store {
     pub fn pixel_mm(&self) -> Result<Option<f64>> {
         let mut sizes = Vec::new();
         for (set, number) in self.images.iter().step_by(self.images.len().div_ceil(ASKED).max(1)) {
-            let record = native::read_record(&self.sets[*set].0.folder, &Set::name(*number))?;
+            let record = self.sets[*set].0.record(*number)?;
             let across = record.conditions.as_ref().and_then(|conditions| conditions.camera.pixel_m());
             sizes.extend(across.map(|m| 1e3 * m * f64::from(record.width) / f64::from(self.shape.width)));
         }

@@ -137,6 +137,11 @@ fn selection(input: &Path) -> Result<Option<Selection>> {
 /// Names and folders of a set's images.
 fn images(selection: &Selection) -> Result<Vec<(String, PathBuf)>> {
     let (set, numbers) = selection.open(Pick::All, 0)?;
+    if set.recipe.pack.is_some() {
+        return Err(Error::misuse("the images of this dataset lie in archives, and these are read from folders")
+            .in_file(&set.folder)
+            .help("name photographs, or a dataset that was begun without --pack; `train evaluate` reads both"));
+    }
     let image = |number: u64| {
         let name = Set::name(number);
         let folder = set.folder.join(native::folder(&name));

@@ -11,7 +11,7 @@ use super::sets::Bound;
 use crate::Result;
 use crate::compare::{Band, Comparison, Options, Pairs, Region};
 use crate::dataset::recipe::{FILE, Rendering};
-use crate::dataset::{Set, native, timing_log};
+use crate::dataset::{Set, timing_log};
 use crate::report::chart::Effect;
 use crate::report::{Cell, Table};
 use crate::train::data::Pick;
@@ -231,14 +231,14 @@ pub(super) fn shots(bound: &Bound) -> Result<Vec<Shot>> {
         Ok(numbers.first().map(|n| (set, *n)))
     };
     let Some((set, number)) = first(base)? else { return Ok(Vec::new()) };
-    let left = Middle::of(&set.folder, number)?;
+    let left = Middle::of(&set, number)?;
     let mut shots = Vec::new();
     for train in others {
         let Some((set, _)) = first(train)? else { continue };
         if number >= set.recipe.count {
             continue;
         }
-        let right = Middle::of(&set.folder, number)?;
+        let right = Middle::of(&set, number)?;
         let edit = set.recipe.rendering().ok().map(Rendering::edit).transpose()?;
         if (left.width, left.height) == (right.width, right.height) {
             let about = edit.map(|edit| format!(": {}", edit.about)).unwrap_or_default();
@@ -257,8 +257,8 @@ struct Middle {
 }
 
 impl Middle {
-    fn of(dataset: &Path, number: u64) -> Result<Self> {
-        let sample = native::read(dataset, &Set::name(number))?;
+    fn of(set: &Set, number: u64) -> Result<Self> {
+        let sample = set.sample(number)?;
         let (w, h) = sample.size();
         let (width, height) = (w.min(SHOWN.0), h.min(SHOWN.1));
         let (left, top) = ((w - width) / 2, (h - height) / 2);

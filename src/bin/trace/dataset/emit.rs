@@ -1,5 +1,6 @@
 //! Job files for a cluster: `trace dataset emit`.
 
+use super::render::PushArgs;
 use clap::ValueEnum;
 use furrow::dataset::Set;
 use furrow::dataset::cluster::{self, Job, Pod, Scheduler};
@@ -42,6 +43,8 @@ pub(crate) struct Args {
     /// Claim of the volume in which the dataset's folder lies; for kubernetes.
     #[arg(long, value_name = "NAME", default_value = "furrow-data")]
     claim: String,
+    #[command(flatten)]
+    push: PushArgs,
     /// Folder for the job files; `jobs` in the dataset's unless given.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -82,6 +85,7 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
         grace: args.grace,
         again: args.rerender,
         program,
+        push: args.push.push()?,
     };
     let (paths, warnings) = cluster::emit(&set, &job, &out)?;
     for warning in warnings {

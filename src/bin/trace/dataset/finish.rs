@@ -1,12 +1,13 @@
 //! What belongs to all images: `trace dataset finish`.
 
 use super::order::{LabelArgs, formats};
-use super::render::{WorkArgs, generate};
+use super::render::{PushArgs, WorkArgs, generate_and_push};
 use furrow::Result;
 use furrow::cli::signal::Signals;
 use furrow::dataset::generate::Shard;
 use furrow::dataset::labels::LeftOut;
-use furrow::dataset::{Set, finish, plan};
+use furrow::dataset::{Set, finish, plan, push};
+use furrow::job::Threads;
 use std::path::PathBuf;
 
 /// Which dataset.
@@ -24,20 +25,30 @@ pub(crate) struct Args {
     labels: LabelArgs,
     #[command(flatten)]
     work: WorkArgs,
+    #[command(flatten)]
+    push: PushArgs,
 }
 
 /// Adds formats, then writes what belongs to all.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let mut set = Set::open(&args.dir)?;
+    let push = args.push.push()?;
     let labelling = args.labels.labelling();
     if !args.format.is_empty() || !labelling.is_usual() {
         for warning in plan::add_formats(&mut set, &args.format, &labelling)? {
             furrow::tell!("warning: {warning}");
         }
-        generate(&set, &args.work, Shard::ALL, None, signals)?;
+        generate_and_push(&set, &args.work, Shard::ALL, None, push.as_ref(), signals)?;
     }
-    let files = finish::finish(&set, args.shards)?;
-    tell_left_out(&set)?;
+    let threads = Threads::new(args.work.threads)?;
+    let files = threads.install(|| {
+        let files = finish::finish(&set, args.shards)?;
+        tell_left_out(&set)?;
+        Ok::<_, furrow::Error>(files)
+    })?;
+    if let Some(push) = &push {
+        push::whole(&set, push, signals.heed())?;
+    }
     Ok(files)
 }
 

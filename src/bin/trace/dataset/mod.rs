@@ -76,6 +76,8 @@ struct MakeArgs {
     order: order::Args,
     #[command(flatten)]
     work: render::WorkArgs,
+    #[command(flatten)]
+    push: render::PushArgs,
     /// Make nothing: draw three images with fewer samples, and tell core hours, disk, files, memory and a number of shards.
     #[arg(long)]
     dry_run: bool,
@@ -103,13 +105,27 @@ pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
             bill::run(order.images.folder(), &order.order()?, work.threads, signals)
         }
         None => {
+            let push = cli.make.push.push()?;
             let set = order::run(&cli.make.order)?;
             order::tell_plants(&set, cli.make.work.quiet)?;
             let memory = cli.make.order.images.memory.bytes;
-            render::generate(&set, &cli.make.work, furrow::dataset::generate::Shard::ALL, memory, signals)?;
-            let files = furrow::dataset::finish::finish(&set, None)?;
-            if !cli.make.work.quiet {
-                finish::tell_left_out(&set)?;
+            let all = furrow::dataset::generate::Shard::ALL;
+            render::generate_and_push(&set, &cli.make.work, all, memory, push.as_ref(), signals)?;
+            if cli.make.push.frees() {
+                furrow::tell!(
+                    "all images are pushed: `trace dataset finish` is for the folder that they were pushed to"
+                );
+                return Ok(Vec::new());
+            }
+            let files = furrow::job::Threads::new(cli.make.work.threads)?.install(|| {
+                let files = furrow::dataset::finish::finish(&set, None)?;
+                if !cli.make.work.quiet {
+                    finish::tell_left_out(&set)?;
+                }
+                Ok::<_, furrow::Error>(files)
+            })?;
+            if let Some(push) = &push {
+                furrow::dataset::push::whole(&set, push, signals.heed())?;
             }
             Ok(files)
         }

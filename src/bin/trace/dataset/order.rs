@@ -8,7 +8,7 @@ use furrow::dataset::keep::{self, Kept};
 use furrow::dataset::labelling::Labelling;
 use furrow::dataset::plan::{self, Order};
 use furrow::dataset::split::Shares;
-use furrow::dataset::{self, Set, format};
+use furrow::dataset::{self, Set, format, pack};
 use furrow::settings::{Quality, RenderOptions};
 use furrow::{Result, cli};
 use std::path::{Path, PathBuf};
@@ -21,6 +21,9 @@ pub(crate) struct Args {
     /// Change one thing of every field, by its name; `trace ablate --list` tells them.
     #[arg(long, value_name = "NAME")]
     edit: Option<String>,
+    /// Put so many images into a tar archive (WebDataset) instead of a folder each; also those of a dataset that has folders.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=pack::MOST))]
+    pack: Option<u64>,
 }
 
 /// Which images, in what form.
@@ -121,7 +124,8 @@ pub(crate) fn formats() -> clap::builder::PossibleValuesParser {
 impl Args {
     /// The dataset that is asked for.
     pub(crate) fn order(&self) -> Result<Order> {
-        self.images.order(self.edit.as_deref().map_or(Ok(&FULL), Edit::named)?)
+        let order = self.images.order(self.edit.as_deref().map_or(Ok(&FULL), Edit::named)?)?;
+        Ok(Order { pack: self.pack, ..order })
     }
 }
 

@@ -7,6 +7,7 @@ use furrow::Result;
 use furrow::cli::signal::Signals;
 use furrow::dataset::Set;
 use furrow::dataset::generate::{self, Callbacks, Shard, Work};
+use furrow::dataset::push::Push;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -22,6 +23,41 @@ pub(crate) struct Args {
     memory: MemoryArgs,
     #[command(flatten)]
     work: WorkArgs,
+    #[command(flatten)]
+    push: PushArgs,
+}
+
+/// How what is finished is sent elsewhere.
+#[derive(clap::Args)]
+pub(crate) struct PushArgs {
+    /// Run this shell command for each finished image or pack: {dir} is a folder with its files by their paths in the dataset, such as
+    /// 'rclone copy {dir} remote:set' or 'cp -r {dir}/. /mnt/set/'. What was pushed is noted, and not pushed again.
+    #[arg(long, value_name = "COMMAND")]
+    push: Option<String>,
+    /// Run this after it; where it fails, the push counts as failed. Such as 'rclone check --one-way {dir} remote:set'.
+    #[arg(long, value_name = "COMMAND", requires = "push")]
+    push_check: Option<String>,
+    /// Remove images here once they are pushed; `finish` is for the other place then.
+    #[arg(long, requires = "push")]
+    push_free: bool,
+    /// How often a push is tried, with longer and longer pauses, before the run ends.
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=10), requires = "push")]
+    push_tries: u32,
+}
+
+impl PushArgs {
+    /// What they ask for.
+    pub(crate) fn push(&self) -> Result<Option<Push>> {
+        let Self { push, push_check: check, push_free: free, push_tries: tries } = self;
+        let push = push.clone().map(|command| Push { command, check: check.clone(), free: *free, tries: *tries });
+        push.as_ref().map_or(Ok(()), Push::check)?;
+        Ok(push)
+    }
+
+    /// Whether what belongs to all images is made at the other place.
+    pub(crate) fn frees(&self) -> bool {
+        self.push_free
+    }
 }
 
 /// How they are made; none of it changes a byte.
@@ -41,20 +77,33 @@ pub(crate) struct WorkArgs {
 
 impl WorkArgs {
     /// The work of a shard.
-    pub(crate) fn of(&self, shard: Shard, memory: Option<u64>) -> Work {
-        Work { shard, threads: self.threads, at_once: self.at_once, memory }
+    pub(crate) fn of(&self, shard: Shard, memory: Option<u64>) -> Work<'static> {
+        Work { shard, threads: self.threads, at_once: self.at_once, memory, push: None }
     }
 }
 
 /// Makes the images of a shard.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let set = Set::open(&args.dir)?;
-    generate(&set, &args.work, args.shard, args.memory.bytes, signals)?;
+    let push = args.push.push()?;
+    generate_and_push(&set, &args.work, args.shard, args.memory.bytes, push.as_ref(), signals)?;
     Ok(Vec::new())
 }
 
 /// Makes the images of a dataset that are missing.
 pub(crate) fn generate(set: &Set, args: &WorkArgs, shard: Shard, memory: Option<u64>, signals: &Signals) -> Result<()> {
+    generate_and_push(set, args, shard, memory, None, signals)
+}
+
+/// The same, and sends them elsewhere.
+pub(super) fn generate_and_push(
+    set: &Set,
+    args: &WorkArgs,
+    shard: Shard,
+    memory: Option<u64>,
+    push: Option<&Push>,
+    signals: &Signals,
+) -> Result<()> {
     let begin = Instant::now();
     let (soon, now) = signals.heed_patiently();
     let progress = Progress::new(begin, args.quiet);
@@ -62,7 +111,7 @@ pub(crate) fn generate(set: &Set, args: &WorkArgs, shard: Shard, memory: Option<
     let done = |_| progress.add();
     let warn = |words: &str| furrow::tell!("warning: {words}");
     let callbacks = Callbacks { begin: &total, warn: &warn, done: &done, soon, now };
-    let made = generate::generate(set, &args.of(shard, memory), &callbacks);
+    let made = generate::generate(set, &Work { push, ..args.of(shard, memory) }, &callbacks);
     let (images, rate) = progress.finish();
     if !args.quiet {
         let rate = if images > 0 { format!(": {rate:.0} images an hour") } else { String::new() };

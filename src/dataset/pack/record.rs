@@ -1,0 +1,151 @@
+//! What is known of a pack: its checksum, where each file lies in it, and the checksums of its images.
+//!
+//! It is written last and holds a hash of itself, so a damaged record is none.
+
+use super::Id;
+use crate::dataset::archive::entry_name;
+use crate::dataset::checksum::Checksum;
+use crate::dataset::checksum_record::ChecksumRecord;
+use crate::dataset::recipe::compact;
+use crate::output::write_atomically;
+use crate::{Result, input};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// A pack that is there.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(in crate::dataset) struct PackRecord {
+    /// Its name.
+    pub(in crate::dataset) pack: String,
+    /// Its archive.
+    pub(in crate::dataset) tar: Checksum,
+    /// Where the contents of each file begin in the archive, and their length.
+    pub(in crate::dataset) members: BTreeMap<String, (u64, u64)>,
+    /// Its images in the order of their numbers.
+    pub(in crate::dataset) images: Vec<ChecksumRecord>,
+}
+
+/// A record as it lies on disk.
+#[derive(Serialize, Deserialize)]
+struct Written {
+    #[serde(flatten)]
+    record: PackRecord,
+    /// SHA-256 of the rest.
+    seal_sha256: String,
+}
+
+impl PackRecord {
+    /// The checksums of an image.
+    pub(in crate::dataset) fn image(&self, index: u64) -> Option<&ChecksumRecord> {
+        self.images.get(self.images.binary_search_by_key(&index, |image| image.index).ok()?)
+    }
+
+    /// Reads a pack's record; `None` where there is none or it is damaged.
+    pub(in crate::dataset) fn read(folder: &Path, id: Id) -> Option<Self> {
+        let bytes = input::contents(&folder.join(id.seal())).ok()?;
+        let written: Written = serde_json::from_slice(&bytes).ok()?;
+        let own = written.record.hash().ok()?;
+        (own == written.seal_sha256 && written.record.pack == id.name()).then_some(written.record)
+    }
+
+    /// Writes it: after its archive.
+    pub(in crate::dataset) fn write(&self, folder: &Path, id: Id) -> Result<()> {
+        let written = Written { seal_sha256: self.hash()?, record: self.clone() };
+        write_atomically(&folder.join(id.seal()), &compact(&written)?)
+    }
+
+    /// SHA-256 over everything in it, hex.
+    pub(in crate::dataset) fn hash(&self) -> Result<String> {
+        Ok(hex::encode(Sha256::digest(compact(self)?)))
+    }
+}
+
+/// Most records of packs that are kept in memory: each takes some megabytes for a thousand images.
+const MOST_KEPT: usize = 32;
+
+/// The packs of one dataset, their records read when they are needed.
+#[derive(Clone, Debug, Default)]
+pub(in crate::dataset) struct Packs(Arc<Mutex<BTreeMap<Id, Arc<PackRecord>>>>);
+
+impl Packs {
+    /// A pack's record, where there is one.
+    pub(in crate::dataset) fn get(&self, folder: &Path, id: Id) -> Option<Arc<PackRecord>> {
+        let lock = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = lock().get(&id) {
+            return Some(Arc::clone(known));
+        }
+        // Read without the lock: others may need other packs meanwhile.
+        let record = Arc::new(PackRecord::read(folder, id)?);
+        let mut kept = lock();
+        if kept.len() >= MOST_KEPT {
+            kept.pop_first();
+        }
+        kept.insert(id, Arc::clone(&record));
+        Some(record)
+    }
+
+    /// Forgets a pack that was written or taken apart.
+    pub(in crate::dataset) fn forget(&self, id: Id) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).remove(&id);
+    }
+
+    /// Length of an image's file in a pack.
+    pub(in crate::dataset) fn length(&self, folder: &Path, id: Id, path: &str) -> io::Result<u64> {
+        let (record, (_, length)) = self.member(folder, id, path)?;
+        let there = std::fs::metadata(folder.join(id.path()))?.len();
+        if there == record.tar.bytes { Ok(length) } else { Err(io::ErrorKind::UnexpectedEof.into()) }
+    }
+
+    /// Contents of an image's file in a pack.
+    pub(in crate::dataset) fn contents(&self, folder: &Path, id: Id, path: &str) -> io::Result<Vec<u8>> {
+        let (record, (offset, length)) = self.member(folder, id, path)?;
+        if offset.checked_add(length).is_none_or(|end| end > record.tar.bytes) {
+            return Err(io::ErrorKind::InvalidData.into());
+        }
+        let mut file = input::open(&folder.join(id.path()))?;
+        file.seek(SeekFrom::Start(offset))?;
+        let mut bytes = Vec::new();
+        file.take(length).read_to_end(&mut bytes)?;
+        if bytes.len() as u64 == length { Ok(bytes) } else { Err(io::ErrorKind::UnexpectedEof.into()) }
+    }
+
+    fn member(&self, folder: &Path, id: Id, path: &str) -> io::Result<(Arc<PackRecord>, (u64, u64))> {
+        let not_found = || io::Error::from(io::ErrorKind::NotFound);
+        let record = self.get(folder, id).ok_or_else(not_found)?;
+        let place = *record.members.get(&entry_name(path)).ok_or_else(not_found)?;
+        Ok((record, place))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::split::Split;
+
+    /// Expected: a record comes back as it was written, and one of which a digit was changed is none.
+    #[test]
+    fn records_come_back_as_they_were() {
+        let folder = tempfile::tempdir().unwrap();
+        let id = Id { split: Split::Val, number: 3 };
+        let sum = Checksum::of(b"x");
+        let image = ChecksumRecord {
+            index: 7,
+            recipe: "ab".into(),
+            labelling: None,
+            files: [("images/000007/rgb.png".to_owned(), sum.clone())].into(),
+        };
+        let members = [("000007.rgb.png".to_owned(), (512, 1))].into();
+        let record = PackRecord { pack: id.name(), tar: sum, members, images: vec![image] };
+        record.write(folder.path(), id).unwrap();
+        assert_eq!(PackRecord::read(folder.path(), id).as_ref(), Some(&record));
+        assert!(record.image(7).is_some() && record.image(8).is_none());
+        let path = folder.path().join(id.seal());
+        let text = std::fs::read_to_string(&path).unwrap();
+        std::fs::write(&path, text.replace("512", "513")).unwrap();
+        assert_eq!(PackRecord::read(folder.path(), id), None);
+    }
+}

@@ -1,0 +1,162 @@
+//! Puts images into their packs, and takes packs apart.
+
+use super::record::PackRecord;
+use super::{Id, Packing};
+use crate::dataset::archive::{BLOCK, append, entry_name};
+use crate::dataset::checksum_record::{ChecksumRecord, write_files};
+use crate::dataset::generate::{Task, remaining};
+use crate::dataset::push::Unit;
+use crate::dataset::set::{Set, Whole};
+use crate::dataset::{File, native};
+use crate::{Error, Result};
+use std::collections::BTreeMap;
+use std::io::ErrorKind;
+use std::path::Path;
+
+/// Whether a pack is there and holds what its dataset asks for, down to each byte. One that does not is taken apart: its images that are
+/// whole lie in folders of their own then.
+pub(in crate::dataset) fn settle(set: &Set, id: Id) -> Result<bool> {
+    let Set { folder, packs, .. } = set;
+    packs.forget(id);
+    let Some(record) = packs.get(folder, id) else { return Ok(false) };
+    if Unit::Pack(id).is_freed(set) {
+        if is_complete(set, id, &record)? {
+            return Ok(true);
+        }
+        return Err(Error::misuse(format!(
+            "{} was pushed and removed here, and is to hold other images or formats now",
+            id.name()
+        ))
+        .help("bring it back, or make what is to be added as a dataset of its own")
+        .in_file(folder));
+    }
+    if is_complete(set, id, &record)?
+        && record.tar.holds(&folder.join(id.path()))
+        && record.images.iter().all(|image| set.faults_beside_packs(image).is_empty())
+    {
+        clear(folder, &record)?;
+        return Ok(true);
+    }
+    take_apart(set, id, &record)?;
+    Ok(false)
+}
+
+/// Puts the images of a pack into it where all are there, also those that were added since it was written.
+pub(in crate::dataset) fn ensure(set: &Set, id: Id) -> Result<()> {
+    if let Some(record) = set.packs.get(&set.folder, id)
+        && !is_complete(set, id, &record)?
+    {
+        take_apart(set, id, &record)?;
+    }
+    close(set, id)
+}
+
+/// Whether a record tells of all images that a pack is to hold, with all their files.
+fn is_complete(set: &Set, id: Id, record: &PackRecord) -> Result<bool> {
+    let Some(packing) = Packing::of(&set.recipe) else { return Ok(false) };
+    let wanted = packing.images(id);
+    if !record.images.iter().map(|image| image.index).eq(wanted) {
+        return Ok(false);
+    }
+    for image in &record.images {
+        if remaining(set, image)? != Task::Done {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// Puts the images of a pack into it where all are there, and removes their folders. Does nothing where some are missing.
+pub(in crate::dataset) fn close(set: &Set, id: Id) -> Result<()> {
+    match written(set, id) {
+        // Another run may have put them there meanwhile, and removed their folders.
+        Err(e) if e.is_not_found() => {
+            set.packs.forget(id);
+            match set.packs.get(&set.folder, id) {
+                Some(record) if is_complete(set, id, &record)? => clear(&set.folder, &record),
+                _ => Err(e),
+            }
+        }
+        other => other,
+    }
+}
+
+fn written(set: &Set, id: Id) -> Result<()> {
+    let Set { folder, packs, .. } = set;
+    let Some(packing) = Packing::of(&set.recipe) else { return Ok(()) };
+    let mut images = Vec::new();
+    for index in packing.images(id) {
+        match ChecksumRecord::read(folder, index) {
+            Some(image) if remaining(set, &image)? == Task::Done => images.push(image),
+            _ => {
+                // Of a pack that is there already, what a killed run has left.
+                return match packs.get(folder, id) {
+                    Some(record) if is_complete(set, id, &record)? => clear(folder, &record),
+                    _ => Ok(()),
+                };
+            }
+        }
+    }
+    let mut members = BTreeMap::new();
+    let mut whole = Whole::new(folder);
+    whole.file(&id.path(), |out| {
+        let mut archive = tar::Builder::new(out);
+        for image in &images {
+            for path in native::in_order(image.files.keys().filter(|path| native::is_native(path))) {
+                let file = folder.join(path);
+                let bytes = crate::input::contents(&file).map_err(Error::io(&file))?;
+                members.insert(entry_name(path), (archive.get_ref().written() + BLOCK, bytes.len() as u64));
+                append(&mut archive, path, &bytes).map_err(Error::io(&file))?;
+            }
+        }
+        archive.finish().map_err(Error::io(&folder.join(id.path())))
+    })?;
+    let tar = whole.files.remove(&id.path()).ok_or_else(|| Error::failed("an archive was not written"))?;
+    let record = PackRecord { pack: id.name(), tar, members, images };
+    record.write(folder, id)?;
+    packs.forget(id);
+    clear(folder, &record)
+}
+
+/// Removes the folders of images that a pack holds.
+fn clear(folder: &Path, record: &PackRecord) -> Result<()> {
+    for index in record.images.iter().map(|image| image.index) {
+        // First what says that it is whole.
+        remove(&ChecksumRecord::path(folder, index), |path| std::fs::remove_file(path))?;
+        remove(&folder.join(native::folder(&Set::name(index))), |path| std::fs::remove_dir_all(path))?;
+    }
+    Ok(())
+}
+
+fn remove(path: &Path, by: impl Fn(&Path) -> std::io::Result<()>) -> Result<()> {
+    match by(path) {
+        Err(e) if e.kind() != ErrorKind::NotFound => Err(Error::io(path)(e)),
+        _ => Ok(()),
+    }
+}
+
+/// Takes a pack apart: what is whole of it lies in folders again.
+fn take_apart(set: &Set, id: Id, record: &PackRecord) -> Result<()> {
+    let Set { folder, packs, .. } = set;
+    for image in &record.images {
+        if ChecksumRecord::read(folder, image.index).is_some() {
+            continue;
+        }
+        let native = image.files.iter().filter(|(path, _)| native::is_native(path));
+        let whole = native.map(|(path, sum)| {
+            let bytes = packs.contents(folder, id, path).ok()?;
+            sum.is_of(&bytes).then(|| File { path: path.clone(), bytes })
+        });
+        // An image of which a byte was changed is made again.
+        if let Some(files) = whole.collect::<Option<Vec<File>>>() {
+            write_files(folder, &files)?;
+            image.write(folder)?;
+        }
+    }
+    packs.forget(id);
+    // First what says that it is whole.
+    for path in [id.seal(), id.path()] {
+        remove(&folder.join(path), |path| std::fs::remove_file(path))?;
+    }
+    Ok(())
+}
