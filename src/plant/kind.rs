@@ -186,10 +186,12 @@ impl LeafKind {
         }
     }
 
-    /// Angle between midrib and the skeleton's branches, radians; `None` for a blade that only bends along.
-    pub(super) fn branch_angle(&self) -> Option<f32> {
+    /// Angle between midrib and the skeleton's branches, radians, and the half-width at each vein joint, metres, of a sheet of this width;
+    /// `None` for a blade that only bends along.
+    pub(super) fn branches(&self, outline: Outline, width: f32, veins: &[f32]) -> Option<(f32, Vec<f32>)> {
         let angle = self.branch_angle_deg.unwrap_or(self.vein_angle_deg).f32().to_radians();
-        (0.1..1.5).contains(&angle).then_some(angle)
+        let halves = veins.iter().map(|t| (outline.half_width(*t) * width).max(1e-5));
+        (0.1..1.5).contains(&angle).then(|| (angle, halves.collect()))
     }
 
     /// The list of fractions that does not rise strictly between 0 and 1, by the name of its field.

@@ -3,7 +3,7 @@
 use super::blade::{self, Rest};
 use super::fern;
 use super::growth::{CELL, LeafNow};
-use super::kind::{LeafKind, Shape};
+use super::kind::Shape;
 use super::leaflets;
 use super::organ::{LeafAxis, LeafSize, Organ, OrganKind};
 use super::ribbons;
@@ -131,7 +131,7 @@ fn measures(leaf: &LeafNow<'_>) -> Measures {
     let (veins, secondaries) = match &leaf.kind.shape {
         Shape::Sheet { outline } => {
             let veins = leaf.kind.joints_along(count);
-            let branches = branches(leaf.kind, *outline, leaf.width, &veins);
+            let branches = leaf.kind.branches(*outline, leaf.width, &veins);
             (veins, branches)
         }
         // Their joints are the leaflets'.
@@ -145,12 +145,6 @@ fn measures(leaf: &LeafNow<'_>) -> Measures {
         veins,
         secondaries,
     }
-}
-
-/// Angle of the skeleton's branches and the half-width at each vein joint, metres, of a sheet; `None` if it has no branches.
-pub(super) fn branches(kind: &LeafKind, outline: Outline, width: f32, veins: &[f32]) -> Option<(f32, Vec<f32>)> {
-    let halves = veins.iter().map(|t| (outline.half_width(*t) * width).max(1e-5));
-    kind.branch_angle().map(|angle| (angle, halves.collect()))
 }
 
 /// The frame of ST1 in plant coordinates: vein along the stalk, y out of the upper side, which faces the axis.

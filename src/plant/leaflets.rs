@@ -6,7 +6,6 @@
 use super::blade::{self, Rest};
 use super::growth::LeafNow;
 use super::kind::Shape;
-use super::leaf::branches;
 use super::skeleton::{Measures, Pose, Skeleton};
 use super::skin::{self, BladeRelief};
 use crate::math::{Mat3, lerp, vec3};
@@ -50,7 +49,7 @@ pub(super) fn blade(
             stalk: 0.0,
             stalk_joints: 1,
             length: along,
-            secondaries: branches(leaf.kind, *outline, width, &veins),
+            secondaries: leaf.kind.branches(*outline, width, &veins),
             veins: veins.clone(),
         });
         let chain = skeleton.along().len();
