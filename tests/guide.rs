@@ -36,7 +36,7 @@ fn reduced(command: &str) -> String {
     if scene && !words.contains(&"--width") {
         words.extend(["--width", "64"]);
     }
-    let samples = ["--spp", "--target-error", "--time"].iter().any(|option| words.contains(option));
+    let samples = ["--spp", "--target-error", "--time", "--labels-only"].iter().any(|option| words.contains(option));
     if ((scene && !export) || catalogue) && !samples {
         words.extend(["--spp", "1"]);
     }

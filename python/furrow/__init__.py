@@ -44,7 +44,7 @@ class Sample(Dict[str, Any]):
     """One image with its labels, by name; a notebook shows its picture.
 
     ========== ======================= ==========================================================
-    image      uint8, (H, W, 3)        the photograph in colour
+    image      uint8, (H, W, 3)        the photograph in colour; none of labels alone
     nir        uint8, (H, W)           the one in near infrared, where there is one
     semantics  uint8, (H, W)           0 soil, 1 crop, 2 weed, 255 no label
     plants     int32, (H, W)           number of the plant, 0 for none
@@ -54,9 +54,10 @@ class Sample(Dict[str, Any]):
     """
 
     def _repr_png_(self) -> bytes:
-        """The photograph, as notebooks show it."""
+        """The photograph, as notebooks show it; the classes where there is none."""
         out = io.BytesIO()
-        Image.fromarray(self["image"]).save(out, "PNG")
+        shown = self["image"] if "image" in self else self["semantics"] * 127
+        Image.fromarray(shown).save(out, "PNG")
         return out.getvalue()
 
 
@@ -100,12 +101,13 @@ _MAPS = (
 )
 
 
-def _sample(folder: Path, photographs: str = "") -> Sample:
+def _sample(folder: Path, photographs: str = "", labels_only: bool = False) -> Sample:
     """The pictures and labels of an image's folder; `photographs` ends the names of other photographs."""
     sample = Sample()
     for name, file, kind in _MAPS:
         path = folder / f"{file}{photographs if name in ('image', 'nir') else ''}.png"
-        if name != "nir" or path.is_file():
+        optional = name == "nir" or (labels_only and name == "image")
+        if not optional or path.is_file():
             sample[name] = _read(path, kind)
     return sample
 
@@ -138,6 +140,7 @@ class Dataset:
             self._captures = int(self.recipe["made"].get("rendered", {}).get("captures", 1))
             every = range(self.recipe["count"])
             self.indices = [k for k in every if split is None or self._split(k) == split]
+            self.labels_only = bool(self.recipe["made"].get("rendered", {}).get("labels_only"))
         except (AttributeError, KeyError, TypeError, ValueError, ZeroDivisionError) as error:
             raise Error(f"{self.path}/dataset.json is damaged: {error!r}") from error
         # Of packs that were read from: where each file lies.
@@ -152,7 +155,7 @@ class Dataset:
         if self.recipe.get("pack") and not folder.is_dir():
             sample = self._packed(index)
         else:
-            sample = _sample(folder)
+            sample = _sample(folder, labels_only=self.labels_only)
             sample["record"] = _json(folder / "record.json")
         return sample if self.transform is None else self.transform(sample)
 

@@ -117,6 +117,11 @@ impl Edit {
         photograph
     }
 
+    /// Whether its labels are made of what samples met.
+    pub(crate) fn asks_samples(&self) -> bool {
+        matches!(self.change, Change::Labels(_))
+    }
+
     /// The labels that are written of a field with these; `tags` holds one row a part.
     #[must_use]
     pub fn labels(&self, mut labels: LabelMap, film: &Film, tags: &[Tag]) -> LabelMap {

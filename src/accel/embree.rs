@@ -80,6 +80,21 @@ impl EmbreeAccel {
         outdated: Option<&AtomicBool>,
         before: Option<&Before<'_>>,
     ) -> Result<Self> {
+        Self::built(surfaces, threads, outdated, before, false)
+    }
+
+    /// The same for few rays: built by Morton codes, in a fraction of the time, and slower to ask. What a ray hits is the same.
+    pub fn build_quickly(surfaces: &[Surface<'_>], threads: u32, outdated: Option<&AtomicBool>) -> Result<Self> {
+        Self::built(surfaces, threads, outdated, None, true)
+    }
+
+    fn built(
+        surfaces: &[Surface<'_>],
+        threads: u32,
+        outdated: Option<&AtomicBool>,
+        before: Option<&Before<'_>>,
+        quick: bool,
+    ) -> Result<Self> {
         let device = match before {
             Some(before) => before.accel.scene.device().clone(),
             None => Arc::new(rtc::Device::new(ISA, threads)?),
@@ -99,7 +114,7 @@ impl EmbreeAccel {
             }
         }
         firsts.push(slots.len());
-        Ok(Self { scene: rtc::Scene::build(&device, geometries, outdated)?, slots, firsts })
+        Ok(Self { scene: rtc::Scene::build(&device, geometries, quick, outdated)?, slots, firsts })
     }
 
     /// The geometries of a part.

@@ -31,7 +31,7 @@ fn go_on(folder: &Path, mut recipe: Recipe, files: &[File]) -> Result<Recipe> {
     recipe.pack = recipe.pack.or(before.pack);
     if let (Made::Rendered(now), Made::Rendered(then)) = (&mut recipe.made, &before.made) {
         now.parts = then.parts;
-        if now.keep == Kept::USUAL {
+        if now.keep == Kept::usual(now.labels_only) {
             now.keep.clone_from(&then.keep);
         }
     }

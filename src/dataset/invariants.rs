@@ -36,7 +36,7 @@ pub fn check(recipe: &Recipe, sample: &Sample) -> Result<()> {
 
 /// What does not hold, in words.
 pub fn faults(recipe: &Recipe, sample: &Sample) -> Vec<String> {
-    let sizes = sizes(sample);
+    let sizes = sizes(sample, recipe.labels_only());
     // Nothing else can be asked of maps that do not lie on each other.
     if !sizes.is_empty() {
         return sizes;
@@ -52,11 +52,11 @@ pub fn faults(recipe: &Recipe, sample: &Sample) -> Vec<String> {
     all
 }
 
-/// Every map has the image's size.
-fn sizes(sample: &Sample) -> Vec<String> {
+/// Every map has the image's size, or is not there where it need not be; a photograph need not where images are labels alone.
+fn sizes(sample: &Sample, labels_only: bool) -> Vec<String> {
     let n = sample.pixels();
     let maps = [
-        ("rgb", sample.rgb.len(), false),
+        ("rgb", sample.rgb.len(), labels_only),
         ("nir", sample.nir.len(), true),
         ("semantics", sample.semantics.len(), false),
         ("species", sample.species.len(), true),

@@ -36,6 +36,11 @@ impl Kept {
     /// What a new dataset keeps unless said otherwise.
     pub const USUAL: [Self; 4] = [Self::Nir, Self::Coverage, Self::Depth, Self::Normals];
 
+    /// The same of a dataset whose images may be labels alone.
+    pub fn usual(labels_only: bool) -> &'static [Self] {
+        if labels_only { &[] } else { &Self::USUAL }
+    }
+
     /// What datasets of before kept, whose recipes do not say it.
     pub const OLDEST: [Self; 4] = [Self::Nir, Self::Coverage, Self::Depth32, Self::Normals16];
 }
@@ -50,6 +55,23 @@ pub fn checked(mut kept: Vec<Kept>) -> Result<Vec<Kept>> {
         }
     }
     Ok(kept)
+}
+
+/// What of it images keep that are labels alone: nothing unless depth or normals are asked for. An error for what only samples tell; the usual
+/// maps are what nobody asked for.
+pub fn of_labels(kept: &[Kept]) -> Result<Vec<Kept>> {
+    if kept == Kept::USUAL {
+        return Ok(Vec::new());
+    }
+    let sampled =
+        Kept::NAMED.iter().find(|(_, map, _)| matches!(map, Kept::Nir | Kept::Coverage) && kept.contains(map));
+    match sampled {
+        Some((name, ..)) => {
+            Err(Error::misuse(format!("--keep {name} is drawn by samples, and --labels-only takes none"))
+                .help("leave one of them out; depth and normals can be kept"))
+        }
+        None => Ok(kept.to_vec()),
+    }
 }
 
 /// Depths as they are kept.
@@ -90,6 +112,8 @@ mod tests {
         for (exact, kept) in slanted.iter().zip(normals(&Kept::USUAL, slanted.into_iter())) {
             assert!(exact.iter().zip(kept).all(|(a, b)| (a - b).abs() <= 0.5 / STEPS && half(b) == b));
         }
+        assert!(of_labels(&Kept::USUAL).unwrap().is_empty() && of_labels(&[Kept::Nir, Kept::Depth]).is_err());
+        assert_eq!(of_labels(&[Kept::Depth, Kept::Normals]).unwrap(), [Kept::Depth, Kept::Normals]);
         assert!(checked(vec![Kept::Depth, Kept::Depth32]).is_err());
         assert_eq!(checked(vec![Kept::Normals, Kept::Nir, Kept::Nir]).unwrap(), [Kept::Nir, Kept::Normals]);
     }

@@ -2,7 +2,7 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | `rgb.png`, `nir.png` | the photographs, 8 bit |
+//! | `rgb.png`, `nir.png` | the photographs, 8 bit; none where images are labels alone |
 //! | `semantics.png` | class, indexed: 0 soil, 1 crop, 2 weed, 255 no label |
 //! | `species.png` | number of the species in `dataset.json`, 8 bit, 0 for none |
 //! | `parts.png` | what is there, indexed: organs and things on the ground, as `parts/names.json` of the format parts; where classes need it |
@@ -50,7 +50,9 @@ pub fn files(recipe: &Recipe, sample: &Sample, text: &str) -> Result<Vec<File>> 
     let mut add = |name: &str, bytes: Vec<u8>| files.push(File { path: format!("{base}/{name}"), bytes });
     let png = |picture: &Picture<'_>| output::encode_png(w, h, picture, text);
     let colors = palette(sample.semantics.contains(&IGNORE));
-    add("rgb.png", png(&Picture::Rgb(&sample.rgb))?);
+    if !sample.rgb.is_empty() {
+        add("rgb.png", png(&Picture::Rgb(&sample.rgb))?);
+    }
     if !sample.nir.is_empty() {
         add("nir.png", png(&Picture::Gray(&sample.nir))?);
     }
@@ -180,7 +182,11 @@ pub(super) fn sample(files: &(impl Files + ?Sized), name: &str) -> Result<Sample
     let image = Image::of(files, name);
     let record = record(files, name)?;
     let size = (record.width, record.height);
-    let rgb = sized(&image, "rgb.png", size, image.rgb("rgb.png")?)?;
+    let rgb = if record.has_photograph() || image.has("rgb.png")? {
+        sized(&image, "rgb.png", size, image.rgb("rgb.png")?)?
+    } else {
+        Vec::new()
+    };
     let of_size =
         |file: &str| image.gray_if_there(file)?.map_or(Ok(Vec::new()), |found| sized(&image, file, size, found));
     let (nir, species) = (of_size("nir.png")?, of_size("species.png")?);

@@ -12,7 +12,7 @@ use super::split::Shares;
 use super::{File, checksum_record, format, pack};
 use crate::ablation::{Edit, FULL};
 use crate::job::{Renderer, SceneFile};
-use crate::settings::RenderOptions;
+use crate::settings::{Engine, RenderOptions};
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -37,6 +37,8 @@ pub struct Order {
     pub labelling: Labelling,
     /// Maps that images keep beside photograph, labels and record.
     pub keep: Vec<Kept>,
+    /// Whether images are labels alone: nothing is lit, and there are no photographs.
+    pub labels_only: bool,
     /// How the images are split.
     pub split: Shares,
     /// Images of an archive, instead of a folder each; a multiple of the images of a field.
@@ -63,6 +65,7 @@ impl Order {
             formats: Vec::new(),
             labelling: Labelling::default(),
             keep: Kept::USUAL.to_vec(),
+            labels_only: false,
             split: Shares::default(),
             pack: None,
             licence: Self::NO_LICENCE.into(),
@@ -109,6 +112,7 @@ pub(super) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
         return Err(Error::input("the images of a dataset have a fixed number of samples")
             .help("give --spp instead of --target-error or --time"));
     }
+    let keep = if order.labels_only { labels_alone(order, &options)? } else { keep::checked(order.keep.clone())? };
     // Before anything grows: what could not be rendered here.
     let kernels = Renderer::open(&options)?.kernels().to_owned();
     let source = opened(&order.scene, order)?.until(stop);
@@ -142,7 +146,8 @@ pub(super) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
             max_depth: options.techniques.max_depth,
             clamp: options.techniques.clamp,
             parts: order.labelling.classes.as_ref().is_some_and(Classes::needs_parts),
-            keep: keep::checked(order.keep.clone())?,
+            keep,
+            labels_only: order.labels_only,
             kernels,
             edit: order.edit.label(),
         }),
@@ -163,10 +168,23 @@ pub(super) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
     Ok(Draft { recipe, files, warnings: told, scene: source, scene_sha256 })
 }
 
+/// The maps that images keep which are labels alone; an error for what such images cannot be.
+fn labels_alone(order: &Order, options: &RenderOptions) -> Result<Vec<Kept>> {
+    let refused = |what: &str| Err(Error::misuse(what).help("leave --labels-only out, or this"));
+    if options.engine != Engine::Trace {
+        return refused("--engine raster draws its labels with its picture, and --labels-only draws none");
+    }
+    if order.edit.asks_samples() {
+        return refused("this --edit makes labels of samples, and --labels-only takes none");
+    }
+    keep::checked(keep::of_labels(&order.keep)?)
+}
+
 /// A scene file as an order asks for it.
 fn opened(scene: &Path, order: &Order) -> Result<SceneFile> {
     let scene = SceneFile::edited(scene, order.edit)?;
-    Ok(scene.seed(order.seed).width(order.width).height(order.height).memory(order.memory))
+    let scene = scene.seed(order.seed).width(order.width).height(order.height).memory(order.memory);
+    Ok(scene.unlit(order.labels_only))
 }
 
 /// SHA-256 of a scene whose copies may name other files than the originals do, found by growing the first field from them in

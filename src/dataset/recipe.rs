@@ -91,6 +91,9 @@ pub struct Rendering {
     /// Maps that images keep beside photograph, labels and record; [`Kept::OLDEST`] where a recipe of before does not say.
     #[serde(default = "oldest", skip_serializing_if = "is_oldest")]
     pub keep: Vec<Kept>,
+    /// Whether images are labels alone: no photographs and nothing that samples tell, so `spp` says nothing.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub labels_only: bool,
     /// The ray tracing kernels and their instruction set, or the graphics card and its driver.
     pub kernels: String,
     /// What was changed of the field, by its name among [`ablation::EDITS`]. What an edit of the drawing changes stands above as well.
@@ -242,6 +245,11 @@ impl Recipe {
         let what = "classes of organs or of things on the ground need parts.png, which these images lack";
         let help = "leave those labels out of --classes, or begin another dataset with these --classes";
         Err(Error::misuse(what).help(help))
+    }
+
+    /// Whether its images are labels alone, without photographs.
+    pub fn labels_only(&self) -> bool {
+        matches!(&self.made, Made::Rendered(rendering) if rendering.labels_only)
     }
 
     /// How it is rendered; an error for images from elsewhere.

@@ -43,7 +43,7 @@ pub struct Record {
     /// Leaf area over the ground that it shows; null in older records, for an imported image, and where the camera sees the horizon.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub canopy: Option<Canopy>,
-    /// How the sensor was set; null for an imported image.
+    /// How the sensor was set; null for an imported image, and for one that is labels alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure: Option<Exposure>,
     /// How well it is sampled; left out where that is not known, and of a denoised image.
@@ -52,6 +52,13 @@ pub struct Record {
     /// What whoever made it should know.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
+}
+
+impl Record {
+    /// Whether there is a photograph of it; a field that was labelled alone has none.
+    pub fn has_photograph(&self) -> bool {
+        self.exposure.is_some() || self.conditions.is_none()
+    }
 }
 
 /// Writes conditions as records have always had them: keys in the order of the alphabet, numbers with the digits of double precision.

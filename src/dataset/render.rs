@@ -44,7 +44,8 @@ pub fn scene_file(set: &Set) -> Result<SceneFile> {
     let rendering = set.recipe.rendering()?;
     let (folder, edit) = (&set.folder, rendering.edit()?);
     let scene = SceneFile::open_within(rendering.scene_in(folder)?, edit, recipe::scope(folder))?;
-    Ok(scene.seed(rendering.seed).width(rendering.width).height(rendering.height))
+    let scene = scene.seed(rendering.seed).width(rendering.width).height(rendering.height);
+    Ok(scene.unlit(rendering.labels_only))
 }
 
 /// What renders the images of a dataset; `None` for images that were imported. An error where this machine would make other bits than
@@ -114,6 +115,9 @@ pub fn render(
     kept: &mut LastField,
 ) -> Result<RenderedSample> {
     let (field, grow) = kept.at(set, scene_file, index)?;
+    if set.recipe.labels_only() {
+        return label(set, field, grow, index, renderer);
+    }
     let image = renderer.render(field, &Request { watch, ..Request::default() })?;
     image.check_denoised()?;
     let begin = Instant::now();
@@ -123,17 +127,52 @@ pub fn render(
     Ok(RenderedSample { sample, text, times: Times { grow, draw, label: label + begin.elapsed() } })
 }
 
+/// Labels an image without drawing it.
+fn label(set: &Set, field: &Field, grow: Duration, index: u64, renderer: &Renderer) -> Result<RenderedSample> {
+    let begin = Instant::now();
+    let labels = field.label()?;
+    let sample = field.threads().install(|| labelled(&set.recipe, index, field, labels))?;
+    let text = format!("{}\nlabels: without light\nkernels: {}", field.grown().provenance(), renderer.kernels());
+    Ok(RenderedSample { sample, text, times: Times { grow, draw: Duration::ZERO, label: begin.elapsed() } })
+}
+
 /// The sample of an image.
 fn describe(recipe: &Recipe, index: u64, image: Image<'_>) -> Result<Sample> {
     let photograph = image.photograph();
-    let field = image.field().grown();
+    let field = image.field();
+    let Image { film, labels, denoised, .. } = image;
+    let mut sample = labelled(recipe, index, field, labels)?;
+    sample.record.exposure = Some(Exposure {
+        gain: photograph.gain,
+        nir_gain: photograph.nir_gain,
+        white_balance: photograph.white_balance,
+    });
+    sample.record.sampling = if denoised.is_none() { film.sampling() } else { None };
+    sample.rgb = photograph.rgb.as_chunks::<3>().0.to_vec();
+    if recipe.keeps(Kept::Nir) {
+        sample.nir = photograph.nir;
+    }
+    sample.coverage = render::coverage(&film, &field.grown().scene.tags()).into_iter().map(of_255).collect();
+    // Classes know what they cover.
+    (sample.record.classes, sample.record.ignored) = annotate::classes(&sample);
+    if !recipe.keeps(Kept::Coverage) {
+        sample.coverage.clear();
+    }
+    if let Some(rendered) = &mut sample.film {
+        rendered.film = Some(film);
+    }
+    Ok(sample)
+}
+
+/// The sample of an image of which nothing but labels is known.
+fn labelled(recipe: &Recipe, index: u64, of: &Field, labels: LabelMap) -> Result<Sample> {
+    let field = of.grown();
     let flows = if format::all(recipe)?.iter().any(|(_, format)| format.needs_flow()) {
-        flow::flows(&field.captures, field.capture, &image.labels.depth, image.field().geometry()?)
+        flow::flows(&field.captures, field.capture, &labels.depth, of.geometry()?)
     } else {
         Vec::new()
     };
     let tags = field.scene.tags();
-    let Image { film, labels, denoised, .. } = image;
     let kinds: BTreeMap<u16, u16> = field.plants.iter().map(|p| (p.number, p.kind)).collect();
     let kind = |plant: u16| kinds.get(&plant).copied().unwrap_or(0);
     let mut sample = Sample {
@@ -146,43 +185,36 @@ fn describe(recipe: &Recipe, index: u64, image: Image<'_>) -> Result<Sample> {
                 let Capture { name, frame, time_s, .. } = &field.captures[field.capture];
                 CaptureRecord { field: field.index, frame: *frame, camera: name.clone(), time_s: *time_s }
             }),
-            width: film.window.width(),
-            height: film.window.height(),
+            width: labels.window.width(),
+            height: labels.window.height(),
             classes: Vec::new(),
             ignored: 0,
             plants: Vec::new(),
             conditions: Some(field.conditions.clone()),
             canopy: None,
-            exposure: Some(Exposure {
-                gain: photograph.gain,
-                nir_gain: photograph.nir_gain,
-                white_balance: photograph.white_balance,
-            }),
-            sampling: if denoised.is_none() { film.sampling() } else { None },
+            exposure: None,
+            sampling: None,
             warnings: field.warnings.clone(),
         },
-        rgb: photograph.rgb.as_chunks::<3>().0.to_vec(),
-        nir: if recipe.keeps(Kept::Nir) { photograph.nir } else { Vec::new() },
+        rgb: Vec::new(),
+        nir: Vec::new(),
         semantics: labels.tags.iter().map(|t| t.class as u8).collect(),
         // The recipe holds no more species than 8 bits number.
         species: labels.tags.iter().map(|t| kind(t.plant) as u8).collect(),
         parts: if recipe.rendering()?.parts { annotate::part_numbers(&labels, &field.kinds) } else { Vec::new() },
         plants: labels.tags.iter().map(|t| t.plant).collect(),
         leaves: labels.tags.iter().map(|t| t.leaf).collect(),
-        coverage: render::coverage(&film, &tags).into_iter().map(of_255).collect(),
+        coverage: Vec::new(),
         depth: keep::depths(&recipe.rendering()?.keep, &labels.depth),
         normals: keep::normals(&recipe.rendering()?.keep, labels.normals.iter().map(Vec3::to_array)),
         film: None,
     };
     (sample.record.classes, sample.record.ignored) = annotate::classes(&sample);
-    if !recipe.keeps(Kept::Coverage) {
-        sample.coverage.clear();
-    }
     let traits = Traits::of(field);
     sample.record.canopy = traits.canopy;
     sample.record.plants = plants(field, &traits, &labels, &sample);
     sample.film = Some(Rendered {
-        film,
+        film: None,
         labels,
         tags,
         kinds: field.kinds.clone(),

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 pub struct Sample {
     /// What is known in words and numbers.
     pub record: Record,
-    /// 8-bit sRGB.
+    /// 8-bit sRGB; empty where images are labels alone.
     pub rgb: Vec<[u8; 3]>,
     /// 8-bit near infrared.
     pub nir: Vec<u8>,
@@ -47,8 +47,8 @@ impl Sample {
 /// What formats for compositing (layers, Cryptomattes) hold beyond a photograph.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rendered {
-    /// Linear radiance, its variance, what each sample met.
-    pub film: Film,
+    /// Linear radiance, its variance, what each sample met; none where images are labels alone.
+    pub film: Option<Film>,
     /// Which part lies at each pixel's centre, and who that is.
     pub labels: LabelMap,
     /// Class, plant and leaf of each part.

@@ -3,7 +3,9 @@
 use super::threads::Threads;
 use crate::ablation::Edit;
 use crate::accel::{Before, EmbreeAccel};
+use crate::geometry::Window;
 use crate::integrator::World;
+use crate::render::{self, LabelMap};
 use crate::scene;
 use crate::scene::assemble::Options;
 use crate::{Error, Result};
@@ -77,12 +79,23 @@ impl Field {
                 EmbreeAccel::build_until(&scene.surfaces(), count, self.options.stop.as_deref(), before)
             };
             let built = self.threads.install(|| match &self.options.preview {
+                // A ray a pixel and no more: a good hierarchy takes longer to build than all of them.
+                None if self.options.unlit => {
+                    EmbreeAccel::build_quickly(&scene.surfaces(), count, self.options.stop.as_deref()).map(Arc::new)
+                }
                 None => build(None).map(Arc::new),
                 Some(preview) => preview.geometry(&scene.parts, build),
             })?;
             let _ = self.geometry.set((built, begin.elapsed()));
         }
         self.geometry.get().map(|(built, _)| built.as_ref()).ok_or_else(|| Error::failed("the scene was not built"))
+    }
+
+    /// Labels of what the camera sees, without any light: one ray for each pixel. An edit of the labels is not made, which asks samples.
+    pub fn label(&self) -> Result<LabelMap> {
+        let (scene, geometry) = (&self.grown.scene, self.geometry()?);
+        let window = Window::full(scene.camera.width(), scene.camera.height());
+        Ok(self.threads.install(|| render::label(geometry, &scene.parts, &scene.camera, window)))
     }
 
     /// Scene and geometry, as integrators take them.

@@ -97,6 +97,14 @@ impl SceneFile {
         self
     }
 
+    /// For labels alone: what the ground looks like is not worked out. Shapes, and all that is told of a field, stay bit for bit.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn unlit(mut self, unlit: bool) -> Self {
+        self.options.unlit = unlit;
+        self
+    }
+
     /// About what field `index` will take, before it grows.
     #[doc(hidden)]
     pub fn estimate(&self, index: u64) -> Result<Estimate> {

@@ -78,6 +78,7 @@ impl Ground {
             ao: Vec::new(),
             like: self.color.like,
         };
+        let look = self.look();
         let crumbs = self.crumbs(raster);
         let mut detail = crumbs.height;
         let rows = (
@@ -101,7 +102,7 @@ impl Ground {
                     0 => 1.0,
                     t => f32::from(t) / 128.0,
                 };
-                let tone = tint * cell.mix(|v| self.fine.tone[v]);
+                let tone = tint * cell.mix(|v| look.tone[v]);
                 albedo[i] = GroundMaps::encode(self.dry(maps, share, p).map(|a| a * tone));
                 weights[i] = share.map(|w| (w * 255.0 + 0.5) as u8);
             }
@@ -176,6 +177,7 @@ impl Ground {
 
     /// What lies in pits of the detail sees less of the sky and dries later; crumbs dry first, by the shares in `dry`.
     fn bake_pits(&self, raster: Raster, split: usize, mut detail: Vec<f32>, dry: &[u8], baked: &mut GroundMaps) {
+        let moistures = &self.look().moisture;
         let cell = |k: usize| self.texel_cell(k % raster.width, k / raster.width, split);
         detail.par_iter_mut().enumerate().for_each(|(k, d)| *d -= cell(k).mix(|v| self.fine.detail[v]));
         let around = blur(&detail, raster.width, (0.0008 / raster.step).ceil() as usize);
@@ -183,7 +185,7 @@ impl Ground {
         let open = |k: usize| (255.0 / (1.0 + pit(k)) + 0.5) as u8;
         let moisture = |k: usize| {
             let left = 1.0 - f32::from(dry[k]) / 255.0;
-            let wet = (cell(k).mix(|v| self.fine.moisture[v]) + PIT_WETTING * pit(k).min(1.0)) * left;
+            let wet = (cell(k).mix(|v| moistures[v]) + PIT_WETTING * pit(k).min(1.0)) * left;
             (wet.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
         };
         (baked.ao, baked.moisture) = (0..detail.len()).into_par_iter().map(|k| (open(k), moisture(k))).unzip();

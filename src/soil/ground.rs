@@ -17,6 +17,7 @@ use crate::sampling::{Purpose, Stream};
 use crate::texture::noise::Perlin;
 use rayon::prelude::*;
 use std::path::Path;
+use std::sync::OnceLock;
 
 /// Rows of vertices that are raised at once: what is kept of them beside the ground stays small.
 const BLOCK_ROWS: usize = 64;
@@ -31,12 +32,17 @@ pub(super) struct Fine {
     pub(super) noise: Vec<Weights>,
     /// Height of layers and crumbs, the part of the relief that the baked maps know more finely.
     pub(super) detail: Vec<f32>,
+    /// Share of the aggregates that the layers hold.
+    pub(super) share: Vec<f32>,
+}
+
+/// What is seen at each vertex of the fine grid beyond its shape.
+#[derive(Clone, Debug)]
+pub(super) struct Look {
     /// 0..1.
     pub(super) moisture: Vec<f32>,
     /// Brightness, about 1.
     pub(super) tone: Vec<f32>,
-    /// Share of the aggregates that the layers hold.
-    pub(super) share: Vec<f32>,
 }
 
 /// One piece of ground.
@@ -56,6 +62,10 @@ pub struct Ground {
     pub(super) step: f32,
     relief: ReliefRecord,
     moisture: MoistureRecord,
+    /// How much drier is what stands out.
+    drying: f32,
+    /// Worked out when it is first asked for: a field that nobody lights does without.
+    look: OnceLock<Look>,
 }
 
 impl Ground {
@@ -87,13 +97,18 @@ impl Ground {
             stream: stream.clone(),
             step: site.grid_m,
             relief: relief.record.clone(),
-            moisture: MoistureRecord::default(),
+            moisture: MoistureRecord {
+                mean: desc.moisture.mean.draw32(&mut stream.child(Purpose::Soil, 30)),
+                spread: desc.moisture.spread.draw32(&mut stream.child(Purpose::Soil, 31)),
+                patch_m: desc.moisture.patch_m.draw(&mut stream.child(Purpose::Soil, 32)),
+            },
+            drying: desc.moisture.drying.f32(),
+            look: OnceLock::new(),
             grid,
         };
         ground.raise(maps, &relief);
         ground.strew();
         ground.slopes = ground.differences();
-        ground.wet(desc);
         Ok(ground)
     }
 
@@ -154,16 +169,18 @@ impl Ground {
         Crumbs::draw(raster, &self.law, self.crumbs_mm, self.crumbs_amount, &stream, |p| self.share(p))
     }
 
-    fn wet(&mut self, desc: &SoilDesc) {
+    /// Moisture and brightness.
+    pub(super) fn look(&self) -> &Look {
+        self.look.get_or_init(|| self.wet())
+    }
+
+    fn wet(&self) -> Look {
         let child = |k| self.stream.child(Purpose::Soil, k);
-        let mean = desc.moisture.mean.draw32(&mut child(30));
-        let spread = desc.moisture.spread.draw32(&mut child(31));
-        let patch_m = desc.moisture.patch_m.draw(&mut child(32));
-        self.moisture = MoistureRecord { mean, spread, patch_m };
+        let MoistureRecord { mean, spread, patch_m } = self.moisture;
+        let drying = self.drying;
         let frequency = 1.0 / patch_m;
         let patches = Perlin::new(child(33).seed32());
         let tones = Perlin::new(child(34).seed32());
-        let drying = desc.moisture.drying.f32();
         let raster = self.raster();
         let heights: Vec<f32> = (0..raster.height)
             .flat_map(|j| (0..raster.width).map(move |i| (i, j)))
@@ -177,13 +194,14 @@ impl Ground {
             let (x, y) = (f64::from(p.x) * frequency, f64::from(p.y) * frequency);
             patches.fbm2(x + 0.5, y + 0.5, 4, 0.6) as f32 / FBM4_SD
         });
-        self.fine.tone = slowly(raster, self.every(), |p| {
+        let tone = slowly(raster, self.every(), |p| {
             let tone = tones.fbm2(f64::from(p.x) / 0.03 + 0.5, f64::from(p.y) / 0.03 + 0.5, 3, 0.6) as f32 / FBM4_SD;
             1.0 + 0.06 * tone.clamp(-2.5, 2.5)
         });
-        self.fine.moisture = (patches.iter().zip(&out))
+        let moisture = (patches.iter().zip(&out))
             .map(|(patch, out)| (mean + spread * patch - drying * (out / sd).clamp(-2.0, 2.0)).clamp(0.0, 1.0))
             .collect();
+        Look { moisture, tone }
     }
 
     /// Moisture of the dry and of the damp clods, 0..1.
@@ -295,7 +313,7 @@ impl Ground {
 
     /// Moisture at a place, 0..1; beyond the area that of the mirrored place.
     pub fn moisture(&self, x: f32, y: f32) -> f32 {
-        self.fine_value(&self.fine.moisture, self.mirrored(vec2(x, y)))
+        self.fine_value(&self.look().moisture, self.mirrored(vec2(x, y)))
     }
 
     /// Texture coordinates of a place in [`Ground::bake`]; beyond the area the maps are mirrored.

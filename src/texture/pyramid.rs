@@ -38,7 +38,14 @@ impl Wrap {
         let place = self.coordinate(x) * n as f32 - 0.5;
         let floor = place.floor();
         let i = floor as i32;
-        (self.index(i, n), self.index(i + 1, n), place - floor)
+        // A coordinate that repeats is at most one texel outside: no division is needed to bring it back.
+        let index = |i: i32| match self {
+            Self::Repeat if i < 0 => n - 1,
+            Self::Repeat if i as u32 >= n => 0,
+            Self::Repeat => i as u32,
+            Self::Clamp => self.index(i, n),
+        };
+        (index(i), index(i + 1), place - floor)
     }
 }
 

@@ -24,6 +24,7 @@ pub(super) const RTC_BUFFER_TYPE_INDEX: c_uint = 0;
 pub(super) const RTC_BUFFER_TYPE_VERTEX: c_uint = 1;
 pub(super) const RTC_FORMAT_UINT3: c_uint = 0x5003;
 pub(super) const RTC_FORMAT_FLOAT3: c_uint = 0x9003;
+pub(super) const RTC_BUILD_QUALITY_LOW: c_uint = 0;
 pub(super) const RTC_BUILD_QUALITY_MEDIUM: c_uint = 1;
 pub(super) const RTC_SCENE_FLAG_ROBUST: c_uint = 1 << 2;
 

@@ -113,6 +113,7 @@ impl Args {
             height: self.scene.height,
             labelling: Labelling { classes: self.classes.clone(), ..Labelling::default() },
             options: self.look.options(),
+            labels_only: self.look.labels_only,
             edit: self.edit.as_deref().map_or(Ok(&FULL), Edit::named)?,
             memory: self.memory.bytes,
             ..Order::new(self.scene.path(), count)

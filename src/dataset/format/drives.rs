@@ -37,6 +37,10 @@ impl<T: OfFields> Format for T {
         true
     }
 
+    fn needs_photograph(&self) -> bool {
+        OfFields::names_photographs(self)
+    }
+
     fn names_photographs(&self) -> bool {
         OfFields::names_photographs(self)
     }

@@ -38,6 +38,10 @@ impl Format for Writer {
         true
     }
 
+    fn needs_photograph(&self) -> bool {
+        false
+    }
+
     fn needs_flow(&self) -> bool {
         true
     }

@@ -18,7 +18,7 @@ use crate::dataset::recipe::{Made, Recipe};
 use crate::dataset::sample::Sample;
 use crate::dataset::File;
 use crate::output;
-use crate::Result;
+use crate::{Error, Result};
 
 pub(super) struct Writer;
 
@@ -28,8 +28,9 @@ impl Format for Writer {
     fn image(&self, recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
         let record = &sample.record;
         let rendered = sample.rendered(FOLDER)?;
+        let film = rendered.film.as_ref().ok_or_else(|| Error::misuse("layers hold radiance, and these images are labels alone"))?;
         let text = provenance(recipe, record.index);
-        let bytes = output::encode_layers(&rendered.film, &rendered.labels, &rendered.tags, &text)?;
+        let bytes = output::encode_layers(film, &rendered.labels, &rendered.tags, &text)?;
         Ok(vec![File { path: format!("{FOLDER}/{}/{}.exr", record.split.name(), record.name), bytes }])
     }
 

@@ -36,6 +36,11 @@ pub trait Format: Sync {
         &[]
     }
 
+    /// Whether it holds photographs, or names them, so that images which are labels alone cannot be written in it.
+    fn needs_photograph(&self) -> bool {
+        true
+    }
+
     /// Whether it names the photographs in `images/`, which it does not copy.
     fn names_photographs(&self) -> bool {
         false
@@ -143,6 +148,17 @@ pub fn all(recipe: &Recipe) -> Result<Vec<(&str, &'static dyn Format)>> {
 /// An error where a format, or a class of its labels, needs a map that the images of this recipe do not have.
 pub fn check_maps(recipe: &Recipe) -> Result<()> {
     for (format, writer) in all(recipe)? {
+        if recipe.labels_only() && writer.needs_photograph() {
+            let known = NAMES.iter().filter(|(name, _)| named(name).is_some_and(|format| !format.needs_photograph()));
+            let known: Vec<&str> = known.map(|(name, _)| *name).collect();
+            return Err(Error::misuse(format!(
+                "--format {format} holds photographs, and these images are labels alone"
+            ))
+            .help(format!(
+                "leave --labels-only or this format out; without photographs there are {}",
+                known.join(", ")
+            )));
+        }
         let lacks = writer.needs_maps().iter().find(|map| !recipe.keeps(**map));
         if let Some((name, ..)) = lacks.and_then(|map| Kept::NAMED.iter().find(|(_, kept, _)| kept == map)) {
             return Err(Error::misuse(format!("--format {format} holds {name}, which these images do not keep"))

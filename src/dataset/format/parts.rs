@@ -35,6 +35,10 @@ impl Format for Writer {
     fn needs_film(&self) -> bool {
         true
     }
+
+    fn needs_photograph(&self) -> bool {
+        false
+    }
 }
 
 /// The number of what each pixel shows; an error that names `format` for an image that was not rendered.

@@ -70,6 +70,10 @@ impl Format for Writer {
     fn needs_film(&self) -> bool {
         true
     }
+
+    fn needs_photograph(&self) -> bool {
+        false
+    }
 }
 
 /// The joints of a leaf; none of a model's.

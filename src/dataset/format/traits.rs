@@ -78,6 +78,10 @@ impl Format for Writer {
         false
     }
 
+    fn needs_photograph(&self) -> bool {
+        false
+    }
+
     fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
         table::<PlantRow<'_>>(set, out, "plants.csv", |record, table| {
             record.plants.iter().try_for_each(|plant| table.row(PlantRow::of(record, plant)))

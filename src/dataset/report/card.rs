@@ -2,6 +2,7 @@
 
 use super::statistics::{Species, Statistics};
 use crate::dataset::format;
+use crate::dataset::keep::Kept;
 use crate::dataset::recipe::{Made, Recipe, Rendering};
 use crate::dataset::split::Split;
 use crate::report::{count, keyed, legend, list, pairs, percent, whole};
@@ -28,6 +29,9 @@ pub(super) fn lead(recipe: &Recipe, found: &Statistics) -> String {
         many => format!("{} sizes, {} to {} pixels", many.len(), many[0], many[many.len() - 1]),
     };
     match &recipe.made {
+        Made::Rendered(Rendering { labels_only: true, .. }) => {
+            format!("Labels of procedurally grown crop fields at {size}, exact by their geometry, without photographs.")
+        }
         Made::Rendered(Rendering { engine, spp, .. }) => {
             let how = if *engine == Engine::Trace { "path traced" } else { "rasterized" };
             format!(
@@ -50,9 +54,13 @@ pub(super) fn provenance(recipe: &Recipe) -> Markup {
             rows.push(("seed", html! { (made.seed) }));
             rows.push(("image size", html! { (made.width) " × " (made.height) " pixels" }));
             let engine = if made.engine == Engine::Trace { "path tracer" } else { made.engine.name() };
-            rows.push(("engine", html! { (engine) }));
-            rows.push(("samples a pixel", html! { (made.spp) }));
-            rows.push(("denoised", html! { (if made.denoise { "yes, Open Image Denoise" } else { "no" }) }));
+            if made.labels_only {
+                rows.push(("drawn", html! { "labels alone, one ray a pixel" }));
+            } else {
+                rows.push(("engine", html! { (engine) }));
+                rows.push(("samples a pixel", html! { (made.spp) }));
+                rows.push(("denoised", html! { (if made.denoise { "yes, Open Image Denoise" } else { "no" }) }));
+            }
             let mut deviations: Vec<String> = made.without.iter().map(|t| format!("without {}", t.name())).collect();
             deviations.extend(made.max_depth.map(|n| format!("at most {n} surfaces on a path")));
             deviations.extend(made.clamp.map(|x| format!("radiance of a path clamped to {x}")));
@@ -145,7 +153,10 @@ fn stages(of: &Species) -> String {
 /// The files of an image, and how they are opened.
 pub(super) fn reading(recipe: &Recipe, nir: bool) -> Markup {
     let rendered = matches!(recipe.made, Made::Rendered(_));
-    let mut rows = vec![("rgb.png", html! { "photograph in colour, 8-bit sRGB" })];
+    let mut rows = Vec::new();
+    if !recipe.labels_only() {
+        rows.push(("rgb.png", html! { "photograph in colour, 8-bit sRGB" }));
+    }
     if nir {
         rows.push(("nir.png", html! { "photograph in near infrared, 8 bit" }));
     }
@@ -155,9 +166,11 @@ pub(super) fn reading(recipe: &Recipe, nir: bool) -> Markup {
     }
     rows.push(("plants.png", html! { "number of the plant, 16 bit, 0 for none" }));
     rows.push(("leaves.png", html! { "number of the leaf on its plant, 16 bit, 0 for none" }));
-    if rendered {
+    if recipe.keeps(Kept::Coverage) && rendered {
         let coverage = "share of soil, crop, weed in the pixel as R, G, B; they sum to 255";
         rows.push(("coverage.png", html! { (coverage) }));
+    }
+    if [Kept::Depth, Kept::Depth32, Kept::Normals, Kept::Normals16].iter().any(|map| recipe.keeps(*map)) && rendered {
         let geometry = html! {
             code { "depth.Z" } " in metres along the optical axis, " code { "normal.X/Y/Z" } " in world coordinates"
         };
@@ -218,11 +231,13 @@ pub(super) fn limits(recipe: &Recipe, found: &Statistics) -> Markup {
                     .into(),
             );
             all.push("Stones, straw and everything else that is no plant is soil.".into());
-            all.push(if made.denoise {
-                "Denoising blurs what is finer than a pixel.".into()
-            } else {
-                format!("The photographs hold the noise of {} samples a pixel, beside the sensor's.", made.spp)
-            });
+            if !made.labels_only {
+                all.push(if made.denoise {
+                    "Denoising blurs what is finer than a pixel.".into()
+                } else {
+                    format!("The photographs hold the noise of {} samples a pixel, beside the sensor's.", made.spp)
+                });
+            }
             all.push("Wind and diseases are not modelled. Damage by insects, dead tissue and motion blur are there where the scene file says so.".into());
         }
         Made::Imported { .. } => {

@@ -27,7 +27,7 @@ struct Means([f64; 3], f64, Option<f64>);
 
 /// Measures photographs of a dataset.
 pub(super) fn measure(set: &Set) -> Result<Photographs> {
-    let count = set.recipe.count;
+    let count = if set.recipe.labels_only() { 0 } else { set.recipe.count };
     let measured = count.min(MOST);
     // Numbers of images, spread evenly.
     let places: Vec<u64> =

@@ -16,6 +16,8 @@ use rayon::prelude::*;
 const MOST: usize = 24;
 /// Most pixels of a side.
 const SIDE: u32 = 360;
+/// What stands for a photograph where there is none.
+const EARTH: [u8; 3] = [70, 62, 54];
 /// Quality of the JPEGs.
 const QUALITY: u8 = 82;
 
@@ -137,7 +139,10 @@ fn chosen(sizes: [usize; Split::ALL.len()]) -> [Vec<usize>; Split::ALL.len()] {
 /// One image: photograph, labels, words.
 fn card(sample: &Sample, facts: &Facts, unusual: f64, has_files: bool) -> Result<Markup> {
     let Record { name, source, split, width, height, .. } = &sample.record;
-    let (w, h, rgb) = output::shrink(*width, *height, &sample.rgb, SIDE);
+    // Labels alone lie on plain earth.
+    let earth = if sample.rgb.is_empty() { vec![EARTH; sample.pixels()] } else { Vec::new() };
+    let (shown, full) = if earth.is_empty() { (&sample.rgb, "rgb.png") } else { (&earth, "semantics.png") };
+    let (w, h, rgb) = output::shrink(*width, *height, shown, SIDE);
     let photograph = data_url("jpeg", &output::encode_jpeg(w, h, &rgb, QUALITY)?);
     let labels = data_url("png", &output::encode_png(w, h, &Picture::Rgba(&overlay(sample, w, h)), "")?);
     Ok(html! {
@@ -153,7 +158,7 @@ fn card(sample: &Sample, facts: &Facts, unusual: f64, has_files: bool) -> Result
             figcaption {
                 b { (name) } " " (split.name()) " · " (words(&sample.record)) " "
                 @if has_files {
-                    a.enlarge href={ (native::folder(name)) "/rgb.png" } { "full size" } " "
+                    a.enlarge href={ (native::folder(name)) "/" (full) } { "full size" } " "
                     a href={ (native::folder(name)) "/record.json" } { "record" }
                 }
             }

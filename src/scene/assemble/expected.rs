@@ -33,7 +33,7 @@ impl Source {
     }
 
     /// Asks a field that has not grown.
-    fn ask<T>(&self, options: &Options, question: impl FnOnce(&mut Builder<'_>) -> Result<T>) -> Result<T> {
+    pub(super) fn ask<T>(&self, options: &Options, question: impl FnOnce(&mut Builder<'_>) -> Result<T>) -> Result<T> {
         let held = || self.library.lock().unwrap_or_else(PoisonError::into_inner);
         let library = held().clone();
         let mut builder = Builder::new(&self.page, &self.desc, options, library)?;

@@ -5,6 +5,7 @@ use super::builder::{Builder, Floor};
 use super::earth::{BakedGrounds, Bed, Earth, Laid, Soil};
 use super::preview::Under;
 use super::view::View;
+use crate::bsdf::{Bsdf, OrenNayar};
 use crate::geometry::{Cost, Mesh};
 use crate::material::{BakedGround, Ground as GroundMaterial, Material, Solid};
 use crate::math::Spectrum;
@@ -68,7 +69,11 @@ impl Builder<'_> {
         let record = self.soil_record(desc, &ground);
         // The bake takes as long as everything else, and neither needs the other.
         let (baked, rest) = rayon::join(
-            || known.as_ref().map_or_else(|| Arc::new(bake(&ground, &soil)), |bed| bed.baked.clone()),
+            || match &known {
+                _ if options.unlit => None,
+                Some(bed) => Some(bed.baked.clone()),
+                None => Some(Arc::new(bake(&ground, &soil))),
+            },
             || {
                 let taken: Vec<Disc> = earth.stones.iter().map(|s| (s.centre.truncate(), s.radius)).collect();
                 let (seedlings, _) = self.seedlings(view.grown(PLANT_MARGIN), &taken)?;
@@ -82,8 +87,8 @@ impl Builder<'_> {
         );
         let (plants, same, clods) = rest?;
         self.options.wanted()?;
-        let laid = same.unwrap_or_else(|| Arc::new(lay(floor, clods, earth.stones, &baked)));
-        if let (Some(preview), Some(earth)) = (preview, bare) {
+        let laid = same.unwrap_or_else(|| Arc::new(lay(floor, clods, earth.stones, baked.as_deref())));
+        if let (Some(preview), Some(earth), Some(baked)) = (preview, bare, baked) {
             let bed = known.unwrap_or_else(|| Arc::new(Bed { soil, earth, baked }));
             let plants = self.scene.parts.iter().map(|part| part.mesh.clone()).collect();
             preview.keep_ground(Under { bed, plants }, &laid);
@@ -183,9 +188,10 @@ fn bake(ground: &Ground, Soil { maps, texel, .. }: &Soil) -> BakedGrounds {
     }
 }
 
-/// Makes parts of everything of the ground.
-fn lay(floor: Floor<'_>, clods: Vec<Clods>, debris: Vec<Debris>, baked: &BakedGrounds) -> Laid {
+/// Makes parts of everything of the ground; black ones where it was not baked.
+fn lay(floor: Floor<'_>, clods: Vec<Clods>, debris: Vec<Debris>, baked: Option<&BakedGrounds>) -> Laid {
     let mut laid = Laid::default();
+    let black = || Material::Plain(Bsdf::OrenNayar(OrenNayar::new(Spectrum::ZERO, 0.0)));
     let mut add = |mesh: Mesh, material: Material, kind| {
         let material_of = laid.materials.len() as u32;
         laid.materials.push(material);
@@ -193,12 +199,18 @@ fn lay(floor: Floor<'_>, clods: Vec<Clods>, debris: Vec<Debris>, baked: &BakedGr
         laid.parts.push(Part { mesh: Arc::new(mesh), mask: None, material: material_of, tag: Tag::default() });
     };
     let mesh = if floor.flat { floor.ground.levelled().mesh() } else { floor.ground.mesh() };
-    add(mesh, Material::Ground(GroundMaterial::new(baked.ground.clone())), PartKind::Soil);
+    let shown = baked.map(|baked| Material::Ground(GroundMaterial::new(baked.ground.clone())));
+    add(mesh, shown.unwrap_or_else(black), PartKind::Soil);
     for group in clods {
-        let maps = baked.clods[usize::from(group.damp)].clone();
-        add(group.mesh, Material::Ground(GroundMaterial::clods(maps, group.tint)), PartKind::Soil);
+        let maps = baked.map(|baked| baked.clods[usize::from(group.damp)].clone());
+        let shown = maps.map(|maps| Material::Ground(GroundMaterial::clods(maps, group.tint)));
+        add(group.mesh, shown.unwrap_or_else(black), PartKind::Soil);
     }
     for (i, thing) in debris.into_iter().enumerate() {
+        let Some(baked) = baked else {
+            add(thing.mesh, black(), PartKind::Debris(thing.kind));
+            continue;
+        };
         let solid = Solid::new(thing.albedo * thing.tint, DEBRIS_SIGMA);
         // A stone is of a piece; dead matter is mottled by what eats it.
         let patch = 0.5 * thing.radius.max(1e-3);

@@ -152,10 +152,10 @@ impl Source {
 
     /// What field `options.index` takes, before it grows.
     pub fn estimate(&self, options: &Options) -> Result<Estimate> {
-        let library = self.library.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        let mut builder = Builder::new(&self.page, &self.desc, options, library)?;
-        let View { area, open } = builder.looked_at()?;
-        builder.estimate(area, open)
+        self.ask(options, |builder| {
+            let View { area, open } = builder.looked_at()?;
+            builder.estimate(area, open)
+        })
     }
 }
 

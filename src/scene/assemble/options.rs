@@ -23,6 +23,9 @@ pub struct Options {
     pub stop: Option<Arc<AtomicBool>>,
     /// Given for a preview: meshes are as coarse as its pixels, and what did not change since the field before is taken from there.
     pub preview: Option<Preview>,
+    /// Whether the field is only labelled: what the ground looks like is not worked out, and it reflects nothing. Its shape, and everything that
+    /// is told of the field, stays.
+    pub unlit: bool,
 }
 
 impl Options {

@@ -70,6 +70,10 @@ pub(crate) struct LookArgs {
     /// Samples a pixel.
     #[arg(long, default_value_t = Quality::SPP, value_parser = samples())]
     spp: u32,
+    /// Draw no photographs: labels and records alone, of the same fields. Nothing is lit, and no sensor is asked; of --keep only depth and
+    /// normals can be had, and unless they are named, nothing.
+    #[arg(long, conflicts_with_all = ["spp", "denoise", "engine", "without", "max_depth", "clamp"])]
+    pub(crate) labels_only: bool,
     /// Take the noise of few samples out of the photographs; needs Open Image Denoise.
     #[arg(long)]
     denoise: bool,
@@ -156,7 +160,8 @@ pub(crate) fn begin(folder: &Path, order: &Order) -> Result<Set> {
 impl LookArgs {
     /// How images are rendered without an edit.
     pub(crate) fn options(&self) -> RenderOptions {
-        self.technique.options(Quality { denoise: self.denoise, ..Quality::spp(self.spp) })
+        let spp = if self.labels_only { 1 } else { self.spp };
+        self.technique.options(Quality { denoise: self.denoise, ..Quality::spp(spp) })
     }
 }
 
@@ -195,6 +200,7 @@ impl ImageArgs {
             labelling: self.labels.labelling(),
             licence: self.licence.clone(),
             options: self.options(),
+            labels_only: self.look.labels_only,
             edit,
             memory: self.memory.bytes,
             ..Order::new(self.scene.path(), self.count.unwrap_or(0))

@@ -1,0 +1,212 @@
+//! How time and memory grow: with pixels, samples, plants, triangles, threads and images.
+//!
+//!     cargo bench --bench scale            all; `-- pixels plants` for some of the tables
+//!
+//! Each row is a run of this bench of its own, so that its peak memory is its own. Time is that of all cores together, from Linux's clock of
+//! the process (a hundredth of a second), since a busy machine stretches every other; of threads it is the clock on the wall. The exponents are
+//! slopes of the logarithms by least squares: 1 is linear, 0 constant.
+
+#![allow(clippy::print_stdout, reason = "its tables are its result")]
+
+use furrow::accel::EmbreeAccel;
+use furrow::dataset::meter;
+use furrow::geometry::Window;
+use furrow::integrator::{PathTracer, World};
+use furrow::render::{self, Settings, Watch};
+use furrow::sampling::Points;
+use furrow::scene::assemble;
+use furrow::scene::traits::Traits;
+use std::process::Command;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+/// A row: pixels across (three to two down), samples, crop plants on a square metre, clods over 5 mm on it, threads, images.
+#[derive(Clone, Copy)]
+struct Row {
+    width: u32,
+    spp: u32,
+    density: f64,
+    clods: u32,
+    threads: usize,
+    images: u64,
+}
+
+/// What the tables vary one value of.
+const BASE: Row = Row { width: 324, spp: 8, density: 60.0, clods: 9000, threads: 1, images: 1 };
+
+/// What a row took.
+#[derive(Clone, Copy, Default)]
+struct Cost {
+    plants: f64,
+    triangles: f64,
+    /// Seconds of a core: growing, building, drawing, labels with extents and traits.
+    seconds: [f64; 4],
+    wall: f64,
+    /// Most memory, bytes.
+    peak: f64,
+}
+
+/// A table: its name, what varies, and its rows.
+fn tables() -> Vec<(&'static str, Vec<(f64, Row)>)> {
+    let rows = |values: &[u32], of: fn(u32) -> Row| values.iter().map(|v| (f64::from(*v), of(*v))).collect();
+    let pixels = [162, 324, 648, 1296].map(|width| {
+        let row = Row { width, ..BASE };
+        (f64::from(width) * f64::from(height(width)), row)
+    });
+    vec![
+        ("pixels", pixels.to_vec()),
+        ("samples", rows(&[4, 8, 16, 32, 64], |spp| Row { spp, ..BASE })),
+        // The field of which about 1.1 m² is planted holds 67, 250, 1 000 and 4 000.
+        ("plants", rows(&[37, 140, 560, 2240], |density| Row { density: f64::from(density), ..BASE })),
+        ("triangles", rows(&[1000, 4000, 16000, 64000], |clods| Row { clods, ..BASE })),
+        ("threads", rows(&[1, 2], |threads| Row { threads: threads as usize, spp: 32, ..BASE })),
+        ("images", rows(&[1, 2, 4, 8], |images| Row { images: u64::from(images), ..BASE })),
+    ]
+}
+
+fn height(width: u32) -> u32 {
+    width * 2 / 3
+}
+
+/// The scene of a row: seedlings in rows so narrow that they stand all over a piece of ground, of the same age whatever their number.
+fn scene(row: &Row) -> String {
+    let side = (1.0 / row.density).sqrt();
+    format!(
+        r#"Field(
+            seed: 7,
+            camera: Pinhole(size: ({}, {}), intrinsics: FieldOfView(horizontal_deg: 50), pose: Nadir(height_m: 1)),
+            lights: [Daylight(sun: Angles(elevation_deg: 50, azimuth_deg: 160))],
+            soil: (
+                layers: [(albedo: "textures/soil/dirt.png", height: "textures/soil/dirt.height.png", size_m: 0.5, height_mm: (-4, 8))],
+                clods: (over_5mm_per_m2: {}),
+            ),
+            crops: [(species: "scenes/species/sugar_beet.ron", growth: AgeDays(12), rows: (spacing_m: {side}, in_row_m: {side}))],
+        )"#,
+        row.width,
+        height(row.width),
+        row.clods,
+    )
+}
+
+/// Makes the images of a row one after another, and tells what that took.
+fn run(row: &Row) -> Cost {
+    let pool = render::pool(row.threads).expect("threads");
+    let text = scene(row);
+    let mut cost = Cost::default();
+    let begin = Instant::now();
+    for index in 0..row.images {
+        let options = assemble::Options { index, ..assemble::Options::default() };
+        let mut clock = meter::cpu();
+        let mut lap = |into: &mut f64| {
+            let now = meter::cpu();
+            *into += now.zip(clock).map_or(0.0, |(now, then)| (now - then).as_secs_f64());
+            clock = now;
+        };
+        let field = pool.install(|| assemble::field_of(&text, &options)).expect("a field");
+        lap(&mut cost.seconds[0]);
+        let accel = pool.install(|| EmbreeAccel::build(&field.scene.surfaces(), row.threads as u32)).expect("a BVH");
+        lap(&mut cost.seconds[1]);
+        let camera = &field.scene.camera;
+        let window = Window::full(camera.width(), camera.height());
+        let settings = Settings { spp: row.spp, seed: field.sample_seed(), window, points: Points::Sobol };
+        let (stop, world) = (AtomicBool::new(false), World { scene: &field.scene, geometry: &accel });
+        let watch = Watch { done: &|_| (), stop: &stop };
+        pool.install(|| render::render(&world, &PathTracer::default(), &settings, &watch)).expect("a film");
+        lap(&mut cost.seconds[2]);
+        pool.install(|| {
+            let labels = render::label(&accel, &field.scene.parts, camera, window);
+            (render::extents(&field.scene, &labels), Traits::of(&field))
+        });
+        lap(&mut cost.seconds[3]);
+        cost.plants = field.plants.len() as f64;
+        cost.triangles = field.scene.triangles() as f64;
+    }
+    cost.wall = begin.elapsed().as_secs_f64();
+    cost.peak = meter::peak_memory().unwrap_or(0) as f64;
+    cost
+}
+
+/// The same in a process of its own.
+fn measured(row: &Row) -> Cost {
+    let Row { width, spp, density, clods, threads, images } = row;
+    let program = std::env::current_exe().expect("this program");
+    let words = format!("{width} {spp} {density} {clods} {threads} {images}");
+    let output = Command::new(program).env(ROW, words).output().expect("a run");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let numbers: Vec<f64> =
+        String::from_utf8_lossy(&output.stdout).split_whitespace().map(|n| n.parse().expect("a number")).collect();
+    let [plants, triangles, a, b, c, d, wall, peak] = numbers[..] else { panic!("{numbers:?}") };
+    Cost { plants, triangles, seconds: [a, b, c, d], wall, peak }
+}
+
+/// Names the variable that makes a run of one row.
+const ROW: &str = "FURROW_SCALE_ROW";
+
+/// Slope of the logarithms by least squares.
+fn exponent(x: &[f64], y: &[f64]) -> f64 {
+    let of = |v: &[f64]| -> Vec<f64> { v.iter().map(|v| v.max(1e-3).ln()).collect() };
+    let (x, y) = (of(x), of(y));
+    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+    let (mx, my) = (mean(&x), mean(&y));
+    let (above, below) =
+        x.iter().zip(&y).fold((0.0, 0.0), |(a, b), (x, y)| (a + (x - mx) * (y - my), b + (x - mx).powi(2)));
+    above / below
+}
+
+fn main() {
+    if let Ok(words) = std::env::var(ROW) {
+        let n: Vec<f64> = words.split_whitespace().map(|n| n.parse().expect("a number")).collect();
+        let [width, spp, density, clods, threads, images] = n[..] else { panic!("{words}") };
+        let row = Row {
+            width: width as u32,
+            spp: spp as u32,
+            density,
+            clods: clods as u32,
+            threads: threads as usize,
+            images: images as u64,
+        };
+        let Cost { plants, triangles, seconds: [a, b, c, d], wall, peak } = run(&row);
+        println!("{plants} {triangles} {a} {b} {c} {d} {wall} {peak}");
+        return;
+    }
+    let wanted: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
+    for (name, rows) in tables() {
+        if !wanted.is_empty() && !wanted.iter().any(|word| word == name) {
+            continue;
+        }
+        println!("| {name} | plants | triangles | grow, s | build, s | draw, s | labels, s | wall, s | peak, MB |");
+        println!("|---|---|---|---|---|---|---|---|---|");
+        let costs: Vec<(f64, Cost)> = rows.iter().map(|(value, row)| (*value, measured(row))).collect();
+        for (value, cost) in &costs {
+            let [grow, build, draw, labels] = cost.seconds;
+            println!(
+                "| {value} | {} | {:.2} M | {grow:.2} | {build:.2} | {draw:.2} | {labels:.2} | {:.2} | {:.0} |",
+                cost.plants,
+                cost.triangles / 1e6,
+                cost.wall,
+                cost.peak / 1e6
+            );
+        }
+        // Of triangles and plants as they came out, for densities tell them only about.
+        let x: Vec<f64> = costs
+            .iter()
+            .map(|(value, cost)| match name {
+                "plants" => cost.plants,
+                "triangles" => cost.triangles,
+                _ => *value,
+            })
+            .collect();
+        let of =
+            |value: &dyn Fn(&Cost) -> f64| exponent(&x, &costs.iter().map(|(_, cost)| value(cost)).collect::<Vec<_>>());
+        println!(
+            "\nexponents: grow {:.2}, build {:.2}, draw {:.2}, labels {:.2}, all {:.2}, wall {:.2}, memory {:.2}\n",
+            of(&|c| c.seconds[0]),
+            of(&|c| c.seconds[1]),
+            of(&|c| c.seconds[2]),
+            of(&|c| c.seconds[3]),
+            of(&|c| c.seconds.iter().sum()),
+            of(&|c| c.wall),
+            of(&|c| c.peak),
+        );
+    }
+}

@@ -1,0 +1,97 @@
+//! `trace dataset --labels-only`: labels and records of fields that nobody lights.
+//!
+//! Rationale: who counts, measures or plans wants labels of thousands of fields and no photograph; they must be those of the photographed
+//! fields. Expected: maps and records equal to those of an ordinary dataset of the same scene, value by value; files of photographs missing and
+//! nothing else; formats that need photographs, and everything else that needs samples, refused in words. Source: the ordinary dataset.
+
+mod common;
+
+use common::dataset::{fail, path, succeed, tree, verb};
+use common::program::{SMALL, scratch, trace};
+use common::python::python;
+use furrow::dataset::{Set, native};
+use std::path::Path;
+use std::process::Command;
+
+/// Images in each dataset.
+const COUNT: u64 = 3;
+
+/// Makes a dataset of the small scene.
+fn make(folder: &Path, more: &[&str]) -> Command {
+    let mut command = trace(&["dataset", "--scene", SMALL, "--quiet", "--width", "96", "--out", path(folder)]);
+    command.args(["--count", &COUNT.to_string()]).args(more);
+    command
+}
+
+#[test]
+fn labels_are_those_of_the_photographed_fields() {
+    let (_keep, base) = scratch();
+    let (lit, unlit) = (base.join("lit"), base.join("unlit"));
+    succeed(make(&lit, &["--spp", "1", "--classes", "soil; blade; weed", "--keep", "depth32,normals16"]));
+    let labels_only = ["--labels-only", "--classes", "soil; blade; weed", "--keep", "depth32,normals16"];
+    succeed(make(&unlit, &labels_only));
+    for index in 0..COUNT {
+        let name = Set::name(index);
+        let [a, b] = [&lit, &unlit].map(|folder| native::read(folder, &name).expect("an image"));
+        assert!(a.rgb.len() == a.pixels() && b.rgb.is_empty() && b.nir.is_empty() && b.coverage.is_empty());
+        assert!(a.semantics.contains(&1) && a.leaves.iter().any(|leaf| *leaf > 1));
+        assert!(a.semantics == b.semantics && a.plants == b.plants && a.leaves == b.leaves);
+        assert!(a.species == b.species && a.parts == b.parts && a.depth == b.depth && a.normals == b.normals);
+        assert_eq!(a.record.plants, b.record.plants);
+        assert_eq!((&a.record.conditions, a.record.canopy), (&b.record.conditions, b.record.canopy));
+        assert!(a.record.has_photograph() && !b.record.has_photograph() && b.record.sampling.is_none());
+    }
+    let names = |folder: &Path| -> Vec<String> {
+        tree(folder).into_keys().filter(|name| name.starts_with("images/")).collect()
+    };
+    let expected: Vec<String> = names(&lit).into_iter().filter(|name| !name.ends_with("rgb.png")).collect();
+    assert_eq!(names(&unlit), expected);
+    succeed(verb("verify", &unlit, &["--rerender", "2"]));
+    // Begun as what it is, it is nothing else.
+    assert!(fail(make(&unlit, &["--spp", "1", "--keep", "depth32,normals16"]), 2).contains("labels_only"));
+}
+
+#[test]
+fn formats_without_photographs_are_written_and_others_refused() {
+    let (_keep, data) = scratch();
+    succeed(make(&data, &["--labels-only", "--format", "flow,parts,skeletons,traits,tum,mots"]));
+    let files = tree(&data);
+    for name in ["traits/leaves.csv", "parts/names.json", "tum/000000-camera.txt", "report.html"] {
+        assert!(files.contains_key(name), "{name}");
+    }
+    assert!(!files.keys().any(|name| name.ends_with("geometry.exr") || name.ends_with("coverage.png")));
+    // The same command goes on with it.
+    succeed(make(&data, &["--labels-only"]));
+    let later = fail(verb("finish", &data, &["--format", "yolo"]), 2);
+    assert!(later.contains("--format yolo holds photographs"), "{later}");
+    for (more, words) in [
+        (&["--format", "coco"][..], "without photographs there are flow, mots, parts, skeletons, traits, tum"),
+        (&["--keep", "nir"], "--keep nir is drawn by samples"),
+        (&["--edit", "smooth-labels"], "makes labels of samples"),
+        (&["--edit", "raster"], "draws its labels with its picture"),
+        (&["--spp", "4"], "cannot be used with"),
+    ] {
+        let (_keep, other) = scratch();
+        let said = fail(make(&other, &[&["--labels-only"], more].concat()), 2);
+        assert!(said.contains(words), "{more:?}: {said}");
+        assert!(!other.join("dataset.json").exists(), "{more:?}");
+    }
+}
+
+#[test]
+fn python_reads_labels_alone() {
+    const READ: &str = "
+import sys, furrow
+data = furrow.Dataset(sys.argv[1])
+sample = data[0]
+assert data.labels_only and sorted(sample) == ['leaves', 'plants', 'record', 'semantics'], sorted(sample)
+assert sample['semantics'].shape == sample['plants'].shape and sample['plants'].max() > 0
+assert sample['record']['plants'] and sample._repr_png_().startswith(b'\\x89PNG')
+";
+    let Some(python) = python("import numpy, PIL") else { return };
+    let (_keep, data) = scratch();
+    succeed(make(&data, &["--labels-only"]));
+    let mut read = Command::new(python);
+    read.args(["-c", READ, path(&data)]).env("PYTHONPATH", Path::new(env!("CARGO_MANIFEST_DIR")).join("python"));
+    succeed(read);
+}
