@@ -57,6 +57,10 @@ pub struct LeafDesc {
     #[serde(skip_serializing_if = "Num::is_zero")]
     #[schemars(extend("x-example" = "0.05"))]
     pub hairs: Num<Fraction>,
+    /// The same of the lower side, where it is felted and the upper side is not, as on thistles; default: as on the upper side.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "0.3"))]
+    pub hairs_back: Option<Num<Fraction>>,
     /// Share that meets a crystal of wax or a bladder of meal: 0.03 bluish, 0.1 mealy; default none. They scatter blue the most.
     #[serde(skip_serializing_if = "Num::is_zero")]
     #[schemars(extend("x-example" = "0.03"))]
@@ -82,6 +86,7 @@ impl Default for LeafDesc {
             roughness_along: None,
             ior: Num::new(1.45),
             hairs: Num::new(0.0),
+            hairs_back: None,
             bloom: Num::new(0.0),
             back_paleness: Num::new(1.4),
             relief: Num::new(1.0),
@@ -131,6 +136,7 @@ impl LeafMaterial {
         let back = desc.roughness_back.f32().max(0.02);
         let ior = desc.ior.f32();
         let layer = SurfaceLayer::new(desc.hairs.f32(), desc.bloom.f32());
+        let below = SurfaceLayer::new(desc.hairs_back.unwrap_or(desc.hairs).f32(), desc.bloom.f32());
         let optics = Arc::new(LeafOptics::new(&desc.pigments));
         let exposure = match &picture {
             Some(picture) if !desc.calibrated => exposure(&picture.color, optics.plain().reflectance.0.truncate()),
@@ -141,7 +147,7 @@ impl LeafMaterial {
             optics,
             exposure,
             upper: Side::new(ior, [across, along], Spectrum::ZERO).layered(layer),
-            lower: Side::new(ior, [back, along.max(back)], Spectrum::ZERO).layered(layer),
+            lower: Side::new(ior, [back, along.max(back)], Spectrum::ZERO).layered(below),
             back_paleness: desc.back_paleness.f32(),
             relief: desc.relief.f32(),
             tint: Vec3::ONE,

@@ -4,15 +4,18 @@ use super::growth::{Growth, LeafNow};
 use super::leaf::Seat;
 use super::organ::{Organ, OrganKind};
 use super::tube::{self, Profile, Ring};
-use crate::math::{Frame, Vec3, direction, lerp, vec3};
+use crate::math::{Frame, Vec3, direction, lerp, smoothstep, vec3};
 use crate::sampling::Purpose;
-use std::f32::consts::FRAC_PI_2;
+use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 /// How far everything that stands in the soil continues below it, metres.
 pub(super) const ROOT: f32 = 0.008;
 
 /// Height of a crown's dome over its radius.
 const CROWN: f32 = 0.5;
+
+/// Pieces of a hypocotyl.
+const HYPOCOTYL: usize = 5;
 
 /// How a form builds its axis.
 #[derive(Clone, Copy, Debug)]
@@ -48,7 +51,7 @@ impl Axis {
         // On a crown the younger leaves stand higher up the dome, just under its surface.
         let whole = self.radii[0];
         let lift = whole * (self.crown * (1.0 - (r / whole).powi(2)).max(0.0).sqrt() - 0.1 * self.crown);
-        Seat { point: point + (out - axis * out.dot(axis)) * r + axis * lift, axis }
+        Seat { point: point + (out - axis * out.dot(axis)) * r + axis * lift, axis, out }
     }
 }
 
@@ -82,20 +85,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
         nodes.push((base, direction_now));
         radii.push(radius);
     }
-    let material = |own: &str| if own.is_empty() { "stalk".to_owned() } else { own.to_owned() };
-    let foot = -ROOT / nodes[0].1.z.max(0.3);
-    let rings: Vec<Ring> = [foot, 0.0, growth.hypocotyl * 0.5, growth.hypocotyl]
-        .into_iter()
-        .map(|h| ring(nodes[0].1 * h, nodes[0].1, radius, Profile::Channelled(1.0)))
-        .collect();
-    let mesh = tube::rigid(&rings, 10);
-    organs.push(Organ {
-        kind: OrganKind::Hypocotyl,
-        leaf: 0,
-        material: material(&growth.desc.hypocotyl_material),
-        mesh,
-        axis: None,
-    });
+    hypocotyl(organs, growth, nodes[0].1, radius);
     let mut rings: Vec<Ring> = Vec::with_capacity(2 * nodes.len() + 4);
     if stemless {
         // Leaf bases close round a crown: it is green like them, however red the hypocotyl below.
@@ -126,6 +116,32 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
         axis: None,
     });
     Axis { nodes, radii, section, crown }
+}
+
+/// The written name of a material, or that of stalks.
+pub(super) fn material(own: &str) -> String {
+    if own.is_empty() { "stalk".to_owned() } else { own.to_owned() }
+}
+
+/// Adds the stem below the seed leaves, from the soil along a direction: round, of this radius at both ends. Where it is slender it is a
+/// little bowed and thinner in its middle, as one that has pushed itself out of the soil is.
+pub(super) fn hypocotyl(organs: &mut Vec<Organ>, growth: &Growth<'_>, along: Vec3, radius: f32) {
+    let mut stream = growth.stream.child(Purpose::Plant, 2);
+    let side = along.cross(direction(FRAC_PI_2, stream.range32(0.0, TAU))).normalize_or(Vec3::X);
+    let bow = 0.05 * stream.normal().clamp(-2.0, 2.0) as f32 * growth.hypocotyl;
+    let slender = smoothstep(2.0, 6.0, growth.hypocotyl / (2.0 * radius));
+    let below = -ROOT / along.z.max(0.3);
+    let mut rings = vec![ring(along * below, along, radius, Profile::Channelled(1.0))];
+    for i in 0..=HYPOCOTYL {
+        let s = i as f32 / HYPOCOTYL as f32;
+        let centre = along * (growth.hypocotyl * s) + side * (slender * bow * (PI * s).sin());
+        let direction = (along + side * (slender * PI * bow / growth.hypocotyl.max(1e-4) * (PI * s).cos())).normalize();
+        let thick = 1.0 - 0.18 * slender * (PI * s).sin().max(0.0).powf(0.7);
+        rings.push(ring(centre, direction, thick * radius, Profile::Channelled(1.0)));
+    }
+    dome(&mut rings, along, radius, 0.5);
+    let (mesh, material) = (tube::rigid(&rings, 10), material(&growth.desc.hypocotyl_material));
+    organs.push(Organ { kind: OrganKind::Hypocotyl, leaf: 0, material, mesh, axis: None });
 }
 
 /// A ring across `along`.

@@ -34,6 +34,15 @@ impl Rest {
         self.positions.len() as u32 - 1
     }
 
+    /// Adds all corners and triangles of another.
+    pub fn append(&mut self, other: Self) {
+        let first = self.positions.len() as u32;
+        self.positions.extend(other.positions);
+        self.uvs.extend(other.uvs);
+        self.weights.extend(other.weights);
+        self.triangles.extend(other.triangles.into_iter().map(|t| t.map(|i| i + first)));
+    }
+
     /// Adds the two triangles of each cell between two rows of corners that start at `near` and `far`.
     pub fn stitch(&mut self, near: u32, far: u32, cells: u32) {
         for j in 0..cells {

@@ -23,7 +23,8 @@ fn of_leaf(kind: &LeafKind) -> f64 {
         Shape::Leaflets { pairs, .. } => (4.0 * pairs.get() + 1.0) * sheet,
         _ => DIVIDED,
     };
-    blade + RING * (kind.rows.get() + kind.joints.get() + 16.0)
+    let spines = kind.spines.as_ref().map_or(0.0, |s| 18.0 * s.lobes.get());
+    blade + spines + RING * (kind.rows.get() + kind.joints.get() + 16.0)
 }
 
 /// The most triangles of a plant's flowering axes at a stage, and all that they bear.
@@ -46,7 +47,8 @@ pub fn most_triangles(desc: &PlantDesc) -> f64 {
     let largest = desc.kinds.values().map(of_leaf).fold(0.0, f64::max);
     let leaves = |layers: f64| layers * largest + RING * 64.0;
     let stages = desc.stages.iter().map(|stage| {
-        let side = if stage.tillers.usual().1 > 0.0 { SHOOTS } else { 1.0 };
+        let each = 1.0 + stage.branches.usual().1.min(SHOOTS);
+        let side = if stage.tillers.usual().1 > 0.0 { 1.0 + SHOOTS * each } else { 1.0 };
         side * leaves(stage.layers.iter().map(|layer| layer.leaves.get()).sum()) + of_axes(desc, stage)
     });
     stages.fold(0.0, f64::max)

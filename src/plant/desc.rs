@@ -102,6 +102,9 @@ pub struct PlantDesc {
     /// How far the axis leans.
     #[schemars(default = "lean")]
     pub lean_deg: Vary<Finite>,
+    /// Length over width at which a stem of a `Runner` or `Whorl` begins to sink under its own weight, and at which it lies on the soil.
+    #[schemars(default = "lies_at")]
+    pub lies_at: (Num<Positive>, Num<Positive>),
     /// Material of the hypocotyl; empty: `"stalk"`.
     #[schemars(default)]
     #[schemars(extend("x-example" = "\"leaf\""))]
@@ -134,6 +137,8 @@ struct Written {
     azimuth_deg: Vary<Finite>,
     #[serde(default = "lean")]
     lean_deg: Vary<Finite>,
+    #[serde(default = "lies_at")]
+    lies_at: (Num<Positive>, Num<Positive>),
     #[serde(default, alias = "hypocotyl_skin")]
     hypocotyl_material: String,
     #[serde(default, alias = "stem_skin")]
@@ -167,6 +172,10 @@ fn kept(mut stages: Vec<StageDesc>) -> Vec<StageDesc> {
     stages
 }
 
+fn lies_at() -> (Num<Positive>, Num<Positive>) {
+    (Num::new(40.0), Num::new(105.0))
+}
+
 impl<'de> Deserialize<'de> for PlantDesc {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         ron_file::from_raw(deserializer, |raw| {
@@ -182,6 +191,7 @@ impl<'de> Deserialize<'de> for PlantDesc {
                 size: w.size,
                 azimuth_deg: w.azimuth_deg,
                 lean_deg: w.lean_deg,
+                lies_at: w.lies_at,
                 hypocotyl_material: w.hypocotyl_material,
                 stem_material: w.stem_material,
             };
@@ -203,6 +213,15 @@ impl PlantDesc {
         if self.stages.is_empty() {
             let help = "write (bbch: 10, days: 4, hypocotyl_mm: 8, stem_mm: 1, layers: […])";
             return Err((vec![Field("stages")], "a plant needs at least one stage".into(), help.into()));
+        }
+        if self.lies_at.0.get() >= self.lies_at.1.get() {
+            let message = "a stem begins to sink before it lies".into();
+            return Err((vec![Field("lies_at")], message, "write (40, 105): the second ratio is the larger".into()));
+        }
+        if let Some((name, field)) = self.kinds.iter().find_map(|(name, kind)| Some((name, kind.unordered()?))) {
+            let message =
+                format!("{field} of the kind \"{name}\" must rise from above 0 to below 1, with a place for each");
+            return Err((vec![Field("kinds")], message, format!("write {field}: [0.2, 0.5, 0.8]")));
         }
         for (i, stage) in self.stages.iter().enumerate() {
             let mut at = vec![Field("stages"), Item(i), Field("layers")];

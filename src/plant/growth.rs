@@ -65,6 +65,10 @@ pub(super) struct Growth<'a> {
     /// Width of the stem at the soil, metres.
     pub(super) stem: f32,
     pub(super) tillers: usize,
+    /// Side shoots of each side shoot.
+    pub(super) branches: usize,
+    /// Layer and azimuth of each axil from below, of withered leaves too.
+    pub(super) axils: Vec<(usize, f32)>,
     /// Height of each layer over the first, metres.
     pub(super) rise: Vec<f32>,
     pub(super) leaves: Vec<LeafNow<'a>>,
@@ -186,7 +190,9 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
     let spin = turn(stream);
     let hypocotyl = between.draw(whole, None, &own, 2, |s| &s.hypocotyl_mm) * MM;
     let tillers = between.draw(whole, None, &own, 4, |s| &s.tillers).round() as usize;
+    let branches = between.draw(whole, None, &own, 5, |s| &s.branches).round() as usize;
     let (mut leaves, mut rise, mut height, mut number) = (Vec::new(), Vec::new(), 0.0, 0);
+    let mut axils = Vec::new();
     for (k, layer) in to.layers.iter().enumerate() {
         let before = from.layers.get(k);
         let ends = (before, layer);
@@ -202,6 +208,8 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
             let jitter = desc.azimuth_deg.draw32(&mut stream).to_radians();
             let blade = between.draw(ends, Some(0.0), &stream, 1, |l| &l.blade_mm) * MM * size;
             let Some((name, kind)) = desc.kinds.get_key_value(&layer.kind) else { continue };
+            let azimuth = spin + PI * (2.0 * i as f32 / n as f32 + alpha) + jitter;
+            axils.push((k, azimuth));
             if blade < BUD {
                 continue;
             }
@@ -213,7 +221,7 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
                 layer: k,
                 kind_name: name,
                 kind,
-                azimuth: spin + PI * (2.0 * i as f32 / n as f32 + alpha) + jitter,
+                azimuth,
                 blade,
                 width: between.draw(ends, Some(0.0), &stream, 2, |l| &l.width_mm) * MM * size,
                 stalk: between.draw(ends, Some(0.0), &stream, 3, |l| &l.stalk_mm) * MM * size,
@@ -242,6 +250,8 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
         hypocotyl,
         stem,
         tillers,
+        branches,
+        axils,
         rise,
         leaves,
         vigour,

@@ -53,7 +53,33 @@ pub enum Shape {
         /// Length of small leaflets that stand between the pairs over that of the others: potato; 0 for none.
         #[serde(default = "num::<NonNegative, 0>", skip_serializing_if = "Num::is_zero")]
         interjected: Num<NonNegative>,
+        /// Where the pairs stand on the rachis, rising, as fractions of it; empty: at equal distances.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        #[schemars(extend("x-example" = "[0.55, 1]"))]
+        pair_at: Vec<Num<Fraction>>,
+        /// How far a leaflet rises about the rachis from the plane of the whole leaf; default: as far as the leaf's halves are folded.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(extend("x-example" = "Uniform(-10, 25)"))]
+        rise_deg: Option<Vary<Finite>>,
+        /// How far each leaflet bends from base to tip when it is held level; default: as far as the whole leaf.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(extend("x-example" = "Uniform(5, 30)"))]
+        leaflet_bend_deg: Option<Vary<Finite>>,
     },
+}
+
+/// Spines on a blade's margin, of the stalk's material.
+///
+/// ```
+/// let thistle: furrow::plant::Spines = ron::from_str("(lobes: 6, length_mm: Uniform(1.5, 3))").unwrap();
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Spines {
+    /// Lobes on each side, as the drawn texture has them: each bears one spine on its tip and two smaller ones on its shoulders.
+    pub lobes: Num<PositiveCount>,
+    /// Length of the spines on the lobes' tips of a grown leaf; on blades below 50 mm they are shorter in proportion.
+    pub length_mm: Vary<Positive>,
 }
 
 /// A kind of leaf.
@@ -86,6 +112,23 @@ pub struct LeafKind {
     /// Vein joints along the midrib.
     #[serde(default = "num::<PositiveCount, 5>")]
     pub joints: Num<PositiveCount>,
+    /// Where the vein joints stand along the midrib, rising, as fractions of the blade's length; of a compound leaf along each leaflet.
+    /// Empty: `joints` of them at equal distances. Source: the relative distances of Di Cicco et al. 2017, §III-A.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(extend("x-example" = "[0.08, 0.22, 0.4, 0.62, 0.84]"))]
+    pub joint_at: Vec<Num<Fraction>>,
+    /// Angle between the midrib and the skeleton's branches, for blades that bend across though their veins are parallel or none are seen;
+    /// default: that of the secondary veins.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "60"))]
+    pub branch_angle_deg: Option<Num<NonNegative>>,
+    /// How far a half rises at the two hinges of its branches, at the midrib and half-way out; negative hangs. Each branch draws its own.
+    #[serde(default = "level", skip_serializing_if = "is_level")]
+    pub branch_bend_deg: (Vary<Finite>, Vary<Finite>),
+    /// Spines on its margin; only for `Sheet`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "(lobes: 6, length_mm: Uniform(1.5, 3))"))]
+    pub spines: Option<Spines>,
     /// Angle between midrib and secondary veins; 0 for parallel veins, which leave no branches in the skeleton.
     #[serde(default = "num::<NonNegative, 55>")]
     pub vein_angle_deg: Num<NonNegative>,
@@ -146,6 +189,49 @@ pub struct LeafKind {
     /// experiments do.
     #[serde(skip)]
     pub flat: bool,
+}
+
+impl LeafKind {
+    /// Where the vein joints stand along the midrib, as fractions of its length: as written, else `count` at equal distances.
+    pub(super) fn joints_along(&self, count: usize) -> Vec<f32> {
+        if self.joint_at.is_empty() {
+            (1..=count).map(|k| k as f32 / (count as f32 + 1.0)).collect()
+        } else {
+            self.joint_at.iter().map(|t| t.f32()).collect()
+        }
+    }
+
+    /// Angle between midrib and the skeleton's branches, radians, and the half-width at each vein joint, metres, of a sheet of this width;
+    /// `None` for a blade that only bends along.
+    pub(super) fn branches(&self, outline: Outline, width: f32, veins: &[f32]) -> Option<(f32, Vec<f32>)> {
+        let angle = self.branch_angle_deg.unwrap_or(self.vein_angle_deg).f32().to_radians();
+        let halves = veins.iter().map(|t| (outline.half_width(*t) * width).max(1e-5));
+        (0.1..1.5).contains(&angle).then(|| (angle, halves.collect()))
+    }
+
+    /// The list of fractions that does not rise strictly between 0 and 1, by the name of its field.
+    pub(super) fn unordered(&self) -> Option<&'static str> {
+        let rises = |list: &[Num<Fraction>], most: f64| {
+            let inside = list.iter().all(|t| t.get() > 0.0 && t.get() <= most);
+            inside && list.windows(2).all(|w| w[0].get() < w[1].get())
+        };
+        let pairs = match &self.shape {
+            Shape::Leaflets { pair_at, pairs, .. } if !pair_at.is_empty() => {
+                pair_at.len() == pairs.get() as usize && rises(pair_at, 1.0)
+            }
+            _ => true,
+        };
+        let joints = rises(&self.joint_at, 0.999);
+        if joints { (!pairs).then_some("pair_at") } else { Some("joint_at") }
+    }
+}
+
+fn level() -> (Vary<Finite>, Vary<Finite>) {
+    (Vary::fixed(0.0), Vary::fixed(0.0))
+}
+
+fn is_level(bends: &(Vary<Finite>, Vary<Finite>)) -> bool {
+    *bends == level()
 }
 
 fn blade() -> OrganKind {

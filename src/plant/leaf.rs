@@ -10,12 +10,12 @@ use super::organ::{LeafAxis, LeafSize, Organ, OrganKind};
 use super::ribbons::{self, Division};
 use super::skeleton::{Measures, Pose, Skeleton};
 use super::skin::{self, BladeRelief};
+use super::spines;
 use super::stipules;
 use super::tube::{self, Profile, Ring};
 use crate::geometry::outline::Outline;
-use crate::math::{Mat3, Vec3, direction, lerp, smoothstep, vec3};
+use crate::math::{Mat3, Vec3, lerp, smoothstep, vec3};
 use crate::sampling::Stream;
-use std::f32::consts::FRAC_PI_2;
 
 /// Corners round a stalk.
 const SIDES: u32 = 9;
@@ -34,6 +34,8 @@ pub(super) struct Seat {
     pub(super) point: Vec3,
     /// The growth axis there, unit.
     pub(super) axis: Vec3,
+    /// The side of the axis on which the leaf stands; not along the axis.
+    pub(super) out: Vec3,
 }
 
 /// What the lower part of a leaf is.
@@ -41,10 +43,8 @@ pub(super) struct Seat {
 pub(super) enum Lower {
     /// A stalk.
     Petiole,
-    /// A tube of this radius round the stem, metres.
+    /// A tube of this radius round the shoot, metres, its outer wall in line with the blade.
     Sheath(f32),
-    /// The same, its outer wall in line with the blade.
-    Wrap(f32),
 }
 
 /// Adds a leaf's organs.
@@ -52,14 +52,15 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
     // One stream for the posture, one for the relief: what the relief draws never moves the posture.
     let mut stream = leaf.stream.child(crate::sampling::Purpose::Leaf, 100);
     let mut skeleton = Skeleton::new(&measures(leaf));
-    let root = stand(leaf, seat, &mut stream);
-    pose(&mut skeleton, leaf, root, &mut stream);
+    let root = stand(leaf, seat, lower, &mut stream);
+    pose(&mut skeleton, leaf, root, lower, &mut stream);
     if leaf.kind.flat {
         skeleton.straighten();
     }
     let motions = skeleton.motions(root);
     let mut stream = leaf.stream.child(crate::sampling::Purpose::Leaf, 101);
     let relief = relief(leaf, &mut stream);
+    let mut spined = Rest::default();
     let rest = match &leaf.kind.shape {
         Shape::Sheet { outline } => {
             let (rows, columns) = cells(leaf);
@@ -67,6 +68,10 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
             let mut own = leaf.stream.child(crate::sampling::Purpose::Leaf, 102);
             LeafOutline::draw(leaf.kind.margin_sd.f32(), &mut own).apply(&mut sheet, leaf.blade);
             relief.apply(&mut sheet, leaf.blade);
+            if let Some(spines) = &leaf.kind.spines {
+                let mut own = leaf.stream.child(crate::sampling::Purpose::Leaf, 104);
+                spined = spines::grow(&sheet, spines, leaf.blade, &mut own);
+            }
             sheet.rest
         }
         Shape::Pinnate { pairs, lobes, segment_mm, bare } => {
@@ -102,12 +107,14 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
         joints: skeleton.placed(root),
     };
     organs.push(Organ { kind, leaf: leaf.number, material: material.to_owned(), mesh, axis: Some(axis) });
-    let rest = stalk(leaf, &skeleton, &relief, lower, &mut stream);
+    let mut rest = stalk(leaf, &skeleton, &relief, lower, &mut stream);
+    let ringed = rest.positions.len();
+    rest.append(spined);
     if rest.triangles.is_empty() {
         return;
     }
     let mut mesh = skin::skin(rest, &motions);
-    tube::close_seams(&mut mesh, sides(leaf), 0);
+    tube::close_seams(&mut mesh, sides(leaf), ringed);
     if !leaf.kind.stipules.none() {
         mesh.append(&skin::skin(stipules::pair(&leaf.kind.stipules, leaf, &skeleton), &motions));
     }
@@ -128,14 +135,16 @@ fn cells(leaf: &LeafNow<'_>) -> (usize, usize) {
 }
 
 fn measures(leaf: &LeafNow<'_>) -> Measures {
-    let n = leaf.kind.joints.get() as usize;
-    let veins: Vec<f32> = (1..=n).map(|k| k as f32 / (n as f32 + 1.0)).collect();
-    let angle = leaf.kind.vein_angle_deg.f32().to_radians();
-    let secondaries = match leaf.kind.shape {
-        Shape::Sheet { outline } if (0.1..1.5).contains(&angle) => {
-            Some((angle, veins.iter().map(|t| (outline.half_width(*t) * leaf.width).max(1e-5)).collect()))
+    let count = leaf.kind.joints.get() as usize;
+    let (veins, secondaries) = match &leaf.kind.shape {
+        Shape::Sheet { outline } => {
+            let veins = leaf.kind.joints_along(count);
+            let branches = leaf.kind.branches(*outline, leaf.width, &veins);
+            (veins, branches)
         }
-        _ => None,
+        // Their joints are the leaflets'.
+        Shape::Leaflets { .. } => ((1..=count).map(|k| k as f32 / (count as f32 + 1.0)).collect(), None),
+        _ => (leaf.kind.joints_along(count), None),
     };
     Measures {
         stalk: leaf.stalk,
@@ -147,13 +156,14 @@ fn measures(leaf: &LeafNow<'_>) -> Measures {
 }
 
 /// The frame of ST1 in plant coordinates: vein along the stalk, y out of the upper side, which faces the axis.
-fn stand(leaf: &LeafNow<'_>, seat: Seat, stream: &mut Stream) -> Pose {
-    let out = direction(FRAC_PI_2, leaf.azimuth);
-    let out = (out - seat.axis * out.dot(seat.axis)).normalize_or(Vec3::X);
+fn stand(leaf: &LeafNow<'_>, seat: Seat, lower: Lower, stream: &mut Stream) -> Pose {
+    let out = (seat.out - seat.axis * seat.out.dot(seat.axis)).normalize_or(Vec3::X);
     let (sin, cos) = leaf.angle.sin_cos();
     let vein = seat.axis * cos + out * sin;
     let up = seat.axis * sin - out * cos;
     let roll = leaf.kind.roll_deg.draw32(stream).to_radians();
+    // A sheath cannot leave the one that it stands in.
+    let roll = if lower == Lower::Petiole { roll } else { 0.0 };
     let rotation = Mat3::from_cols(vein, up, vein.cross(up)) * Mat3::from_rotation_x(roll);
     Pose { rotation, origin: seat.point }
 }
@@ -163,9 +173,10 @@ fn stand(leaf: &LeafNow<'_>, seat: Seat, stream: &mut Stream) -> Pose {
 /// Gravity: the moment of what lies beyond joint k is Σ mⱼ·(sⱼ − sₖ)·cos φ, φ the elevation there; the midrib's stiffness
 /// falls towards the tip as (1 − 0.75 s)³. Their ratio is scaled so that a blade held level bends by `bend` in all, and is
 /// added to the joint's angle; so are the random bends.
-fn pose(skeleton: &mut Skeleton, leaf: &LeafNow<'_>, root: Pose, stream: &mut Stream) {
+fn pose(skeleton: &mut Skeleton, leaf: &LeafNow<'_>, root: Pose, lower: Lower, stream: &mut Stream) {
     let wobble = leaf.kind.wobble_deg.f32().to_radians();
-    let stalk_bend = leaf.kind.stalk_bend_deg.draw32(stream).to_radians() + leaf.arch;
+    let free = if lower == Lower::Petiole { 1.0 } else { 0.0 };
+    let stalk_bend = free * (leaf.kind.stalk_bend_deg.draw32(stream).to_radians() + leaf.arch);
     let base = skeleton.base();
     let along: Vec<f32> = skeleton.along().to_vec();
     let shape = |t: f32| match leaf.kind.shape {
@@ -194,7 +205,8 @@ fn pose(skeleton: &mut Skeleton, leaf: &LeafNow<'_>, root: Pose, stream: &mut St
         };
         let mut bend = designed - load * (elevation + designed).cos().max(0.0);
         // A young stalk's base is held by its neighbours.
-        bend += wobble * stream.normal() as f32 * if k == 0 { 0.4 } else { 1.0 };
+        let held = if k < base { free } else { 1.0 };
+        bend += wobble * stream.normal() as f32 * if k == 0 { 0.4 } else { 1.0 } * held;
         let link = along[k + 1] - along[k];
         let lying = lerp(near, far.max(near), ((along[k + 1] - start) / whole).min(1.0));
         let lowest = ((lying - height) / link.max(1e-6)).clamp(-1.0, 0.25).asin();
@@ -207,7 +219,13 @@ fn pose(skeleton: &mut Skeleton, leaf: &LeafNow<'_>, root: Pose, stream: &mut St
     }
     // The sides hang a little where the blade is level, and each is its own.
     let hang = 0.12 * leaf.bend * elevation.cos();
-    skeleton.bend_branches(|_, _| (wobble * stream.normal() as f32, 1.5 * wobble * stream.normal() as f32 - hang));
+    let mut own = leaf.stream.child(crate::sampling::Purpose::Leaf, 102);
+    let [inner, outer] = [&leaf.kind.branch_bend_deg.0, &leaf.kind.branch_bend_deg.1];
+    skeleton.bend_branches(|_, _| {
+        let designed = [inner, outer].map(|bend| bend.draw32(&mut own).to_radians());
+        let noise = [wobble * stream.normal() as f32, 1.5 * wobble * stream.normal() as f32];
+        (designed[0] + noise[0], designed[1] + noise[1] - hang)
+    });
 }
 
 /// A dissected blade, pressed into its plane where all leaves are flat.
@@ -276,12 +294,6 @@ fn stalk(leaf: &LeafNow<'_>, skeleton: &Skeleton, relief: &BladeRelief, lower: L
                     rings.push(ring(y, (wide, wide * lerp(0.7, 0.85, s)), channel, 0.0));
                 }
                 Lower::Sheath(radius) => {
-                    // The sheath opens towards its blade.
-                    let open = smoothstep(0.75, 1.0, s);
-                    let r = radius * lerp(1.0, 0.9, s);
-                    rings.push(ring(y, (r * (1.0 + 0.2 * open), r), lerp(1.0, -0.4, open), 0.0));
-                }
-                Lower::Wrap(radius) => {
                     // It opens where the next leaf comes out, and flattens into the blade.
                     let open = smoothstep(0.8, 1.0, s);
                     let r = radius * lerp(1.0, 0.9, s);
@@ -293,7 +305,7 @@ fn stalk(leaf: &LeafNow<'_>, skeleton: &Skeleton, relief: &BladeRelief, lower: L
     }
     let reach = leaf.kind.rib.f32() * leaf.blade;
     if reach > 0.0 {
-        let wide = if let Lower::Sheath(radius) = lower { 0.7 * radius } else { tip_radius };
+        let wide = if let Lower::Sheath(radius) = lower { tip_radius.min(0.35 * radius) } else { tip_radius };
         let rachis = matches!(leaf.kind.shape, Shape::Leaflets { .. });
         // Without a stalk the rib begins at the stem.
         for i in u8::from(leaf.stalk > 0.0)..=8 {

@@ -1,7 +1,7 @@
 //! Compound blades: leaflets on a rachis. Peanut has two pairs, soybean one pair and a leaflet at the tip, potato small ones between its pairs.
 //!
-//! A leaflet is a sheet like a whole blade, with relief, fold and bend of its own; its joints bend it once in the flat leaf's
-//! coordinates, then it goes rigidly where the rachis carries its foot. Young leaflets stand up and lie against each other.
+//! A leaflet is a sheet like a whole blade, with relief, fold and bend of its own, and joints along its midrib and its branches; they bend
+//! it once in the flat leaf's coordinates, then it goes where the rachis carries its foot. Young leaflets stand up and lie against each other.
 
 use super::blade::{self, Rest};
 use super::growth::LeafNow;
@@ -24,9 +24,23 @@ pub(super) fn blade(
     stream: &mut Stream,
 ) -> Rest {
     let mut rest = Rest::default();
-    let Shape::Leaflets { outline, pairs, aspect, spread_deg, terminal, interjected } = &leaf.kind.shape else {
+    let Shape::Leaflets {
+        outline,
+        pairs,
+        aspect,
+        spread_deg,
+        terminal,
+        interjected,
+        pair_at,
+        rise_deg,
+        leaflet_bend_deg,
+    } = &leaf.kind.shape
+    else {
         return rest;
     };
+    let veins = leaf.kind.joints_along(JOINTS);
+    // What species files pose draws from a stream of its own.
+    let mut own = leaf.stream.child(Purpose::Leaf, 103);
     let pairs = pairs.get() as usize;
     let reach = leaf.kind.rib.f32() * leaf.blade;
     let spread = [spread_deg.0, spread_deg.1].map(|s| s.f32().to_radians());
@@ -37,21 +51,29 @@ pub(super) fn blade(
     let mut add = |share: f32, side: f32, size: f32, turn: f32, stream: &mut Stream| {
         let size = size * (1.0 + 0.04 * stream.normal() as f32);
         let turn = turn + 0.06 * stream.normal() as f32;
-        let rise = (leaf.fold + 0.08 * stream.normal() as f32).min(1.35);
+        let fold = rise_deg.as_ref().map_or(leaf.fold, |rise| rise.draw32(&mut own).to_radians());
+        let bend = leaflet_bend_deg.as_ref().map_or(leaf.bend, |bend| bend.draw32(&mut own).to_radians());
+        let rise = (fold + 0.08 * stream.normal() as f32).min(1.35);
         let (along, width) = (length * size, length * size * aspect.f32());
         let mut skeleton = Skeleton::new(&Measures {
             stalk: 0.0,
             stalk_joints: 1,
             length: along,
-            veins: (1..=JOINTS).map(|k| k as f32 / (JOINTS as f32 + 1.0)).collect(),
-            secondaries: None,
+            secondaries: leaf.kind.branches(*outline, width, &veins),
+            veins: veins.clone(),
         });
-        for joint in &mut skeleton.joints[1..] {
-            joint.bend = -leaf.bend / (JOINTS as f32 + 1.0) + 0.02 * stream.normal() as f32;
+        let chain = skeleton.along().len();
+        for joint in &mut skeleton.joints[1..chain] {
+            joint.bend = -bend / (veins.len() as f32 + 1.0) + 0.02 * stream.normal() as f32;
         }
+        let (inner, outer) = &leaf.kind.branch_bend_deg;
+        skeleton.bend_branches(|_, _| {
+            let [i, o] = [inner, outer].map(|b| b.draw32(&mut own).to_radians() + 0.03 * own.normal() as f32);
+            (i, o)
+        });
         let mut sheet = blade::sheet(*outline, width, rows, columns, &skeleton);
-        let mut own = leaf.stream.child(Purpose::Leaf, 102).child(Purpose::Leaf, rest.positions.len() as u64);
-        LeafOutline::draw(leaf.kind.margin_sd.f32(), &mut own).apply(&mut sheet, along);
+        let mut margin = leaf.stream.child(Purpose::Leaf, 102).child(Purpose::Leaf, rest.positions.len() as u64);
+        LeafOutline::draw(leaf.kind.margin_sd.f32(), &mut margin).apply(&mut sheet, along);
         let seed = stream.seed32();
         BladeRelief { fold: 0.5 * leaf.fold, fold_tip: 0.3 * leaf.fold, seed, ..*relief }.apply(&mut sheet, along);
         let foot = Pose { rotation: stance(side, turn, rise), origin: vec3(0.0, reach * share, 0.0) };
@@ -63,7 +85,8 @@ pub(super) fn blade(
         rest.triangles.extend(sheet.rest.triangles.iter().map(|t| t.map(|i| i + first)));
     };
     for pair in 0..pairs {
-        let share = if steps > 0 { pair as f32 / steps as f32 } else { 1.0 };
+        let even = if steps > 0 { pair as f32 / steps as f32 } else { 1.0 };
+        let share = pair_at.get(pair).map_or(even, |at| at.f32());
         for side in [-1.0_f32, 1.0] {
             add(share, side, lerp(0.92, 1.0, share), lerp(spread[0], spread[1], share), stream);
         }

@@ -19,6 +19,7 @@
 //! | `flower` | flowers, heads, ears, tassels, pods, berries |
 //! | `inflorescence` | the axes that bear them, and where these begin |
 //! | `stipules` | what stands at the foot of a stalk |
+//! | `spines` | spines on a blade's margin |
 //! | `condition` | age, health and damage of a plant and its leaves |
 //! | `rosette`, `whorl`, `erect`, `dissected`, `tuft`, `cane`, `runner` | growth forms |
 //!
@@ -47,6 +48,7 @@ mod rosette;
 mod runner;
 pub mod skeleton;
 pub mod skin;
+mod spines;
 mod stage;
 mod stipules;
 pub mod table;
@@ -60,7 +62,7 @@ pub use condition::{Condition, ConditionDesc};
 pub use desc::{Form, PlantDesc, Stage};
 pub use flower::desc::{FlowerDesc, RingDesc};
 pub use inflorescence::desc::{FlowersDesc, InflorescenceDesc, Seat, StemLeafDesc};
-pub use kind::{LeafKind, Shape};
+pub use kind::{LeafKind, Shape, Spines};
 pub use organ::{LeafAxis, LeafSize, Organ, OrganKind};
 pub use skeleton::PlacedJoint;
 pub use stage::{BUD, LayerDesc, StageDesc};

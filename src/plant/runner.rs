@@ -1,20 +1,18 @@
 //! Plants with side shoots from their lowest axils, whose stems lie down when they are too long for their width: chickweed,
 //! black bindweed, peanut.
 //!
-//! A stem carries itself up to some forty times its width; beyond that it sinks, creeps along the soil, and only its tip
-//! turns to the light. Along a creeping stem leaves turn to its two sides and face the sky, whatever their place on it.
+//! A stem carries itself up to some forty times its width ([`super::PlantDesc::lies_at`]); beyond that it sinks, creeps along the soil,
+//! and only its tip turns to the light. Along a creeping stem leaves turn to its two sides and face the sky, whatever their place on it.
 
-use super::axis::{self, ROOT};
+use super::axis;
 use super::growth::{Growth, LeafNow};
 use super::leaf::{self, Lower, Seat};
 use super::organ::{Organ, OrganKind};
-use super::tube::{self, Profile, Ring};
+use super::tube::{self, Profile};
 use crate::math::{Vec3, direction, lerp, smoothstep};
 use crate::sampling::{Purpose, Stream};
 use std::f32::consts::{FRAC_PI_2, TAU};
 
-/// Length over width of a stem that begins to sink, and of one that lies.
-const SLENDER: (f32, f32) = (40.0, 105.0);
 /// Elevation of a stem that sinks, until the soil holds it, radians.
 const CREEP: f32 = -0.35;
 /// Size of a side shoot over that of the main one.
@@ -27,30 +25,80 @@ const MOST: usize = 24;
 const PIECES: usize = 4;
 /// Width of a stem's top over that of its base.
 const TAPER: f32 = 0.6;
+/// Cells of a side shoot's blades over those of the main shoot's: there are many of them.
+const SIDE_CELL: f32 = 1.2;
 
 /// A stem's nodes: where leaves sit, and the stem's direction and radius there.
 type Nodes = Vec<(Vec3, Vec3, f32)>;
 
+/// How a plant of side shoots is built.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Habit {
+    /// Cross-section of its stems.
+    pub(super) profile: Profile,
+    /// Corners round them.
+    pub(super) sides: u32,
+    /// Whether leaves stay where they stand round a lying stem, instead of turning to its two sides.
+    pub(super) whorled: bool,
+}
+
+/// Round stems whose leaves turn to the light.
+const HABIT: Habit = Habit { profile: Profile::Channelled(1.0), sides: 10, whorled: false };
+
 /// Grows a plant.
 pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {
-    let mut organs = Vec::with_capacity(2 + 2 * growth.leaves.len() * (1 + growth.tillers.min(MOST)));
+    shoots(growth, HABIT)
+}
+
+/// The main shoot, its side shoots, and theirs.
+pub(super) fn shoots(growth: &Growth<'_>, habit: Habit) -> Vec<Organ> {
+    let mut plant = Shoots {
+        organs: Vec::with_capacity(2 + 2 * growth.leaves.len() * (1 + growth.tillers.min(MOST))),
+        growth,
+        habit,
+        number: growth.leaves.last().map_or(0, |leaf| leaf.number),
+    };
     let mut stream = growth.stream.child(Purpose::Plant, 1);
     let lean = growth.desc.lean_deg.draw32(&mut stream).to_radians();
     let towards = stream.range32(0.0, TAU);
     let upright = direction(lean, towards);
     let radius = (0.5 * growth.stem).max(2e-4);
     let foot = Foot { point: upright * growth.hypocotyl, along: upright, radius, length: growth.hypocotyl };
-    hypocotyl(&mut organs, growth, &foot);
-    let nodes = stem(&mut organs, growth, &foot, &growth.rise, &mut stream);
+    axis::hypocotyl(&mut plant.organs, growth, upright, radius);
+    let nodes = plant.stem(&foot, &growth.rise, &mut stream);
     for leaf in &growth.leaves {
-        seat(&mut organs, leaf, &nodes, leaf.layer);
+        plant.seat(leaf, &nodes, leaf.layer);
     }
-    let mut number = growth.leaves.last().map_or(0, |leaf| leaf.number);
-    // The lowest axils whose leaves are still there break first.
-    for (k, axil) in axils(growth).into_iter().take(growth.tillers.min(MOST)).enumerate() {
-        side(&mut organs, growth, &nodes, axil, k, &mut number);
+    let axils = axils(growth, habit);
+    // The lowest axils break first.
+    for (k, axil) in axils.iter().take(growth.tillers.min(MOST)).enumerate() {
+        let stream = growth.stream.child(Purpose::Plant, 100 + k as u64);
+        let size = 0.95_f32.powi(k as i32);
+        let Some(shoot) = plant.side(&nodes, Axil { layer: axil.0, node: axil.0, azimuth: axil.1, size }, stream)
+        else {
+            continue;
+        };
+        // Its own lowest axils, from its second layer on, so that it has left its mother's leaves behind.
+        let own = axils.iter().filter(|a| a.0 > axil.0 + 1).take(growth.branches.min(MOST));
+        for (m, (layer, azimuth)) in own.enumerate() {
+            let stream = growth.stream.child(Purpose::Plant, 200 + (MOST * k + m) as u64);
+            let azimuth = azimuth + shoot.turn;
+            let axil = Axil { layer: *layer, node: layer - axil.0 - 1, azimuth, size: 0.8 * shoot.size };
+            plant.side(&shoot.nodes, axil, stream);
+        }
     }
-    organs
+    plant.organs
+}
+
+/// Layer and azimuth of each axil from below, as far as leaves above it have grown; of a whorl one axil on each side.
+fn axils(growth: &Growth<'_>, habit: Habit) -> Vec<(usize, f32)> {
+    let youngest = growth.leaves.iter().map(|l| l.layer).max().unwrap_or(0);
+    let mut all = Vec::new();
+    for layer in growth.axils.chunk_by(|a, b| a.0 == b.0) {
+        let half = if habit.whorled { layer.len().div_ceil(2) } else { 1 };
+        all.extend(layer.iter().step_by(half).filter(|a| a.0 + 2 <= youngest));
+    }
+    all
 }
 
 /// Where a stem begins.
@@ -62,122 +110,130 @@ struct Foot {
     length: f32,
 }
 
-fn material(own: &str) -> String {
-    if own.is_empty() { "stalk".to_owned() } else { own.to_owned() }
+/// Where a side shoot begins: its layer of the plant, the node of the stem that bears it, its azimuth, and its size over that of the main
+/// shoot.
+struct Axil {
+    layer: usize,
+    node: usize,
+    azimuth: f32,
+    size: f32,
 }
 
-fn hypocotyl(organs: &mut Vec<Organ>, growth: &Growth<'_>, foot: &Foot) {
-    let below = -ROOT / foot.along.z.max(0.3);
-    let heights = [below, 0.0, 0.5 * growth.hypocotyl, growth.hypocotyl];
-    let ring = |h: f32| axis::ring(foot.along * h, foot.along, foot.radius, Profile::Channelled(1.0));
-    let mut rings: Vec<Ring> = heights.into_iter().map(ring).collect();
-    axis::dome(&mut rings, foot.along, foot.radius, 0.5);
-    let (mesh, material) = (tube::rigid(&rings, 10), material(&growth.desc.hypocotyl_material));
-    organs.push(Organ { kind: OrganKind::Hypocotyl, leaf: 0, material, mesh, axis: None });
+/// A side shoot.
+struct Shoot {
+    nodes: Nodes,
+    /// What is added to its leaves' azimuths.
+    turn: f32,
+    size: f32,
 }
 
-/// Grows a stem through nodes at these lengths along it; returns them.
-fn stem(organs: &mut Vec<Organ>, growth: &Growth<'_>, foot: &Foot, rise: &[f32], stream: &mut Stream) -> Nodes {
-    let whole = rise.last().copied().unwrap_or(0.0);
-    let sunk = smoothstep(SLENDER.0, SLENDER.1, (foot.length + whole) / (2.0 * foot.radius));
-    let start = foot.along.z.clamp(-1.0, 1.0).asin();
-    let mut heading = foot.along.x.atan2(foot.along.y);
-    let (mut point, mut along, mut below) = (foot.point, foot.along, 0.0);
-    let (mut nodes, mut rings) = (Nodes::new(), Vec::new());
-    rings.push(axis::ring(point - along * (1.2 * foot.radius), along, foot.radius, Profile::Channelled(1.0)));
-    for rise in rise {
-        let radius = foot.radius * lerp(1.0, TAPER, if whole > 0.0 { rise / whole } else { 0.0 });
-        let step = (rise - below) / PIECES as f32;
-        let (swerve, sway) = (0.16 * stream.normal() as f32, 0.07 * stream.normal() as f32);
-        for piece in 1..=if step > 1e-6 { PIECES } else { 0 } {
-            let t = (below + step * piece as f32) / whole;
-            heading += swerve / PIECES as f32;
-            // What stands turns to the light as it grows; what sinks does so from its foot, and only its tip stands up again.
-            let stands = start + (1.0 - sunk) * 0.6 * t * start.cos();
-            let lies = lerp(stands, CREEP, sunk * smoothstep(0.0, 0.45, t));
-            let elevation = lies + sway + 1.1 * sunk * smoothstep(0.82, 1.0, t);
-            // It never goes into the soil.
-            let floor = (1.5 * radius + 1e-3 - point.z) / step;
-            let steep = elevation.min(FRAC_PI_2).sin().max(floor.clamp(-1.0, 0.5));
-            along = direction(FRAC_PI_2 - steep.asin(), heading);
-            point += along * step;
-            let thick = if piece == PIECES { 1.12 } else { 1.0 };
-            rings.push(axis::ring(point, along, thick * radius, Profile::Channelled(1.0)));
+/// A plant while it grows.
+struct Shoots<'a> {
+    organs: Vec<Organ>,
+    growth: &'a Growth<'a>,
+    habit: Habit,
+    /// Leaves so far.
+    number: u16,
+}
+
+impl Shoots<'_> {
+    /// Grows a stem through nodes at these lengths along it; returns them.
+    fn stem(&mut self, foot: &Foot, rise: &[f32], stream: &mut Stream) -> Nodes {
+        let Habit { profile, sides, .. } = self.habit;
+        let (sinks, lies) = (self.growth.desc.lies_at.0.f32(), self.growth.desc.lies_at.1.f32());
+        let whole = rise.last().copied().unwrap_or(0.0);
+        let sunk = smoothstep(sinks, lies, (foot.length + whole) / (2.0 * foot.radius));
+        let start = foot.along.z.clamp(-1.0, 1.0).asin();
+        let mut heading = foot.along.x.atan2(foot.along.y);
+        let (mut point, mut along, mut below) = (foot.point, foot.along, 0.0);
+        let (mut nodes, mut rings) = (Nodes::new(), Vec::new());
+        rings.push(axis::ring(point - along * (1.2 * foot.radius), along, foot.radius, profile));
+        for rise in rise {
+            let radius = foot.radius * lerp(1.0, TAPER, if whole > 0.0 { rise / whole } else { 0.0 });
+            let step = (rise - below) / PIECES as f32;
+            let (swerve, sway) = (0.16 * stream.normal() as f32, 0.07 * stream.normal() as f32);
+            for piece in 1..=if step > 1e-6 { PIECES } else { 0 } {
+                let t = (below + step * piece as f32) / whole;
+                heading += swerve / PIECES as f32;
+                // What stands turns to the light as it grows; what sinks does so from its foot, and only its tip stands up again.
+                let stands = start + (1.0 - sunk) * 0.6 * t * start.cos();
+                let lies = lerp(stands, CREEP, sunk * smoothstep(0.0, 0.45, t));
+                let elevation = lies + sway + 1.1 * sunk * smoothstep(0.82, 1.0, t);
+                // It never goes into the soil.
+                let floor = (1.5 * radius + 1e-3 - point.z) / step;
+                let steep = elevation.min(FRAC_PI_2).sin().max(floor.clamp(-1.0, 0.5));
+                along = direction(FRAC_PI_2 - steep.asin(), heading);
+                point += along * step;
+                let thick = if piece == PIECES { 1.12 } else { 1.0 };
+                rings.push(axis::ring(point, along, thick * radius, profile));
+            }
+            nodes.push((point, along, radius));
+            below = *rise;
         }
-        nodes.push((point, along, radius));
-        below = *rise;
+        let (_, _, radius) = nodes.last().copied().unwrap_or((point, along, foot.radius));
+        axis::dome(&mut rings, along, radius, 1.0);
+        let (mesh, material) = (tube::rigid(&rings, sides), axis::material(&self.growth.desc.stem_material));
+        self.organs.push(Organ { kind: OrganKind::Stem, leaf: 0, material, mesh, axis: None });
+        nodes
     }
-    let (_, _, radius) = nodes.last().copied().unwrap_or((point, along, foot.radius));
-    axis::dome(&mut rings, along, radius, 1.0);
-    let (mesh, material) = (tube::rigid(&rings, 10), material(&growth.desc.stem_material));
-    organs.push(Organ { kind: OrganKind::Stem, leaf: 0, material, mesh, axis: None });
-    nodes
-}
 
-/// Seats a leaf at a node and grows it.
-fn seat(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, nodes: &Nodes, node: usize) {
-    let Some((point, along, radius)) = nodes.get(node.min(nodes.len().saturating_sub(1))).copied() else { return };
-    let lying = smoothstep(0.75, 0.3, along.z);
-    let out = direction(FRAC_PI_2, leaf.azimuth);
-    let across = along.cross(Vec3::Z).normalize_or(out);
-    let across = if across.dot(out) < 0.0 { -across } else { across };
-    // Not quite across: leaves of a creeping stem lean to its tip.
-    let across = (across + along.with_z(0.0) * 0.35).normalize_or(across);
-    let out = out.lerp(across, lying).normalize_or(out);
-    let stands = along.lerp(Vec3::Z, lying).normalize_or(Vec3::Z);
-    let leaf = LeafNow { azimuth: out.x.atan2(out.y), ..leaf.clone() };
-    let level = (out - along * out.dot(along)).normalize_or(out);
-    leaf::grow(organs, &leaf, Seat { point: point + level * (0.6 * radius), axis: stands }, Lower::Petiole);
-}
-
-/// Layer and azimuth of each axil, from below.
-fn axils(growth: &Growth<'_>) -> Vec<(usize, f32)> {
-    let mut all: Vec<(usize, f32)> = growth.leaves.iter().map(|l| (l.layer, l.azimuth)).collect();
-    let youngest = all.iter().map(|a| a.0).max().unwrap_or(0);
-    all.retain(|a| a.0 + 2 <= youngest);
-    all
-}
-
-/// One side shoot from an axil (layer, azimuth): the main one's leaves above it, smaller.
-fn side(
-    organs: &mut Vec<Organ>,
-    growth: &Growth<'_>,
-    nodes: &Nodes,
-    (layer, azimuth): (usize, f32),
-    k: usize,
-    number: &mut u16,
-) {
-    let mut stream = growth.stream.child(Purpose::Plant, 100 + k as u64);
-    let size = stream.range32(SIDE.0, SIDE.1) * 0.95_f32.powi(k as i32);
-    let Some((point, along, radius)) = nodes.get(layer.min(nodes.len().saturating_sub(1))).copied() else { return };
-    let out = direction(FRAC_PI_2, azimuth + stream.range32(-0.3, 0.3));
-    let spread = stream.range32(SPREAD.0, SPREAD.1);
-    let start = (Vec3::Z.lerp(along, 0.3) * spread.cos() + out * spread.sin()).normalize_or(out);
-    let foot = Foot { point: point + out * (0.3 * radius), along: start, radius: 0.8 * radius, length: 0.0 };
-    // It had less time than the main shoot: it lacks seed leaves and as many layers as stand below its axil.
-    let skip = layer + 1;
-    let shift = growth.rise.get(layer).copied().unwrap_or(0.0);
-    let rise: Vec<f32> = growth.rise[skip.min(growth.rise.len())..].iter().map(|r| (r - shift) * size).collect();
-    if rise.is_empty() {
-        return;
-    }
-    let nodes = stem(organs, growth, &foot, &rise, &mut stream);
-    let turn = stream.range32(0.0, TAU);
-    for leaf in growth.leaves.iter().filter(|l| l.layer >= skip) {
-        *number += 1;
-        let leaf = LeafNow {
-            number: *number,
-            azimuth: leaf.azimuth + turn,
-            blade: leaf.blade * size,
-            width: leaf.width * size,
-            stalk: leaf.stalk * size,
-            stream: growth.stream.child(Purpose::Leaf, u64::from(*number)),
-            ..leaf.clone()
-        };
-        if leaf.blade >= super::stage::BUD {
-            seat(organs, &leaf, &nodes, leaf.layer - skip);
+    /// Seats a leaf at a node and grows it.
+    fn seat(&mut self, leaf: &LeafNow<'_>, nodes: &Nodes, node: usize) {
+        let Some((point, along, radius)) = nodes.get(node.min(nodes.len().saturating_sub(1))).copied() else { return };
+        let out = direction(FRAC_PI_2, leaf.azimuth);
+        let (out, stands) = if self.habit.whorled {
+            // Carried over with the stem by the shortest turn from upright; what would point into the soil is pressed aside.
+            let out = out - (Vec3::Z + along) * (along.dot(out) / (1.0 + along.z).max(0.1));
+            (out.with_z(out.z.max(-0.3)).normalize_or(out), along)
         } else {
-            *number -= 1;
+            let lying = smoothstep(0.75, 0.3, along.z);
+            let across = along.cross(Vec3::Z).normalize_or(out);
+            let across = if across.dot(out) < 0.0 { -across } else { across };
+            // Not quite across: leaves of a creeping stem lean to its tip.
+            let across = (across + along.with_z(0.0) * 0.35).normalize_or(across);
+            (out.lerp(across, lying).normalize_or(out), along.lerp(Vec3::Z, lying).normalize_or(Vec3::Z))
+        };
+        let level = (out - along * out.dot(along)).normalize_or(out);
+        leaf::grow(
+            &mut self.organs,
+            leaf,
+            Seat { point: point + level * (0.6 * radius), axis: stands, out },
+            Lower::Petiole,
+        );
+    }
+
+    /// One side shoot from an axil: the main one's leaves above it, smaller.
+    fn side(&mut self, nodes: &Nodes, axil: Axil, mut stream: Stream) -> Option<Shoot> {
+        let growth = self.growth;
+        let size = stream.range32(SIDE.0, SIDE.1) * axil.size;
+        let (point, along, radius) = nodes.get(axil.node.min(nodes.len().saturating_sub(1))).copied()?;
+        let out = direction(FRAC_PI_2, axil.azimuth + stream.range32(-0.3, 0.3));
+        let spread = stream.range32(SPREAD.0, SPREAD.1);
+        let start = (Vec3::Z.lerp(along, 0.3) * spread.cos() + out * spread.sin()).normalize_or(out);
+        let foot = Foot { point: point + out * (0.3 * radius), along: start, radius: 0.8 * radius, length: 0.0 };
+        // It had less time than the main shoot: it lacks seed leaves and as many layers as stand below its axil.
+        let skip = axil.layer + 1;
+        let shift = growth.rise.get(axil.layer).copied().unwrap_or(0.0);
+        let rise: Vec<f32> = growth.rise[skip.min(growth.rise.len())..].iter().map(|r| (r - shift) * size).collect();
+        if rise.is_empty() {
+            return None;
         }
+        let nodes = self.stem(&foot, &rise, &mut stream);
+        let turn = stream.range32(0.0, TAU);
+        for leaf in growth.leaves.iter().filter(|l| l.layer >= skip && l.blade * size >= super::stage::BUD) {
+            self.number += 1;
+            let leaf = LeafNow {
+                number: self.number,
+                azimuth: leaf.azimuth + turn,
+                blade: leaf.blade * size,
+                width: leaf.width * size,
+                stalk: leaf.stalk * size,
+                cell: leaf.cell * SIDE_CELL,
+                stream: growth.stream.child(Purpose::Leaf, u64::from(self.number)),
+                ..leaf.clone()
+            };
+            self.seat(&leaf, &nodes, leaf.layer - skip);
+        }
+        Some(Shoot { nodes, turn, size })
     }
 }

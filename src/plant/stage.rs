@@ -71,6 +71,9 @@ pub struct StageDesc {
     /// Side shoots, each a smaller copy of the main one.
     #[serde(default = "vary::<NonNegative>")]
     pub tillers: Vary<NonNegative>,
+    /// Side shoots of each side shoot of a `Runner` or `Whorl`.
+    #[serde(default = "vary::<NonNegative>")]
+    pub branches: Vary<NonNegative>,
     /// Layers from the oldest to the youngest, seed leaves first. A later stage may only add layers at the end; one that names none keeps
     /// those of the stage before.
     #[serde(default)]

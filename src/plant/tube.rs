@@ -68,14 +68,15 @@ pub(super) fn rigid(rings: &[Ring], sides: u32) -> Mesh {
     let mut rest = Rest::default();
     sweep(&mut rest, rings, sides, |_| Weights::default());
     let mut mesh = Mesh::smooth(rest.positions, rest.uvs, rest.triangles);
-    close_seams(&mut mesh, sides, 0);
+    let corners = mesh.normals.len();
+    close_seams(&mut mesh, sides, corners);
     mesh
 }
 
-/// Gives the two corners at which each ring closes one normal; rings start at corner `from`.
-pub(super) fn close_seams(mesh: &mut Mesh, sides: u32, from: usize) {
+/// Gives the two corners at which each ring closes one normal; the first `corners` corners are those of rings.
+pub(super) fn close_seams(mesh: &mut Mesh, sides: u32, corners: usize) {
     let stride = sides as usize + 1;
-    for ring in mesh.normals[from..].chunks_exact_mut(stride) {
+    for ring in mesh.normals[..corners].chunks_exact_mut(stride) {
         let normal = (ring[0] + ring[stride - 1]).normalize_or(Vec3::Z);
         ring[0] = normal;
         ring[stride - 1] = normal;

@@ -1,4 +1,8 @@
 //! Grasses: nested sheaths, each with an arching blade, in two ranks; later side shoots from the same base.
+//!
+//! The sheaths of a shoot share its axis: each is a tube round all younger ones, the oldest outermost and shortest, so that what leaves the
+//! ground is one stem. A blade continues the outer wall of its sheath; both angles of its stage, that of the sheath and that of the
+//! blade, count where it leaves it. Source: the build of a grass shoot, e.g. Clifford & McLean 1962, "Grasses: their structure".
 
 use super::axis::ROOT;
 use super::growth::{Growth, LeafNow};
@@ -10,6 +14,8 @@ use std::f32::consts::{FRAC_PI_2, PI};
 
 /// Size of a side shoot over that of the main one.
 const TILLER: (f32, f32) = (0.45, 0.7);
+/// Radius of the youngest sheath over that of the oldest.
+const TAPER: f32 = 0.5;
 /// Side shoots stop here, whatever a species file asks for.
 const MOST: usize = 24;
 
@@ -17,10 +23,8 @@ const MOST: usize = 24;
 pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {
     let mut organs = Vec::with_capacity(2 * growth.leaves.len() * (1 + growth.tillers.min(MOST)));
     let mut number = growth.leaves.last().map_or(0, |leaf| leaf.number);
-    let mut stream = growth.stream.child(Purpose::Plant, 1);
-    let lean = growth.desc.lean_deg.draw32(&mut stream).to_radians();
-    let axis = direction(lean, stream.range32(0.0, 2.0 * PI));
-    shoot(&mut organs, growth, axis, Vec3::ZERO, growth.leaves.iter().cloned());
+    let axis = lean(growth);
+    shoot(&mut organs, (0.5 * growth.stem, TAPER), axis, Vec3::ZERO, growth.leaves.iter().cloned());
     for k in 0..growth.tillers.min(MOST) {
         let mut stream = growth.stream.child(Purpose::Plant, 100 + k as u64);
         let size = stream.range32(TILLER.0, TILLER.1) * 0.93_f32.powi(k as i32);
@@ -28,7 +32,7 @@ pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {
         let towards =
             growth.leaves.first().map_or(0.0, |l| l.azimuth) + PI * (k % 2) as f32 + stream.range32(-0.7, 0.7);
         let axis = direction(stream.range32(0.35, 0.75), towards);
-        let base = direction(FRAC_PI_2, towards) * (0.5 * growth.stem);
+        let base = direction(FRAC_PI_2, towards) * (0.4 * growth.stem);
         let turn = FRAC_PI_2 + stream.range32(-0.5, 0.5);
         // Its leaves are as many as the main shoot has, less the oldest, which it had no time for.
         let leaves: Vec<_> = growth.leaves.iter().skip(1 + growth.leaves.len() / 3).collect();
@@ -47,15 +51,23 @@ pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {
                 }
             })
             .collect();
-        shoot(&mut organs, growth, axis, base, leaves.into_iter());
+        shoot(&mut organs, (0.5 * growth.stem * size.sqrt(), TAPER), axis, base, leaves.into_iter());
     }
     organs
 }
 
-/// One shoot: sheaths one within the other, the outermost the oldest.
-fn shoot<'a>(
+/// The direction of the main shoot.
+pub(super) fn lean(growth: &Growth<'_>) -> Vec3 {
+    let mut stream = growth.stream.child(Purpose::Plant, 1);
+    let lean = growth.desc.lean_deg.draw32(&mut stream).to_radians();
+    direction(lean, stream.range32(0.0, 2.0 * PI))
+}
+
+/// One shoot: sheaths one within the other, the outermost the oldest. Its radius at the soil is given in metres, and that of its youngest
+/// sheath over it.
+pub(super) fn shoot<'a>(
     organs: &mut Vec<Organ>,
-    growth: &Growth<'_>,
+    (width, taper): (f32, f32),
     axis: Vec3,
     base: Vec3,
     leaves: impl ExactSizeIterator<Item = LeafNow<'a>>,
@@ -63,9 +75,12 @@ fn shoot<'a>(
     let count = leaves.len().max(1) as f32;
     let foot = ROOT / axis.z.max(0.3);
     for (k, leaf) in leaves.enumerate() {
-        let radius = 0.5 * growth.stem * lerp(1.0, 0.55, k as f32 / count);
+        let radius = width * lerp(1.0, taper, k as f32 / count);
+        let out = direction(FRAC_PI_2, leaf.azimuth);
+        let out = (out - axis * out.dot(axis)).normalize_or(Vec3::X);
         // The sheath stands in the soil; its length counts from there up.
-        let leaf = LeafNow { stalk: leaf.stalk + foot, ..leaf };
-        leaf::grow(organs, &leaf, Seat { point: base - axis * foot, axis }, Lower::Sheath(radius));
+        let leaf = LeafNow { stalk: leaf.stalk + foot, pitch: leaf.pitch + leaf.angle, angle: 0.0, ..leaf };
+        let seat = Seat { point: base + out * radius - axis * foot, axis, out };
+        leaf::grow(organs, &leaf, seat, Lower::Sheath(radius));
     }
 }

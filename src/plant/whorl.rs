@@ -1,20 +1,15 @@
-//! Whorls of leaves without stalks on a square stem: bedstraws such as cleavers.
+//! Whorls of leaves without stalks on a square stem, with side shoots from the axils of the seed leaves: bedstraws such as cleavers. The
+//! stem is too weak to stand by itself and lies down as it grows longer; its whorls stand round it there too.
 
-use super::axis::{self, Section};
 use super::growth::Growth;
-use super::leaf::{self, Lower};
 use super::organ::Organ;
+use super::runner::{self, Habit};
 use super::tube::Profile;
 
-/// Square, slender, leaves seated just below the surface.
-const SECTION: Section = Section { profile: Profile::Square, taper: 0.65, wander: 0.11, seat: (0.7, 0.7) };
+/// Square, slender; a leaf stays where it stands on the stem.
+const HABIT: Habit = Habit { profile: Profile::Square, sides: 12, whorled: true };
 
 /// Grows whorls.
 pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {
-    let mut organs = Vec::with_capacity(2 + 2 * growth.leaves.len());
-    let axis = axis::grow(&mut organs, growth, SECTION);
-    for leaf in &growth.leaves {
-        leaf::grow(&mut organs, leaf, axis.seat(leaf), Lower::Petiole);
-    }
-    organs
+    runner::shoots(growth, HABIT)
 }

@@ -71,9 +71,10 @@ pub fn from_raw<'de, D: Deserializer<'de>, T>(
     read(raw).map_err(de::Error::custom)
 }
 
-/// Parses RON inside a value, keeping the place of an error.
+/// Parses RON inside a value, keeping the place of an error. As in a whole file, a value needs no `Some`.
 pub fn parse_in<T: de::DeserializeOwned>(raw: &str) -> Result<T, Fault> {
-    ron::from_str(raw).map_err(|e| locate(raw, &e))
+    let options = ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
+    options.from_str(raw).map_err(|e| locate(raw, &e))
 }
 
 /// The place of a parser's error within `text`, and words for it.

@@ -1,0 +1,112 @@
+//! How plants are built: sheaths, mats, joints, spines.
+
+use super::*;
+use crate::math::vec2;
+
+/// Rationale: sheaths that leave the ground side by side look like straws; grasses have one stem of nested ones. Expected: what a main
+/// shoot's sheaths cover near the soil, below its lowest collar, is the stem's width, and a quarter for its lean. Source: Clifford &
+/// McLean 1962.
+#[test]
+fn sheaths_of_a_shoot_are_nested() {
+    for (eppo, bbch) in [("ZEAMX", 16), ("ECHCG", 14), ("POAAN", 13), ("TRZAX", 13)] {
+        let desc = page(eppo);
+        for seed in 0..10 {
+            let plant = grow(&desc, Stage::Bbch(bbch), &stream(seed));
+            let low = if eppo == "POAAN" { 1e-3..3e-3 } else { 4e-3..10e-3 };
+            let sheaths = || plant.organs.iter().filter(|o| o.kind == OrganKind::Sheath);
+            let corners =
+                |o: &Organ| -> Vec<Vec3> { o.mesh.positions.iter().copied().filter(|p| low.contains(&p.z)).collect() };
+            let width = |points: &[Vec3]| {
+                let wide = points.iter().flat_map(|p| points.iter().map(move |q| (*p - *q).truncate().length()));
+                wide.fold(0.0_f32, f32::max)
+            };
+            let all: Vec<Vec3> = sheaths().flat_map(corners).collect();
+            let widest = sheaths().map(|o| width(&corners(o))).fold(0.0, f32::max);
+            let most = 1.25 * growth::growth(&desc, Stage::Bbch(bbch), &stream(seed), 1.0).unwrap().stem;
+            assert!(
+                !all.is_empty() && width(&all) < most.max(1.05 * widest),
+                "{eppo} {seed}: {} over {most}",
+                width(&all)
+            );
+        }
+    }
+}
+
+/// Rationale: seen from above a chickweed of BBCH 25 is a mat, not a line, and cleavers lie down. Expected: along the narrowest direction
+/// the mat is at least half as wide as along the widest; it stands at most half as high as it is wide. Maize of BBCH 16 is about as high
+/// as wide. Sources: Holm et al. 1977 for the growth of chickweed; the ratios are estimates from pictures.
+#[test]
+fn plants_are_as_high_as_they_are_wide_or_lie() {
+    let extents = |eppo: &str, bbch: u32| {
+        let desc = page(eppo);
+        let of = |seed| {
+            let plant = grow(&desc, Stage::Bbch(bbch), &stream(seed));
+            let width = |angle: f32| {
+                let across = vec2(angle.cos(), angle.sin());
+                let along = plant.organs.iter().flat_map(|o| &o.mesh.positions).map(|p| p.truncate().dot(across));
+                let (low, high) = along.fold((f32::MAX, f32::MIN), |(l, h), x| (l.min(x), h.max(x)));
+                high - low
+            };
+            let widths: Vec<f32> = (0..12).map(|k| width(PI * k as f32 / 12.0)).collect();
+            let (low, high) = widths.iter().fold((f32::MAX, 0.0_f32), |(l, h), w| (l.min(*w), h.max(*w)));
+            [low, high, plant.height]
+        };
+        let all: Vec<[f32; 3]> = (0..10).map(of).collect();
+        [0, 1, 2].map(|k| all.iter().map(|e| e[k]).sum::<f32>() / 10.0)
+    };
+    let [narrow, wide, high] = extents("STEME", 25);
+    assert!(narrow > 0.5 * wide && high < 0.5 * wide, "chickweed: {narrow} {wide} {high}");
+    let [_, wide, high] = extents("GALAP", 15);
+    assert!(high < 0.6 * wide, "cleavers: {wide} {high}");
+    let [_, wide, high] = extents("ZEAMX", 16);
+    assert!((0.6..1.2).contains(&(high / wide)), "maize: {wide} {high}");
+}
+
+/// Rationale: joints stand where a species bends, not at equal distances. Expected: those of the written list, and branches on a blade of
+/// parallel veins that asks for them. Source: Di Cicco et al. 2017, §III-A.
+#[test]
+fn joints_stand_where_the_species_file_says() {
+    let plain = r#"(form: Rosette, kinds: {"leaf": (shape: Sheet(outline: Power(a: 0.5, b: 0.8)), vein_angle_deg: 0)}, stages: [
+        (bbch: 12, days: 3, hypocotyl_mm: 5, stem_mm: 1, layers: [(kind: "leaf", blade_mm: 50, width_mm: 20, angle_deg: 50)])])"#;
+    let posed = plain.replace("vein_angle_deg: 0", "vein_angle_deg: 0, branch_angle_deg: 60, joint_at: [0.1, 0.5]");
+    let joints = |text: &str| {
+        let desc: PlantDesc = ron::from_str(text).unwrap();
+        let plant = grow(&desc, Stage::Bbch(12), &stream(1));
+        plant.leaf_axes().next().unwrap().joints
+    };
+    let named = |joints: &[PlacedJoint], name: &str| joints.iter().find(|j| j.name.to_string() == name).map(|j| j.at);
+    let (before, after) = (joints(plain), joints(&posed));
+    assert!(named(&before, "STL1").is_none() && named(&before, "VN5").is_some());
+    assert!(named(&after, "STL2").is_some() && named(&after, "VN3").is_none());
+    let [base, first, second] = ["B", "VN1", "VN2"].map(|name| named(&after, name).unwrap());
+    let share = base.distance(first) / first.distance(second);
+    assert!((share - 0.25).abs() < 0.01, "{share}");
+    for bad in ["joint_at: [0.5, 0.1]", "joint_at: [0, 0.5]"] {
+        let wrong = posed.replace("joint_at: [0.1, 0.5]", bad);
+        assert!(ron::from_str::<PlantDesc>(&wrong).unwrap_err().to_string().contains("must rise"));
+    }
+}
+
+/// Rationale: a thistle pricks. Expected: spines as long as the species file says, some above the blade and some below, on the leaves that
+/// ask for them and on no other. Source: 1.5-3 mm, SLU Ogräsrådgivaren.
+#[test]
+fn thistles_have_spines_off_the_blades_plane() {
+    let armed = page("CIRAR");
+    let mut bare = armed.clone();
+    bare.kinds.get_mut("leaf").unwrap().spines = None;
+    let [a, b] = [&armed, &bare].map(|desc| grow(desc, Stage::Bbch(16), &stream(2)));
+    for (a, b) in a.organs.iter().zip(&b.organs) {
+        let more = a.mesh.positions.len() - b.mesh.positions.len();
+        let spined = a.kind == OrganKind::Petiole && armed.kinds["leaf"].spines.is_some() && more > 0;
+        if !spined {
+            assert_eq!(more, 0, "{:?} {}", a.kind, a.leaf);
+            continue;
+        }
+        assert_eq!(more % 4, 0);
+        for spine in a.mesh.positions[b.mesh.positions.len()..].chunks(4) {
+            let long = spine[3].distance((spine[0] + spine[1] + spine[2]) / 3.0);
+            assert!((0.1e-3..4e-3).contains(&long), "leaf {}: {long}", a.leaf);
+        }
+    }
+    assert!(a.organs.iter().zip(&b.organs).any(|(a, b)| a.mesh.positions.len() > b.mesh.positions.len()));
+}
