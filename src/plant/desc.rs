@@ -71,7 +71,7 @@ pub struct PlantDesc {
     /// What its flowers and fruits are made like, by names that its stages' `inflorescences` use.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     #[schemars(default)]
-    #[schemars(extend("x-example" = "{\"daisy\": Head(disc: 0.4, florets: 200, rings: [])}"))]
+    #[schemars(extend("x-example" = "{\"daisy\": Head(disc: 0.4, florets: 200, rings: [])}", "x-beside" = "inflorescences"))]
     pub flowers: BTreeMap<String, FlowerDesc>,
     /// Its stages, youngest first.
     pub stages: Vec<StageDesc>,

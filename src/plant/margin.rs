@@ -12,8 +12,8 @@ use std::f32::consts::PI;
 
 /// Periods of the stretch to a blade's length.
 const PERIODS: f64 = 2.3;
-/// Standard deviation of the noise.
-const NOISE_SD: f32 = 0.26;
+/// Standard deviation of the noise along the two rows that are read.
+const NOISE_SD: f32 = 0.45;
 /// How far the margin is moved along the midrib, lengths, for each half-width that it is moved across.
 const ALONG: f32 = 0.25;
 /// Most that a margin is moved across, of the half-width.

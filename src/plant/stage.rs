@@ -80,6 +80,7 @@ pub struct StageDesc {
     pub layers: Vec<LayerDesc>,
     /// Its flowering axes, those before which others stand first. A later stage may only add some at the end.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(extend("x-first" = ["On", "(name: \"name\", at: Tip, length_mm: 200, width_mm: 2)"]))]
     pub inflorescences: Vec<InflorescenceDesc>,
 }
 

@@ -484,7 +484,7 @@ fn triangles_stay_within_budget() {
             ("STEME", 20..) => 60_000,
             ("GALAP", 12..) => 40_000,
             ("ARHHY", 14..) => 24_000,
-            ("DAUCA" | "CIRAR" | "ARHHY" | "GLXMA" | "SOLTU" | "MATIN", _) => 14_000,
+            ("CAPBP" | "DAUCA" | "CIRAR" | "ARHHY" | "GLXMA" | "SOLTU" | "MATIN", _) => 14_000,
             ("TRZAX", 22..) => 24_000,
             _ => 9_000,
         };

@@ -5,6 +5,12 @@ use serde_json::{Map, Value};
 /// Key of a schema that holds an example, RON: for fields whose type alone suggests none that reads well.
 pub(super) const EXAMPLE: &str = "x-example";
 
+/// Key of a schema that holds a step of a path: an example of what stands below that step has this field too, since it refers to it.
+pub(super) const BESIDE: &str = "x-beside";
+
+/// Key of a list's schema that holds a step of a path and an item, RON: an example of what stands below that step has this item first.
+pub(super) const FIRST: &str = "x-first";
+
 /// A schema.
 pub(super) type Object = Map<String, Value>;
 

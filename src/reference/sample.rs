@@ -1,6 +1,6 @@
 //! Examples: a value as it may be written, and a whole file with it in its place.
 
-use super::node::{EXAMPLE, Part, Types, parts, tuple};
+use super::node::{BESIDE, EXAMPLE, FIRST, Part, Types, parts, tuple};
 use super::ron;
 use crate::ron_file::{DRAWN, KIND, RANGE};
 use serde_json::Value;
@@ -39,7 +39,13 @@ pub(super) fn value(types: &Types, schema: &Value, path: &[&str]) -> String {
         return format!("({})", items.join(", "));
     }
     if let Some(items) = node.schema.get("items") {
-        return format!("[{}]", value(types, items, path));
+        let first = schema
+            .get(FIRST)
+            .and_then(Value::as_array)
+            .map(|pair| [0, 1].map(|i| pair[i].as_str().unwrap_or_default()));
+        let first =
+            first.filter(|[step, _]| path.contains(step)).map_or(String::new(), |[_, item]| format!("{item}, "));
+        return format!("[{first}{}]", value(types, items, path));
     }
     if let Some(values) = node.schema.get("additionalProperties").filter(|v| v.is_object()) {
         return format!("{{\"{KEY}\": {}}}", value(types, values, path));
@@ -48,7 +54,12 @@ pub(super) fn value(types: &Types, schema: &Value, path: &[&str]) -> String {
     if node.schema.contains_key("properties") {
         let fields: Vec<String> = all
             .iter()
-            .filter(|part| part.required == Some(true) || path.first() == Some(&part.name))
+            .filter(|part| {
+                let beside = part.schema.get(BESIDE).and_then(Value::as_str);
+                part.required == Some(true)
+                    || path.first() == Some(&part.name)
+                    || beside.is_some_and(|step| path.contains(&step))
+            })
             .map(|part| {
                 let rest = if path.first() == Some(&part.name) { &path[1..] } else { &[] };
                 format!("{}: {}", part.name, value(types, part.schema, rest))

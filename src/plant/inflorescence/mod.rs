@@ -253,7 +253,7 @@ impl<'a> Grower<'a, '_> {
                 cell: self.pen.cell,
                 stream: own,
             };
-            let seat = leaf::Seat { point: point + out * (0.6 * radius), axis: along, out };
+            let seat = leaf::Seat { point: point + out * (0.8 * radius), axis: along, out };
             leaf::grow(self.organs, &leaf, seat, Lower::Petiole);
         }
     }
