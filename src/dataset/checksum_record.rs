@@ -4,8 +4,8 @@
 
 use super::File;
 use super::checksum::Checksum;
+use super::native;
 use super::recipe::{Recipe, compact};
-use super::set::Set;
 use crate::input::below;
 use crate::output::{Together, write_atomically, write_together};
 use crate::{Error, Result};
@@ -46,7 +46,7 @@ impl ChecksumRecord {
 
     /// Where the checksums of an image lie.
     pub fn path(folder: &Path, index: u64) -> PathBuf {
-        folder.join("seals").join(format!("{}.json", Set::name(index)))
+        folder.join("seals").join(format!("{}.json", native::image_name(index)))
     }
 
     /// Reads an image's checksums; `None` where there is none or it is damaged.

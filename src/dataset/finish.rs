@@ -2,12 +2,12 @@
 
 use super::checksum::Checksum;
 use super::checksum_record::ChecksumRecord;
-use super::generate::{self, Task};
 use super::labels::LeftOut;
 use super::native::is_native;
 use super::pack::{Id, Packing, store};
-use super::recipe::{FILE, Recipe};
+use super::recipe::{FILE, MANIFEST, Recipe};
 use super::set::{Set, Stream, Whole};
+use super::task::{Task, remaining};
 use super::{format, index, push, report};
 use crate::output::{is_unfinished, remove_unfinished};
 use crate::{Error, Result};
@@ -15,9 +15,6 @@ use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-
-/// The manifest's file.
-pub const MANIFEST: &str = "manifest.json";
 
 /// Writes everything that belongs to all images. A [`Kind::Damaged`](crate::error::Kind::Damaged) names the images that are missing, and, of a dataset in so many
 /// `shards`, those.
@@ -27,7 +24,7 @@ pub fn finish(set: &Set, shards: Option<u64>) -> Result<Vec<PathBuf>> {
     let mut missing = Vec::new();
     for (index, checksums) in (0..).zip(set.all_checksums()) {
         match checksums {
-            Some(checksums) if generate::remaining(set, &checksums)? == Task::Done => {}
+            Some(checksums) if remaining(set, &checksums)? == Task::Done => {}
             _ => missing.push(index),
         }
     }

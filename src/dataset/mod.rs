@@ -29,7 +29,7 @@
 //! | `pack`, `archive` | images in archives instead of folders; names in them |
 //! | `push` | sends what is finished elsewhere, by a command of the user's |
 //! | `make` | all of it in one call |
-//! | `plan`, `gather`, `begin`, `generate`, `timing_log`, `finish` | from a scene file, copied with all that it names, to images and a manifest; what remains to be done is found by looking at the disk |
+//! | `plan`, `gather`, `begin`, `task`, `generate`, `timing_log`, `finish` | from a scene file, copied with all that it names, to images and a manifest; what remains to be done is found by looking at the disk |
 //! | `bill`, `meter` | what a dataset will cost, from three of its images; what this process has taken |
 //! | `status` | how far a dataset is, from what lies in its folder |
 //! | `stream` | the images of a dataset without its folder, as an archive for a program that reads them as they are made |
@@ -106,6 +106,7 @@ pub mod split;
 pub mod status;
 #[doc(hidden)]
 pub mod stream;
+mod task;
 #[doc(hidden)]
 pub mod timing_log;
 #[doc(hidden)]

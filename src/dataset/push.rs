@@ -15,9 +15,8 @@
 
 use super::checksum::Checksum;
 use super::checksum_record::ChecksumRecord;
-use super::finish::MANIFEST;
 use super::pack::{Id, Packing};
-use super::recipe::{FILE, compact};
+use super::recipe::{FILE, MANIFEST, compact};
 use super::set::Set;
 use super::{index, native, report};
 use crate::input::below;

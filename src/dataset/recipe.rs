@@ -6,7 +6,6 @@
 use super::classes::Classes;
 use super::keep::Kept;
 use super::labelling::Labelling;
-use super::pack::Packing;
 use super::split::{Shares, Split};
 use crate::ablation::{self, Edit};
 use crate::input::{Scope, below};
@@ -155,6 +154,9 @@ pub const MOST_IMAGES: u64 = 99_999_999;
 /// The recipe's file, below the dataset's folder.
 pub const FILE: &str = "dataset.json";
 
+/// The manifest's file.
+pub const MANIFEST: &str = "manifest.json";
+
 impl Recipe {
     /// Reads a dataset's recipe.
     pub fn read(folder: &Path) -> Result<Self> {
@@ -239,19 +241,6 @@ impl Recipe {
     /// Whether images tell which of their field they are.
     pub fn has_sequences(&self) -> bool {
         self.captures() > 1 || !self.days().is_empty()
-    }
-
-    /// What the shards of a run share out, by number: fields on a day, or packs where images lie in such.
-    pub fn unit_of(&self, index: u64) -> u64 {
-        match Packing::of(self) {
-            Some(packing) => packing.place(packing.id(index)),
-            None => self.growing_of(index),
-        }
-    }
-
-    /// How many of them there are.
-    pub fn units(&self) -> u64 {
-        Packing::of(self).map_or(self.count, |packing| packing.all().count() as u64)
     }
 
     /// The split of an image: all images of a field are in one.

@@ -4,10 +4,10 @@
 //! An image counts as done where its checksums name files of the right lengths; [`verify`](super::verify()) reads their bytes too.
 
 use super::checksum_record::ChecksumRecord;
-use super::generate::{Task, remaining};
 use super::push::{self, Unit};
 use super::recipe::compact;
 use super::set::Set;
+use super::task::{Task, remaining};
 use super::timing_log::{self, End, ImageFailure, ImageTiming, Row, RunLog};
 use crate::input::below;
 use crate::{Error, Result};

@@ -2,14 +2,15 @@
 
 use super::checksum::Checksum;
 use super::difference::Difference;
-use super::finish::{MANIFEST, lacks, of_image, ranges};
-use super::generate::Task;
+use super::finish::{lacks, of_image, ranges};
 use super::native::Files;
 use super::pack::{Id, Packing};
+use super::recipe::MANIFEST;
 use super::render::{LastField, RenderedSample, render, scene_file};
 use super::set::Set;
 use super::split::Split;
-use super::{File, format, generate, invariants, native, push, timing_log};
+use super::task::{Task, remaining};
+use super::{File, format, invariants, native, push, timing_log};
 use crate::input::below;
 use crate::job::{Renderer, Threads};
 use crate::render::Watch;
@@ -150,7 +151,7 @@ fn look(set: &Set, index: u64) -> Result<Looked> {
     let mut faults: Vec<String> =
         set.faults(&checksums).into_iter().map(|(path, fault)| format!("{path} {fault}")).collect();
     let mut missing = !faults.is_empty();
-    if !missing && generate::remaining(set, &checksums)? != Task::Done {
+    if !missing && remaining(set, &checksums)? != Task::Done {
         missing = true;
         faults.push(format!("image {name}: it was made by another recipe, or lacks a format"));
     }

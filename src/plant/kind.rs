@@ -1,9 +1,8 @@
 //! Kinds of leaves: what all leaves of a kind share in the species file, whatever their size.
 
 use super::organ::OrganKind;
-use super::stipules::Stipules;
 use crate::geometry::outline::Outline;
-use crate::ron_file::{Finite, Fraction, NonNegative, Num, Positive, PositiveCount, Vary};
+use crate::ron_file::{Count, Finite, Fraction, NonNegative, Num, Positive, PositiveCount, Vary};
 use serde::{Deserialize, Serialize};
 
 /// How a blade is made.
@@ -80,6 +79,30 @@ pub struct Spines {
     pub lobes: Num<PositiveCount>,
     /// Length of the spines on the lobes' tips of a grown leaf; on blades below 50 mm they are shorter in proportion.
     pub length_mm: Vary<Positive>,
+}
+
+/// How a kind's stipules look.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Stipules {
+    /// Length of the end lobe, of the blade's length; 0 for no stipules.
+    pub length: Num<NonNegative>,
+    /// Lobes on each side of it; the outer side has one more.
+    pub lobes: Num<Count>,
+}
+
+impl Default for Stipules {
+    /// None.
+    fn default() -> Self {
+        Self { length: Num::new(0.0), lobes: Num::new(2.0) }
+    }
+}
+
+impl Stipules {
+    /// Whether there are none.
+    pub(super) fn none(&self) -> bool {
+        self.length.get() == 0.0
+    }
 }
 
 /// A kind of leaf.

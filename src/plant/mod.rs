@@ -62,11 +62,10 @@ pub use condition::{Condition, ConditionDesc};
 pub use desc::{Form, PlantDesc, Stage};
 pub use flower::desc::{FlowerDesc, RingDesc};
 pub use inflorescence::desc::{FlowersDesc, InflorescenceDesc, Seat, StemLeafDesc};
-pub use kind::{LeafKind, Shape, Spines};
+pub use kind::{LeafKind, Shape, Spines, Stipules};
 pub use organ::{LeafAxis, LeafSize, Organ, OrganKind};
 pub use skeleton::PlacedJoint;
 pub use stage::{BUD, LayerDesc, StageDesc};
-pub use stipules::Stipules;
 
 use crate::sampling::Stream;
 use growth::Growth;

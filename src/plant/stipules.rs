@@ -4,36 +4,11 @@
 
 use super::blade::Rest;
 use super::growth::LeafNow;
+use super::kind::Stipules;
 use super::ribbons::Ribbons;
 use super::skeleton::Skeleton;
 use crate::math::{Vec3, lerp, vec3};
-use crate::ron_file::{Count, NonNegative, Num};
 use crate::sampling::Purpose;
-use serde::{Deserialize, Serialize};
-
-/// How a kind's stipules look.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct Stipules {
-    /// Length of the end lobe, of the blade's length; 0 for no stipules.
-    pub length: Num<NonNegative>,
-    /// Lobes on each side of it; the outer side has one more.
-    pub lobes: Num<Count>,
-}
-
-impl Default for Stipules {
-    /// None.
-    fn default() -> Self {
-        Self { length: Num::new(0.0), lobes: Num::new(2.0) }
-    }
-}
-
-impl Stipules {
-    /// Whether there are none.
-    pub(super) fn none(&self) -> bool {
-        self.length.get() == 0.0
-    }
-}
 
 /// Angle between stalk and end lobe, radians.
 const SPREAD: f32 = 0.55;

@@ -5,7 +5,7 @@ use crate::geometry::{Mesh, outline};
 use crate::math::{Vec2, Vec3};
 use crate::ron_file::Vary;
 use crate::sampling::Purpose;
-use crate::scene::species_file::SpeciesFile;
+use crate::scene::species_text::SpeciesFile;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::collections::BTreeMap;

@@ -4,7 +4,7 @@ use super::desc::{ModelDesc, SpeciesDesc};
 use super::drive;
 use super::growing::Growing;
 use super::shipped::species as shipped_species;
-use super::species_file::SpeciesFile;
+use super::species_text::SpeciesFile;
 use crate::error::{Kind, Place};
 use crate::geometry::{AlphaMask, Margin};
 use crate::input::{self, Outside, Scope, shipped};

@@ -11,6 +11,7 @@ mod part_kind;
 pub mod record;
 pub mod shipped;
 pub mod species_file;
+pub mod species_text;
 pub mod tag;
 pub mod traits;
 

@@ -2,8 +2,9 @@
 
 use super::desc::SpeciesDesc;
 use super::library::Library;
+use super::species_text::SpeciesFile;
 use crate::plant::table::{LeafTable, NoRows};
-use crate::ron_file::{RonFile, Spliced, Step};
+use crate::ron_file::{self, RonFile, Spliced, Step};
 use crate::{Error, Result};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -25,34 +26,10 @@ impl SpeciesDesc {
     }
 }
 
-/// A species file's text, with what other files add to it.
-pub struct SpeciesFile(Spliced);
-
 impl SpeciesFile {
     /// Reads it. What it names may lie anywhere.
     pub fn read(path: &Path) -> Result<Self> {
         Library::default().species_file(path)
-    }
-
-    /// What stands in it.
-    pub fn parse(&self) -> Result<SpeciesDesc> {
-        self.0.page.parse_all().map_err(|error| self.locate(error))
-    }
-
-    /// The whole text, as one file in the place of the one that was asked for.
-    pub fn page(&self) -> &RonFile {
-        &self.0.page
-    }
-
-    /// The files that it was read from, that which was asked for first.
-    pub fn sources(&self) -> &[RonFile] {
-        self.0.sources()
-    }
-
-    /// An error about the whole text, shown in the file where the words at fault were written.
-    #[must_use]
-    pub fn locate(&self, error: Error) -> Error {
-        self.0.locate(error)
     }
 }
 
@@ -193,7 +170,7 @@ fn writes_layers(own: &Spliced) -> bool {
 
 /// The text in quotes that stands at these bytes.
 fn literal(page: &RonFile, at: &Range<usize>, example: &str) -> Result<String> {
-    ron::from_str(&page.text[at.clone()])
+    ron_file::parse_in(&page.text[at.clone()])
         .map_err(|_| page.about_bytes(at.clone(), "the name of a file is expected here", format!("write {example}")))
 }
 

@@ -20,13 +20,14 @@ pub mod phenobench;
 
 use super::begin::{self, refuse_full};
 use super::checksum_record::{ChecksumRecord, write_files};
-use super::generate::{self, Task};
+use super::generate;
 use super::labelling::Labelling;
 use super::recipe::{FILE, Made, Recipe};
 use super::record::{Keypoint, Record};
 use super::sample::Sample;
 use super::set::Set;
 use super::split::{Shares, Split};
+use super::task::{Task, task};
 use super::{annotate, invariants, native};
 use crate::Result;
 use rayon::prelude::*;
@@ -151,7 +152,7 @@ fn begin(folder: &Path, source: &dyn Source, order: &Order) -> Result<Set> {
 /// Brings in one image, where it is not there yet.
 fn bring(set: &Set, source: &dyn Source, index: u64) -> Result<()> {
     let Set { folder, recipe, .. } = set;
-    let files = match generate::task(set, index)? {
+    let files = match task(set, index)? {
         Task::Done => return Ok(()),
         Task::Formats | Task::All => {
             let sample = sample(recipe, &source.images()[index as usize], index, source.read(index as usize)?);

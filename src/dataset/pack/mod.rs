@@ -12,13 +12,14 @@
 //! of any dataset, and an archive is written once. Which image is in which pack follows from its number, splits and the size of packs.
 //! A pack of which a byte was changed, or that is to hold more images or other files, is taken apart first ([`store::settle`]).
 
+mod check;
 pub(super) mod record;
 pub(super) mod store;
 
-use super::format;
+pub use check::check;
+
 use super::recipe::Recipe;
 use super::split::Split;
-use crate::{Error, Result};
 
 /// Most images of a pack: the record of one is read into memory.
 pub const MOST: u64 = 100_000;
@@ -106,21 +107,19 @@ impl<'a> Packing<'a> {
     }
 }
 
-/// An error where a dataset cannot have the packs that its recipe asks for.
-pub fn check(recipe: &Recipe) -> Result<()> {
-    let Some(images) = recipe.pack else { return Ok(()) };
-    let captures = recipe.captures();
-    if !images.is_multiple_of(captures) || images == 0 {
-        let near = (images / captures).max(1) * captures;
-        return Err(Error::misuse(format!("--pack {images} would cut fields of {captures} images each"))
-            .help(format!("give a multiple of {captures}, such as --pack {near}")));
-    }
-    match format::all(recipe)?.into_iter().find(|(_, format)| format.names_photographs()) {
-        None => Ok(()),
-        Some((name, _)) => {
-            Err(Error::misuse(format!("--format {name} names the files in images/, which --pack puts into archives"))
-                .help(format!("leave --pack or --format {name} out")))
+impl Recipe {
+    /// What the shards of a run share out, by number: fields on a day, or packs where images lie in such.
+    pub fn unit_of(&self, index: u64) -> u64 {
+        match Packing::of(self) {
+            Some(packing) => packing.place(packing.id(index)),
+            None => self.growing_of(index),
         }
+    }
+
+    /// How many of them there are.
+    pub fn units(&self) -> u64 {
+        let unpacked = || self.count.checked_sub(1).map_or(0, |last| self.growing_of(last) + 1);
+        Packing::of(self).map_or_else(unpacked, |packing| packing.all().count() as u64)
     }
 }
 

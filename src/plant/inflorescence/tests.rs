@@ -3,7 +3,7 @@
 use super::*;
 use crate::geometry::Mesh;
 use crate::plant::{Plant, PlantDesc, Stage, grow as grow_plant, most_triangles};
-use crate::scene::species_file::SpeciesFile;
+use crate::scene::species_text::SpeciesFile;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 

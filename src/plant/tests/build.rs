@@ -70,7 +70,7 @@ fn joints_stand_where_the_species_file_says() {
         (bbch: 12, days: 3, hypocotyl_mm: 5, stem_mm: 1, layers: [(kind: "leaf", blade_mm: 50, width_mm: 20, angle_deg: 50)])])"#;
     let posed = plain.replace("vein_angle_deg: 0", "vein_angle_deg: 0, branch_angle_deg: 60, joint_at: [0.1, 0.5]");
     let joints = |text: &str| {
-        let desc: PlantDesc = ron::from_str(text).unwrap();
+        let desc: PlantDesc = crate::ron_file::RonFile::of(text).parse().unwrap();
         let plant = grow(&desc, Stage::Bbch(12), &stream(1));
         plant.leaf_axes().next().unwrap().joints
     };
@@ -83,7 +83,9 @@ fn joints_stand_where_the_species_file_says() {
     assert!((share - 0.25).abs() < 0.01, "{share}");
     for bad in ["joint_at: [0.5, 0.1]", "joint_at: [0, 0.5]"] {
         let wrong = posed.replace("joint_at: [0.1, 0.5]", bad);
-        assert!(ron::from_str::<PlantDesc>(&wrong).unwrap_err().to_string().contains("must rise"));
+        assert!(
+            crate::ron_file::RonFile::of(&wrong).parse::<PlantDesc>().unwrap_err().to_string().contains("must rise")
+        );
     }
 }
 

@@ -76,3 +76,9 @@ impl Cells {
         Cell { away: best.sqrt(), border: border.max(0.0), own: unit(mix(own)), shared: unit(mix(own ^ other)) }
     }
 }
+
+/// A union without a crease: the larger, rounded over `k`.
+pub(super) fn smooth_max(a: f32, b: f32, k: f32) -> f32 {
+    let h = (k - (a - b).abs()).max(0.0) / k;
+    a.max(b) + h * h * k * 0.25
+}

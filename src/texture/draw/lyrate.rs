@@ -3,8 +3,7 @@
 //!
 //! Coordinates as in [`super::shape`].
 
-use super::cells::unit;
-use super::shape::smooth_max;
+use super::cells::{smooth_max, unit};
 use crate::geometry::outline::Outline;
 use crate::math::{Vec2, lerp, smoothstep, vec2};
 use crate::ron_file::{Fraction, NonNegative, Num, Positive};

@@ -2,7 +2,7 @@
 //!
 //! Coordinates are in lengths of the leaf: Y along the midrib, 0 at the base and 1 at the tip, X to the right.
 
-use super::cells::unit;
+use super::cells::{smooth_max, unit};
 use super::lyrate::{Lyrate, Silhouette};
 use crate::geometry::outline::Outline;
 use crate::math::{Vec2, lerp, smoothstep, vec2};
@@ -320,10 +320,4 @@ impl Spine {
         }
         SPINE * (1.0 - s) - n.abs()
     }
-}
-
-/// A union without a crease: the larger, rounded over `k`.
-pub(super) fn smooth_max(a: f32, b: f32, k: f32) -> f32 {
-    let h = (k - (a - b).abs()).max(0.0) / k;
-    a.max(b) + h * h * k * 0.25
 }

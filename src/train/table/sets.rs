@@ -157,7 +157,7 @@ impl Bound {
             return Ok(());
         }
         let _lock = lock(folder, name, tell, stop)?;
-        if !folder.join(dataset::finish::MANIFEST).exists() {
+        if !folder.join(dataset::recipe::MANIFEST).exists() {
             tell(&format!("making the set `{name}`"));
         }
         let progress = Progress::new(name, tell);

@@ -20,7 +20,7 @@ use furrow::output::{self, Picture};
 use furrow::render::{self, Settings, Watch};
 use furrow::ron_file::RENAMED;
 use furrow::sampling::Points;
-use furrow::scene::species_file::SpeciesFile;
+use furrow::scene::species_text::SpeciesFile;
 use furrow::scene::{Field, PlantRecord, assemble};
 use furrow::{Error, Result};
 use outline::{Measures, Silhouette};
