@@ -13,6 +13,7 @@ use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec3, lerp, smoothstep};
 use crate::optics::soil::wet;
 use crate::texture::noise::Perlin;
+use std::sync::Arc;
 
 /// Roughness α of a film of water on a piece: that of one over grains (0.3) where it begins, of one over worn stone where it is whole.
 const FILM_ROUGHNESS: (f32, f32) = (0.35, 0.22);
@@ -26,7 +27,7 @@ const TOP: (f32, f32) = (0.1, 0.75);
 const MEAN_TOP: f32 = 0.6;
 
 /// One colour with a grain of noise.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Solid {
     /// Moist already, as the soil on it is.
     albedo: Spectrum,
@@ -38,9 +39,9 @@ pub struct Solid {
 }
 
 /// Mottling: the albedo varies by `depth` over patches of `size` metres.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Grain {
-    noise: Perlin,
+    noise: Arc<Perlin>,
     size: f32,
     depth: f32,
 }
@@ -65,7 +66,7 @@ impl Solid {
     /// With mottling of relative depth `depth` (0–1) over patches of `size` metres.
     #[must_use]
     pub fn with_grain(self, seed: u32, size: f32, depth: f32) -> Self {
-        Self { grain: Some(Grain { noise: Perlin::new(seed), size, depth }), ..self }
+        Self { grain: Some(Grain { noise: Arc::new(Perlin::new(seed)), size, depth }), ..self }
     }
 
     /// With dry soil of this reflectance on a share `cover` (0–1) of what faces up, in patches of `size` metres; evenly on a piece
@@ -104,9 +105,9 @@ impl Solid {
     /// Reflectance at a place whose outer normal is `up`.
     fn tone(&self, p: Vec3, up: Vec3) -> Spectrum {
         let noise = |size: f32, apart: f32| {
-            self.grain.map_or(0.0, |g| g.noise.fbm3((p / size + apart).as_dvec3().to_array(), 2, 0.5) as f32)
+            self.grain.as_ref().map_or(0.0, |g| g.noise.fbm3((p / size + apart).as_dvec3().to_array(), 2, 0.5) as f32)
         };
-        let albedo = self.albedo * self.grain.map_or(1.0, |g| 1.0 + g.depth * noise(g.size, 0.0));
+        let albedo = self.albedo * self.grain.as_ref().map_or(1.0, |g| 1.0 + g.depth * noise(g.size, 0.0));
         let albedo = self.dust.map_or(albedo, |d| {
             // Perlin noise of two octaves is mostly within ±0.5: thin here, thick there, its mean the cover.
             let share = d.cover * (1.0 + 1.2 * noise(d.size, APART));
@@ -160,7 +161,7 @@ mod tests {
     #[test]
     fn soil_lies_on_top() {
         let clean = Solid::new(STONE, 0.3);
-        let dusty = clean.with_grain(4, 2e-3, 0.0).with_dust(LOESS, 0.5, 3e-3);
+        let dusty = clean.clone().with_grain(4, 2e-3, 0.0).with_dust(LOESS, 0.5, 3e-3);
         let mean = |solid: &Solid, up: Vec3| {
             let all: Spectrum = (0..400).fold(Spectrum::ZERO, |sum, i| {
                 let p = Vec3::new((i % 20) as f32, (i / 20) as f32, 3.0) * 1.7e-3;

@@ -112,6 +112,7 @@ struct Foot {
 
 /// Where a side shoot begins: its layer of the plant, the node of the stem that bears it, its azimuth, and its size over that of the main
 /// shoot.
+#[derive(Clone, Copy)]
 struct Axil {
     layer: usize,
     node: usize,

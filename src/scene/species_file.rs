@@ -102,13 +102,10 @@ impl Library {
 
     /// The species file that another names: beside it, or one that ships.
     fn need_or_shipped_file(&mut self, page: &RonFile, like: &str) -> Result<PathBuf> {
-        self.need_or_shipped(
-            page,
-            like,
-            |name| {
-                if name.ends_with(".ron") { super::shipped::species(name) } else { Ok(None) }
-            },
-        )
+        self.need_or_shipped(page, like, |name| {
+            let is_file = Path::new(name).extension().is_some_and(|extension| extension == "ron");
+            if is_file { super::shipped::species(name) } else { Ok(None) }
+        })
     }
 }
 
