@@ -99,7 +99,7 @@ fn run(row: &Row) -> Cost {
         let mut clock = meter::cpu();
         let mut lap = |into: &mut f64| {
             let now = meter::cpu();
-            *into += now.zip(clock).map_or(0.0, |(now, then)| (now - then).as_secs_f64());
+            *into += now.zip(clock).map_or(0.0, |(now, then)| now.saturating_sub(then).as_secs_f64());
             clock = now;
         };
         let field = pool.install(|| assemble::field_of(&text, &options)).expect("a field");

@@ -546,7 +546,8 @@ fn a_preview_is_the_same_field_with_coarser_meshes() {
         parts.map(|part| part.mesh.triangles.len()).sum()
     };
     let (fine, coarse) = (triangles(&whole, true), triangles(&preview, true));
-    assert!(coarse < fine / 2, "{coarse} of {fine}");
+    // Ribbons, as of mayweed, are as coarse as they can be.
+    assert!(4 * coarse < 3 * fine, "{coarse} of {fine}");
     let labels = |field: &Field| {
         let geometry = EmbreeAccel::build(&field.scene.surfaces(), 2).expect("an accelerator");
         label(&geometry, &field.scene.parts, &field.scene.camera, Window::full(320, 240)).tags

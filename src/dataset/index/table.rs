@@ -130,6 +130,7 @@ fn dense<T, U>(all: &mut Vec<Option<T>>, as_stored: impl Fn(T) -> U) -> (Vec<i16
 #[expect(clippy::needless_pass_by_value, reason = "what `map_err` hands over")]
 fn failed(error: ParquetError) -> Error {
     Error::failed(format!("a table cannot be written: {error}"))
+        .help("see that the disk has room and may be written, then run the same command again")
 }
 
 /// Rows that are written together: what a reader skips or takes as one.
