@@ -90,9 +90,9 @@ fn however_it_is_made_its_files_are_those_of_one_run() {
     assert!(fs::read_dir(shards.join("images")).is_ok_and(|mut all| all.next().is_none()), "all lies in packs");
     succeed(verb("finish", &shards, &["--quiet"]));
     same(&tree(&shards), &whole);
-    // Shards of packs: there are three, so a fourth would be empty.
-    let said = fail(verb("emit", &shards, &["--scheduler", "slurm", "--shards", "4"]), 2);
-    assert!(said.contains("4 shards of 3 packs"), "{said}");
+    // Shards of packs: there are three to train and one to validate, so a fifth would be empty.
+    let said = fail(verb("emit", &shards, &["--scheduler", "slurm", "--shards", "5"]), 2);
+    assert!(said.contains("5 shards of 4 packs"), "{said}");
 
     let (_keep, grown) = scratch();
     succeed(packed(&grown, 5, &[]));
