@@ -159,12 +159,15 @@ fn lists_have_a_line_for_everything_that_ships() {
     std::fs::create_dir(&folder).unwrap();
     let list = |what: &str| done(&run(&folder, repository(), &[what]));
     let species = list("species");
-    assert_eq!(species.lines().count(), names(&repository().join("scenes/species")).len());
+    assert_eq!(
+        species.lines().count(),
+        names(&repository().join("scenes/species")).iter().filter(|name| name.ends_with(".ron")).count()
+    );
     let thistle = species.lines().find(|line| line.starts_with("cirsium ")).expect("the thistle");
     let words: Vec<&str> = thistle.split("  ").map(str::trim).filter(|word| !word.is_empty()).collect();
     assert_eq!(words, ["cirsium", "Cirsium arvense", "creeping thistle", "CIRAR", "weed", "BBCH 10 to 19"]);
     assert!(
-        species.lines().any(|line| line.starts_with("sugar_beet ") && line.ends_with("BBCH 10 to 39")),
+        species.lines().any(|line| line.starts_with("sugar_beet ") && line.ends_with("BBCH 10 to 65")),
         "{species}"
     );
     let cameras = list("cameras");
