@@ -10,7 +10,7 @@
 //!
 //! Images are made in folders of their own, as ever, and put into their pack when all of it are there: so kills, shards and faults are those
 //! of any dataset, and an archive is written once. Which image is in which pack follows from its number, splits and the size of packs.
-//! A pack of which a byte was changed, or that is to hold more images or other files, is taken apart first ([`store::settle`]).
+//! A pack of which a byte was changed, or that is to hold more images or other files, is taken apart first (`store::settle`).
 
 mod check;
 pub(super) mod record;
