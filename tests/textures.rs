@@ -269,7 +269,7 @@ fn odd_leaves_are_drawn_too() {
             let page = format!(
                 "#![enable(unwrap_variant_newtypes)]
                  (seed: 1, size: 48, length_mm: 9, aspect: {aspect}, outline: {outline}, {rest}, pigments: (chlorophyll: 0),
-                  relief: Some((range_mm: 1, furrow_mm: 9, blister_mm: 9)))"
+                  relief: Some(range_mm: 1, furrow_mm: 9, blister_mm: 9))"
             );
             let recipe = Recipe::Leaf(Box::new(ron::from_str(&page).unwrap_or_else(|e| panic!("{page}: {e}"))));
             let drawn: Drawn = draw::draw(&recipe).unwrap();
