@@ -9,6 +9,7 @@ use super::recipe::{FILE, MANIFEST, Recipe};
 use super::set::{Set, Stream, Whole};
 use super::task::{Task, remaining};
 use super::{format, index, push, report};
+use crate::error::Kind;
 use crate::output::{is_unfinished, remove_unfinished};
 use crate::{Error, Result};
 use rayon::prelude::*;
@@ -19,18 +20,38 @@ use std::path::{Path, PathBuf};
 /// Writes everything that belongs to all images. A [`Kind::Damaged`](crate::error::Kind::Damaged) names the images that are missing, and, of a dataset in so many
 /// `shards`, those.
 pub fn finish(set: &Set, shards: Option<u64>) -> Result<Vec<PathBuf>> {
-    let Set { folder, recipe, .. } = set;
     push::refuse_freed(set)?;
+    let cut = store::cut_short(set);
     let mut missing = Vec::new();
     for (index, checksums) in (0..).zip(set.all_checksums()) {
         match checksums {
-            Some(checksums) if remaining(set, &checksums)? == Task::Done => {}
+            Some(checksums) if remaining(set, &checksums)? == Task::Done && !store::lies_in(set, &cut, index) => {}
             _ => missing.push(index),
         }
     }
     if !missing.is_empty() {
-        return Err(lacks(set, &missing, shards));
+        let lacks = lacks(set, &missing, shards);
+        let words: Vec<String> = cut.into_values().chain([lacks.to_string()]).collect();
+        return Err(if words.len() == 1 { lacks } else { Error::damaged(words.join("\nerror: ")) });
     }
+    written(set).map_err(|e| with_a_way_out(set, e))
+}
+
+/// An error in a file of an image, with what mends it.
+fn with_a_way_out(set: &Set, error: Error) -> Error {
+    let within = error.place().and_then(|place| place.file.strip_prefix(&set.folder).ok());
+    let is_image = within.is_some_and(|path| path.starts_with("images") || path.starts_with("packs"));
+    if !is_image || !matches!(error.kind(), Kind::Damaged | Kind::Input) {
+        return error;
+    }
+    let folder = set.folder.display();
+    error.help(format!(
+        "`trace dataset render {folder}` makes anew what is damaged; `trace dataset verify {folder}` tells all of it"
+    ))
+}
+
+fn written(set: &Set) -> Result<Vec<PathBuf>> {
+    let Set { folder, recipe, .. } = set;
     remove_unfinished(folder)?;
     let packs: Vec<Id> = Packing::of(recipe).map(|packing| packing.all().collect()).unwrap_or_default();
     packs.par_iter().try_for_each(|id| store::ensure(set, *id))?;

@@ -107,6 +107,7 @@ pub(super) fn share(threads: usize, workers: usize, worker: usize) -> usize {
 /// run at once. What is made is kept in any case.
 pub fn generate(set: &Set, work: &Work<'_>, callbacks: &Callbacks<'_>) -> Result<()> {
     let sent = |unit: Unit| work.push.map_or(Ok(()), |push| push.unit(set, unit, callbacks.now));
+    work.push.map_or(Ok(()), |push| push.clear(set))?;
     sent(Unit::Recipe)?;
     let renderer = renderer(set)?;
     let all = Threads::new(work.threads)?;

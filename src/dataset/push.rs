@@ -20,7 +20,7 @@ use super::recipe::{FILE, MANIFEST, compact};
 use super::set::Set;
 use super::{index, native, report};
 use crate::input::below;
-use crate::output::write_atomically;
+use crate::output::{remove_unfinished_in, write_atomically};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -201,8 +201,8 @@ fn hashed(folder: &Path, files: Vec<String>) -> Result<(Vec<String>, String)> {
     let mut words = String::new();
     for file in &files {
         let path = folder.join(file);
-        let bytes = crate::input::contents(&path).map_err(Error::io(&path))?;
-        words.extend([Checksum::of(&bytes).sha256.as_str(), " ", file, "\n"]);
+        let sum = Checksum::of_file(&path).map_err(Error::io(&path))?;
+        words.extend([sum.sha256.as_str(), " ", file, "\n"]);
     }
     Ok((files, Checksum::of(words.as_bytes()).sha256))
 }
@@ -231,7 +231,13 @@ impl Push {
             Some(Note { freed: true, .. }) => return Ok(()),
             Some(_) => {}
             None => {
-                self.send(set, unit, &files, stop)?;
+                match self.send(set, unit, &files, stop) {
+                    // Another run may have pushed it meanwhile, and removed it here.
+                    Err(e) if e.is_not_found() && unit.noted(set, &hash).is_some_and(|note| note.freed) => {
+                        return Ok(());
+                    }
+                    other => other?,
+                }
                 write_atomically(&path, &compact(&note(false))?)?;
             }
         }
@@ -244,29 +250,22 @@ impl Push {
         Ok(())
     }
 
+    /// Clears away what killed runs have left of their pushes and archives: further names of files that are to take no room here any longer.
+    pub(super) fn clear(&self, set: &Set) -> Result<()> {
+        for folder in [set.folder.clone(), set.folder.join("packs")].iter().filter(|_| self.free) {
+            if folder.is_dir() {
+                remove_unfinished_in(folder)?;
+            }
+        }
+        Ok(())
+    }
+
     /// Runs the commands until both end well.
     fn send(&self, set: &Set, unit: Unit, files: &[String], stop: &AtomicBool) -> Result<()> {
         let folder = std::path::absolute(&set.folder).map_err(Error::io(&set.folder))?;
-        // Of the name of unfinished files: what a killed run leaves is cleared away with these.
-        let staged =
-            tempfile::Builder::new().prefix(".furrow-push-").tempdir_in(&folder).map_err(Error::io(&folder))?;
-        let dir = staged.path().join(unit.name());
-        for file in files {
-            let (from, to) = (below(&folder, file)?, below(&dir, file)?);
-            let parent = to.parent().unwrap_or(&dir);
-            std::fs::create_dir_all(parent).map_err(Error::io(parent))?;
-            // Another file system has no second name for it.
-            if std::fs::hard_link(&from, &to).is_err() {
-                std::fs::copy(&from, &to).map_err(Error::io(&from))?;
-            }
-        }
         let mut pause = Duration::from_secs(1);
         for tried in 1..=self.tries {
-            let mut failure = run(&self.command, &dir, stop)?;
-            if let (None, Some(check)) = (&failure, &self.check) {
-                failure = run(check, &dir, stop)?;
-            }
-            match failure {
+            match self.attempt(unit, &folder, files, stop)? {
                 None => return Ok(()),
                 Some(words) if tried >= self.tries => {
                     return Err(Error::failed(format!("{} was not pushed: {words}", unit.name()))
@@ -282,6 +281,63 @@ impl Push {
             pause *= 4;
         }
         Ok(())
+    }
+}
+
+/// How long is waited for whoever clears a folder away to be done with it.
+const CLEARING: Duration = Duration::from_secs(1);
+
+/// A folder with a unit's files, for its commands.
+struct Staged {
+    /// Around it. It has the name of unfinished files: what a killed run leaves is cleared away with these.
+    around: tempfile::TempDir,
+    dir: PathBuf,
+}
+
+impl Staged {
+    fn of(unit: Unit, folder: &Path, files: &[String]) -> Result<Self> {
+        let around = tempfile::Builder::new().prefix(".furrow-push-").tempdir_in(folder).map_err(Error::io(folder))?;
+        let dir = around.path().join(unit.name());
+        for file in files {
+            let (from, to) = (below(folder, file)?, below(&dir, file)?);
+            let parent = to.parent().unwrap_or(&dir);
+            std::fs::create_dir_all(parent).map_err(Error::io(parent))?;
+            // Another file system has no second name for it.
+            if std::fs::hard_link(&from, &to).is_err() {
+                std::fs::copy(&from, &to).map_err(Error::io(&from))?;
+            }
+        }
+        Ok(Self { around, dir })
+    }
+
+    /// Whether another run has cleared it away as what a killed one has left. A command may well move the files out of it.
+    fn was_cleared(&self, files: &[String]) -> bool {
+        if files.iter().all(|file| self.dir.join(file).is_file()) {
+            return false;
+        }
+        std::thread::sleep(CLEARING);
+        !self.around.path().is_dir()
+    }
+}
+
+impl Push {
+    /// Runs the commands once; what is wrong in words where one fails.
+    fn attempt(&self, unit: Unit, folder: &Path, files: &[String], stop: &AtomicBool) -> Result<Option<String>> {
+        loop {
+            let staged = Staged::of(unit, folder, files)?;
+            let mut failure = run(&self.command, &staged.dir, stop)?;
+            // The command has seen all only where nobody has taken any of it away.
+            if staged.was_cleared(files) {
+                continue;
+            }
+            if let (None, Some(check)) = (&failure, &self.check) {
+                failure = run(check, &staged.dir, stop)?;
+                if failure.is_some() && staged.was_cleared(files) {
+                    continue;
+                }
+            }
+            return Ok(failure);
+        }
     }
 }
 

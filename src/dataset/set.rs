@@ -97,7 +97,7 @@ impl Set {
 
     fn faults_where(&self, image: &ChecksumRecord, which: impl Fn(&str) -> bool) -> Vec<(String, String)> {
         let fault = |(path, sum): (&String, &Checksum)| match below(&self.folder, path) {
-            Ok(_) => Some((path.clone(), sum.fault_of(self.length(path), || self.contents(path))?)),
+            Ok(_) => Some((path.clone(), sum.fault_of(self.length(path), || Ok(Checksum::of(&self.contents(path)?)))?)),
             Err(_) => Some((path.clone(), "does not lie in the dataset's folder".into())),
         };
         image.files.iter().filter(|(path, _)| which(path)).filter_map(fault).collect()
@@ -156,8 +156,8 @@ impl Files for Set {
 /// Images that are read at once: enough for all threads, and little memory.
 const AT_ONCE: usize = 256;
 
-/// What is read of each image, in the order of the numbers; several at once.
-fn in_parallel<'a, T: Send + 'a>(
+/// What is read of each image, in the order of the numbers; several at once, of few packs.
+pub(super) fn in_parallel<'a, T: Send + 'a>(
     mut numbers: impl Iterator<Item = u64> + 'a,
     read: impl Fn(u64) -> T + Sync + 'a,
 ) -> impl Iterator<Item = T> + 'a {

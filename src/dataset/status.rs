@@ -6,12 +6,11 @@
 use super::checksum_record::ChecksumRecord;
 use super::push::{self, Unit};
 use super::recipe::compact;
-use super::set::Set;
+use super::set::{Set, in_parallel};
 use super::task::{Task, remaining};
 use super::timing_log::{self, End, ImageFailure, ImageTiming, Row, RunLog};
 use crate::input::below;
 use crate::{Error, Result};
-use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -298,7 +297,7 @@ fn there(set: &Set, stop: &AtomicBool) -> Result<Vec<bool>> {
         let is_there = || has_files(set, &checksums) || freed.contains(&Unit::of(set, index).name());
         Ok(remaining(set, &checksums)? == Task::Done && is_there())
     };
-    (0..set.recipe.count).into_par_iter().map(look).collect()
+    in_parallel(0..set.recipe.count, look).collect()
 }
 
 /// Whether the files that checksums name are there, as long as they say.

@@ -1,8 +1,9 @@
-//! What a dataset in packs cannot have.
+//! What a dataset in packs cannot have, and who cannot read it.
 
 use crate::dataset::format;
-use crate::dataset::recipe::Recipe;
+use crate::dataset::recipe::{FILE, Recipe};
 use crate::{Error, Result};
+use std::path::Path;
 
 /// An error where a dataset cannot have the packs that its recipe asks for.
 pub fn check(recipe: &Recipe) -> Result<()> {
@@ -19,5 +20,24 @@ pub fn check(recipe: &Recipe) -> Result<()> {
             Err(Error::misuse(format!("--format {name} names the files in images/, which --pack puts into archives"))
                 .help(format!("leave --pack or --format {name} out")))
         }
+    }
+}
+
+/// An error where a path is a dataset in packs, its folder of archives or one of them, for what reads pictures from folders.
+pub fn refuse_archives(path: &Path) -> Result<()> {
+    let is_archive = path.extension().is_some_and(|ending| ending == "tar");
+    let packs = if is_archive { path.parent() } else { Some(path) };
+    let above = packs.filter(|packs| packs.ends_with("packs")).and_then(Path::parent);
+    let is_packed =
+        |dir: &&Path| dir.join(FILE).is_file() && Recipe::read(dir).is_ok_and(|recipe| recipe.pack.is_some());
+    match above.into_iter().chain([path]).find(is_packed) {
+        None => Ok(()),
+        Some(dir) => Err(Error::misuse("the images of this dataset lie in archives, and this reads folders")
+            .in_file(dir)
+            .help(format!(
+                "unpack them with GNU tar and name `unpacked`: mkdir -p unpacked/images && for pack in \"{}\"/packs/*.tar; do tar -xf \"$pack\" \
+                 -C unpacked/images --transform 's|[.]|/|'; done",
+                dir.display()
+            ))),
     }
 }

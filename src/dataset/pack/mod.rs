@@ -10,13 +10,15 @@
 //!
 //! Images are made in folders of their own, as ever, and put into their pack when all of it are there: so kills, shards and faults are those
 //! of any dataset, and an archive is written once. Which image is in which pack follows from its number, splits and the size of packs.
-//! A pack of which a byte was changed, or that is to hold more images or other files, is taken apart first (`store::settle`).
+//! A pack of which a byte was changed, or that is to hold more images or other files, is taken apart first (`store::settle`). So is one whose
+//! record is lost and whose archive the manifest knows (`adopt`).
 
+mod adopt;
 mod check;
 pub(super) mod record;
 pub(super) mod store;
 
-pub use check::check;
+pub use check::{check, refuse_archives};
 
 use super::recipe::Recipe;
 use super::split::Split;

@@ -69,28 +69,49 @@ const MOST_KEPT: usize = 32;
 
 /// The packs of one dataset, their records read when they are needed.
 #[derive(Clone, Debug, Default)]
-pub(in crate::dataset) struct Packs(Arc<Mutex<BTreeMap<Id, Arc<PackRecord>>>>);
+pub(in crate::dataset) struct Packs(Arc<Mutex<Known>>);
+
+/// Records that were read, and when each was last asked for, in calls.
+#[derive(Debug, Default)]
+struct Known {
+    records: BTreeMap<Id, (u64, Arc<PackRecord>)>,
+    calls: u64,
+}
+
+impl Known {
+    fn get(&mut self, id: Id) -> Option<Arc<PackRecord>> {
+        self.calls += 1;
+        let (last, record) = self.records.get_mut(&id)?;
+        *last = self.calls;
+        Some(Arc::clone(record))
+    }
+
+    /// Keeps one in the place of the one that nobody has asked for the longest.
+    fn keep(&mut self, id: Id, record: Arc<PackRecord>) {
+        if self.records.len() >= MOST_KEPT {
+            let oldest = self.records.iter().min_by_key(|(_, (last, _))| *last).map(|(id, _)| *id);
+            oldest.and_then(|id| self.records.remove(&id));
+        }
+        self.records.insert(id, (self.calls, record));
+    }
+}
 
 impl Packs {
     /// A pack's record, where there is one.
     pub(in crate::dataset) fn get(&self, folder: &Path, id: Id) -> Option<Arc<PackRecord>> {
         let lock = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(known) = lock().get(&id) {
-            return Some(Arc::clone(known));
+        if let Some(known) = lock().get(id) {
+            return Some(known);
         }
         // Read without the lock: others may need other packs meanwhile.
         let record = Arc::new(PackRecord::read(folder, id)?);
-        let mut kept = lock();
-        if kept.len() >= MOST_KEPT {
-            kept.pop_first();
-        }
-        kept.insert(id, Arc::clone(&record));
+        lock().keep(id, Arc::clone(&record));
         Some(record)
     }
 
     /// Forgets a pack that was written or taken apart.
     pub(in crate::dataset) fn forget(&self, id: Id) {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).remove(&id);
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).records.remove(&id);
     }
 
     /// Length of an image's file in a pack.
@@ -147,5 +168,27 @@ mod tests {
         let text = std::fs::read_to_string(&path).unwrap();
         std::fs::write(&path, text.replace("512", "513")).unwrap();
         assert_eq!(PackRecord::read(folder.path(), id), None);
+    }
+
+    /// Packs of three splits are read side by side. Expected: the one in use stays, however many of others come and go.
+    #[test]
+    fn what_is_in_use_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let of = |number| Id { split: Split::Train, number };
+        for number in 0..=MOST_KEPT as u64 {
+            let id = of(number);
+            let record =
+                PackRecord { pack: id.name(), tar: Checksum::of(b"x"), members: BTreeMap::new(), images: Vec::new() };
+            record.write(folder.path(), id).unwrap();
+        }
+        let packs = Packs::default();
+        for number in 1..=MOST_KEPT as u64 {
+            assert!(packs.get(folder.path(), of(0)).is_some() && packs.get(folder.path(), of(number)).is_some());
+        }
+        // What is kept needs no file.
+        std::fs::remove_dir_all(folder.path().join("seals")).unwrap();
+        assert!(packs.get(folder.path(), of(0)).is_some() && packs.get(folder.path(), of(1)).is_none());
+        packs.forget(of(0));
+        assert!(packs.get(folder.path(), of(0)).is_none());
     }
 }

@@ -1,5 +1,6 @@
 //! Puts images into their packs, and takes packs apart.
 
+use super::adopt::adopt;
 use super::record::PackRecord;
 use super::{Id, Packing};
 use crate::dataset::archive::{BLOCK, append, entry_name};
@@ -9,6 +10,7 @@ use crate::dataset::set::{Set, Whole};
 use crate::dataset::task::{Task, remaining};
 use crate::dataset::{File, native};
 use crate::{Error, Result};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use std::path::Path;
@@ -18,7 +20,10 @@ use std::path::Path;
 pub(in crate::dataset) fn settle(set: &Set, id: Id) -> Result<bool> {
     let Set { folder, packs, .. } = set;
     packs.forget(id);
-    let Some(record) = packs.get(folder, id) else { return Ok(false) };
+    let Some(record) = packs.get(folder, id) else {
+        adopt(set, id)?;
+        return Ok(false);
+    };
     if Unit::Pack(id).is_freed(set) {
         if is_complete(set, id, &record)? {
             return Ok(true);
@@ -49,6 +54,23 @@ pub(in crate::dataset) fn ensure(set: &Set, id: Id) -> Result<()> {
         take_apart(set, id, &record)?;
     }
     close(set, id)
+}
+
+/// Archives that are missing or have another length than their records say, each with what is wrong with it: what is seen without reading them.
+pub(in crate::dataset) fn cut_short(set: &Set) -> BTreeMap<Id, String> {
+    let all: Vec<Id> = Packing::of(&set.recipe).map(|packing| packing.all().collect()).unwrap_or_default();
+    let fault = |id: &Id| {
+        let length = std::fs::metadata(set.folder.join(id.path())).map(|about| about.len());
+        let fault = set.packs.get(&set.folder, *id)?.tar.fault_of_length(length)?;
+        Some((*id, format!("{} {fault}", id.path())))
+    };
+    all.par_iter().filter_map(fault).collect()
+}
+
+/// Whether an image lies in one of these packs and in no folder.
+pub(in crate::dataset) fn lies_in(set: &Set, packs: &BTreeMap<Id, String>, index: u64) -> bool {
+    Packing::of(&set.recipe).is_some_and(|packing| packs.contains_key(&packing.id(index)))
+        && !ChecksumRecord::path(&set.folder, index).is_file()
 }
 
 /// Whether a record tells of all images that a pack is to hold, with all their files.

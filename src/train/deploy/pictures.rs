@@ -5,6 +5,7 @@
 //! it; of a photograph with `rgb` in its name, the file with `nir` instead; or the file of the photograph's name, `a.png`, in a
 //! folder that is named for the band. Files that are another's band are no pictures of their own.
 
+use crate::dataset::pack::refuse_archives;
 use crate::dataset::{Set, native};
 use crate::output;
 use crate::train::data::{Band, Pick, Resize, Selection, Shape};
@@ -137,11 +138,7 @@ fn selection(input: &Path) -> Result<Option<Selection>> {
 /// Names and folders of a set's images.
 fn images(selection: &Selection) -> Result<Vec<(String, PathBuf)>> {
     let (set, numbers) = selection.open(Pick::All, 0)?;
-    if set.recipe.pack.is_some() {
-        return Err(Error::misuse("the images of this dataset lie in archives, and these are read from folders")
-            .in_file(&set.folder)
-            .help("name photographs, or a dataset that was begun without --pack; `train evaluate` reads both"));
-    }
+    refuse_archives(&set.folder)?;
     let image = |number: u64| {
         let name = Set::name(number);
         let folder = set.folder.join(native::folder(&name));
@@ -160,6 +157,7 @@ fn photos(input: &Path, shape: &Shape) -> Result<Vec<PathBuf>> {
             .help("name PNG or JPEG files, folders of them, or images of a set: DIR@PICK")
             .in_file(input));
     }
+    refuse_archives(input)?;
     if !input.is_dir() {
         return Ok(vec![input.into()]);
     }

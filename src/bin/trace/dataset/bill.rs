@@ -57,9 +57,10 @@ fn rows(folder: &Path, bill: &Bill, threads: usize) -> Vec<[String; 2]> {
         row(
             "memory",
             format!(
-                "{} GiB with one image under way, {} GiB with {threads} cores",
+                "{} GiB with one image under way, {} GiB with {}",
                 number(bill.memory(1) as f64 / GIB),
-                number(bill.memory(threads) as f64 / GIB)
+                number(bill.memory(threads) as f64 / GIB),
+                count(threads as u64, "core", "cores")
             ),
         ),
         row(
