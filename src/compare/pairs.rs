@@ -4,7 +4,6 @@
 //! `images/` where it has that: such of folders with `rgb.png` (datasets, renders), by the folder's name; else every PNG and JPEG, by its own,
 //! whose labels lie below `labels/`. Names go without extensions, so that a JPEG may stand against a PNG.
 
-use crate::dataset::pack::refuse_archives;
 use crate::{Error, Result};
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -154,8 +153,6 @@ pub(super) fn there(path: &Path) -> Result<()> {
 
 fn source(path: &Path) -> Result<Source> {
     there(path)?;
-    // Beside its archives lie pictures of formats, which are no photographs.
-    refuse_archives(path)?;
     if path.is_file() {
         return Ok(Source::One(path.into()));
     }

@@ -3,6 +3,7 @@
 use crate::dataset::progress::Progress;
 use crate::quality::threads;
 use furrow::compare::{Comparison, Options, PIXELS_PER_DEGREE, Pairs, gap};
+use furrow::dataset::pack::refuse_archives;
 use furrow::{Error, Result, cli, render};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -62,6 +63,8 @@ fn pixel_mm(text: &str) -> Result<f64, String> {
 /// Measures what was asked for, writes tables and a page, and shows the figures.
 pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     cli::check_folder(&args.out)?;
+    // Beside archives lie pictures of formats, label maps among them, which are no photographs.
+    [&args.a, &args.b, &args.real, &args.synthetic].into_iter().flatten().try_for_each(|path| refuse_archives(path))?;
     match (args.real.as_deref(), args.synthetic.as_deref(), args.a.as_deref(), args.b.as_deref()) {
         (Some(real), Some(synthetic), ..) => sets(args, real, synthetic),
         (.., Some(a), Some(b)) => pairs(args, a, b),

@@ -5,7 +5,6 @@
 //! `nir` where the picture's begins with `rgb`.
 
 use crate::compare::pairs::{beside, beside_rgb, first, stem, told, walk};
-use crate::dataset::pack::refuse_archives;
 use crate::{Error, Result};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -30,7 +29,6 @@ pub fn photos(folder: &Path, option: &str) -> Result<Vec<Photo>> {
         return Err(Error::input(format!("{option} {}: {what}", folder.display()))
             .help("give a folder with images/ and, if there are any, labels/ and nir/; or a dataset"));
     }
-    refuse_archives(folder)?;
     let mut found = BTreeMap::new();
     let (images, rendered) = (folder.join("images"), folder.join("rgb.png"));
     if rendered.is_file() {

@@ -53,7 +53,7 @@ fn rows(folder: &Path, bill: &Bill, threads: usize) -> Vec<[String; 2]> {
         ),
         row("here", format!("{} hours with {with}", number(core_s / 3600.0 / threads as f64))),
         row("disk", format!("{} GB ({} MB)", number(bytes as f64 / 1e9), number(bytes as f64 / 1e6))),
-        row("files", format!("{files} ({})", count(images, "image", "images"))),
+        row("files", format!("{} ({})", number(files as f64), count(images, "image", "images"))),
         row(
             "memory",
             format!(
