@@ -69,6 +69,7 @@ mod tests {
 
     /// A pack of a thousand large images is larger than any file that is read whole. Expected: its bytes are looked at all the same.
     #[test]
+    #[ignore = "takes the checksum of 4 GiB"]
     fn files_of_any_length_are_looked_at() {
         let file = tempfile::NamedTempFile::new().unwrap();
         let sum = Checksum { bytes: LARGEST + 1, ..Checksum::of(b"") };
