@@ -632,3 +632,43 @@ fn a_preview_of_a_file_that_did_not_change_is_not_grown_again() {
         assert_eq!(built, std::ptr::from_ref(again.geometry().unwrap()), "{name} {index}");
     }
 }
+
+/// Rationale: a field of a drone is made of fewer triangles, not of other plants. Expected: at most one pixel in
+/// a hundred gets another class or plant, where a tenth are plants; soil whose small aggregates became heights of the ground, or too small to be drawn, is
+/// as bright within 3 %; a quarter of the triangles. Source: the same scene in full detail, seed and all.
+#[test]
+fn detail_by_pixel_shows_the_same_field() {
+    let page = |detail: &str| {
+        let text = format!(
+            r#"Field(
+                seed: 11,
+                detail: {detail},
+                camera: Pinhole(size: (220, 220), intrinsics: FieldOfView(horizontal_deg: 14), pose: Nadir(height_m: 4.5)),
+                lights: [Daylight(sun: Angles(elevation_deg: 47, azimuth_deg: 150), turbidity: 3.5)],
+                soil: (
+                    layers: [(albedo: "textures/soil/dirt.png", height: "textures/soil/dirt.height.png", size_m: 0.5, height_mm: (-4, 8))],
+                    moisture: (mean: 0.35),
+                ),
+                crops: [(species: "scenes/species/sugar_beet.ron", growth: AgeDays(32), rows: (in_row_m: 0.18))],
+                weeds: [(species: "scenes/species/chenopodium.ron", growth: AgeDays(Uniform(10, 30)), spread: (per_m2: 15))],
+            )"#
+        );
+        field(&text, &Options::default())
+    };
+    let (full, coarse) = (page("Full"), page("ByPixel"));
+    let triangles = |field: &Field| field.scene.parts.iter().map(|part| part.mesh.triangles.len()).sum::<usize>();
+    assert!(4 * triangles(&coarse) < triangles(&full), "{} and {}", triangles(&coarse), triangles(&full));
+    let ids = |field: &Field| field.plants.iter().map(|plant| (plant.id, plant.leaves)).collect::<Vec<_>>();
+    assert_eq!(ids(&full), ids(&coarse));
+    let [(fine, fine_labels), (film, labels)] = [&full, &coarse].map(|field| shoot(field, 8, 0));
+    let pairs = || fine_labels.tags.iter().zip(&labels.tags);
+    let other = pairs().filter(|(a, b)| (a.class, a.plant) != (b.class, b.plant)).count();
+    let plants = pairs().filter(|(a, _)| a.plant > 0).count();
+    assert!(plants > 2000 && 100 * other < labels.tags.len(), "{other} of {}, {plants} of plants", labels.tags.len());
+    let soil = |film: &furrow::film::Film| {
+        let pixels = film.pixels.iter().zip(pairs()).filter(|(_, (a, b))| a.plant == 0 && b.plant == 0);
+        pixels.map(|(pixel, _)| pixel.mean).fold(Spectrum::ZERO, |sum, mean| sum + mean)
+    };
+    let ratio = (soil(&film) / soil(&fine)).to_array();
+    assert!(ratio.iter().all(|ratio| (ratio - 1.0).abs() < 0.03), "{ratio:?}");
+}

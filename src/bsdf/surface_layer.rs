@@ -36,13 +36,13 @@ impl SurfaceLayer {
 
     /// Share of the light from a direction with this cosine that goes on to what lies below, scattered or not.
     #[inline]
-    pub(super) fn through(&self, cos: f32) -> Spectrum {
+    pub(crate) fn through(&self, cos: f32) -> Spectrum {
         self.depth.map(|depth| (-0.5 * depth / cos).exp())
     }
 
     /// The layer's own BRDF between directions whose [`SurfaceLayer::through`] is known.
     #[inline]
-    pub(super) fn reflect(cos: [f32; 2], through: [Spectrum; 2]) -> Spectrum {
+    pub(crate) fn reflect(cos: [f32; 2], through: [Spectrum; 2]) -> Spectrum {
         let both = through[0] * through[1];
         (Spectrum::ONE - both * both) / (4.0 * PI * (cos[0] + cos[1]))
     }

@@ -51,6 +51,12 @@ pub struct FieldDesc {
     /// How the film becomes a picture.
     #[serde(default)]
     pub sensor: SensorDesc,
+    /// How finely the field is made.
+    #[serde(default, skip_serializing_if = "Detail::is_full")]
+    pub detail: Detail,
+    /// How far from the point below each camera the field is grown, metres to the east, north, west and south; at most 100.
+    #[serde(default = "reach", skip_serializing_if = "is_reach")]
+    pub reach_m: Num<Positive>,
     /// How a pixel gathers light.
     #[serde(default = "point_spread")]
     pub filter: Filter,
@@ -76,6 +82,46 @@ pub struct FieldDesc {
     /// Models from disk in their places.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub models: Vec<ModelDesc>,
+}
+
+/// How finely a field is made.
+///
+/// From a drone most of what a field camera sees is smaller than a pixel. By pixels, the cells of leaves, of the ground and of its maps
+/// grow with the pixels on the ground, and aggregates shorter than three pixels become heights of the ground instead of bodies. Plants
+/// stand and grow as they do in full detail, their leaves moved by less than a cell; what lies on the ground is another draw.
+///
+/// ```
+/// use furrow::scene::desc::{Detail, FieldDesc};
+/// let text = "Field(camera: JaiAd130(height_m: 10), reach_m: 8, detail: ByPixel, soil: ())";
+/// let field: FieldDesc = ron::from_str(text).unwrap();
+/// assert_eq!((field.detail, field.reach_m.get()), (Detail::ByPixel, 8.0));
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+pub enum Detail {
+    /// As a field camera a metre over the ground sees it, whatever the camera: images of all sizes show the same field.
+    #[default]
+    Full,
+    /// As the pixels need it, for cameras high above: 144 m² in seconds.
+    ByPixel,
+}
+
+impl Detail {
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
+    fn is_full(&self) -> bool {
+        *self == Self::Full
+    }
+}
+
+/// Reach of a field unless given, metres: 144 m² at most, some 1,500 beets. A camera 10 m up with a view of 60° sees as much.
+const REACH_M: f64 = 6.0;
+
+fn reach() -> Num<Positive> {
+    Num::new(REACH_M)
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
+fn is_reach(reach_m: &Num<Positive>) -> bool {
+    reach_m.get() == REACH_M
 }
 
 /// Which of a scene file's crops a field has.

@@ -5,7 +5,7 @@
 //! the ground are left out: half of them, which no ray finds.
 
 use super::body::{self, Cut, LEVELS, Pose, Shape};
-use super::crumb::Local;
+use super::crumb::{LOOSE_GAIN, Local, loose_gain, sink};
 use super::{Canopy, Ground, Pile, Rect};
 use crate::geometry::{Cost, Mesh};
 use crate::math::{Spectrum, Vec2, vec2, vec3};
@@ -31,9 +31,6 @@ const AXES: (f32, f32) = (0.77, 0.55);
 const FINE_M: f32 = 0.0009;
 /// Shortest clod, mm, of each level of detail on a grid of [`FINE_M`]; on a coarser grid, for larger pixels, in proportion.
 const FROM_MM: [f32; LEVELS] = [0.0, 3.6, 6.5, 13.0, 28.0];
-
-/// Logarithm of how much brighter a clod is that lies loosely on top than one half sunk.
-const LOOSE_GAIN: f32 = 0.14;
 
 /// Room between a clod and the leaf above it, metres; one that then stands out by less than this is not worth its triangles.
 const UNDER_LEAF_M: f32 = 0.0008;
@@ -98,7 +95,7 @@ pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy) -> Vec<Clods> {
         let axes = vec3(1.0, vary(AXES.0), vary(AXES.1)) * half;
         let pose = Pose::lying(shape, axes, 0.3, &mut s);
         let sink = sink(clod.mm, s.uniform32());
-        let tint = ground.law.tint_sigma * s.normal() as f32 + LOOSE_GAIN * (0.35 - sink) / 0.15;
+        let tint = ground.law.tint_sigma * s.normal() as f32 + loose_gain(sink);
         let sink = sink * (1.0 - ground.law.loose);
         let stays = s.uniform32();
         let damp = s.uniform32() < ground.law.damp;
@@ -190,7 +187,7 @@ fn candidates(ground: &Ground, stream: &Stream) -> Vec<Candidate> {
     let mut all = Vec::new();
     ground.law.scatter(
         ground.area(),
-        ground.clods_mm,
+        ground.sizes.clods,
         stream,
         |p| ground.share(p),
         |at, mm, s| {
@@ -202,11 +199,6 @@ fn candidates(ground: &Ground, stream: &Stream) -> Vec<Candidate> {
     );
     all.sort_by(|a, b| b.mm.total_cmp(&a.mm).then(a.key.cmp(&b.key)));
     all
-}
-
-/// Share of the height below the surface, from u in 0..1: 0.2–0.4 for the small, 0.3–0.5 for those of 15 mm and more.
-fn sink(mm: f32, u: f32) -> f32 {
-    0.2 + 0.1 * (mm / 15.0).min(1.0) + 0.2 * u
 }
 
 /// The tone of a logarithm of brightness beside the mean clod's: even steps over ±2.2 of its standard deviations.

@@ -16,6 +16,12 @@ const PIVOT_MM: f32 = 5.0;
 /// Standard deviation of [`Perlin::fbm2`] with three octaves and gain 0.5.
 const FBM3_SD: f32 = 0.28;
 
+/// Logarithm of how much brighter a clod is that lies loosely on top than one half sunk.
+pub(super) const LOOSE_GAIN: f32 = 0.14;
+
+/// Mean area of a crumb's outline over the square of its length, of 4000 drawn ones: that of the ellipse is 0.62, and a quarter is cut off.
+const OUTLINE: f32 = 0.476;
+
 /// Straight breaks in the outline of a crumb.
 const BREAKS: usize = 6;
 
@@ -43,6 +49,38 @@ pub(super) struct Law {
     pub(super) loose: f32,
 }
 
+/// Some of the aggregates of a ground.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Part {
+    /// Lengths from and to, mm; none where they are equal.
+    pub(super) mm: (f32, f32),
+    /// Share of what the law says.
+    pub(super) amount: f32,
+    /// Logarithm of how much brighter than the ground's matter those of a length in mm are on the mean.
+    pub(super) gain: fn(f32) -> f32,
+}
+
+impl Part {
+    fn is_some(&self) -> bool {
+        self.mm.0 < self.mm.1 && self.amount > 0.0
+    }
+}
+
+/// Share of a clod's height below the surface, from u in 0..1: 0.2–0.4 for the small, 0.3–0.5 for those of 15 mm and more.
+pub(super) fn sink(mm: f32, u: f32) -> f32 {
+    0.2 + 0.1 * (mm / 15.0).min(1.0) + 0.2 * u
+}
+
+/// Logarithm of how much brighter a clod is than one of which 35 % are sunk.
+pub(super) fn loose_gain(sink: f32) -> f32 {
+    LOOSE_GAIN * (0.35 - sink) / 0.15
+}
+
+/// Logarithm of how much brighter than the ground's matter clods of this length are on the mean.
+pub(super) fn mean_gain(mm: f32) -> f32 {
+    loose_gain(sink(mm, 0.5))
+}
+
 /// Where the law holds: the local number over 5 mm, m⁻², and the local exponent.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Local {
@@ -55,6 +93,14 @@ impl Local {
     pub(super) fn number(self, min_mm: f32, max_mm: f32) -> f32 {
         let over = |mm: f32| self.over_pivot * (PIVOT_MM / mm).powf(self.exponent);
         (over(min_mm) - over(max_mm)).max(0.0)
+    }
+
+    /// Area of those between two lengths as seen from above, over that of the ground.
+    fn cover(self, (min_mm, max_mm): (f32, f32)) -> f32 {
+        // Of n(L) = D N₅ 5^D L^{−D−1} ellipses of OUTLINE · L² each.
+        let by = 2.0 - self.exponent;
+        let powers = if by.abs() < 1e-3 { (max_mm / min_mm).ln() } else { (max_mm.powf(by) - min_mm.powf(by)) / by };
+        OUTLINE * 1e-6 * self.exponent * self.over_pivot * PIVOT_MM.powf(self.exponent) * powers
     }
 
     /// A length between two, from u in 0..1.
@@ -93,6 +139,14 @@ impl Law {
             over_pivot: share * self.over_pivot * (more - 0.5 * self.clustering * self.clustering).exp(),
             exponent: self.exponent * (1.0 - coarser),
         }
+    }
+
+    /// Brightness times 128 and loss of moisture times 255 of an aggregate, from three numbers in 0..1.
+    fn shade(&self, u: [f32; 3], gain: f32) -> (u8, u8) {
+        // The sum of two uniforms less one has standard deviation 0.408.
+        let tint = ((u[0] + u[1] - 1.0) / 0.408 * 1.5 * self.tint_sigma + gain).exp();
+        let dry = if u[2] < self.damp { 0 } else { (self.dryness * 255.0) as u8 };
+        ((tint * 128.0).clamp(1.0, 255.0) as u8, dry)
     }
 
     /// Every aggregate between two lengths whose centre lies in `area`: its place, its length in mm, and a stream of its
@@ -143,35 +197,68 @@ pub(super) struct Raster {
     pub(super) height: usize,
 }
 
+impl Raster {
+    /// What it covers.
+    fn area(self) -> Rect {
+        let far = self.origin + vec2(self.width as f32, self.height as f32) * self.step;
+        Rect::new(self.origin.x, self.origin.y, far.x, far.y)
+    }
+}
+
 impl Crumbs {
-    /// Draws all crumbs between two lengths onto a raster.
+    /// Draws the parts that are `seen` onto a raster one by one. Samples that none of them covers lie under aggregates of the parts that are `unseen`
+    /// as often as such cover the ground, so that what is too small to be drawn keeps its share of the ground's colour.
     pub(super) fn draw(
         raster: Raster,
         law: &Law,
-        mm: (f32, f32),
-        amount: f32,
+        seen: [Part; 2],
+        unseen: [Part; 2],
         stream: &Stream,
         share: impl Fn(Vec2) -> f32,
     ) -> Self {
         let n = raster.width * raster.height;
         let mut crumbs = Self { height: vec![0.0; n], tint: vec![0; n], dry: vec![0; n] };
-        let far = raster.origin + vec2(raster.width as f32, raster.height as f32) * raster.step;
-        let area = Rect::new(raster.origin.x, raster.origin.y, far.x, far.y).grown(mm.1 * 1e-3);
-        if mm.0 < mm.1 && amount > 0.0 {
+        for (k, part) in seen.into_iter().enumerate().filter(|(_, part)| part.is_some()) {
+            let stream = if k == 0 { stream.clone() } else { stream.child(Purpose::Debris, k as u64) };
             law.scatter(
-                area,
-                mm,
-                stream,
-                |p| amount * share(p),
-                |p, length, s| {
-                    crumbs.add(raster, p, length, law, s);
-                },
+                raster.area().grown(part.mm.1 * 1e-3),
+                part.mm,
+                &stream,
+                |p| part.amount * share(p),
+                |p, length, s| crumbs.add(raster, p, length, part.gain, law, s),
             );
+        }
+        if unseen.iter().any(Part::is_some) {
+            crumbs.fill(raster, law, unseen, &stream.child(Purpose::Debris, seen.len() as u64), share);
         }
         crumbs
     }
 
-    fn add(&mut self, raster: Raster, p: Vec2, length_mm: f32, law: &Law, s: &mut Stream) {
+    /// Lays aggregates that are smaller than samples are apart where nothing lies yet.
+    fn fill(&mut self, raster: Raster, law: &Law, parts: [Part; 2], stream: &Stream, share: impl Fn(Vec2) -> f32) {
+        let from = |cell: i32, origin: f32, size: usize| {
+            ((cell as f32 * CELL_M - origin) / raster.step).ceil().clamp(0.0, size as f32) as usize
+        };
+        for (i, j) in cells(raster.area(), CELL_M) {
+            let centre = (vec2(i as f32, j as f32) + 0.5) * CELL_M;
+            let local = law.at(centre, share(centre));
+            let cover = parts.map(|part| if part.is_some() { part.amount * local.cover(part.mm) } else { 0.0 });
+            let [bare, first] = [(-cover[0] - cover[1]).exp(), cover[0] / (cover[0] + cover[1]).max(f32::MIN_POSITIVE)];
+            let mut s = cell_stream(stream, i, j);
+            for y in from(j, raster.origin.y, raster.height)..from(j + 1, raster.origin.y, raster.height) {
+                for x in from(i, raster.origin.x, raster.width)..from(i + 1, raster.origin.x, raster.width) {
+                    let k = y * raster.width + x;
+                    if self.tint[k] == 0 && s.uniform32() >= bare {
+                        let part = &parts[usize::from(s.uniform32() >= first)];
+                        let u = [s.uniform32(), s.uniform32(), s.uniform32()];
+                        (self.tint[k], self.dry[k]) = law.shade(u, (part.gain)(part.mm.1));
+                    }
+                }
+            }
+        }
+    }
+
+    fn add(&mut self, raster: Raster, p: Vec2, length_mm: f32, gain: fn(f32) -> f32, law: &Law, s: &mut Stream) {
         // As many numbers whatever happens, so that a crumb outside the area leaves its neighbours as they are.
         let mut u = [0.0; 18];
         u.fill_with(|| s.uniform32());
@@ -183,10 +270,7 @@ impl Crumbs {
         let centre = top * (0.6 - 0.6 * u[3]);
         let face = |v: f32, w: f32| Vec2::from_angle(v * std::f32::consts::TAU) * (0.4 + 0.9 * w);
         let (f, g) = (face(u[4], u[5]), face(u[6], u[7]));
-        // The sum of two uniforms less one has standard deviation 0.408.
-        let tint = ((u[8] + u[9] - 1.0) / 0.408 * 1.5 * law.tint_sigma).exp();
-        let tint = (tint * 128.0).clamp(1.0, 255.0) as u8;
-        let dry = if u[10] < law.damp { 0 } else { (law.dryness * 255.0) as u8 };
+        let (tint, dry) = law.shade([u[8], u[9], u[10]], gain(length_mm));
         // The outline: an ellipse cut by straight breaks, so that crumbs are angular and no two alike.
         let breaks: [Vec2; BREAKS] = std::array::from_fn(|k| {
             let at = (k as f32 + 0.8 * u[11 + k]) / BREAKS as f32;
@@ -277,6 +361,28 @@ mod tests {
         let (even, clustered) = (count(0.0), count(0.45));
         assert!((clustered.0 / even.0 - 1.0).abs() < 0.15, "{even:?} {clustered:?}");
         assert!(clustered.1 > 5.0 * even.1 && (even.1 - 1.0).abs() < 0.3, "{even:?} {clustered:?}");
+    }
+
+    /// Rationale: what is too small to be drawn must cover as much as if it were drawn. Expected: the share of samples under crumbs, drawn far finer than
+    /// they are, and dithered on a raster far coarser, both 1 − e^{−cover}. Source: the law's integral over the outlines.
+    #[test]
+    fn aggregates_cover_as_much_drawn_or_not() {
+        let law = law(0.0);
+        let mm = (2.5, 10.0);
+        let some = Part { mm, amount: 0.2, gain: |_| 0.0 };
+        let none = Part { mm: (2.5, 2.5), ..some };
+        let covered = |step: f32, size: usize, seen: Part, unseen: Part| {
+            let raster = Raster { origin: vec2(0.0, 0.0), step, width: size, height: size };
+            let stream = Stream::of(9, 0, Purpose::Test, 0);
+            let crumbs = Crumbs::draw(raster, &law, [seen, none], [unseen, none], &stream, |_| 1.0);
+            crumbs.tint.iter().filter(|tint| **tint > 0).count() as f32 / crumbs.tint.len() as f32
+        };
+        let cover = 0.2 * law.at(Vec2::ZERO, 1.0).cover(mm);
+        let expected = 1.0 - (-cover).exp();
+        let (drawn, dithered) = (covered(4e-4, 1500, some, none), covered(1.2e-2, 200, none, some));
+        assert!(expected > 0.1, "{expected}");
+        assert!((drawn / expected - 1.0).abs() < 0.05, "{drawn} of {expected}");
+        assert!((dithered / expected - 1.0).abs() < 0.05, "{dithered} of {expected}");
     }
 
     #[test]

@@ -48,20 +48,21 @@ pub fn expected(
     let bare = Cost::of(2.0 * vertices, 1.0) + maps;
     let law = Law::new(&desc.clods, ground);
     let places = places(desc, site, &law, ground);
-    let (min, max) = (desc.clods.min_mm.f32(), desc.clods.max_mm.f32());
+    let sizes = site.sizes(desc);
     let mut all = Vec::new();
     let mut add = |at: &[Step<'static>], cost, advice| all.push(Expected { at: at.to_vec(), cost, advice });
     if !desc.flat {
         add(
             &[Step::Field("clods")],
-            clod::cost(&places, (min, max), site.grid_m, area),
+            clod::cost(&places, sizes.clods, site.grid_m, area),
             "lower over_5mm_per_m2 or raise min_mm",
         );
     }
     let amount = f64::from(desc.crumbs.amount.draw32(&mut ground.child(Purpose::Soil, 20)));
     let mean =
         |of: &dyn Fn(&Local) -> f32| places.iter().map(|law| f64::from(of(law))).sum::<f64>() / places.len() as f64;
-    let crumbs = square * amount * mean(&|law| law.number(desc.crumbs.min_mm.f32(), min));
+    let number = |(min, max): (f32, f32)| square * mean(&|law| law.number(min, max));
+    let crumbs = amount * number(sizes.crumbs) + number(sizes.drawn);
     add(
         &[Step::Field("crumbs")],
         Cost::work(0.0, 2.0 * crumbs * SECONDS_PER_CRUMB),

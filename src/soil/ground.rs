@@ -2,11 +2,11 @@
 
 use super::blend::{Blend, Weights};
 use super::color::{Shift, mean};
-use super::crumb::{Crumbs, Law, Raster};
+use super::crumb::{Crumbs, Law, Part, Raster, mean_gain};
 use super::grid::Grid;
-use super::record::{ClodsRecord, LayerRecord, LitterRecord, MoistureRecord, ReliefRecord, SoilRecord};
+use super::record::{ClodsRecord, LayerRecord, LitterRecord, MoistureRecord, SoilRecord};
 use super::relief::Relief;
-use super::site::Site;
+use super::site::{Site, Sizes};
 use super::stone_cover;
 use super::{LayerMaps, MAX_LAYERS, Rect, SoilDesc};
 use crate::error::{Error, Result};
@@ -21,6 +21,9 @@ use std::sync::OnceLock;
 
 /// Rows of vertices that are raised at once: what is kept of them beside the ground stays small.
 const BLOCK_ROWS: usize = 64;
+
+/// Detail of the ground that plants stand on where its own grid is coarser, metres: the coarsest grid of full detail.
+const STANCE_M: f32 = 4e-3;
 
 /// Standard deviation of [`Perlin::fbm2`] with four octaves and gain 0.6.
 const FBM4_SD: f32 = 0.245;
@@ -51,21 +54,36 @@ pub struct Ground {
     pub(super) grid: Grid,
     pub(super) heights: Vec<f32>,
     slopes: Vec<Vec2>,
+    shape: Relief,
     pub(super) fine: Fine,
     pub(super) blend: Blend,
     pub(super) law: Law,
     pub(super) color: Shift,
-    pub(super) crumbs_mm: (f32, f32),
-    pub(super) clods_mm: (f32, f32),
+    pub(super) sizes: Sizes,
     pub(super) crumbs_amount: f32,
     pub(super) stream: Stream,
     pub(super) step: f32,
-    relief: ReliefRecord,
     moisture: MoistureRecord,
     /// How much drier is what stands out.
     drying: f32,
     /// Worked out when it is first asked for: a field that nobody lights does without.
     look: OnceLock<Look>,
+}
+
+/// Unit normal of the plane that fits some heights within `radius` of a point.
+fn plane(x: f32, y: f32, radius: f32, height: impl Fn(f32, f32) -> f32) -> Vec3 {
+    let mut slope = Vec2::ZERO;
+    // Opposite points on three rings: Σ h·d is the least-squares slope times Σ d²/2.
+    let mut weight = 0.0;
+    for ring in 1..=3u8 {
+        let r = radius * f32::from(ring) / 3.0;
+        for k in 0..12u8 {
+            let d = Vec2::from_angle(f32::from(k) * std::f32::consts::TAU / 12.0) * r;
+            slope += d * height(x + d.x, y + d.y);
+            weight += 0.5 * r * r;
+        }
+    }
+    up(if weight > 0.0 { slope / weight } else { Vec2::ZERO })
 }
 
 impl Ground {
@@ -91,12 +109,11 @@ impl Ground {
             blend,
             law,
             color: Shift::draw(colors, &maps[0], &mut stream.child(Purpose::Soil, 40)),
-            crumbs_mm: (desc.crumbs.min_mm.f32(), desc.clods.min_mm.f32()),
-            clods_mm: (desc.clods.min_mm.f32(), desc.clods.max_mm.f32()),
+            sizes: site.sizes(desc),
             crumbs_amount: desc.crumbs.amount.draw32(&mut stream.child(Purpose::Soil, 20)),
             stream: stream.clone(),
             step: site.grid_m,
-            relief: relief.record.clone(),
+            shape: relief,
             moisture: MoistureRecord {
                 mean: desc.moisture.mean.draw32(&mut stream.child(Purpose::Soil, 30)),
                 spread: desc.moisture.spread.draw32(&mut stream.child(Purpose::Soil, 31)),
@@ -106,14 +123,14 @@ impl Ground {
             look: OnceLock::new(),
             grid,
         };
-        ground.raise(maps, &relief);
+        ground.raise(maps);
         ground.strew();
         ground.slopes = ground.differences();
         Ok(ground)
     }
 
     /// Relief and layers.
-    fn raise<L: LayerMaps + Sync>(&mut self, maps: &[L], relief: &Relief) {
+    fn raise<L: LayerMaps + Sync>(&mut self, maps: &[L]) {
         let raster = self.raster();
         let inside: Vec<Vec<f32>> =
             (0..self.blend.layers()).map(|k| slowly(raster, self.every(), |p| self.blend.noise(k, p))).collect();
@@ -130,8 +147,8 @@ impl Ground {
             let detail = ground.blend.displacement(weights, heights);
             // Cells that are long one way would turn fine heights into furrows.
             let fade = (2.0 * ground.step / cell).min(1.0);
-            let height = relief.height(p, cell) + detail * fade * fade;
-            (height, fine.map(|_| (noise, detail, ground.blend.clods(weights) * relief.left(p))))
+            let height = ground.shape.height(p, cell) + detail * fade * fade;
+            (height, fine.map(|_| (noise, detail, ground.blend.clods(weights) * ground.shape.left(p))))
         };
         let (columns, rows) = (self.grid.columns(), self.grid.rows());
         for first in (0..rows).step_by(BLOCK_ROWS) {
@@ -166,7 +183,11 @@ impl Ground {
     /// The crumbs on any raster.
     pub(super) fn crumbs(&self, raster: Raster) -> Crumbs {
         let stream = self.stream.child(Purpose::Debris, 100);
-        Crumbs::draw(raster, &self.law, self.crumbs_mm, self.crumbs_amount, &stream, |p| self.share(p))
+        let Sizes { drawn, unseen, .. } = self.sizes;
+        let crumbs = |mm| Part { mm, amount: self.crumbs_amount, gain: |_| 0.0 };
+        let clods = |mm| Part { mm, amount: 1.0, gain: mean_gain };
+        let (seen, unseen) = ([crumbs(self.sizes.crumbs), clods(drawn)], [crumbs(unseen[0]), clods(unseen[1])]);
+        Crumbs::draw(raster, &self.law, seen, unseen, &stream, |p| self.share(p))
     }
 
     /// Moisture and brightness.
@@ -221,7 +242,7 @@ impl Ground {
                 .collect(),
             blend_scale_m,
             blend_sharpness,
-            relief: self.relief.clone(),
+            relief: self.shape.record.clone(),
             clods: ClodsRecord {
                 over_5mm_per_m2: self.law.over_pivot,
                 exponent: self.law.exponent,
@@ -285,20 +306,28 @@ impl Ground {
         up(row(k).lerp(row(k + self.grid.columns()), ty))
     }
 
-    /// Unit normal of the plane that fits the ground within `radius` of a point: what a plant stands on.
-    pub fn trend(&self, x: f32, y: f32, radius: f32) -> Vec3 {
-        let mut slope = Vec2::ZERO;
-        // Opposite points on three rings: Σ h·d is the least-squares slope times Σ d²/2.
-        let mut weight = 0.0;
-        for ring in 1..=3u8 {
-            let r = radius * f32::from(ring) / 3.0;
-            for k in 0..12u8 {
-                let d = Vec2::from_angle(f32::from(k) * std::f32::consts::TAU / 12.0) * r;
-                slope += d * self.height(x + d.x, y + d.y);
-                weight += 0.5 * r * r;
-            }
+    /// Height, metres, and unit normal of the plane that fits the ground within `radius` of a point: what a plant stands on. Where clods are drawn into
+    /// the ground it is the ground without them, as fine as [`STANCE_M`] whatever the grid: plants stand as they do in full detail.
+    pub fn stance<L: LayerMaps>(&self, maps: &[L], x: f32, y: f32, radius: f32) -> (f32, Vec3) {
+        let Sizes { drawn, .. } = self.sizes;
+        if drawn.0 >= drawn.1 {
+            return (self.height(x, y), self.trend(x, y, radius));
         }
-        up(if weight > 0.0 { slope / weight } else { Vec2::ZERO })
+        let height = |x: f32, y: f32| {
+            let p = vec2(x, y);
+            let mut noise = [0.0; MAX_LAYERS];
+            for (k, n) in noise.iter_mut().enumerate().take(self.blend.layers()) {
+                *n = self.blend.noise(k, p);
+            }
+            let heights = self.blend.heights(maps, p);
+            self.shape.height(p, STANCE_M) + self.blend.displacement(self.blend.weights(noise, heights), heights)
+        };
+        (height(x, y), plane(x, y, radius, height))
+    }
+
+    /// Unit normal of the plane that fits the ground within `radius` of a point.
+    pub fn trend(&self, x: f32, y: f32, radius: f32) -> Vec3 {
+        plane(x, y, radius, |x, y| self.height(x, y))
     }
 
     /// The area with the fine grid: the one asked for, widened to whole steps.

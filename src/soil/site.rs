@@ -1,6 +1,6 @@
 //! Which piece of ground, and which rows were sown on it.
 
-use super::Rect;
+use super::{Rect, SoilDesc};
 
 /// The seed rows that shaped the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,6 +13,9 @@ pub struct SeedRows {
     pub offset_m: f32,
 }
 
+/// Lengths from which on aggregates are bodies, over the length of the smallest that are told from the ground.
+pub(super) const BODIES_FROM: f32 = 3.0;
+
 /// Which piece of ground to make, and how finely.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Site {
@@ -22,6 +25,33 @@ pub struct Site {
     pub grid_m: f32,
     /// How far the coarse ground goes on beyond the area, for low suns and light that bounces.
     pub margin_m: f32,
+    /// Length of the smallest aggregates that are told from the ground, mm; those up to [`BODIES_FROM`] times as long are drawn into its heights,
+    /// even where the soil makes bodies of them. 0: as the soil says.
+    pub smallest_mm: f32,
     /// The seed rows, if the ground was sown.
     pub rows: Option<SeedRows>,
+}
+
+/// Lengths of the aggregates of a ground, from the least to the greatest, mm; nothing where they are equal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Sizes {
+    /// What the soil calls crumbs, drawn into the heights.
+    pub(super) crumbs: (f32, f32),
+    /// What the soil makes bodies of, but the site draws into the heights.
+    pub(super) drawn: (f32, f32),
+    /// Of the two what is too small to be drawn.
+    pub(super) unseen: [(f32, f32); 2],
+    /// Bodies.
+    pub(super) clods: (f32, f32),
+}
+
+impl Site {
+    /// How the aggregates of a soil are made here.
+    pub(super) fn sizes(&self, desc: &SoilDesc) -> Sizes {
+        let (crumb, clod, most) = (desc.crumbs.min_mm.f32(), desc.clods.min_mm.f32(), desc.clods.max_mm.f32());
+        let crumbs = (self.smallest_mm.clamp(crumb, clod.max(crumb)), clod);
+        let body = (BODIES_FROM * self.smallest_mm).clamp(clod, most);
+        let drawn = (self.smallest_mm.clamp(clod, body), body);
+        Sizes { crumbs, drawn, unseen: [(crumb, crumbs.0), (clod, drawn.0)], clods: (body, most) }
+    }
 }

@@ -3,6 +3,7 @@
 //! What a [`Material`] is made of is its own affair; here it is asked, point by point on a flat patch, how it scatters: at each
 //! texel of the one level that its pictures are read on, see [`super::level`].
 
+use super::mean::Mean;
 use crate::bsdf::microfacet::Ggx;
 use crate::bsdf::{Bsdf, SurfaceLayer};
 use crate::geometry::{Hit, Interaction, Mesh};
@@ -39,6 +40,17 @@ pub(super) struct Texel {
     pub(super) film: f32,
     /// Shading normal in the frame of ∂p/∂u, its normal to the side, and the surface's normal.
     pub(super) normal: Vec3,
+}
+
+impl Texel {
+    /// The same with hairs and bloom on it, as part of what is diffuse.
+    pub(super) fn covered(&self, layers: [Option<SurfaceLayer>; 2], mean: &Mean) -> Self {
+        let side = |i: usize| {
+            let (through, own) = layers[i].map_or((Spectrum::ONE, Spectrum::ZERO), |layer| mean.layer(layer));
+            self.reflect[i] * through + own
+        };
+        Self { reflect: [side(0), side(1)], transmit: self.transmit * mean.across(layers[0], layers[1]), ..*self }
+    }
 }
 
 /// A material's scattering over an image of `width` × `height` texels; one texel where it varies nowhere.

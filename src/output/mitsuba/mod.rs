@@ -25,6 +25,7 @@ mod files;
 mod level;
 mod light;
 mod look;
+mod mean;
 mod ply;
 mod surface;
 mod xml;
@@ -43,6 +44,7 @@ use level::Leveled;
 pub use level::fix_levels;
 use light::Lights;
 use look::Look;
+use mean::Mean;
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
@@ -84,15 +86,16 @@ pub fn write(folder: &Path, scene: &Scene, text: &str) -> Result<Export> {
     }
     let mut masks: HashMap<usize, String> = HashMap::new();
     let mut lost = BTreeSet::new();
+    let mean = Mean::of(scene);
     let mut surfaces = Vec::with_capacity(groups.len());
     for group in &groups {
         let mask = group.mask.as_ref().map(|m| mask_file(m, text, &mut masks, &mut files)).transpose()?;
         let look = Look::of(&leveled.materials[group.material as usize]);
-        let factor = Surface::corner_factor(look.kind);
+        let factor = Surface::corner_factor(look.kind, &mean);
         let colors: Option<Vec<Spectrum>> = group.colors.as_ref().map(|c| c.iter().map(|s| *s * factor).collect());
         let surface = match colors {
-            Some(_) => Surface::of_corners(&look, &group.name, &mut files)?,
-            None => Surface::write(&look, &group.name, mask, &mut files)?,
+            Some(_) => Surface::of_corners(&look, &group.name, &mean, &mut files)?,
+            None => Surface::write(&look, &group.name, mask, &mean, &mut files)?,
         };
         surface.warnings(&group.name, &mut lost);
         files.write(&mesh_file(&group.name), &ply::encode(&group.mesh, colors.as_deref()))?;

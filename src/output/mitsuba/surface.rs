@@ -4,7 +4,8 @@
 //! |---|---|---|
 //! | Lambert | `diffuse` | exact |
 //! | sheet without coats | blend of `diffuse` on either side and `principledthin` that only transmits | exact |
-//! | Oren–Nayar | `diffuse` of (A + (2/3 − 64/(45π)) B) times the albedo | as bright on the mean over all directions, no retroreflection |
+//! | Oren–Nayar | `diffuse` of (A + m B) times the albedo, m by [`Mean`] | as bright on the mean over the scene's light and view |
+//! | hairs and bloom | part of the `diffuse` below them | the same |
 //! | coats, films of water | blend with `roughplastic` that has no base | Smith's masking is uncorrelated there |
 //! | what lies under a coat | Lambert | as bright where it is seen along the normal and lit from all sides alike |
 //! | coats rougher across than along | `roughplastic` of the geometric mean | as bright, of another shape |
@@ -18,6 +19,7 @@
 
 use super::files::{Band, Files, Plugins};
 use super::look::{Kind, Look};
+use super::mean::Mean;
 use super::xml::Element;
 use crate::bsdf::microfacet::Ggx;
 use crate::math::{Spectrum, Vec3};
@@ -30,8 +32,6 @@ const THROUGH: f32 = 0.4;
 const COAT: f32 = 0.2;
 /// Optical depth of hairs and bloom over what is written for it: colours above 1 are refused.
 const DEEPEST_LAYER: f32 = 16.0;
-/// Mean of max(0, cos Δφ) sin α tan β, the term of B in Oren & Nayar 1994, over both hemispheres, weighed by both cosines: 2/3 − 64/(45π).
-const MEAN_B: f32 = 0.213_961;
 /// Weight of a film of water over soil.
 const FILM: f32 = 0.1;
 
@@ -46,16 +46,23 @@ enum Paint {
     Corners,
 }
 
+/// What a surface sends back on its upper and lower side, and through.
+#[derive(Clone, Debug)]
+struct Shares {
+    reflect: [Paint; 2],
+    transmit: Option<Paint>,
+}
+
 /// A surface's scattering, its pictures written.
 #[derive(Clone, Debug)]
 pub(super) struct Surface {
     kind: Kind,
-    /// Diffuse reflectance, upper and lower, times `factor`.
-    reflect: [Paint; 2],
+    /// Diffuse reflectance, upper and lower, times `factor`, and transmittance times `through`: of the tissue alone.
+    bare: Shares,
     factor: [f32; 2],
-    /// Transmittance times `through`.
-    transmit: Option<Paint>,
     through: f32,
+    /// The same with hairs and bloom on it, for Mitsuba's own plugins.
+    covered: Option<Shares>,
     /// Share under water over its weight, a picture's stem.
     film: Option<String>,
     /// Shading normals, a picture's stem.
@@ -64,16 +71,9 @@ pub(super) struct Surface {
     mask: Option<String>,
 }
 
-impl Surface {
-    /// Writes the pictures of a look, their names beginning with `stem`.
-    pub(super) fn write(look: &Look, stem: &str, mask: Option<String>, files: &mut Files<'_>) -> Result<Self> {
-        let (factor, through) = match look.kind {
-            Kind::Soil { .. } => ([Self::corner_factor(look.kind); 2], 0.0),
-            Kind::Sheet { coats, .. } => {
-                let side = |c: Option<Ggx>| 1.0 / ((1.0 - THROUGH) * c.map_or(1.0, |_| 1.0 - COAT));
-                (coats.map(side), 1.0 / THROUGH)
-            }
-        };
+impl Shares {
+    /// Writes the pictures of what varies.
+    fn write(look: &Look, factor: [f32; 2], through: f32, stem: &str, files: &mut Files<'_>) -> Result<Self> {
         let mut paint = |what: &str, scale: f32, of: &dyn Fn(usize) -> Spectrum| -> Result<Paint> {
             let all: Vec<Spectrum> = (0..look.texels.len()).map(|i| of(i) * scale).collect();
             match all.first() {
@@ -93,6 +93,35 @@ impl Surface {
             Kind::Soil { .. } => None,
             Kind::Sheet { .. } => Some(paint("through", through, &|i| look.texels[i].transmit)?),
         };
+        Ok(Self { reflect: [upper, lower], transmit })
+    }
+}
+
+impl Surface {
+    /// Writes the pictures of a look, their names beginning with `stem`.
+    pub(super) fn write(
+        look: &Look,
+        stem: &str,
+        mask: Option<String>,
+        mean: &Mean,
+        files: &mut Files<'_>,
+    ) -> Result<Self> {
+        let (factor, through) = match look.kind {
+            Kind::Soil { .. } => ([Self::corner_factor(look.kind, mean); 2], 0.0),
+            Kind::Sheet { coats, .. } => {
+                let side = |c: Option<Ggx>| 1.0 / ((1.0 - THROUGH) * c.map_or(1.0, |_| 1.0 - COAT));
+                (coats.map(side), 1.0 / THROUGH)
+            }
+        };
+        let bare = Shares::write(look, factor, through, stem, files)?;
+        let covered = match look.kind {
+            Kind::Sheet { layers, .. } if layers.iter().any(Option::is_some) => {
+                let texels = look.texels.iter().map(|texel| texel.covered(layers, mean)).collect();
+                let below = Look { texels, ..look.clone() };
+                Some(Shares::write(&below, factor, through, &format!("{stem}-covered"), files)?)
+            }
+            _ => None,
+        };
         let film = match look.constant(|t| t.film) {
             Some(0.0) => None,
             _ => Some(format!("textures/{stem}-film")),
@@ -110,11 +139,11 @@ impl Surface {
             let channels = [("R", axis(0)), ("G", axis(1)), ("B", axis(2))];
             files.numbers(&format!("{normal}.exr"), look.width, look.height, &channels)?;
         }
-        Ok(Self { kind: look.kind, reflect: [upper, lower], factor, transmit, through, film, normal, mask })
+        Ok(Self { kind: look.kind, bare, factor, through, covered, film, normal, mask })
     }
 
     /// A rough surface whose reflectance the mesh's corners hold, times [`Surface::corner_factor`], and of one film of water everywhere.
-    pub(super) fn of_corners(look: &Look, stem: &str, files: &mut Files<'_>) -> Result<Self> {
+    pub(super) fn of_corners(look: &Look, stem: &str, mean: &Mean, files: &mut Files<'_>) -> Result<Self> {
         let kind = look.kind;
         let share = look.texels.first().map_or(0.0, |t| t.film);
         let film = (share > 0.0).then(|| format!("textures/{stem}-film"));
@@ -123,10 +152,10 @@ impl Surface {
         }
         Ok(Self {
             kind,
-            reflect: [Paint::Corners, Paint::Corners],
-            factor: [Self::corner_factor(kind); 2],
-            transmit: None,
+            bare: Shares { reflect: [Paint::Corners, Paint::Corners], transmit: None },
+            factor: [Self::corner_factor(kind, mean); 2],
             through: 0.0,
+            covered: None,
             film,
             normal: None,
             mask: None,
@@ -134,9 +163,9 @@ impl Surface {
     }
 
     /// What reflectances at a mesh's corners are multiplied by.
-    pub(super) fn corner_factor(kind: Kind) -> f32 {
+    pub(super) fn corner_factor(kind: Kind, mean: &Mean) -> f32 {
         match kind {
-            Kind::Soil { shape: [a, b], film } => (a + MEAN_B * b) / film.map_or(1.0, |_| 1.0 - FILM),
+            Kind::Soil { shape: [a, b], film } => (a + mean.retroreflection() * b) / film.map_or(1.0, |_| 1.0 - FILM),
             Kind::Sheet { .. } => 1.0,
         }
     }
@@ -149,7 +178,7 @@ impl Surface {
         match self.kind {
             Kind::Soil { shape: [_, b], film } => {
                 if b > 0.0 {
-                    warn("Oren–Nayar is written as Lambert, equal on the mean over all directions");
+                    warn("Oren–Nayar is written as Lambert, equal on the mean over the light and the view");
                 }
                 if film.is_some() {
                     warn("the film of water is about equal");
@@ -157,7 +186,9 @@ impl Surface {
             }
             Kind::Sheet { coats, layers } => {
                 if layers.iter().flatten().count() > 0 {
-                    warn("hairs and bloom are left out");
+                    warn(
+                        "hairs and bloom are written as part of the tissue, equal on the mean over the light and the view",
+                    );
                 }
                 if coats.iter().flatten().count() > 0 {
                     warn("leaf coats are about equal");
@@ -167,7 +198,7 @@ impl Surface {
                 }
             }
         }
-        if self.reflect[0] == Paint::Corners {
+        if self.bare.reflect[0] == Paint::Corners {
             warn("the grain of stones, straw and wood is sampled at the corners of their meshes");
         }
         if self.normal.is_some() {
@@ -199,7 +230,7 @@ impl Surface {
     }
 
     fn soil(&self, film: Option<Ggx>, band: Band) -> Element {
-        let diffuse = Element::plugin("bsdf", "diffuse").inside([paint("reflectance", &self.reflect[0], band)]);
+        let diffuse = Element::plugin("bsdf", "diffuse").inside([paint("reflectance", &self.bare.reflect[0], band)]);
         let inner = match (&self.film, film) {
             (Some(share), Some(coat)) => Element::plugin("bsdf", "blendbsdf")
                 .float("weight", FILM)
@@ -210,13 +241,14 @@ impl Surface {
     }
 
     fn sheet(&self, coats: [Option<Ggx>; 2], band: Band) -> Element {
+        let shares = self.covered.as_ref().unwrap_or(&self.bare);
         let side = |i: usize| {
-            let base = Element::plugin("bsdf", "diffuse").inside([paint("reflectance", &self.reflect[i], band)]);
+            let base = Element::plugin("bsdf", "diffuse").inside([paint("reflectance", &shares.reflect[i], band)]);
             let Some(coat) = coats[i] else { return base };
             let weight = Element::property("float", "specular_reflectance", 1.0 / ((1.0 - THROUGH) * COAT));
             Element::plugin("bsdf", "blendbsdf").float("weight", COAT).inside([base, gloss(coat, weight)])
         };
-        let through = self.transmit.clone().unwrap_or(Paint::Plain(Spectrum::ZERO));
+        let through = shares.transmit.clone().unwrap_or(Paint::Plain(Spectrum::ZERO));
         Element::plugin("bsdf", "blendbsdf").float("weight", THROUGH).inside([
             Element::plugin("bsdf", "twosided").inside([side(0), side(1)]),
             Element::plugin("bsdf", "principledthin").float("diff_trans", 2.0).inside([paint(
@@ -234,7 +266,7 @@ impl Surface {
                     .float("a", a)
                     .float("b", b)
                     .float("scale", 1.0 / self.factor[0])
-                    .inside([paint("reflectance", &self.reflect[0], band)]);
+                    .inside([paint("reflectance", &self.bare.reflect[0], band)]);
                 match (&self.film, film) {
                     (Some(share), Some(coat)) => soil
                         .float("film_alpha", coat.alpha[0])
@@ -259,11 +291,11 @@ impl Surface {
                     }
                     leaf = leaf.float(&format!("{side}_scale"), 1.0 / self.factor[i]).inside([paint(
                         side,
-                        &self.reflect[i],
+                        &self.bare.reflect[i],
                         band,
                     )]);
                 }
-                let through = self.transmit.clone().unwrap_or(Paint::Plain(Spectrum::ZERO));
+                let through = self.bare.transmit.clone().unwrap_or(Paint::Plain(Spectrum::ZERO));
                 leaf.float("through_scale", 1.0 / self.through).inside([paint("through", &through, band)])
             }
         };

@@ -5,13 +5,15 @@ use super::options::Options;
 use super::season::Season;
 use super::today::Today;
 use crate::light::LightRecord;
+use crate::math::Vec3;
 use crate::plant::OrganKind;
 use crate::ron_file::RonFile;
 use crate::scene::desc::FieldDesc;
 use crate::scene::drive::Capture;
-use crate::scene::library::Library;
+use crate::scene::library::{Layer, Library};
 use crate::scene::{PartKind, Scene};
 use crate::soil::Ground;
+use std::sync::Arc;
 
 /// Farthest that a model or a camera may be from the world's origin along an axis, metres: single precision tells 0.06 mm apart there.
 pub(super) const FARTHEST: f32 = 1000.0;
@@ -44,10 +46,15 @@ pub(super) struct Builder<'a> {
     pub(super) warnings: Vec<String>,
 }
 
+/// Radius over which the ground's slope decides how a plant stands, metres.
+const STANCE: f32 = 0.02;
+
 /// What plants and models stand on.
 #[derive(Clone, Copy)]
 pub(super) struct Floor<'a> {
     pub(super) ground: &'a Ground,
+    /// Of its layers.
+    pub(super) maps: &'a [Arc<Layer>],
     /// Whether the ground is the plane z = 0; what grows leans on it as it does on the ground with its heights.
     pub(super) flat: bool,
 }
@@ -56,5 +63,11 @@ impl Floor<'_> {
     /// Height at a place, metres.
     pub(super) fn height(&self, x: f32, y: f32) -> f32 {
         if self.flat { 0.0 } else { self.ground.height(x, y) }
+    }
+
+    /// Height at which a plant stands, metres, and the normal of the ground about it.
+    pub(super) fn stance(&self, x: f32, y: f32) -> (f32, Vec3) {
+        let (height, normal) = self.ground.stance(self.maps, x, y, STANCE);
+        (if self.flat { 0.0 } else { height }, normal)
     }
 }

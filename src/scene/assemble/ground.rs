@@ -13,6 +13,7 @@ use crate::ron_file::{Step, Vary};
 use crate::sampling::Purpose;
 use crate::sampling::rng::mix;
 use crate::scatter::{Disc, Rows};
+use crate::scene::desc::Detail;
 use crate::scene::library::Layer;
 use crate::scene::tag::Tag;
 use crate::scene::{Part, PartKind, PlantRecord};
@@ -65,7 +66,7 @@ impl Builder<'_> {
         self.options.wanted()?;
         let bare = preview.map(|_| earth.clone());
         let ground = earth.ground.clone();
-        let floor = Floor { ground: &ground, flat: desc.flat };
+        let floor = Floor { ground: &ground, maps: &soil.maps, flat: desc.flat };
         let record = self.soil_record(desc, &ground);
         // The bake takes as long as everything else, and neither needs the other.
         let (baked, rest) = rayon::join(
@@ -132,22 +133,33 @@ impl Builder<'_> {
 
     /// Which piece of ground is made, and how finely.
     pub(super) fn site(&self, view: Rect, open: bool) -> Site {
-        let pixel = self.ground_pixel();
+        let pixel = self.soil_pixel();
         let rows = self.sown.clone().next().map(|k| {
             let rows = Rows::draw(&self.desc.crops[k].rows, &self.stream(Purpose::Scatter, k as u64));
             SeedRows { spacing_m: rows.spacing_m, azimuth: rows.azimuth, offset_m: rows.offset_m }
         });
+        let (coarsest, smallest_mm) = match self.desc.detail {
+            Detail::Full => (4e-3, 0.0),
+            Detail::ByPixel => (f32::INFINITY, 1e3 * pixel),
+        };
         Site {
             area: view.grown(GROUND_MARGIN),
-            grid_m: (2.5 * pixel).clamp(8e-4, 4e-3).max((view.area() / MOST_CELLS).sqrt()),
+            grid_m: (2.5 * pixel).clamp(8e-4, coarsest).max((view.area() / MOST_CELLS).sqrt()),
             margin_m: if open { OPEN_REACH } else { GROUND_REACH },
+            smallest_mm,
             rows,
         }
     }
 
     /// Side of a texel of the ground's maps, metres.
     pub(super) fn texel(&self, view: Rect) -> f32 {
-        (0.9 * self.ground_pixel()).clamp(2e-4, 2e-3).max((view.area() / MOST_TEXELS).sqrt())
+        let coarsest = if self.desc.detail == Detail::Full { 2e-3 } else { f32::INFINITY };
+        (0.9 * self.soil_pixel()).clamp(2e-4, coarsest).max((view.area() / MOST_TEXELS).sqrt())
+    }
+
+    /// Side of the pixels that the ground is made for, metres.
+    fn soil_pixel(&self) -> f32 {
+        if self.desc.detail == Detail::Full { self.ground_pixel() } else { self.finest_pixel() }
     }
 
     /// What the ground and each thing on it take, before any of it is made.

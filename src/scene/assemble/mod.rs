@@ -23,7 +23,7 @@ mod today;
 mod unlikely;
 mod view;
 
-use super::desc::{FieldDesc, Growth};
+use super::desc::{Detail, FieldDesc, Growth};
 use super::estimate::{Estimate, usual_memory};
 pub use super::growing::Growing;
 use super::library::{Library, Species};
@@ -63,8 +63,6 @@ use view::View;
 const PLANT_MARGIN: f32 = 0.35;
 /// Length of the longest shadow that counts, in plant heights: that of a sun 20° above the horizon.
 const SHADOW: f32 = 2.75;
-/// Radius over which the ground's slope decides how a plant stands, metres.
-const STANCE: f32 = 0.02;
 /// Address of the season's stream, behind those of any number of lights.
 const SEASON: u64 = 1 << 32;
 /// Address of the first of the streams from which lists of lights are drawn, one for each place among the scene file's lights.
@@ -249,7 +247,23 @@ impl<'a> Builder<'a> {
     /// Shortest cell of the plants' meshes, metres: in a preview as many of its pixels as the usual one has of a field camera's.
     fn cell(&self) -> f32 {
         let usual = GrowOptions::default().cell;
-        if self.options.preview.is_some() { usual.max(4.0 * self.ground_pixel()) } else { usual }
+        let by_pixel = match self.desc.detail {
+            _ if self.options.preview.is_some() => 4.0 * self.ground_pixel(),
+            Detail::ByPixel => 1.5 * self.finest_pixel(),
+            Detail::Full => 0.0,
+        };
+        usual.max(by_pixel)
+    }
+
+    /// Side of the smallest pixel on the ground in any image, metres; 1 mm where no camera looks down.
+    fn finest_pixel(&self) -> f32 {
+        let finest = |camera: &Camera| {
+            let corner = |k: u32| (k % 3 * (camera.width() - 1) / 2, k / 3 * (camera.height() - 1) / 2);
+            let rays = (0..9).map(corner).map(|(x, y)| camera.centre_ray(x, y));
+            let sides = rays.filter(|(_, direction)| direction.z < -0.05);
+            sides.map(|(origin, direction)| origin.z / -direction.z * camera.pixel_angle()).reduce(f32::min)
+        };
+        self.captures.iter().filter_map(|capture| finest(&capture.camera)).reduce(f32::min).unwrap_or(1e-3)
     }
 
     fn material(&mut self, material: Material) -> u32 {
@@ -432,7 +446,7 @@ impl<'a> Builder<'a> {
         let stand = |seedling: &Seedling| {
             options.wanted()?;
             let Vec2 { x, y } = seedling.position;
-            let (height, normal) = floor.map_or((0.0, Vec3::Z), |f| (f.height(x, y), f.ground.trend(x, y, STANCE)));
+            let (height, normal) = floor.map_or((0.0, Vec3::Z), |f| f.stance(x, y));
             let place = Place { height, normal, dust, cell };
             let known = options.preview.as_ref().and_then(|preview| preview.plant(seedling, &place));
             let known = known.filter(|known| known.organs.is_some() || !reaches(&known.record));

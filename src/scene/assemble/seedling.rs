@@ -106,14 +106,6 @@ pub(super) fn grow(
     let mut leaf_axes: Vec<LeafAxis> = axes.map(|a| a.moved(to_world)).collect();
     leaf_axes.sort_by_key(|a| a.leaf);
     let record = PlantRecord {
-        number: 0,
-        id: s.id,
-        leaf_ids: Vec::new(),
-        species: desc.name.clone(),
-        eppo: desc.eppo.clone(),
-        kind: 0,
-        class,
-        position: foot,
         axis,
         bbch: plant.bbch,
         age_days: plant.age_days,
@@ -122,6 +114,7 @@ pub(super) fn grow(
         leaves: plant.organs.iter().map(|o| o.leaf).filter(|leaf| kept(*leaf)).max().unwrap_or(0),
         leaf_axes,
         condition: ailing.as_ref().map(Ailing::drawn),
+        ..unborn(s, normal, z)
     };
     if !wanted(&record) {
         return (record, None);
@@ -171,7 +164,7 @@ fn stage(s: &Seedling, stream: &mut Stream) -> Option<Stage> {
     }
 }
 
-/// What is known of a plant that has not emerged.
+/// What is known of a plant that has not emerged: who it is, and where.
 fn unborn(s: &Seedling, normal: Vec3, height: f32) -> PlantRecord {
     let desc: &SpeciesDesc = &s.species.desc;
     PlantRecord {

@@ -1,6 +1,6 @@
 //! How much of the ground a camera sees, and how much of that is planted.
 //!
-//! A camera that looks down sees a piece of ground with an end, all of which is planted up to [`REACH`] from the point below it.
+//! A camera that looks down sees a piece of ground with an end, all of which is planted up to the scene file's `reach_m` from the point below it.
 //! One that sees the horizon, or ground further away, gets bare ground there: its pixels are then labelled soil, so the field says
 //! so in its warnings, with the share of the ground in view that this is. Where it is more than half, the scene is refused.
 
@@ -11,9 +11,8 @@ use crate::sensor::Camera;
 use crate::soil::Rect;
 use crate::{Error, Result};
 
-/// How far from the point below the camera fields are grown, along east and north, metres: 144 m² at most, some 1,500 beets. A
-/// camera 10 m up with a view of 60° sees as much.
-pub(super) const REACH: f32 = 6.0;
+/// The longest reach of a field, metres.
+const LONGEST_REACH: f32 = 100.0;
 /// Below this sine of the angle under the horizon a ray is said to see the horizon.
 const HORIZON: f32 = 0.05;
 /// Sides of the raster of rays by which the share of bare ground is estimated.
@@ -47,9 +46,6 @@ fn meets(origin: Vec3, direction: Vec3) -> Option<Vec2> {
     (direction.z < 0.0 && origin.z > 0.0).then(|| (origin + direction * (origin.z / -direction.z)).truncate())
 }
 
-/// Most ground that is grown for one field, m²: that of a camera which sees as far as [`REACH`] on all sides.
-const MOST_AREA: f32 = 4.0 * REACH * REACH;
-
 impl Builder<'_> {
     /// The ground that all images see together, with a warning where some of it is not planted.
     pub(super) fn view(&mut self) -> Result<View> {
@@ -61,17 +57,30 @@ impl Builder<'_> {
         }
         let whole = whole.unwrap_or(View::NONE);
         let area = whole.area.area();
+        // That of a camera which sees as far as the reach on all sides.
+        let most = 4.0 * self.reach()?.powi(2);
         // A single camera is bounded by its reach, and by what its shutter travels.
-        if cameras.len() > 1 && area > MOST_AREA {
-            let words = format!("the drive sees {area:.0} m² of ground, more than the {MOST_AREA} m² of one field");
-            let help = "take fewer frames, drive along a row to the north or east, or drive through several fields";
+        if cameras.len() > 1 && area > most {
+            let words = format!("the drive sees {area:.0} m² of ground, more than the {most} m² of one field");
+            let help = "take fewer frames, drive along a row to the north or east, or drive through several fields, or raise reach_m";
             return Err(self.page.blame(&[Step::Field("drive")], Error::input(words).help(help)));
         }
         Ok(whole)
     }
 
+    /// How far from the point below a camera the field is grown, metres.
+    fn reach(&self) -> Result<f32> {
+        let reach = self.desc.reach_m.f32();
+        if reach > LONGEST_REACH {
+            let error = Error::input(format!("reach_m is {reach}, more than {LONGEST_REACH}")).help("lower it");
+            return Err(self.page.blame(&[Step::Field("reach_m")], error));
+        }
+        Ok(reach)
+    }
+
     /// The ground that one camera sees; with a warning where some of it is not planted, unless that was `told`.
     fn view_of(&mut self, camera: &Camera, told: bool) -> Result<View> {
+        let reach = self.reach()?;
         let (w, h) = (camera.width() as f32, camera.height() as f32);
         let below = camera.pose().position.truncate();
         if camera.pose().position.abs().max_element() > FARTHEST {
@@ -88,7 +97,7 @@ impl Builder<'_> {
             if direction.z < -HORIZON && origin.z > 0.0 {
                 seen.extend(meets(origin, direction));
             } else {
-                level.push(below + direction.truncate().normalize_or_zero() * REACH);
+                level.push(below + direction.truncate().normalize_or_zero() * reach);
             }
         }
         if seen.is_empty() {
@@ -99,7 +108,7 @@ impl Builder<'_> {
         // Some of the view is of the horizon: the ground is seen as far as it is planted.
         let hull = seen.iter().chain(&level).copied();
         let all = [hull.clone().fold(Vec2::INFINITY, Vec2::min), hull.fold(Vec2::NEG_INFINITY, Vec2::max)];
-        let (lo, hi) = (all[0].max(below - Vec2::splat(REACH)), all[1].min(below + Vec2::splat(REACH)));
+        let (lo, hi) = (all[0].max(below - Vec2::splat(reach)), all[1].min(below + Vec2::splat(reach)));
         // Rows' corners are seen in the middle of their exposures.
         let area = Rect::new(lo.x, lo.y, hi.x, hi.y).grown(camera.travel());
         if level.is_empty() && [lo, hi] == all {
@@ -111,11 +120,11 @@ impl Builder<'_> {
         }
         let far = if level.is_empty() { format!("{farthest:.0} m away") } else { "to the horizon".into() };
         let words = format!(
-            "the camera sees ground {far}, and plants are grown up to {REACH} m east, north, west and south of the point below it: \
+            "the camera sees ground {far}, and plants are grown up to {reach} m east, north, west and south of the point below it: \
              {:.0} % of the ground in the image stays bare and its labels call it soil",
             (100.0 * bare).ceil()
         );
-        let help = "lower the camera, turn it down or narrow its angle of view";
+        let help = "lower the camera, turn it down, narrow its angle of view, or raise reach_m";
         if bare > TOO_BARE {
             return Err(self.page.blame(&[Step::Field("camera")], Error::input(words).help(help)));
         }
