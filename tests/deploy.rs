@@ -193,8 +193,8 @@ fn half_precision_is_a_run_of_half_the_size() {
         output::read_indexed(&out.join("large.png")).unwrap().2
     });
     let differ = answers[0].iter().zip(&answers[1]).filter(|(a, b)| a != b).count();
-    // A network of few steps is undecided in many pixels: one in a hundred may fall on the other side.
-    assert!(differ * 100 <= answers[0].len(), "{differ} of {} pixels differ", answers[0].len());
+    // A network of few steps is undecided in many pixels: one in thirty may fall on the other side.
+    assert!(differ * 30 <= answers[0].len(), "{differ} of {} pixels differ", answers[0].len());
 }
 
 /// Rationale: whoever has photographs and no network gets an answer on the first evening. Expected: the networks that ship are listed; by
