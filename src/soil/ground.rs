@@ -307,7 +307,7 @@ impl Ground {
     }
 
     /// Height, metres, and unit normal of the plane that fits the ground within `radius` of a point: what a plant stands on. Where clods are drawn into
-    /// the ground it is the ground without them, as fine as [`STANCE_M`] whatever the grid: plants stand as they do in full detail.
+    /// the ground it is the ground without them, as fine as 4 mm whatever the grid: plants stand as they do in full detail.
     pub fn stance<L: LayerMaps>(&self, maps: &[L], x: f32, y: f32, radius: f32) -> (f32, Vec3) {
         let Sizes { drawn, .. } = self.sizes;
         if drawn.0 >= drawn.1 {

@@ -25,8 +25,8 @@ pub struct Site {
     pub grid_m: f32,
     /// How far the coarse ground goes on beyond the area, for low suns and light that bounces.
     pub margin_m: f32,
-    /// Length of the smallest aggregates that are told from the ground, mm; those up to [`BODIES_FROM`] times as long are drawn into its heights,
-    /// even where the soil makes bodies of them. 0: as the soil says.
+    /// Length of the smallest aggregates that are told from the ground, mm; those up to three times as long are drawn into its heights, even
+    /// where the soil makes bodies of them. 0: as the soil says.
     pub smallest_mm: f32,
     /// The seed rows, if the ground was sown.
     pub rows: Option<SeedRows>,
