@@ -92,7 +92,7 @@ pub struct FieldDesc {
 ///
 /// ```
 /// use furrow::scene::desc::{Detail, FieldDesc};
-/// let text = "Field(camera: JaiAd130(height_m: 10), reach_m: 8, detail: ByPixel, soil: ())";
+/// let text = "Field(camera: JaiAd130(height_m: 10), reach_m: 8, detail: ByPixel)";
 /// let field: FieldDesc = ron::from_str(text).unwrap();
 /// assert_eq!((field.detail, field.reach_m.get()), (Detail::ByPixel, 8.0));
 /// ```

@@ -6,7 +6,7 @@ use crate::ron_file::{Step, place};
 use crate::sampling::Purpose;
 use crate::scatter::Rows;
 use crate::scene::PlantRecord;
-use crate::scene::desc::{Growth, SpeciesDesc};
+use crate::scene::desc::{Detail, Growth, SpeciesDesc};
 use crate::scene::tag::Class;
 use crate::soil::Rect;
 
@@ -21,7 +21,8 @@ impl Builder<'_> {
     /// Warnings about the camera and the sensor.
     pub(super) fn warn_of_camera(&mut self) {
         let height = self.scene.camera.pose().height();
-        if height > HIGH_M {
+        // Who asks for a drone's detail means it.
+        if height > HIGH_M && self.desc.detail == Detail::Full {
             self.warnings.push(format!(
                 "the camera hangs {height:.1} m above the ground; heights are in metres, 0.85 for 85 cm"
             ));
