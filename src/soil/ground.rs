@@ -54,6 +54,7 @@ pub struct Ground {
     pub(super) grid: Grid,
     pub(super) heights: Vec<f32>,
     slopes: Vec<Vec2>,
+    /// The ground without layers and crumbs.
     shape: Relief,
     pub(super) fine: Fine,
     pub(super) blend: Blend,
@@ -463,7 +464,7 @@ fn check(desc: &SoilDesc, maps: usize, site: &Site) -> Result<()> {
         return fault(format!("height_mm of {} runs from high to low: swap its ends", l.height.display()));
     }
     if desc.clods.min_mm.get() >= desc.clods.max_mm.get() {
-        return fault("the clods' min_mm is not below their max_mm".into());
+        return Err(Error::input("the clods' min_mm is not below their max_mm").help("lower min_mm, or raise max_mm"));
     }
     let size = site.area.size();
     let vertices = (size.x / site.grid_m) * (size.y / site.grid_m);

@@ -48,7 +48,9 @@ pub(super) struct Sizes {
 impl Site {
     /// How the aggregates of a soil are made here.
     pub(super) fn sizes(&self, desc: &SoilDesc) -> Sizes {
-        let (crumb, clod, most) = (desc.crumbs.min_mm.f32(), desc.clods.min_mm.f32(), desc.clods.max_mm.f32());
+        let (crumb, clod) = (desc.crumbs.min_mm.f32(), desc.clods.min_mm.f32());
+        // A soil whose clods' lengths run from high to low is refused only when it is made, after it was counted.
+        let most = desc.clods.max_mm.f32().max(clod);
         let crumbs = (self.smallest_mm.clamp(crumb, clod.max(crumb)), clod);
         let body = (BODIES_FROM * self.smallest_mm).clamp(clod, most);
         let drawn = (self.smallest_mm.clamp(clod, body), body);

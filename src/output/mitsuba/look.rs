@@ -3,7 +3,7 @@
 //! What a [`Material`] is made of is its own affair; here it is asked, point by point on a flat patch, how it scatters: at each
 //! texel of the one level that its pictures are read on, see [`super::level`].
 
-use super::mean::Mean;
+use super::mean::Cover;
 use crate::bsdf::microfacet::Ggx;
 use crate::bsdf::{Bsdf, SurfaceLayer};
 use crate::geometry::{Hit, Interaction, Mesh};
@@ -43,13 +43,10 @@ pub(super) struct Texel {
 }
 
 impl Texel {
-    /// The same with hairs and bloom on it, as part of what is diffuse.
-    pub(super) fn covered(&self, layers: [Option<SurfaceLayer>; 2], mean: &Mean) -> Self {
-        let side = |i: usize| {
-            let (through, own) = layers[i].map_or((Spectrum::ONE, Spectrum::ZERO), |layer| mean.layer(layer));
-            self.reflect[i] * through + own
-        };
-        Self { reflect: [side(0), side(1)], transmit: self.transmit * mean.across(layers[0], layers[1]), ..*self }
+    /// The same under a cover, as part of what is diffuse.
+    pub(super) fn under(&self, cover: &Cover) -> Self {
+        let side = |i: usize| self.reflect[i] * cover.sides[i].0 + cover.sides[i].1;
+        Self { reflect: [side(0), side(1)], transmit: self.transmit * cover.across, ..*self }
     }
 }
 

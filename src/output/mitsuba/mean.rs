@@ -46,6 +46,15 @@ pub(super) struct Mean {
     pairs: Vec<Pair>,
 }
 
+/// Hairs and bloom on both sides of a leaf, on the mean.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cover {
+    /// Of either side: what it lets through of the light that goes in and out, and what it reflects itself.
+    pub(super) sides: [(Spectrum, Spectrum); 2],
+    /// What both let through of light that passes the leaf.
+    pub(super) across: Spectrum,
+}
+
 impl Mean {
     /// Of a scene as it is exported. The same scene gives the same means.
     pub(super) fn of(scene: &Scene) -> Self {
@@ -81,8 +90,14 @@ impl Mean {
         self.pairs.iter().map(term).sum()
     }
 
+    /// What lies on the upper and the lower side of a leaf.
+    pub(super) fn cover(&self, layers: [Option<SurfaceLayer>; 2]) -> Cover {
+        let side = |layer: Option<SurfaceLayer>| layer.map_or((Spectrum::ONE, Spectrum::ZERO), |l| self.layer(l));
+        Cover { sides: layers.map(side), across: self.across(layers) }
+    }
+
     /// What a layer on the side that is seen lets through of the light that goes in and out, and what it reflects itself.
-    pub(super) fn layer(&self, layer: SurfaceLayer) -> (Spectrum, Spectrum) {
+    fn layer(&self, layer: SurfaceLayer) -> (Spectrum, Spectrum) {
         let mut sums = (Spectrum::ZERO, Spectrum::ZERO);
         for pair in &self.pairs {
             let through = pair.cos.map(|cos| layer.through(cos));
@@ -93,7 +108,7 @@ impl Mean {
     }
 
     /// What the layers of both sides let through of light that passes the leaf: one on its way to the eye, the other from the light.
-    pub(super) fn across(&self, near: Option<SurfaceLayer>, far: Option<SurfaceLayer>) -> Spectrum {
+    fn across(&self, [near, far]: [Option<SurfaceLayer>; 2]) -> Spectrum {
         let through = |layer: Option<SurfaceLayer>, cos| layer.map_or(Spectrum::ONE, |layer| layer.through(cos));
         let both = |pair: &Pair| through(near, pair.cos[0]) * through(far, pair.cos[1]) * pair.weight;
         self.pairs.iter().map(both).fold(Spectrum::ZERO, |sum, part| sum + part)

@@ -116,7 +116,8 @@ impl Surface {
         let bare = Shares::write(look, factor, through, stem, files)?;
         let covered = match look.kind {
             Kind::Sheet { layers, .. } if layers.iter().any(Option::is_some) => {
-                let texels = look.texels.iter().map(|texel| texel.covered(layers, mean)).collect();
+                let cover = mean.cover(layers);
+                let texels = look.texels.iter().map(|texel| texel.under(&cover)).collect();
                 let below = Look { texels, ..look.clone() };
                 Some(Shares::write(&below, factor, through, &format!("{stem}-covered"), files)?)
             }
