@@ -8,11 +8,13 @@ mod common;
 use common::program::{SMALL, field, shoot, small_text};
 use furrow::job::{Field as Shown, SceneFile};
 use furrow::light::LightRecord;
-use furrow::math::{Spectrum, vec3};
+use furrow::math::{Spectrum, Vec3, vec3};
+use furrow::plant::OrganKind;
 use furrow::scene::assemble::{self, Options, Preview};
-use furrow::scene::tag::Class;
-use furrow::scene::{Field, PlantRecord};
+use furrow::scene::tag::{Class, Tag};
+use furrow::scene::{Field, PartKind, PlantRecord};
 use furrow::settings::Quality;
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -671,4 +673,58 @@ fn detail_by_pixel_shows_the_same_field() {
     };
     let ratio = (soil(&film) / soil(&fine)).to_array();
     assert!(ratio.iter().all(|ratio| (ratio - 1.0).abs() < 0.03), "{ratio:?}");
+}
+
+/// Rationale: a camera that looks along the rows sees plants a metre away and plants of a few pixels; each must be as fine as its own pixels, and still be the
+/// plant that full detail shows. Expected: the same plants with the same leaves where both are seen, labels equal in 98 % of the pixels at a third of the
+/// triangles, near leaves finer than far ones, feet on the ground, and the sky above a horizon without a gap.
+#[test]
+fn a_front_camera_shows_the_same_field_by_pixel() {
+    let page = |detail: &str| {
+        let text = format!(
+            r#"Field(
+                seed: 5,
+                detail: {detail},
+                reach_m: 4,
+                camera: Pinhole(size: (240, 180), intrinsics: FieldOfView(horizontal_deg: 40), pose: LookAt(position_m: (0, 0, 0.7), target_m: (0, 1.6, 0.1))),
+                lights: [Daylight(sun: Angles(elevation_deg: 47, azimuth_deg: 150), turbidity: 3.5)],
+                soil: (
+                    layers: [(albedo: "textures/soil/dirt.png", height: "textures/soil/dirt.height.png", size_m: 0.5, height_mm: (-4, 8))],
+                    clods: (over_5mm_per_m2: 500),
+                ),
+                crops: [(species: "scenes/species/sugar_beet.ron", growth: AgeDays(32), rows: (in_row_m: 0.18))],
+                weeds: [(species: "scenes/species/tripleurospermum.ron", growth: AgeDays(Uniform(10, 30)), spread: (per_m2: 5))],
+            )"#
+        );
+        field(&text, &Options::default())
+    };
+    let (full, coarse) = (page("Full"), page("ByPixel"));
+    let triangles = |field: &Field| field.scene.parts.iter().map(|part| part.mesh.triangles.len()).sum::<usize>();
+    assert!(3 * triangles(&coarse) < triangles(&full), "{} and {}", triangles(&coarse), triangles(&full));
+    let known: BTreeMap<u32, (u16, Vec3)> = full.plants.iter().map(|p| (p.id, (p.leaves, p.position))).collect();
+    let ground = &coarse.scene.parts[0].mesh;
+    for plant in &coarse.plants {
+        let (leaves, position) = known[&plant.id];
+        assert_eq!(leaves, plant.leaves);
+        assert_eq!(position.truncate(), plant.position.truncate());
+        assert!((position.z - plant.position.z).abs() < 0.02, "{position} {}", plant.position);
+    }
+    assert!(ground.positions.iter().any(|p| p.y > 190.0), "it ends at the horizon");
+    let cells = |field: &Field, far: bool| {
+        let plant = |tag: u16| field.plants.iter().find(|p| p.number == tag).map(|p| p.position.y);
+        let of = field.scene.parts.iter().zip(&field.kinds).filter(|(part, kind)| {
+            matches!(kind, PartKind::Organ(OrganKind::Blade)) && plant(part.tag.plant).is_some_and(|y| (y > 3.0) == far)
+        });
+        let (sum, count) = of.fold((0, 0), |(sum, count), (part, _)| (sum + part.mesh.triangles.len(), count + 1));
+        sum / count.max(1)
+    };
+    assert!(cells(&coarse, false) > 2 * cells(&coarse, true), "{} {}", cells(&coarse, false), cells(&coarse, true));
+    let [(_, fine), (film, labels)] = [&full, &coarse].map(|field| shoot(field, 8, 0));
+    // Numbers differ, for the rectangle about the view holds more plants than the view.
+    let name =
+        |field: &Field, tag: &Tag| (tag.class, field.plants.iter().find(|p| p.number == tag.plant).map(|p| p.id));
+    let other = fine.tags.iter().zip(&labels.tags).filter(|(a, b)| name(&full, a) != name(&coarse, b)).count();
+    let plants = labels.tags.iter().filter(|tag| tag.plant > 0).count();
+    assert!(plants > 2000 && 50 * other < labels.tags.len(), "{other} of {}, {plants} of plants", labels.tags.len());
+    assert!(film.pixels.iter().all(|pixel| !pixel.mean.is_black()), "no gap between the ground and the sky");
 }

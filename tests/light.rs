@@ -274,6 +274,29 @@ const HOSEK: [(f32, f32, f32, f32, [f32; 3]); 20] = [
     (85.0, 3.0, 80.0, 75.0, [9.944087, 15.593354, 23.473393]),
 ];
 
+/// Rationale: a camera that looks at the sky must not see the table's steps, nor another sky than the one that lights. Expected: no step between neighbouring
+/// directions above 2 % away from the sun, where the table has larger ones; the mean over the hemisphere within 0.5 % of the table's; the
+/// horizon's haze below it.
+#[test]
+fn the_sky_that_a_camera_sees_is_smooth() {
+    let (_, sky) = furrow::light::daylight(40.0, 150.0, 3.0, 0.2);
+    let sky = sky.expect("a sky");
+    let at = |azimuth: f32, elevation: f32| {
+        vec3(azimuth.cos() * elevation.cos(), azimuth.sin() * elevation.cos(), elevation.sin())
+    };
+    let row: Vec<Vec3> = (0..3000).map(|k| at(0.4 + 1e-3 * k as f32, 0.15)).collect();
+    let steps =
+        |of: &dyn Fn(Vec3) -> f32| row.windows(2).map(|w| (of(w[1]) / of(w[0]) - 1.0).abs()).fold(0.0_f32, f32::max);
+    let (seen, table) = (steps(&|d| sky.seen(d).mean()), steps(&|d| sky.le(d).mean()));
+    assert!(seen < 0.02 && table > 2.0 * seen, "{seen} {table}");
+    let all = (0..40_000).map(|k| at(2.399_963 * k as f32, ((k as f32 + 0.5) / 40_000.0).asin()));
+    let (a, b) = all.fold((0.0, 0.0), |(a, b), d| (a + f64::from(sky.seen(d).mean()), b + f64::from(sky.le(d).mean())));
+    assert!((a / b - 1.0).abs() < 0.005, "{}", a / b);
+    let below = vec3(0.6, 0.8, -0.2).normalize();
+    assert!((sky.seen(below).mean() / sky.seen(vec3(0.6, 0.8, 0.0)).mean() - 1.0).abs() < 1e-5);
+    assert!(sky.le(below).is_black());
+}
+
 /// Rationale: the dome's shape is that of the published model or it is our invention. Expected: relative 10⁻⁴. Source: the authors'
 /// C code.
 #[test]

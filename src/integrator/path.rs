@@ -96,11 +96,13 @@ impl PathTracer {
     fn escaped(&self, world: &World<'_>, ray: &Ray, from: Option<&Origin>) -> Spectrum {
         let mut sum = Spectrum::ZERO;
         for light in &world.scene.lights {
+            let Some(from) = from else {
+                sum += light.seen(ray.direction);
+                continue;
+            };
             let emitted = light.le(ray.direction);
             if !emitted.is_black() {
-                let weight =
-                    from.map_or(1.0, |from| self.weigh(world, from, light, || light.pdf_li(from.p, ray.direction)));
-                sum += emitted * weight;
+                sum += emitted * self.weigh(world, from, light, || light.pdf_li(from.p, ray.direction));
             }
         }
         sum

@@ -83,6 +83,12 @@ impl Light {
         of!(self, light => light.le(dir))
     }
 
+    /// What a camera sees along a ray that left the scene in the unit direction `dir`.
+    #[inline]
+    pub fn seen(&self, dir: Vec3) -> Spectrum {
+        of!(self, light => light.seen(dir))
+    }
+
     /// The lamp as met by a ray; `None` for lights infinitely far away.
     #[inline]
     pub fn hit(&self, origin: Vec3, dir: Vec3) -> Option<LampHit> {

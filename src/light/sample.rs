@@ -8,6 +8,7 @@
 //! - [`Emitter::le`] is L for directions that leave the scene, of lights infinitely far away; [`Emitter::hit`] is L for lights
 //!   with a place. A ray that left adds `le` of every light; a ray that did not must be tested against `hit` of every light.
 //!   Lamps are no geometry: they are never seen as a part and cast no shadow.
+//! - [`Emitter::seen`] is what a camera sees of `le` itself; nothing is lit by it, so it need not be `le` to the last bit.
 //! - [`Emitter::importance`] is above zero wherever the light can contribute.
 //! - Nothing here allocates.
 
@@ -47,6 +48,12 @@ pub trait Emitter {
 
     /// Radiance along a ray that left the scene in the unit direction `dir`; zero for lamps.
     fn le(&self, dir: Vec3) -> Spectrum;
+
+    /// Radiance that a camera sees along a ray that left the scene: `le`, or a smoother picture of it where that is a table with steps.
+    #[inline]
+    fn seen(&self, dir: Vec3) -> Spectrum {
+        self.le(dir)
+    }
 
     /// The light as met by a ray, for lights with a place.
     fn hit(&self, origin: Vec3, dir: Vec3) -> Option<LampHit>;

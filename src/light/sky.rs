@@ -6,7 +6,8 @@
 //! Independent Unit Vectors", JCGT 3(2).
 //!
 //! Radiance is constant within a cell (about 1°), so a density proportional to radiance × solid angle of the cell is an exact
-//! table, and the irradiance that the table gives is known and can be set. Zero below the horizon.
+//! table, and the irradiance that the table gives is known and can be set. Zero below the horizon. A camera that looks at the sky sees the table
+//! interpolated between the cells' centres, and below the horizon, where no ground is, the haze on it.
 
 use super::sample::{Emitter, LampHit, LightSample};
 use crate::math::{Spectrum, Vec3, vec3};
@@ -130,6 +131,19 @@ impl Emitter for Sky {
     #[inline]
     fn le(&self, dir: Vec3) -> Spectrum {
         if dir.z < 0.0 { Spectrum::ZERO } else { self.dome.cells[cell_of(to_square(dir))] }
+    }
+
+    fn seen(&self, dir: Vec3) -> Spectrum {
+        let place = to_square(dir.with_z(dir.z.max(0.0))).map(|v| v * SIDE as f32 - 0.5);
+        let [(s0, s1, s), (t0, t1, t)] = place.map(|v| {
+            let index = |v: f32| v.clamp(0.0, (SIDE - 1) as f32) as usize;
+            (index(v.floor()), index(v.floor() + 1.0), v - v.floor())
+        });
+        let row = |t: usize| {
+            let [a, b] = [s0, s1].map(|column| self.dome.cells[t * SIDE + column]);
+            a * (1.0 - s) + b * s
+        };
+        row(t0) * (1.0 - t) + row(t1) * t
     }
 
     #[inline]

@@ -107,7 +107,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
             dome(&mut rings, *d, *r, 1.0);
         }
     }
-    let mesh = tube::rigid(&rings, if stemless { 10 } else { 12 });
+    let mesh = tube::rigid(&rings, tube::sides(radius, if stemless { 10 } else { 12 }, growth.cell()));
     organs.push(Organ {
         kind: OrganKind::Stem,
         leaf: 0,
@@ -140,7 +140,8 @@ pub(super) fn hypocotyl(organs: &mut Vec<Organ>, growth: &Growth<'_>, along: Vec
         rings.push(ring(centre, direction, thick * radius, Profile::Channelled(1.0)));
     }
     dome(&mut rings, along, radius, 0.5);
-    let (mesh, material) = (tube::rigid(&rings, 10), material(&growth.desc.hypocotyl_material));
+    let (mesh, material) =
+        (tube::rigid(&rings, tube::sides(radius, 10, growth.cell())), material(&growth.desc.hypocotyl_material));
     organs.push(Organ { kind: OrganKind::Hypocotyl, leaf: 0, material, mesh, axis: None });
 }
 

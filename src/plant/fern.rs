@@ -4,7 +4,7 @@
 //! plan with pinnules, and each pinnule is cut into lobes with a pointed tip. The ribbons are those of mayweed.
 
 use super::blade::Rest;
-use super::ribbons::{MOST, Ribbons};
+use super::ribbons::{MOST, Ribbons, drawn};
 use super::skeleton::Skeleton;
 use crate::math::{Vec3, lerp, vec3};
 use crate::sampling::Stream;
@@ -22,11 +22,12 @@ struct Limb {
     reach: f32,
 }
 
-/// The rest mesh of a blade with `pairs` of pinnae and `pinnules` pairs on the longest, within `width`.
+/// The rest mesh of a blade with `pairs` of pinnae and `pinnules` pairs on the longest, within `width`, for a mesh whose shortest
+/// cell is `cell` long, metres.
 pub(super) fn blade(
     (pairs, pinnules): (usize, usize),
     segment: f32,
-    width: f32,
+    (width, cell): (f32, f32),
     skeleton: &Skeleton,
     stream: &mut Stream,
 ) -> Rest {
@@ -34,7 +35,8 @@ pub(super) fn blade(
     // Small leaves have fewer, not finer, segments.
     let (pairs, pinnules) = (pairs.min(MOST), pinnules.min(MOST));
     let pairs = pairs.min((length / (2.4 * segment)) as usize).max(1);
-    let mut ribbons = Ribbons { rest: Rest::default(), skeleton, width: segment, count: 0 };
+    let mut ribbons =
+        Ribbons { rest: Rest::default(), skeleton, width: segment, count: 0, drawn: drawn(segment, cell) };
     ribbons.strip(Vec3::ZERO, vec3(0.0, length, 0.0), Vec3::Z, Vec3::ZERO, segment, 2 * pairs.min(8) as u32);
     let whole =
         Limb { start: Vec3::ZERO, along: vec3(0.0, length, 0.0), up: Vec3::Z, pairs, reach: 0.5 * width / length };

@@ -80,6 +80,13 @@ pub(super) struct Growth<'a> {
     pub(super) stream: &'a Stream,
 }
 
+impl Growth<'_> {
+    /// Shortest cell of the plant's meshes, metres.
+    pub(super) fn cell(&self) -> f32 {
+        self.leaves.first().map_or(CELL, |leaf| leaf.cell)
+    }
+}
+
 /// Two neighbouring stages and the way from the first to the second.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Between<'a> {

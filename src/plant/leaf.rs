@@ -19,8 +19,10 @@ use crate::sampling::Stream;
 
 /// Corners round a stalk.
 const SIDES: u32 = 9;
-/// Corners round the stalk of a mesh that is coarser than usual.
-const FEW_SIDES: u32 = 5;
+/// Fewest cells of a blade, along and across.
+const FEWEST: (f64, f64) = (8.0, 4.0);
+/// The same where cells are coarser than usual: a leaf of a few pixels.
+const FEWEST_COARSE: (f64, f64) = (4.0, 2.0);
 /// A midrib never comes nearer to the soil than this, metres, plus [`LYING_WIDTH`] of the blade's width for its hanging
 /// sides: a leaf that would, lies on the soil's crumbs. Near the crown the bound falls to half the crown's height.
 const LYING: f32 = 0.004;
@@ -77,13 +79,13 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
         Shape::Pinnate { pairs, lobes, segment_mm, bare } => {
             let (pairs, lobes) = (pairs.draw(&mut stream) as usize, lobes.draw(&mut stream) as usize);
             let segment = segment_mm.draw32(&mut stream) * 1e-3;
-            let division = Division { pairs, lobes, bare: bare.f32().min(0.9), segment };
+            let division = Division { pairs, lobes, bare: bare.f32().min(0.9), segment, cell: leaf.cell };
             pressed(leaf, ribbons::blade(division, leaf.width, &skeleton, &mut stream))
         }
         Shape::Fern { pairs, pinnules, segment_mm } => {
             let counts = (pairs.draw(&mut stream) as usize, pinnules.draw(&mut stream) as usize);
             let segment = segment_mm.draw32(&mut stream) * 1e-3;
-            pressed(leaf, fern::blade(counts, segment, leaf.width, &skeleton, &mut stream))
+            pressed(leaf, fern::blade(counts, segment, (leaf.width, leaf.cell), &skeleton, &mut stream))
         }
         Shape::Leaflets { .. } => leaflets::blade(leaf, &relief, cells(leaf), &skeleton, &mut stream),
     };
@@ -124,14 +126,23 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
 
 /// Corners round the stalk.
 fn sides(leaf: &LeafNow<'_>) -> u32 {
-    if leaf.cell > CELL { FEW_SIDES } else { SIDES }
+    tube::sides(0.5 * leaf.kind.stalk_width.f32() * leaf.blade, SIDES, leaf.cell)
+}
+
+/// Pieces of a stalk or midrib so long, metres, which has `usual` of them.
+fn pieces(leaf: &LeafNow<'_>, length: f32, usual: u8) -> u8 {
+    if leaf.cell > CELL { ((length / leaf.cell).ceil().min(255.0) as u8).clamp(2, usual) } else { usual }
 }
 
 /// Cells along and across the blade: those of the kind, but none shorter than the leaf's shortest, so that a bud costs little.
 fn cells(leaf: &LeafNow<'_>) -> (usize, usize) {
     let (rows, columns) = (leaf.kind.rows.get(), leaf.kind.columns.get());
-    let fit = f64::from(leaf.blade / leaf.cell).max(8.0).min(rows);
-    (fit.round() as usize, (columns * (fit / rows).sqrt()).round().max(4.0).min(columns) as usize)
+    let fewest = if leaf.cell > CELL { FEWEST_COARSE } else { FEWEST };
+    let fit = f64::from(leaf.blade / leaf.cell).max(fewest.0).min(rows);
+    let across = (columns * (fit / rows).sqrt()).round();
+    // Columns of a coarse blade are as wide as its rows are long.
+    let across = if leaf.cell > CELL { across.min(f64::from(leaf.width / leaf.cell).ceil()) } else { across };
+    (fit.round() as usize, across.max(fewest.1).min(columns) as usize)
 }
 
 fn measures(leaf: &LeafNow<'_>) -> Measures {
@@ -281,8 +292,9 @@ fn stalk(leaf: &LeafNow<'_>, skeleton: &Skeleton, relief: &BladeRelief, lower: L
         profile: Profile::Channelled(top),
     };
     if leaf.stalk > 0.0 {
-        for i in 0..=10 {
-            let s = i as f32 / 10.0;
+        let count = pieces(leaf, leaf.stalk, 10);
+        for i in 0..=count {
+            let s = f32::from(i) / f32::from(count);
             let y = -leaf.stalk * (1.0 - s);
             match lower {
                 Lower::Petiole => {
@@ -308,8 +320,9 @@ fn stalk(leaf: &LeafNow<'_>, skeleton: &Skeleton, relief: &BladeRelief, lower: L
         let wide = if let Lower::Sheath(radius) = lower { tip_radius.min(0.35 * radius) } else { tip_radius };
         let rachis = matches!(leaf.kind.shape, Shape::Leaflets { .. });
         // Without a stalk the rib begins at the stem.
-        for i in u8::from(leaf.stalk > 0.0)..=8 {
-            let s = f32::from(i) / 8.0;
+        let count = pieces(leaf, reach, 8);
+        for i in u8::from(leaf.stalk > 0.0)..=count {
+            let s = f32::from(i) / f32::from(count);
             let r = wide * if rachis { lerp(0.8, 0.5, s) } else { lerp(0.8, 0.06, s.sqrt()) };
             // Sunk so that the blade lies on its flat top.
             rings.push(ring(s * reach, (r, r), -0.2, 0.1 * r));

@@ -6,6 +6,7 @@
 //! the leaves of mayweed do.
 
 use super::blade::Rest;
+use super::growth::CELL;
 use super::skeleton::Skeleton;
 use crate::math::{Vec3, lerp, smoothstep, vec2, vec3};
 use crate::sampling::Stream;
@@ -13,6 +14,11 @@ use std::f32::consts::PI;
 
 /// The most ribbons of one blade: a guard against species files that ask for a million lobes.
 pub(super) const MOST: usize = 600;
+
+/// Least share of the finest ribbons that a coarse mesh draws.
+const LEAST_DRAWN: f32 = 0.12;
+/// Fraction of the golden ratio.
+const GOLDEN: f32 = 0.618_034;
 
 /// A blade of ribbons while it grows.
 pub(super) struct Ribbons<'a> {
@@ -24,6 +30,15 @@ pub(super) struct Ribbons<'a> {
     pub(super) width: f32,
     /// How many ribbons there are.
     pub(super) count: usize,
+    /// Share of the finest ribbons that are drawn, each as many times wider: 1 for all.
+    pub(super) drawn: f32,
+}
+
+/// Share of the finest ribbons that a mesh with such cells draws, of ribbons so wide, metres. Stochastic simplification: where single elements cannot be told
+/// apart, some of them, scaled so that their area stays, show the same. Source: Cook, Halstead, Planck & Ryu 2007, "Stochastic
+/// Simplification of Aggregate Detail", ACM Transactions on Graphics 26(3).
+pub(super) fn drawn(width: f32, cell: f32) -> f32 {
+    if cell > CELL { (2.0 * width / cell).clamp(LEAST_DRAWN, 1.0) } else { 1.0 }
 }
 
 impl Ribbons<'_> {
@@ -45,12 +60,20 @@ impl Ribbons<'_> {
         if self.count > MOST {
             return;
         }
+        let mut wider = 1.0;
+        if pieces == 1 && self.drawn < 1.0 {
+            // Additive recurrence with the golden ratio: which are drawn is spread evenly over the blade.
+            if (self.count as f32 * GOLDEN).fract() >= self.drawn {
+                return;
+            }
+            wider = 1.0 / self.drawn;
+        }
         let right = along.cross(up).normalize_or(Vec3::X);
         let mut previous = None;
         for i in 0..=pieces {
             let s = i as f32 / pieces as f32;
             let centre = start + along * s + bow * (s * s);
-            let half = 0.5 * width(s);
+            let half = 0.5 * wider * width(s);
             let tie = self.skeleton.weights_on_chain(centre.y);
             let first = self.rest.positions.len() as u32;
             for (k, side) in [-1.0_f32, 0.0, 1.0].into_iter().enumerate() {
@@ -117,6 +140,8 @@ pub(super) struct Division {
     pub(super) bare: f32,
     /// Width of a segment, metres.
     pub(super) segment: f32,
+    /// Shortest cell of the mesh, metres.
+    pub(super) cell: f32,
 }
 
 /// Share of the pinnae that a leaf with a long bare rachis lacks.
@@ -125,11 +150,12 @@ const LACKING: f32 = 0.5;
 /// The rest mesh of a divided blade within `width`.
 pub(super) fn blade(division: Division, width: f32, skeleton: &Skeleton, stream: &mut Stream) -> Rest {
     let length = skeleton.length();
-    let Division { pairs, lobes, bare, segment } = division;
+    let Division { pairs, lobes, bare, segment, cell } = division;
     // Small leaves have fewer, not finer, segments.
     let pairs = pairs.min(MOST).min((length * (1.0 - bare) / (1.6 * segment)) as usize).max(1);
     let lobes = lobes.min(MOST).min((0.5 * width / (3.0 * segment)) as usize);
-    let mut ribbons = Ribbons { rest: Rest::default(), skeleton, width: segment, count: 0 };
+    let mut ribbons =
+        Ribbons { rest: Rest::default(), skeleton, width: segment, count: 0, drawn: drawn(segment, cell) };
     let rachis = (Vec3::ZERO, vec3(0.0, length, 0.0), Vec3::Z, Vec3::ZERO);
     ribbons.band(rachis, (2 * pairs.min(12) as u32).max(8), |s| {
         // A thread that widens where the pinnae stand; with few of them the tip is a little blade itself.
@@ -173,7 +199,7 @@ mod tests {
             Skeleton::new(&Measures { stalk: 0.0, stalk_joints: 1, length: 0.02, veins: vec![0.5], secondaries: None });
         for seed in 0..20 {
             for (bare, from) in [(0.5, 0.5), (0.0, 0.05)] {
-                let division = Division { pairs: 3, lobes: 1, bare, segment: 0.001 };
+                let division = Division { pairs: 3, lobes: 1, bare, segment: 0.001, cell: CELL };
                 let mut stream = Stream::of(seed, 0, Purpose::Leaf, 0);
                 let rest = blade(division, 0.008, &skeleton, &mut stream);
                 let wide = rest.positions.iter().filter(|p| p.x.abs() > 0.00051);

@@ -173,7 +173,10 @@ impl Shoots<'_> {
         }
         let (_, _, radius) = nodes.last().copied().unwrap_or((point, along, foot.radius));
         axis::dome(&mut rings, along, radius, 1.0);
-        let (mesh, material) = (tube::rigid(&rings, sides), axis::material(&self.growth.desc.stem_material));
+        let (mesh, material) = (
+            tube::rigid(&rings, tube::sides(radius, sides, self.growth.cell())),
+            axis::material(&self.growth.desc.stem_material),
+        );
         self.organs.push(Organ { kind: OrganKind::Stem, leaf: 0, material, mesh, axis: None });
         nodes
     }

@@ -1,10 +1,16 @@
 //! Tubes: stems, hypocotyls, sheaths and stalks as rings of corners. u runs around, v along from base to tip.
 
 use super::blade::Rest;
+use super::growth::CELL;
 use super::skeleton::Weights;
 use crate::geometry::Mesh;
 use crate::math::{Vec3, vec2};
 use std::f32::consts::{FRAC_1_SQRT_2, TAU};
+
+/// Corners round a tube of a mesh that is coarser than usual.
+const FEW_SIDES: u32 = 5;
+/// The same where the tube is thinner than half of the mesh's cells.
+const FEWEST_SIDES: u32 = 3;
 
 /// The shape of a cross-section.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,6 +34,15 @@ pub(super) struct Ring {
     pub(super) radii: (f32, f32),
     /// Its shape.
     pub(super) profile: Profile,
+}
+
+/// Corners round a tube of a radius, metres, which has `usual` of them in meshes whose cells are no longer than usual.
+pub(super) fn sides(radius: f32, usual: u32, cell: f32) -> u32 {
+    match cell {
+        cell if cell <= CELL => usual,
+        cell if radius < 0.25 * cell => FEWEST_SIDES,
+        _ => FEW_SIDES,
+    }
 }
 
 /// Adds the tube through the rings to a rest mesh. The rings' up × right points along the tube.

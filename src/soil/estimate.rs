@@ -41,7 +41,7 @@ pub fn expected(
 ) -> (Cost, Vec<Expected>) {
     let area = site.area;
     let square = f64::from(area.area());
-    let grid = Grid::new(area, site.grid_m, site.margin_m);
+    let grid = Grid::new(site);
     let (vertices, texels) = ((grid.columns() * grid.rows()) as f64, square / f64::from(texel_m).powi(2));
     let maps =
         Cost::work(vertices * BYTES_PER_VERTEX + texels * BYTES_PER_TEXEL, (vertices + texels) * SECONDS_PER_CELL);

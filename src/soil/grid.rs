@@ -3,11 +3,8 @@
 //! Both axes are split once for the whole grid, so the fine area and its surroundings share every vertex of the border and
 //! no crack can open.
 
-use super::Rect;
+use super::{Rect, Site};
 use crate::math::Vec2;
-
-/// How much longer each step beyond the area is than the one before.
-const GROWTH: f32 = 1.3;
 
 /// The lines across one axis.
 #[derive(Clone, Debug)]
@@ -23,12 +20,13 @@ pub(super) struct Axis {
 }
 
 impl Axis {
-    /// Lines at multiples of `step` from at or below `lo` to at or above `hi`, and on for `margin` to both sides.
-    pub(super) fn new(lo: f32, hi: f32, step: f32, margin: f32) -> Self {
+    /// Lines at multiples of `step` from at or below `lo` to at or above `hi`, and on for `margin` to both sides, each step there `growth` times as long as the one
+    /// before.
+    pub(super) fn new((lo, hi): (f32, f32), step: f32, margin: f32, growth: f32) -> Self {
         let from = (lo / step + 1e-3).floor() as i32;
         let to = ((hi / step - 1e-3).ceil() as i32).max(from + 1);
         let outside: Vec<f32> =
-            std::iter::successors(Some((0.0, step)), |(at, by)| Some((at + by * GROWTH, by * GROWTH)))
+            std::iter::successors(Some((0.0, step)), |(at, by)| Some((at + by * growth, by * growth)))
                 .skip(1)
                 .map(|(at, _)| at)
                 .scan(true, |more, at| std::mem::replace(more, at < margin).then_some(at))
@@ -74,8 +72,9 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    pub(super) fn new(area: Rect, step: f32, margin: f32) -> Self {
-        Self { x: Axis::new(area.x0, area.x1, step, margin), y: Axis::new(area.y0, area.y1, step, margin) }
+    pub(super) fn new(Site { area, grid_m, margin_m, growth, .. }: &Site) -> Self {
+        let axis = |lo, hi| Axis::new((lo, hi), *grid_m, *margin_m, *growth);
+        Self { x: axis(area.x0, area.x1), y: axis(area.y0, area.y1) }
     }
 
     /// The even part: the area asked for, widened to whole steps.
@@ -133,15 +132,17 @@ mod tests {
     #[test]
     fn lines_ascend_and_reach_the_margin() {
         for (lo, hi, step, margin) in [(-0.3, 0.3, 0.001, 1.5), (0.0, 0.0101, 0.01, 0.0), (1.0, 1.5, 0.0008, 0.4)] {
-            let axis = Axis::new(lo, hi, step, margin);
-            assert!(axis.at.windows(2).all(|w| w[1] > w[0]));
-            assert!(axis.at[0] <= lo - margin + 1e-5 && axis.at[axis.at.len() - 1] >= hi + margin - 1e-5);
-            let (a, b) = axis.ends();
-            assert!(a <= lo + 1e-5 && b >= hi - 1e-5 && b - a < hi - lo + 2.1 * step);
-            for x in [lo, hi, 0.5 * (lo + hi), lo - 0.5 * margin, hi + 0.9 * margin] {
-                let (i, t) = axis.locate(x);
-                let back = axis.at[i] + t * (axis.at[i + 1] - axis.at[i]);
-                assert!((back - x).abs() < 1e-5 || margin == 0.0, "{x} {back}");
+            for growth in [1.3, 1.04] {
+                let axis = Axis::new((lo, hi), step, margin, growth);
+                assert!(axis.at.windows(2).all(|w| w[1] > w[0]));
+                assert!(axis.at[0] <= lo - margin + 1e-5 && axis.at[axis.at.len() - 1] >= hi + margin - 1e-5);
+                let (a, b) = axis.ends();
+                assert!(a <= lo + 1e-5 && b >= hi - 1e-5 && b - a < hi - lo + 2.1 * step);
+                for x in [lo, hi, 0.5 * (lo + hi), lo - 0.5 * margin, hi + 0.9 * margin] {
+                    let (i, t) = axis.locate(x);
+                    let back = axis.at[i] + t * (axis.at[i + 1] - axis.at[i]);
+                    assert!((back - x).abs() < 1e-5 || margin == 0.0, "{x} {back}");
+                }
             }
         }
     }

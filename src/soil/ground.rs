@@ -99,10 +99,10 @@ impl Ground {
         stream: &Stream,
     ) -> Result<Self> {
         check(desc, maps.len(), site)?;
-        let relief = Relief::new(&desc.relief, site.rows, stream);
+        let relief = Relief::new(&desc.relief, *site, stream);
         let blend = Blend::new(&desc.blend, &desc.layers, stream).with_crust(desc.crust);
         let law = Law::new(&desc.clods, stream);
-        let grid = Grid::new(site.area, site.grid_m, site.margin_m);
+        let grid = Grid::new(site);
         let mut ground = Self {
             heights: Vec::with_capacity(grid.columns() * grid.rows()),
             slopes: Vec::new(),
@@ -311,7 +311,8 @@ impl Ground {
     /// the ground it is the ground without them, as fine as 4 mm whatever the grid: plants stand as they do in full detail.
     pub fn stance<L: LayerMaps>(&self, maps: &[L], x: f32, y: f32, radius: f32) -> (f32, Vec3) {
         let Sizes { drawn, .. } = self.sizes;
-        if drawn.0 >= drawn.1 {
+        // Beyond the fine grid it stands on what is there: cells as long as a row is wide do not follow its profile.
+        if drawn.0 >= drawn.1 || !self.area().contains(vec2(x, y)) {
             return (self.height(x, y), self.trend(x, y, radius));
         }
         let height = |x: f32, y: f32| {

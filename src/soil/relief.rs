@@ -5,7 +5,7 @@
 
 use super::record::{ReliefRecord, RowReliefRecord};
 use super::wheel::Wheel;
-use super::{ReliefDesc, SeedRows};
+use super::{ReliefDesc, Site};
 use crate::math::{Vec2, smoothstep, vec2};
 use crate::sampling::{Purpose, Stream};
 use crate::texture::noise::Perlin;
@@ -24,6 +24,8 @@ pub(super) struct Relief {
     gain: f32,
     longest: f32,
     tilt: Vec2,
+    /// How far from the origin it is tilted; level from there on, metres.
+    level_m: f32,
     rows: Option<Rows>,
     wheels: Vec<Wheel>,
     /// What was drawn.
@@ -43,7 +45,7 @@ struct Rows {
 }
 
 impl Relief {
-    pub(super) fn new(desc: &ReliefDesc, rows: Option<SeedRows>, stream: &Stream) -> Self {
+    pub(super) fn new(desc: &ReliefDesc, Site { rows, level_m, .. }: Site, stream: &Stream) -> Self {
         let child = |k| stream.child(Purpose::Soil, k);
         let hurst = desc.hurst.draw32(&mut child(1));
         let gain = 2f32.powf(-hurst);
@@ -70,6 +72,7 @@ impl Relief {
             gain,
             longest,
             tilt,
+            level_m,
             rows: seeded.zip(row.as_ref()).map(|(r, row)| Rows {
                 across: vec2(r.azimuth.cos(), -r.azimuth.sin()),
                 offset: r.offset_m,
@@ -95,7 +98,8 @@ impl Relief {
     /// Height at `p`, leaving out what is finer than two cells.
     pub(super) fn height(&self, p: Vec2, cell: f32) -> f32 {
         let tracks: f32 = self.wheels.iter().map(|w| w.height(p)).sum();
-        self.tilt.dot(p) + self.left(p) * (self.fbm(p, cell) + self.row(p)) + tracks
+        let tilted = p * (self.level_m / p.length().max(f32::MIN_POSITIVE)).min(1.0);
+        self.tilt.dot(tilted) + self.left(p) * (self.fbm(p, cell) + self.row(p)) + tracks
     }
 
     /// Share of roughness and of clods that wheels have left.
@@ -139,7 +143,7 @@ impl Relief {
 mod tests {
     use super::*;
     use crate::ron_file::Vary;
-    use crate::soil::RowReliefDesc;
+    use crate::soil::{Rect, RowReliefDesc, SeedRows};
 
     fn desc(rms_mm: f64) -> ReliefDesc {
         ReliefDesc {
@@ -151,10 +155,15 @@ mod tests {
         }
     }
 
+    fn site(rows: Option<SeedRows>) -> Site {
+        let area = Rect::new(0.0, 0.0, 1.0, 1.0);
+        Site { area, grid_m: 0.001, margin_m: 0.0, growth: 1.3, level_m: f32::INFINITY, smallest_mm: 0.0, rows }
+    }
+
     #[test]
     fn rms_height_is_the_one_asked_for() {
         for (seed, rms) in [(1, 4.0), (2, 9.0), (3, 30.0)] {
-            let relief = Relief::new(&desc(rms), None, &Stream::of(seed, 0, Purpose::Test, 0));
+            let relief = Relief::new(&desc(rms), site(None), &Stream::of(seed, 0, Purpose::Test, 0));
             let heights: Vec<f32> = (0..40_000)
                 .map(|k| relief.height(vec2((k % 200) as f32 * 0.0437, (k / 200) as f32 * 0.0391), 0.0005))
                 .collect();
@@ -167,7 +176,7 @@ mod tests {
     #[test]
     fn the_seed_row_lies_deeper_than_its_shoulders() {
         let rows = SeedRows { spacing_m: 0.5, azimuth: 0.3, offset_m: 0.1 };
-        let mut relief = Relief::new(&desc(0.0), Some(rows), &Stream::of(1, 0, Purpose::Test, 0));
+        let mut relief = Relief::new(&desc(0.0), site(Some(rows)), &Stream::of(1, 0, Purpose::Test, 0));
         relief.rows.iter_mut().for_each(|r| r.wander = 0.0);
         let across = vec2(rows.azimuth.cos(), -rows.azimuth.sin());
         for row in -3..3 {

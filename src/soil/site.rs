@@ -25,6 +25,10 @@ pub struct Site {
     pub grid_m: f32,
     /// How far the coarse ground goes on beyond the area, for low suns and light that bounces.
     pub margin_m: f32,
+    /// How much longer each of its cells is than the one before, above 1.
+    pub growth: f32,
+    /// How far from the world's origin the ground may be tilted, metres: level beyond, so that it ends at the horizon. Infinite where it need not.
+    pub level_m: f32,
     /// Length of the smallest aggregates that are told from the ground, mm; those up to three times as long are drawn into its heights, even
     /// where the soil makes bodies of them. 0: as the soil says.
     pub smallest_mm: f32,

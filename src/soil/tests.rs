@@ -33,7 +33,15 @@ fn page() -> SoilDesc {
 }
 
 fn site(size: f32) -> Site {
-    Site { area: Rect::new(-size, -size, size, size), grid_m: 0.001, margin_m: 0.5, smallest_mm: 0.0, rows: None }
+    Site {
+        area: Rect::new(-size, -size, size, size),
+        grid_m: 0.001,
+        margin_m: 0.5,
+        growth: 1.3,
+        level_m: f32::INFINITY,
+        smallest_mm: 0.0,
+        rows: None,
+    }
 }
 
 fn stream() -> Stream {
@@ -266,7 +274,15 @@ fn a_seedbed_stays_within_its_budget_and_keeps_stems_clear() {
     page.clods.over_5mm_per_m2 = Vary::fixed(12000.0);
     page.clods.exponent = Vary::fixed(3.3);
     let maps = [Plain { albedo: [0.2, 0.15, 0.1], height: 0.5 }];
-    let site = Site { area: Rect::new(0.0, 0.0, 0.3, 0.2), grid_m: 0.001, margin_m: 0.1, smallest_mm: 0.0, rows: None };
+    let site = Site {
+        area: Rect::new(0.0, 0.0, 0.3, 0.2),
+        grid_m: 0.001,
+        margin_m: 0.1,
+        growth: 1.3,
+        level_m: f32::INFINITY,
+        smallest_mm: 0.0,
+        rows: None,
+    };
     let ground = Ground::new(&page, &[], &maps, &site, &stream()).unwrap();
     let stem = vec2(0.15, 0.1);
     let mut canopy = Canopy::none(&ground);

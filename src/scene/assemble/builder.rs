@@ -1,5 +1,6 @@
 //! What a field is built with, and of.
 
+use super::ground_view::GroundView;
 use super::lighting::Lighting;
 use super::options::Options;
 use super::season::Season;
@@ -39,6 +40,8 @@ pub(super) struct Builder<'a> {
     pub(super) scene: Scene,
     /// The images that are taken of it.
     pub(super) captures: Vec<Capture>,
+    /// The ground in each of them, once it was looked at.
+    pub(super) seen: Vec<GroundView>,
     /// What the parts of the ground are, in the order of the parts.
     pub(super) ground: Vec<PartKind>,
     /// What the plants' parts are, in the order of the parts.

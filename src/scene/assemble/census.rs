@@ -5,6 +5,9 @@ use crate::ron_file::{RonFile, Step};
 use crate::{Error, Result};
 use std::ops::Range;
 
+/// The most places for plants of one population that are looked at where those beside the view are left out: a second's work.
+const MOST_PLACES: f64 = 4e6;
+
 /// Where in a scene file plants come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Population {
@@ -36,13 +39,17 @@ impl Population {
 /// Counts plants population by population.
 pub(super) struct Census<'a> {
     page: &'a RonFile,
+    /// The most places that are looked at for one population.
+    most_places: f64,
     /// Populations in order, each with the number of plants before it.
     begun: Vec<(Population, usize)>,
 }
 
 impl<'a> Census<'a> {
-    pub(super) fn new(page: &'a RonFile) -> Self {
-        Self { page, begun: Vec::new() }
+    /// For plants of which labels must be able to number all that stand in places which are looked at; with `culled`, of which most stand beside the view.
+    pub(super) fn new(page: &'a RonFile, culled: bool) -> Self {
+        let most_places = if culled { MOST_PLACES } else { 2.0 * MOST_PLANTS as f64 };
+        Self { page, most_places, begun: Vec::new() }
     }
 
     /// Begins the next population, with so many plants before it and about so many places for its own. Refuses what labels cannot
@@ -51,7 +58,7 @@ impl<'a> Census<'a> {
         self.close(before)?;
         self.begun.push((population, before));
         // An expected number may be missed; one far beyond the limit may not.
-        if places <= 2.0 * MOST_PLANTS as f64 {
+        if places <= self.most_places {
             return Ok(());
         }
         Err(self.refusal(population, places.ceil() + before as f64))

@@ -5,6 +5,7 @@ use super::builder::Builder;
 use super::census::Population;
 use super::preview::Counted;
 use super::seedling::{Place, Seedling, grow};
+use super::view::View;
 use crate::Result;
 use crate::film::Pixel;
 use crate::geometry::Cost;
@@ -13,7 +14,7 @@ use crate::optics::soil::LOESS;
 use crate::plant::most_triangles;
 use crate::ron_file::Step;
 use crate::scene::estimate::{Estimate, Share};
-use crate::soil::{Expected, Rect};
+use crate::soil::Expected;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -31,8 +32,8 @@ const TRIED: f64 = 2e7;
 const SECONDS_PER_TRIANGLE: f64 = 2e-6;
 
 impl Builder<'_> {
-    /// What the field takes whose camera sees this ground; `open` where it sees more.
-    pub(super) fn estimate(&mut self, view: Rect, open: bool) -> Result<Estimate> {
+    /// What the field takes whose cameras see this ground.
+    pub(super) fn estimate(&mut self, view: View) -> Result<Estimate> {
         let camera = &self.scene.camera;
         let pixels = f64::from(camera.width()) * f64::from(camera.height());
         let film = Cost::work(pixels * (size_of::<Pixel>() as f64 + BYTES_BESIDE), pixels * SECONDS_PER_PIXEL);
@@ -43,7 +44,7 @@ impl Builder<'_> {
         };
         add(&[Step::Field("camera"), Step::Field("size")], film, "make the image smaller, with --width");
         if let Some(soil) = &self.desc.soil {
-            let (bare, all) = self.expected_soil(soil, view, open);
+            let (bare, all) = self.expected_soil(soil, view);
             add(
                 &[Step::Field("camera")],
                 bare,
@@ -53,12 +54,12 @@ impl Builder<'_> {
                 add(&[&[Step::Field("soil")], &at[..]].concat(), cost, &format!("{advice}, or lower the camera"));
             }
         }
-        let (seedlings, populations) = self.seedlings(view.grown(PLANT_MARGIN), &[])?;
-        let (cell, mut counted) = (self.cell(), Vec::new());
+        let (seedlings, populations) = self.seedlings(view.area.grown(PLANT_MARGIN), &[])?;
+        let mut counted = Vec::new();
         for (population, range) in populations {
             let (at, advice) = population.place();
             let number = range.len();
-            let some = self.count(&seedlings, population, range, cell);
+            let some = self.count(&seedlings, population, range);
             add(&at, expected(&some, number), &format!("{advice}, or lower the camera"));
             counted.extend(some);
         }
@@ -73,13 +74,14 @@ impl Builder<'_> {
         }
         Ok(Estimate { shares })
     }
-    /// The sizes of some plants of a population, meshed with such cells, which are grown for it. Not grown is what might itself be too large.
-    fn count(&self, seedlings: &[Seedling], population: Population, range: Range<usize>, cell: f32) -> Vec<Counted> {
+    /// The sizes of some plants of a population, which are grown for it. Not grown is what might itself be too large.
+    fn count(&self, seedlings: &[Seedling], population: Population, range: Range<usize>) -> Vec<Counted> {
         let number = range.len();
         let most = if population == Population::Placed { LOOKED_AT_PLACED } else { LOOKED_AT };
         let tried = number.min(most);
         let samples = (0..tried).into_par_iter().map(|k| {
             let seedling = &seedlings[range.start + (2 * k + 1) * number / (2 * tried)];
+            let cell = self.cell(seedling.position);
             let known = self.options.preview.as_ref().and_then(|preview| preview.counted(seedling, cell));
             Counted { seedling: seedling.clone(), cell, size: known.unwrap_or_else(|| size(seedling, cell)) }
         });

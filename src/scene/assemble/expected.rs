@@ -1,7 +1,6 @@
 //! What is known of a field before it grows: its warnings, and how many plants are to be expected in its view, from its densities alone.
 
 use super::builder::Builder;
-use super::view::View;
 use super::{Options, Source};
 use crate::Result;
 use crate::sampling::Purpose;
@@ -19,9 +18,9 @@ impl Source {
     pub fn foretold(&self, options: &Options) -> Result<Vec<String>> {
         self.ask(options, |builder| {
             // What cannot be used is refused before anything is told.
-            let View { area, open } = builder.looked_at()?;
+            let view = builder.looked_at()?;
             if let Some(soil) = &self.desc.soil {
-                builder.soil(soil, area, open)?;
+                builder.soil(soil, view)?;
             }
             for model in &self.desc.models {
                 builder.library.model(&self.page, model)?;
@@ -60,5 +59,10 @@ fn expected_plants(builder: &mut Builder<'_>) -> Result<f64> {
         .zip(1000..)
         .map(|(weed, k)| f64::from(WeedsRecord::draw(&weed.spread, &builder.stream(Purpose::Scatter, k)).per_m2));
     let per_m2: f64 = crops.chain(weeds).sum();
-    Ok(placed + per_m2 * f64::from(builder.view()?.area.area()))
+    let view = builder.view()?;
+    let area = match &builder.seen[..] {
+        [seen] if view.is_graded() => seen.area(),
+        _ => view.area.area(),
+    };
+    Ok(placed + per_m2 * f64::from(area))
 }

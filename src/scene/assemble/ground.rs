@@ -8,7 +8,7 @@ use super::view::View;
 use crate::bsdf::{Bsdf, OrenNayar};
 use crate::geometry::{Cost, Mesh};
 use crate::material::{BakedGround, Ground as GroundMaterial, Material, Solid};
-use crate::math::Spectrum;
+use crate::math::{Spectrum, Vec2};
 use crate::ron_file::{Step, Vary};
 use crate::sampling::Purpose;
 use crate::sampling::rng::mix;
@@ -29,6 +29,10 @@ const GROUND_MARGIN: f32 = 0.04;
 const GROUND_REACH: f32 = 2.5;
 /// How far it goes on where the camera sees ground beyond the planted area: to what is nearly the horizon.
 const OPEN_REACH: f32 = 200.0;
+/// How much longer each of its cells is than the one before.
+const GROWTH: f32 = 1.3;
+/// The same where plants stand on it: cells are about as long as a pixel shows of ground that is seen from the side.
+const GROWTH_BY_PIXEL: f32 = 1.06;
 /// About the most cells of the fine ground: a larger view has larger ones.
 const MOST_CELLS: f32 = 1.5e7;
 /// About the most texels of the ground's maps: a larger view has larger ones.
@@ -52,10 +56,10 @@ impl Builder<'_> {
     pub(super) fn cultivate(
         &mut self,
         desc: &SoilDesc,
-        View { area: view, open }: View,
+        view: View,
         shown: Option<Rect>,
     ) -> Result<(Vec<PlantRecord>, SoilRecord)> {
-        let soil = self.soil(desc, view, open)?;
+        let soil = self.soil(desc, view)?;
         let options = self.options;
         let preview = options.preview.as_ref();
         let known = preview.and_then(|preview| preview.bed(&soil));
@@ -77,7 +81,7 @@ impl Builder<'_> {
             },
             || {
                 let taken: Vec<Disc> = earth.stones.iter().map(|s| (s.centre.truncate(), s.radius)).collect();
-                let (seedlings, _) = self.seedlings(view.grown(PLANT_MARGIN), &taken)?;
+                let (seedlings, _) = self.seedlings(view.area.grown(PLANT_MARGIN), &taken)?;
                 // Plants first: what grows moves the clods, not the other way round.
                 let plants = self.populate(&seedlings, Some(floor), shown)?;
                 let meshes = || self.scene.parts.iter().map(|part| part.mesh.clone()).collect();
@@ -99,14 +103,14 @@ impl Builder<'_> {
     }
 
     /// What the ground follows from.
-    pub(super) fn soil(&mut self, desc: &SoilDesc, view: Rect, open: bool) -> Result<Soil> {
+    pub(super) fn soil(&mut self, desc: &SoilDesc, view: View) -> Result<Soil> {
         let mut maps: Vec<Arc<Layer>> = Vec::new();
         for layer in &desc.layers {
             maps.push(self.library.layer(self.page, layer)?);
         }
         let mut read = |file: &str| self.library.soil_spectrum(self.page, file);
         let colors = desc.colors.iter().map(|color| color.reflectance(&mut read)).collect::<Result<Vec<Spectrum>>>()?;
-        let (site, texel, of) = (self.site(view, open), self.texel(view), (self.seed, self.index));
+        let (site, texel, of) = (self.site(view), self.texel(view), (self.seed, self.index));
         Ok(Soil { desc: self.weathered(desc), colors, maps, site, texel, of })
     }
 
@@ -132,29 +136,37 @@ impl Builder<'_> {
     }
 
     /// Which piece of ground is made, and how finely.
-    pub(super) fn site(&self, view: Rect, open: bool) -> Site {
+    pub(super) fn site(&self, view: View) -> Site {
         let pixel = self.soil_pixel();
+        let [cells, _, things] = coarser(view);
         let rows = self.sown.clone().next().map(|k| {
             let rows = Rows::draw(&self.desc.crops[k].rows, &self.stream(Purpose::Scatter, k as u64));
             SeedRows { spacing_m: rows.spacing_m, azimuth: rows.azimuth, offset_m: rows.offset_m }
         });
         let (coarsest, smallest_mm) = match self.desc.detail {
             Detail::Full => (4e-3, 0.0),
-            Detail::ByPixel => (f32::INFINITY, 1e3 * pixel),
+            Detail::ByPixel => (f32::INFINITY, 1e3 * things * pixel),
         };
         Site {
-            area: view.grown(GROUND_MARGIN),
-            grid_m: (2.5 * pixel).clamp(8e-4, coarsest).max((view.area() / MOST_CELLS).sqrt()),
-            margin_m: if open { OPEN_REACH } else { GROUND_REACH },
+            area: view.near.grown(GROUND_MARGIN),
+            grid_m: (2.5 * cells * pixel).clamp(8e-4, coarsest).max((view.near.area() / MOST_CELLS).sqrt()),
+            margin_m: if view.open { OPEN_REACH } else { GROUND_REACH + beyond(view) },
+            growth: if view.is_graded() { GROWTH_BY_PIXEL } else { GROWTH },
+            level_m: if view.is_graded() {
+                view.near.corners().map(Vec2::length).into_iter().fold(0.0, f32::max)
+            } else {
+                f32::INFINITY
+            },
             smallest_mm,
             rows,
         }
     }
 
     /// Side of a texel of the ground's maps, metres.
-    pub(super) fn texel(&self, view: Rect) -> f32 {
+    pub(super) fn texel(&self, view: View) -> f32 {
         let coarsest = if self.desc.detail == Detail::Full { 2e-3 } else { f32::INFINITY };
-        (0.9 * self.soil_pixel()).clamp(2e-4, coarsest).max((view.area() / MOST_TEXELS).sqrt())
+        let [_, texels, _] = coarser(view);
+        (0.9 * texels * self.soil_pixel()).clamp(2e-4, coarsest).max((view.near.area() / MOST_TEXELS).sqrt())
     }
 
     /// Side of the pixels that the ground is made for, metres.
@@ -163,10 +175,10 @@ impl Builder<'_> {
     }
 
     /// What the ground and each thing on it take, before any of it is made.
-    pub(super) fn expected_soil(&self, desc: &SoilDesc, view: Rect, open: bool) -> (Cost, Vec<Expected>) {
+    pub(super) fn expected_soil(&self, desc: &SoilDesc, view: View) -> (Cost, Vec<Expected>) {
         let streams = [(Purpose::Soil, 0), (Purpose::Debris, STONES), (Purpose::Debris, LITTER)];
         let streams = streams.map(|(purpose, index)| self.stream(purpose, index));
-        soil::expected(desc, &self.site(view, open), self.texel(view), streams.each_ref())
+        soil::expected(desc, &self.site(view), self.texel(view), streams.each_ref())
     }
 
     /// The ground as it was drawn.
@@ -199,6 +211,18 @@ impl Builder<'_> {
         self.scene.materials.extend(laid.materials.iter().cloned());
         self.ground.extend(&laid.kinds);
     }
+}
+
+/// How many times as large as the smallest pixels need them the ground's cells, its texels and the smallest aggregates are made: where pixels grow with the
+/// distance, most of them are several times as large.
+fn coarser(view: View) -> [f32; 3] {
+    if view.is_graded() { [1.5, 2.0, 3.0] } else { [1.0; 3] }
+}
+
+/// How far the view goes on beyond its ground of even cells, metres.
+fn beyond(view: View) -> f32 {
+    let ([lo, hi], [a, b]) = (view.area.corners(), view.near.corners());
+    (a - lo).max(hi - b).max_element().max(0.0)
 }
 
 /// What the ground shows.

@@ -8,6 +8,7 @@ mod estimate;
 mod expected;
 mod field;
 mod ground;
+mod ground_view;
 mod grown;
 mod identity;
 mod individual;
@@ -163,8 +164,8 @@ impl Source {
     /// What field `options.index` takes, before it grows.
     pub fn estimate(&self, options: &Options) -> Result<Estimate> {
         self.ask(options, |builder| {
-            let View { area, open } = builder.looked_at()?;
-            builder.estimate(area, open)
+            let view = builder.looked_at()?;
+            builder.estimate(view)
         })
     }
 }
@@ -223,6 +224,7 @@ impl<'a> Builder<'a> {
             lighting,
             scene,
             captures,
+            seen: Vec::new(),
             ground: Vec::new(),
             organs: Vec::new(),
             warnings,
@@ -244,15 +246,24 @@ impl<'a> Builder<'a> {
         first.filter_map(|capture| side(&capture.camera)).reduce(f32::min).unwrap_or(1e-3)
     }
 
-    /// Shortest cell of the plants' meshes, metres: in a preview as many of its pixels as the usual one has of a field camera's.
-    fn cell(&self) -> f32 {
+    /// Shortest cell of the mesh of a plant at a place, metres: in a preview as many of its pixels as the usual one has of a field camera's.
+    fn cell(&self, at: Vec2) -> f32 {
         let usual = GrowOptions::default().cell;
         let by_pixel = match self.desc.detail {
             _ if self.options.preview.is_some() => 4.0 * self.ground_pixel(),
-            Detail::ByPixel => 1.5 * self.finest_pixel(),
+            Detail::ByPixel => 1.5 * self.pixel_at(at),
             Detail::Full => 0.0,
         };
         usual.max(by_pixel)
+    }
+
+    /// Side of the smallest pixel on a plant at a place in any image, metres, across the line of sight.
+    fn pixel_at(&self, at: Vec2) -> f32 {
+        let side = |camera: &Camera| {
+            let distance = camera.pose().position.distance(at.extend(0.0)) - PLANT_MARGIN;
+            distance.max(0.0) * camera.pixel_angle()
+        };
+        self.captures.iter().map(|capture| side(&capture.camera)).reduce(f32::min).unwrap_or(1e-3)
     }
 
     /// Side of the smallest pixel on the ground in any image, metres; 1 mm where no camera looks down.
@@ -275,7 +286,7 @@ impl<'a> Builder<'a> {
     fn build(mut self) -> Result<(Field, Library)> {
         let view = self.looked_at()?;
         let memory = self.options.memory.unwrap_or_else(usual_memory);
-        self.estimate(view.area, view.open)?.check(memory).map_err(|(at, error)| self.page.blame(&at, error))?;
+        self.estimate(view)?.check(memory).map_err(|(at, error)| self.page.blame(&at, error))?;
         let shown = self.has_ground().then_some(view.area);
         self.warn_of_camera();
         self.warn_of_plants()?;
@@ -359,13 +370,16 @@ impl<'a> Builder<'a> {
         let mut all = Vec::new();
         let area = area.corners();
         let (desc, page) = (self.desc, self.page);
-        let mut census = Census::new(page);
+        let mut census = Census::new(page, desc.detail == Detail::ByPixel);
         for k in self.sown.clone() {
             let crop = &desc.crops[k];
             let species = self.library.species(page, &crop.species)?;
             let places = scatter::rows_looked_at(&crop.rows, area, &self.stream(Purpose::Scatter, k as u64));
             census.open(Population::Crop(k), places, all.len())?;
             for spot in scatter::rows(&crop.rows, area, stones, &self.stream(Purpose::Scatter, k as u64)) {
+                if !self.may_be_seen(spot.at) {
+                    continue;
+                }
                 let seedling = self.seedling(&species, &crop.growth, spot, 1 + k as u64);
                 all.push(seedling.tended(&crop.vigour, crop.condition.as_ref()));
             }
@@ -375,6 +389,9 @@ impl<'a> Builder<'a> {
             let places = scatter::weeds_looked_at(&weed.spread, area, &self.stream(Purpose::Scatter, 1000 + k as u64));
             census.open(Population::Weed(k), places, all.len())?;
             for spot in scatter::weeds(&weed.spread, area, stones, &self.stream(Purpose::Scatter, 1000 + k as u64)) {
+                if !self.may_be_seen(spot.at) {
+                    continue;
+                }
                 let seedling = self.seedling(&species, &weed.growth, spot, 1001 + k as u64);
                 all.push(seedling.tended(&weed.vigour, weed.condition.as_ref()));
             }
@@ -437,7 +454,8 @@ impl<'a> Builder<'a> {
         floor: Option<Floor<'_>>,
         view: Option<Rect>,
     ) -> Result<Vec<PlantRecord>> {
-        let (dust, cell, options) = (self.dust()?, self.cell(), self.options);
+        let (dust, options) = (self.dust()?, self.options);
+        let cell = |at: Vec2| self.cell(at);
         // Grown to know its size, left bare where neither it nor its shadow reaches the view.
         let reaches = |plant: &PlantRecord| {
             let reach = plant.radius + SHADOW * plant.height;
@@ -447,7 +465,7 @@ impl<'a> Builder<'a> {
             options.wanted()?;
             let Vec2 { x, y } = seedling.position;
             let (height, normal) = floor.map_or((0.0, Vec3::Z), |f| f.stance(x, y));
-            let place = Place { height, normal, dust, cell };
+            let place = Place { height, normal, dust, cell: cell(seedling.position) };
             let known = options.preview.as_ref().and_then(|preview| preview.plant(seedling, &place));
             let known = known.filter(|known| known.organs.is_some() || !reaches(&known.record));
             Ok(known.unwrap_or_else(|| {

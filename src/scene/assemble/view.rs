@@ -5,8 +5,10 @@
 //! so in its warnings, with the share of the ground in view that this is. Where it is more than half, the scene is refused.
 
 use super::builder::{Builder, FARTHEST};
+use super::ground_view::GroundView;
 use crate::math::{Vec2, Vec3, vec2};
 use crate::ron_file::Step;
+use crate::scene::desc::Detail;
 use crate::sensor::Camera;
 use crate::soil::Rect;
 use crate::{Error, Result};
@@ -19,26 +21,50 @@ const HORIZON: f32 = 0.05;
 const RAYS: usize = 24;
 /// Share of bare ground from which on a scene is refused.
 const TOO_BARE: f32 = 0.5;
+/// Where detail is by pixel, how many times as far as the nearest ground in an image the ground is made of even cells; they grow beyond. Pixels there are
+/// as many times as large, and clods of some centimetres a few of them long.
+const NEAR: f32 = 4.5;
+/// Where detail is by pixel, how far beside what is seen plants are grown, metres: as far as a plant of 0.5 m throws its shadow, with the room in which
+/// others lean in.
+const SIDEWAYS: f32 = 1.75;
 
 /// The ground that a camera sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct View {
     /// What of it is planted, about the plane z = 0, metres.
     pub(super) area: Rect,
+    /// What of that has ground of even cells, and things on it: all, unless detail is by pixel and much of it is far away.
+    pub(super) near: Rect,
     /// Whether the camera sees ground beyond it.
     pub(super) open: bool,
 }
 
 impl View {
     /// That of a scene in which nothing grows.
-    pub(super) const NONE: Self = Self { area: Rect::new(-0.5, -0.5, 0.5, 0.5), open: false };
+    pub(super) const NONE: Self = Self::even(Rect::new(-0.5, -0.5, 0.5, 0.5), false);
+
+    /// A view whose ground is made of even cells.
+    const fn even(area: Rect, open: bool) -> Self {
+        Self { area, near: area, open }
+    }
+
+    /// Whether cells of the ground grow with the distance.
+    pub(super) fn is_graded(&self) -> bool {
+        self.near != self.area
+    }
 
     /// The least rectangle that holds both.
     fn join(self, other: Self) -> Self {
-        let ([lo, hi], [a, b]) = (self.area.corners(), other.area.corners());
-        let (lo, hi) = (lo.min(a), hi.max(b));
-        Self { area: Rect::new(lo.x, lo.y, hi.x, hi.y), open: self.open || other.open }
+        let (area, near) = (around(self.area, other.area), around(self.near, other.near));
+        Self { area, near, open: self.open || other.open }
     }
+}
+
+/// The least rectangle that holds both.
+fn around(a: Rect, b: Rect) -> Rect {
+    let ([lo, hi], [c, d]) = (a.corners(), b.corners());
+    let (lo, hi) = (lo.min(c), hi.max(d));
+    Rect::new(lo.x, lo.y, hi.x, hi.y)
 }
 
 /// Where a ray meets the plane z = 0: at a place, or where it says that it sees the horizon; `None` for a ray above it.
@@ -51,6 +77,7 @@ impl Builder<'_> {
     pub(super) fn view(&mut self) -> Result<View> {
         let cameras: Vec<Camera> = self.captures.iter().map(|capture| capture.camera).collect();
         let mut whole: Option<View> = None;
+        self.seen.clear();
         for camera in &cameras {
             let view = self.view_of(camera, whole.is_some_and(|before| before.open))?;
             whole = Some(whole.map_or(view, |before| before.join(view)));
@@ -111,12 +138,15 @@ impl Builder<'_> {
         let (lo, hi) = (all[0].max(below - Vec2::splat(reach)), all[1].min(below + Vec2::splat(reach)));
         // Rows' corners are seen in the middle of their exposures.
         let area = Rect::new(lo.x, lo.y, hi.x, hi.y).grown(camera.travel());
+        let near = self.near(camera, area);
+        // What stands between the camera and the nearest ground that it sees may be tall.
+        self.seen.push(GroundView::around(seen.iter().chain(&level).copied().chain([below])));
         if level.is_empty() && [lo, hi] == all {
-            return Ok(View { area, open: false });
+            return Ok(View { area, near, open: false });
         }
         let (bare, farthest) = beyond(camera, area, below);
         if bare <= 0.0 {
-            return Ok(View { area, open: false });
+            return Ok(View { area, near, open: false });
         }
         let far = if level.is_empty() { format!("{farthest:.0} m away") } else { "to the horizon".into() };
         let words = format!(
@@ -131,24 +161,61 @@ impl Builder<'_> {
         if !told {
             self.warnings.push(format!("{words}; {help}"));
         }
-        Ok(View { area, open: true })
+        Ok(View { area, near, open: true })
     }
+}
+
+impl Builder<'_> {
+    /// What of a camera's ground is made of even cells.
+    fn near(&self, camera: &Camera, area: Rect) -> Rect {
+        if self.desc.detail == Detail::Full {
+            return area;
+        }
+        let seen: Vec<(Vec2, f32)> = raster(camera)
+            .filter_map(|(origin, direction)| Some((meets(origin, direction)?, origin.z / -direction.z)))
+            .filter(|(at, _)| area.contains(*at))
+            .collect();
+        let nearest = seen.iter().map(|(_, distance)| *distance).fold(f32::INFINITY, f32::min);
+        let (mut near, mut far) = (Vec::new(), false);
+        for (at, distance) in seen {
+            if distance <= NEAR * nearest {
+                near.push(at);
+            } else {
+                far = true;
+            }
+        }
+        if !far {
+            return area;
+        }
+        let (lo, hi) = near.into_iter().fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
+        Rect::new(lo.x, lo.y, hi.x, hi.y)
+    }
+
+    /// Whether a plant at a place may be seen, or may throw a shadow on what is; with `detail: Full`, whether it stands in the rectangle about the view is asked elsewhere.
+    pub(super) fn may_be_seen(&self, at: Vec2) -> bool {
+        self.desc.detail == Detail::Full
+            || self.seen.is_empty()
+            || self.seen.iter().any(|view| view.distance(at) <= SIDEWAYS)
+    }
+}
+
+/// Rays through an even raster of an image's points, from corner to corner.
+fn raster(camera: &Camera) -> impl Iterator<Item = (Vec3, Vec3)> {
+    let size = vec2(camera.width() as f32, camera.height() as f32);
+    (0..=RAYS * (RAYS + 2))
+        .map(|n| vec2((n % (RAYS + 1)) as f32, (n / (RAYS + 1)) as f32))
+        .map(move |at| camera.ray(size * at / RAYS as f32, [0.5; 2]))
 }
 
 /// Share of an image's ground that lies beyond an area, and how far from `below` the farthest of it is, metres.
 fn beyond(camera: &Camera, area: Rect, below: Vec2) -> (f32, f32) {
-    let size = vec2(camera.width() as f32, camera.height() as f32);
     let area = area.grown(1e-3);
     let (mut ground, mut bare, mut farthest) = (0.0_f32, 0.0_f32, 0.0_f32);
-    for k in 0..=RAYS {
-        for i in 0..=RAYS {
-            let (origin, direction) = camera.ray(size * vec2(i as f32, k as f32) / RAYS as f32, [0.5; 2]);
-            let Some(at) = meets(origin, direction) else { continue };
-            ground += 1.0;
-            if !area.contains(at) {
-                bare += 1.0;
-                farthest = farthest.max(at.distance(below));
-            }
+    for at in raster(camera).filter_map(|(origin, direction)| meets(origin, direction)) {
+        ground += 1.0;
+        if !area.contains(at) {
+            bare += 1.0;
+            farthest = farthest.max(at.distance(below));
         }
     }
     (bare / ground.max(1.0), farthest)
