@@ -343,7 +343,7 @@ fn images_of_a_set_are_asked_about_by_name_and_bands_are_found() {
     let network = model(&learnt);
     let pixels = normalised(&learnt, &four, (w, h));
     let mut probabilities = network.probabilities(&pixels, (w, h), (w, h)).unwrap();
-    Refine { colour: true, plants: true }.apply(&pixels, (w, h), &learnt.card.input.bands, &mut probabilities, None);
+    Refine::parse("colour,plants").unwrap().apply(&pixels, (w, h), &learnt.card.input.bands, &mut probabilities, None);
     let n = (w * h) as usize;
     let class = |at: usize| {
         (1..3).fold(0, |best, c| if probabilities[c * n + at] > probabilities[best * n + at] { c } else { best })

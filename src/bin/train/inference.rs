@@ -16,7 +16,8 @@ pub(crate) struct InferenceArgs {
     #[arg(long, value_name = "MM")]
     pixel_mm: Option<f64>,
     /// Refinement: colour (pixels of equal colour in a picture are rather of equal kind, plant or soil), plants (plant pixels that hang
-    /// together are of one class), colour,plants or none. As the training said unless given.
+    /// together are of one class), rows (crop rows and sizes of plants, too, say which are crop and which weed; only beside
+    /// plants), with commas between, or none. As the training said unless given.
     #[arg(long, value_name = "NAMES", value_parser = Refine::parse)]
     refine: Option<Refine>,
 }

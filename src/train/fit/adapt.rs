@@ -15,6 +15,7 @@ use crate::Result;
 use crate::dataset::sample::IGNORE;
 use crate::sampling::{Purpose, Stream};
 use crate::train::data::{Batch, Views, paste};
+use crate::train::refine::Refine;
 use crate::train::torch::Model;
 use std::collections::BTreeMap;
 
@@ -37,9 +38,11 @@ pub(super) fn batch(
     Ok((photos, share))
 }
 
-/// The class of each pixel and its probability, refined as the network's predictions will be.
+/// The class of each pixel and its probability, refined as the network's predictions will be, but for rows: a crop of a photograph holds few
+/// of them.
 fn answers(teacher: &Model, pixels: &[f32], plan: &Plan) -> Result<(Vec<u8>, Vec<f32>)> {
-    let (refine, size, bands) = (plan.hyper.refine, plan.crop_size(), &plan.shape.bands);
+    let refine = Refine { rows: false, ..plan.hyper.refine };
+    let (size, bands) = (plan.crop_size(), &plan.shape.bands);
     if refine.is_none() {
         return teacher.predict_with_probability(pixels, size);
     }

@@ -7,11 +7,13 @@
 //! |---|---|
 //! | `colour` | pixels of equal colour are rather of equal kind, plant or soil |
 //! | `plants` | plant pixels that hang together are of one class |
+//! | `rows` | crop rows and sizes of plants, too, say which are crop and which weed |
 //!
 //! The rules' constants were chosen on the even images of five sets of photographs; `docs/results.md` reports the odd ones.
 
 mod colour;
 mod plants;
+mod rows;
 
 use super::data::Band;
 use crate::dataset::classes::Classes;
@@ -25,31 +27,40 @@ pub struct Refine {
     pub colour: bool,
     /// Whether plant pixels that hang together become of one class.
     pub plants: bool,
+    /// Whether rows and sizes decide with the network which of them are crop and which are weed.
+    pub rows: bool,
 }
 
 impl Refine {
-    /// Reads `none`, or `colour` and `plants` with commas between.
+    /// Reads `none`, or some of `colour`, `plants` and `rows` with commas between; `rows` beside `plants` alone.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let names: Vec<&str> = text.split(',').map(str::trim).collect();
-        let help = "write none, colour, plants or colour,plants";
-        match names.as_slice() {
-            ["none"] => Ok(Self::default()),
-            ["colour"] => Ok(Self { colour: true, plants: false }),
-            ["plants"] => Ok(Self { colour: false, plants: true }),
-            ["colour", "plants"] | ["plants", "colour"] => Ok(Self { colour: true, plants: true }),
-            [name] => Err(format!("there is no refinement `{name}`: {help}")),
-            _ => Err(format!("`{text}` is no refinement: {help}")),
+        let help = "write none, or some of colour, plants and rows with commas between";
+        if text.trim() == "none" {
+            return Ok(Self::default());
         }
+        let mut refine = Self::default();
+        for name in text.split(',').map(str::trim) {
+            let step = match name {
+                "colour" => &mut refine.colour,
+                "plants" => &mut refine.plants,
+                "rows" => &mut refine.rows,
+                _ => return Err(format!("there is no refinement `{name}`: {help}")),
+            };
+            if std::mem::replace(step, true) {
+                return Err(format!("`{text}` is no refinement: {help}"));
+            }
+        }
+        if refine.rows && !refine.plants {
+            return Err("rows decide of which class a plant is: write plants,rows".into());
+        }
+        Ok(refine)
     }
 
     /// As it is written.
-    pub fn name(self) -> &'static str {
-        match (self.colour, self.plants) {
-            (false, false) => "none",
-            (true, false) => "colour",
-            (false, true) => "plants",
-            (true, true) => "colour,plants",
-        }
+    pub fn name(self) -> String {
+        let names = [(self.colour, "colour"), (self.plants, "plants"), (self.rows, "rows")];
+        let names: Vec<&str> = names.iter().filter(|(done, _)| *done).map(|(_, name)| *name).collect();
+        if names.is_empty() { "none".into() } else { names.join(",") }
     }
 
     /// Whether nothing is done.
@@ -61,6 +72,10 @@ impl Refine {
     pub fn check(self, classes: &Classes, bands: &[Band]) -> Result<(), String> {
         if !self.is_none() && !classes.begins_with_soil() {
             return Err("refinement tells plants from soil, and the first class is not soil".into());
+        }
+        let known: Vec<&[String]> = classes.counted().iter().map(|class| class.labels.as_slice()).collect();
+        if self.rows && !matches!(known.as_slice(), [_, [crop], [weed]] if crop == "crop" && weed == "weed") {
+            return Err("refinement by rows needs the classes soil, crop and weed, in this order".into());
         }
         if self.colour && colour_bands(bands).is_none() {
             return Err("refinement by colour needs the bands red, green and blue".into());
@@ -82,7 +97,7 @@ impl Refine {
             colour::refine(pixels, bands.len(), rgb, probabilities);
         }
         if self.plants {
-            plants::refine((width as usize, height as usize), probabilities, finest);
+            plants::refine((width as usize, height as usize), probabilities, finest, self.rows);
         }
     }
 }
@@ -103,7 +118,7 @@ impl TryFrom<String> for Refine {
 
 impl From<Refine> for String {
     fn from(refine: Refine) -> Self {
-        refine.name().into()
+        refine.name()
     }
 }
 
@@ -113,23 +128,39 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read_again_and_other_words_are_not() {
-        for text in ["none", "colour", "plants", "colour,plants"] {
+        for text in ["none", "colour", "plants", "colour,plants", "plants,rows", "colour,plants,rows"] {
             assert_eq!(Refine::parse(text).unwrap().name(), text);
         }
-        assert_eq!(Refine::parse("plants, colour").unwrap().name(), "colour,plants");
-        for bad in ["", "color", "colour;plants", "all", "colour,none", "colour,colour", "colour,plants,plants"] {
+        assert_eq!(Refine::parse("rows, plants, colour").unwrap().name(), "colour,plants,rows");
+        for bad in [
+            "rows",
+            "colour,rows",
+            "",
+            "color",
+            "colour;plants",
+            "all",
+            "colour,none",
+            "colour,colour",
+            "colour,plants,plants",
+        ] {
             assert!(Refine::parse(bad).is_err(), "{bad}");
         }
     }
 
     #[test]
     fn it_is_refused_without_soil_or_colours() {
-        let both = Refine { colour: true, plants: true };
+        let both = Refine { colour: true, plants: true, rows: false };
         let (soil, gray) = (Classes::default(), [Band::Red, Band::Gray("nir".into())]);
         assert!(both.check(&soil, &Band::RGB).is_ok());
         assert!(both.check(&soil, &gray).is_err());
-        assert!(Refine { colour: false, plants: true }.check(&soil, &gray).is_ok());
+        assert!(Refine { colour: false, ..both }.check(&soil, &gray).is_ok());
         assert!(both.check(&Classes::parse("crop; weed; soil").unwrap(), &Band::RGB).is_err());
+        let rows = Refine { rows: true, ..both };
+        assert!(rows.check(&soil, &Band::RGB).is_ok());
+        assert!(rows.check(&Classes::parse("soil; beet=crop; weed; ignore=stone").unwrap(), &Band::RGB).is_ok());
+        for other in ["soil; weed; crop", "soil; plant=crop,weed", "soil; BEAVX; crop; weed"] {
+            assert!(rows.check(&Classes::parse(other).unwrap(), &Band::RGB).is_err(), "{other}");
+        }
         assert!(Refine::default().check(&Classes::parse("crop; weed").unwrap(), &gray).is_ok());
     }
 }
