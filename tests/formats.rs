@@ -122,6 +122,11 @@ fn organs_and_ground_lie_where_the_other_labels_say() {
 }
 
 #[test]
+fn damage_lies_on_blades_and_its_shares_are_of_one_place() {
+    ask("check_damage.py", "import numpy, PIL");
+}
+
+#[test]
 fn joints_of_leaves_lie_between_base_and_tip() {
     ask("check_skeletons.py", "import numpy");
 }

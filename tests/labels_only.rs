@@ -54,7 +54,7 @@ fn labels_are_those_of_the_photographed_fields() {
 #[test]
 fn formats_without_photographs_are_written_and_others_refused() {
     let (_keep, data) = scratch();
-    succeed(make(&data, &["--labels-only", "--format", "flow,parts,skeletons,traits,tum,mots"]));
+    succeed(make(&data, &["--labels-only", "--format", "damage,flow,parts,skeletons,traits,tum,mots"]));
     let files = tree(&data);
     for name in ["traits/leaves.csv", "parts/names.json", "tum/000000-camera.txt", "report.html"] {
         assert!(files.contains_key(name), "{name}");
@@ -65,7 +65,7 @@ fn formats_without_photographs_are_written_and_others_refused() {
     let later = fail(verb("finish", &data, &["--format", "yolo"]), 2);
     assert!(later.contains("--format yolo holds photographs"), "{later}");
     for (more, words) in [
-        (&["--format", "coco"][..], "without photographs there are flow, mots, parts, skeletons, traits, tum"),
+        (&["--format", "coco"][..], "without photographs there are damage, flow, mots, parts, skeletons, traits, tum"),
         (&["--keep", "nir"], "--keep nir is drawn by samples"),
         (&["--edit", "smooth-labels"], "makes labels of samples"),
         (&["--edit", "raster"], "draws its labels with its picture"),

@@ -33,7 +33,7 @@ fn small() -> &'static (Field, Vec<u8>) {
     static SMALL: OnceLock<(Field, Vec<u8>)> = OnceLock::new();
     SMALL.get_or_init(|| {
         let field = program::field(&small_text(), &Options::default());
-        let (bytes, _) = output::gltf::encode(&field.scene, &field.provenance()).unwrap();
+        let (bytes, _) = output::gltf::encode(&field.scene, &[], &field.provenance()).unwrap();
         (field, bytes)
     })
 }
@@ -120,7 +120,7 @@ fn colours_and_transmission_survive_the_way_through_the_file() {
 #[test]
 fn the_exported_file_is_the_same_bytes_every_time() {
     let again = program::field(&small_text(), &Options::default());
-    let (bytes, _) = output::gltf::encode(&again.scene, &again.provenance()).unwrap();
+    let (bytes, _) = output::gltf::encode(&again.scene, &[], &again.provenance()).unwrap();
     assert!(bytes == small().1, "addresses or hash maps have found their way into the file");
 }
 

@@ -54,6 +54,8 @@ pub mod classes;
 #[doc(hidden)]
 pub mod cluster;
 #[doc(hidden)]
+pub mod damage;
+#[doc(hidden)]
 pub mod difference;
 #[doc(hidden)]
 pub mod finish;

@@ -6,7 +6,7 @@ use super::recipe::{self, Recipe};
 use super::record::{CaptureRecord, Exposure, Grown, Leaf, Plant, Record, Seen};
 use super::sample::{Rendered, Sample};
 use super::set::Set;
-use super::{flow, format};
+use super::{damage, flow, format};
 use crate::job::{Field, Image, Renderer, Request, SceneFile};
 use crate::math::Vec3;
 use crate::render::{self, LabelMap, Watch};
@@ -177,8 +177,14 @@ fn describe(recipe: &Recipe, index: u64, image: Image<'_>) -> Result<Sample> {
 /// The sample of an image of which nothing but labels is known.
 fn labelled(recipe: &Recipe, index: u64, of: &Field, labels: LabelMap) -> Result<Sample> {
     let field = of.grown();
-    let flows = if format::all(recipe)?.iter().any(|(_, format)| format.needs_flow()) {
+    let formats = format::all(recipe)?;
+    let flows = if formats.iter().any(|(_, format)| format.needs_flow()) {
         flow::flows(&field.captures, field.capture, &labels.depth, of.geometry()?)
+    } else {
+        Vec::new()
+    };
+    let damage = if formats.iter().any(|(_, format)| format.needs_damage()) {
+        damage::damage(&field.scene, of.geometry()?)
     } else {
         Vec::new()
     };
@@ -228,6 +234,7 @@ fn labelled(recipe: &Recipe, index: u64, of: &Field, labels: LabelMap) -> Result
         plants: field.plants.clone(),
         camera: field.scene.camera,
         flows,
+        damage,
     });
     Ok(sample)
 }

@@ -61,6 +61,8 @@ pub struct Rendered {
     pub camera: crate::sensor::Camera,
     /// Where what this image shows lies in others of its field; none unless a format asks for it.
     pub flows: Vec<Flow>,
+    /// What is wrong with the leaf at each pixel's centre; none unless a format asks for it.
+    pub damage: Vec<crate::material::Damage>,
 }
 
 /// Where what is at each pixel's centre lies in another image of the same field.

@@ -2,6 +2,12 @@
 
 use crate::math::{Mat3, Vec2, Vec3};
 
+/// Joints that carry a corner, and their weights, which sum to one.
+pub type JointWeights = [(u16, f32); 4];
+
+/// All on the first joint: what nothing else is said of.
+const FIRST_JOINT: JointWeights = [(0, 1.0), (0, 0.0), (0, 0.0), (0, 0.0)];
+
 /// An indexed triangle mesh; counter-clockwise triangles seen from outside (for a leaf: from above).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
@@ -13,12 +19,15 @@ pub struct Mesh {
     pub uvs: Vec<Vec2>,
     /// Corner indices.
     pub triangles: Vec<[u32; 3]>,
+    /// By which joints each corner was bent; empty where nobody asked for it, and of what does not bend.
+    pub weights: Vec<JointWeights>,
 }
 
 impl Mesh {
     /// A mesh with smooth normals computed from its triangles, weighted by area.
     pub fn smooth(positions: Vec<Vec3>, uvs: Vec<Vec2>, triangles: Vec<[u32; 3]>) -> Self {
-        let mut mesh = Self { normals: vec![Vec3::ZERO; positions.len()], positions, uvs, triangles };
+        let normals = vec![Vec3::ZERO; positions.len()];
+        let mut mesh = Self { normals, positions, uvs, triangles, weights: Vec::new() };
         mesh.recompute_normals();
         mesh
     }
@@ -44,6 +53,9 @@ impl Mesh {
         let n = self.positions.len();
         if self.normals.len() != n || self.uvs.len() != n {
             return Some(format!("{n} positions, {} normals, {} uvs", self.normals.len(), self.uvs.len()));
+        }
+        if !self.weights.is_empty() && self.weights.len() != n {
+            return Some(format!("{n} positions, {} weights", self.weights.len()));
         }
         if let Some(t) = self.triangles.iter().find(|t| t.iter().any(|i| *i as usize >= n)) {
             return Some(format!("triangle {t:?} points past {n} corners"));
@@ -123,6 +135,7 @@ impl Mesh {
                     into.positions.push(self.positions[i]);
                     into.normals.push(self.normals[i]);
                     into.uvs.push(self.uvs[i]);
+                    into.weights.extend(self.weights.get(i));
                 }
                 place[i]
             });
@@ -156,6 +169,11 @@ impl Mesh {
         self.positions.extend_from_slice(&other.positions);
         self.normals.extend_from_slice(&other.normals);
         self.uvs.extend_from_slice(&other.uvs);
+        if !(self.weights.is_empty() && other.weights.is_empty()) {
+            self.weights.resize(base as usize, FIRST_JOINT);
+            self.weights.extend_from_slice(&other.weights);
+            self.weights.resize(self.positions.len(), FIRST_JOINT);
+        }
         self.triangles.extend(other.triangles.iter().map(|t| t.map(|i| i + base)));
     }
 }
@@ -178,6 +196,17 @@ mod tests {
         both.append(&b);
         assert_eq!(both.pieces(), [a.clone(), b]);
         assert_eq!(a.pieces(), std::slice::from_ref(&a));
+    }
+
+    #[test]
+    fn weights_go_with_their_corners() {
+        let (mut a, b) = (square(0.0, 1.0), square(3.0, 2.0));
+        a.weights = (0..4).map(|i| [(i, 1.0), (0, 0.0), (0, 0.0), (0, 0.0)]).collect();
+        let mut both = b.clone();
+        both.append(&a);
+        assert_eq!(both.weights[..4], [FIRST_JOINT; 4]);
+        assert_eq!(both.pieces()[1], a);
+        assert!(both.fault().is_none());
     }
 
     #[test]

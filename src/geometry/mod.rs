@@ -13,6 +13,6 @@ pub use alpha::AlphaMask;
 pub use cost::Cost;
 pub use interaction::Interaction;
 pub use margin::Margin;
-pub use mesh::Mesh;
+pub use mesh::{JointWeights, Mesh};
 pub use ray::{Hit, Intersect, PACKET, Ray};
 pub use window::Window;

@@ -122,6 +122,13 @@ impl SceneFile {
         self
     }
 
+    /// With leaves that keep the joints by which they bend, for [`gltf`](crate::output::gltf).
+    #[must_use]
+    pub fn rigged(mut self, rigged: bool) -> Self {
+        self.options.rigged = rigged;
+        self
+    }
+
     /// About what field `index` will take, before it grows.
     #[doc(hidden)]
     pub fn estimate(&self, index: u64) -> Result<Estimate> {

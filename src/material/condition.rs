@@ -12,9 +12,10 @@
 //! departure from the leaf's mean; what is already as pale as the palest stays. Dust and splash lie on the upper side: of a
 //! share c of soil a place reflects (1 − c) R + c ρ and passes (1 − c) T, so that the two never sum to more.
 
+use super::Damage;
 use crate::math::{Spectrum, Vec2, Vec3, Vec4, smoothstep};
 use crate::optics::{Leaf, LeafBands, LeafOptics, Pigments};
-use crate::plant::condition::Marks;
+use crate::plant::condition::{Marks, Tissue};
 use crate::ron_file::Num;
 use crate::texture::Texture;
 use crate::texture::noise::Perlin;
@@ -181,6 +182,20 @@ impl ConditionOptics {
         smoothstep(VEIN_CONTRAST.0, VEIN_CONTRAST.1, contrast)
     }
 
+    /// What is wrong at `uv`, seen from `above` or from below; `picture` is the leaf's.
+    pub(super) fn damage(&self, uv: Vec2, picture: Option<&Texture>, above: bool) -> Damage {
+        let inner = &*self.0;
+        let Some(marks) = &inner.marks else { return Damage::default() };
+        let t = marks.tissue(uv, &inner.noise);
+        let alive = (1.0 - t.rim) * (1.0 - t.brown);
+        Damage {
+            chlorosis: yellowness(&t, self.vein(picture, uv)) * alive,
+            necrosis: 1.0 - alive,
+            soil: if above { t.soil } else { 0.0 },
+            edge: marks.edge(uv, &inner.noise),
+        }
+    }
+
     /// What becomes of `leaf` at `uv`; `picture` is the one that it was read from.
     pub(super) fn at(&self, leaf: Leaf, uv: Vec2, picture: Option<&Texture>) -> Worn {
         let inner = &*self.0;
@@ -191,7 +206,7 @@ impl ConditionOptics {
         }
         let Some(marks) = &inner.marks else { return Worn { tissue, upper: tissue, waxy: true } };
         let t = marks.tissue(uv, &inner.noise);
-        let yellow = t.yellow.max(t.interveinal * (1.0 - 0.9 * vein));
+        let yellow = yellowness(&t, vein);
         if yellow > 0.0 {
             tissue = inner.tones.yellowed(tissue, yellow);
         }
@@ -210,6 +225,11 @@ impl ConditionOptics {
         let soil = Leaf { reflectance: inner.soil * t.shade.clamp(0.4, 1.4), transmittance: Spectrum::ZERO };
         Worn { tissue, upper: held(mix(tissue, soil, t.soil)), waxy: t.soil < BURIED }
     }
+}
+
+/// How yellow a place is, of which a vein is a share: the strips along veins stay green longest.
+fn yellowness(tissue: &Tissue, vein: f32) -> f32 {
+    tissue.yellow.max(tissue.interveinal * (1.0 - 0.9 * vein))
 }
 
 /// Within what a sheet can do: 0.99 in all.

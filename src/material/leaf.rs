@@ -1,5 +1,6 @@
 //! Blades, petioles, stems: pigments and a picture → coat, reflection of either side, transmission.
 
+use super::Damage;
 use super::condition::{ConditionOptics, Worn};
 use super::feature::Feature;
 use super::shading::{bump, grained_frame};
@@ -219,6 +220,13 @@ impl LeafMaterial {
                 condition.at(leaf, uv, picture.map(|p| &p.color))
             }
         }
+    }
+
+    /// What is wrong with a place, seen from `above` or from below.
+    pub(super) fn damage(&self, uv: Vec2, above: bool) -> Damage {
+        let picture = self.picture.as_ref().filter(|_| self.pictured);
+        let of = |condition: &ConditionOptics| condition.damage(uv, picture.map(|p| &p.color), above);
+        self.condition.as_ref().map_or_else(Damage::default, of)
     }
 
     /// What a picture of the upper side shows of a tissue, hairs and bloom where there is wax.

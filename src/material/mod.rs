@@ -1,6 +1,7 @@
 //! What parts are made of: textures and optics at a point → its scattering and the frame it scatters in.
 
 mod condition;
+mod damage;
 mod feature;
 pub mod ground;
 pub mod leaf;
@@ -16,6 +17,7 @@ use crate::math::{Frame, Spectrum, Vec3};
 use swatch::{Swatch, Tone};
 
 pub use condition::{ConditionOptics, Tones, tissues};
+pub use damage::Damage;
 pub use feature::Feature;
 pub use ground::{BakedGround, Ground};
 pub use leaf::{LeafDesc, LeafMaterial, Picture};
@@ -73,6 +75,14 @@ impl Material {
             Self::Solid(m) => m.scatter(at, wo),
             Self::Painted(m) => m.scatter(at, wo),
             Self::Plain(bsdf) => (*bsdf, shading::grained_frame(at, at.ns, at.tangents().0, wo)),
+        }
+    }
+
+    /// What is wrong with a leaf's tissue at a hit of a ray along `direction`; nothing with what is no leaf.
+    pub fn damage(&self, at: &Interaction, direction: Vec3) -> Damage {
+        match self {
+            Self::Leaf(m) => m.damage(at.uv, direction.dot(at.ng) < 0.0),
+            Self::Ground(_) | Self::Solid(_) | Self::Painted(_) | Self::Plain(_) => Damage::default(),
         }
     }
 

@@ -67,6 +67,8 @@ objects! {
         cameras: Vec<Camera> = "Vec::is_empty",
         /// Meshes.
         meshes: Vec<Mesh> = "Vec::is_empty",
+        /// Skins: joints that bend meshes.
+        skins: Vec<Skin> = "Vec::is_empty",
         /// Materials.
         materials: Vec<Material> = "Vec::is_empty",
         /// Textures: an image and how it is read.
@@ -116,12 +118,25 @@ objects! {
         scale: Option<[f64; 3]> = "Option::is_none",
         /// What stands there.
         mesh: Option<usize> = "Option::is_none",
+        /// By what it is bent.
+        skin: Option<usize> = "Option::is_none",
         /// Who looks from there.
         camera: Option<usize> = "Option::is_none",
         /// Data of extensions.
         extensions: Map<String, Value> = "Map::is_empty",
         /// The program's own: the label.
         extras: Value = "Value::is_null",
+    }
+    /// Joints that bend meshes.
+    Skin {
+        /// Its name.
+        name: Option<String> = "Option::is_none",
+        /// Accessor of the matrices that carry a mesh into the joints' frames.
+        inverse_bind_matrices: Option<usize> = "Option::is_none",
+        /// The joint above all others.
+        skeleton: Option<usize> = "Option::is_none",
+        /// Nodes that are joints.
+        joints: Vec<usize>,
     }
     /// A camera.
     Camera {

@@ -202,7 +202,7 @@ impl Reader<'_> {
             6 => (2..corners.len()).map(|i| [corners[i - 1], corners[i], corners[0]]).collect(),
             _ => return Err(format!("`{name}` is of the unknown kind {mode}").into()),
         };
-        let mut mesh = Mesh { positions, normals: Vec::new(), uvs, triangles };
+        let mut mesh = Mesh { positions, uvs, triangles, ..Mesh::default() };
         match attribute("NORMAL") {
             Some(normals) => {
                 mesh.normals = self.elements::<3>(normals)?.into_iter().map(Vec3::from).collect();

@@ -120,6 +120,7 @@ fn mesh(of: &tobj::Mesh, name: &str) -> Result<Mesh, String> {
         normals: normals.iter().map(|n| Vec3::from(*n)).collect(),
         positions,
         triangles: of.indices.as_chunks::<3>().0.to_vec(),
+        weights: Vec::new(),
     };
     if mesh.normals.len() != corners {
         faceted(&mut mesh);

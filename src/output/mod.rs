@@ -2,6 +2,7 @@
 //! clock times nor paths, so equal runs write equal bytes.
 
 mod atomic;
+pub mod cloud;
 mod denoise;
 mod exr;
 pub mod gltf;

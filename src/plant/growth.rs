@@ -39,6 +39,8 @@ pub(super) struct LeafNow<'a> {
     pub(super) arch: f32,
     /// Shortest cell of its mesh, metres.
     pub(super) cell: f32,
+    /// Whether its meshes keep the weights of their joints.
+    pub(super) rigged: bool,
     /// This leaf's own numbers.
     pub(super) stream: Stream,
 }
@@ -74,6 +76,8 @@ pub(super) struct Growth<'a> {
     pub(super) leaves: Vec<LeafNow<'a>>,
     /// Factor on all of this plant's sizes.
     pub(super) vigour: f32,
+    /// Whether its leaves keep their joints.
+    pub(super) rigged: bool,
     /// Its stages, for what grows on it later.
     pub(super) between: Between<'a>,
     /// The plant's own numbers.
@@ -239,6 +243,7 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
                 twist: 0.0,
                 arch: 0.0,
                 cell: CELL,
+                rigged: false,
                 stream,
             });
         }
@@ -262,6 +267,7 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
         rise,
         leaves,
         vigour,
+        rigged: false,
         between,
         stream,
     })

@@ -8,6 +8,7 @@ use super::leaflets;
 use super::margin::LeafOutline;
 use super::organ::{LeafAxis, LeafSize, Organ, OrganKind};
 use super::ribbons::{self, Division};
+use super::rig;
 use super::skeleton::{Measures, Pose, Skeleton};
 use super::skin::{self, BladeRelief};
 use super::spines;
@@ -94,7 +95,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
     // The relief leaves the midrib's ends where they are, so they go where their joints go.
     let end = |joint: usize| motions[joint].point(vec3(0.0, skeleton.along()[joint], 0.0));
     let foremost = (0..rest.positions.len()).max_by(|a, b| rest.positions[*a].y.total_cmp(&rest.positions[*b].y));
-    let mesh = skin::skin(rest, &motions);
+    let mesh = skin::skin(rest, &motions, leaf.rigged);
     let tip = match (&leaf.kind.shape, foremost) {
         // Between the foremost leaflets nothing is beyond the rachis; a leaflet at its tip goes its own way.
         (Shape::Leaflets { terminal, .. }, Some(corner)) if terminal.get() > 0.0 => mesh.positions[corner],
@@ -107,6 +108,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
         tip,
         size: LeafSize { length: leaf.blade, width: leaf.width, petiole: leaf.stalk },
         joints: skeleton.placed(root),
+        rig: if leaf.rigged { rig::rig(&skeleton, root) } else { Vec::new() },
     };
     organs.push(Organ { kind, leaf: leaf.number, material: material.to_owned(), mesh, axis: Some(axis) });
     let mut rest = stalk(leaf, &skeleton, &relief, lower, &mut stream);
@@ -115,10 +117,11 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
     if rest.triangles.is_empty() {
         return;
     }
-    let mut mesh = skin::skin(rest, &motions);
+    let mut mesh = skin::skin(rest, &motions, leaf.rigged);
     tube::close_seams(&mut mesh, sides(leaf), ringed);
     if !leaf.kind.stipules.none() {
-        mesh.append(&skin::skin(stipules::pair(&leaf.kind.stipules, leaf, &skeleton), &motions));
+        let stipules = stipules::pair(&leaf.kind.stipules, leaf, &skeleton);
+        mesh.append(&skin::skin(stipules, &motions, leaf.rigged));
     }
     let kind = if lower == Lower::Petiole { OrganKind::Petiole } else { OrganKind::Sheath };
     organs.push(Organ { kind, leaf: leaf.number, material: leaf.kind.stalk_material.clone(), mesh, axis: None });

@@ -44,6 +44,7 @@ mod leaflets;
 mod margin;
 mod organ;
 mod ribbons;
+mod rig;
 mod rosette;
 mod runner;
 pub mod skeleton;
@@ -64,6 +65,7 @@ pub use flower::desc::{FlowerDesc, RingDesc};
 pub use inflorescence::desc::{FlowersDesc, InflorescenceDesc, Seat, StemLeafDesc};
 pub use kind::{LeafKind, Shape, Spines, Stipules};
 pub use organ::{LeafAxis, LeafSize, Organ, OrganKind};
+pub use rig::RigJoint;
 pub use skeleton::PlacedJoint;
 pub use stage::{BUD, LayerDesc, StageDesc};
 
@@ -120,12 +122,14 @@ pub struct GrowOptions<'a> {
     pub condition: Option<(&'a ConditionDesc, &'a Condition)>,
     /// Shortest cell of a blade's mesh, metres. Coarser meshes change no random number and move a leaf by less than a cell.
     pub cell: f32,
+    /// Whether leaves keep the joints by which they bend ([`LeafAxis::rig`]) and the weights of their corners.
+    pub rigged: bool,
 }
 
 impl Default for GrowOptions<'_> {
     /// Of usual size, without a condition, as fine as field cameras see.
     fn default() -> Self {
-        Self { vigour: 1.0, condition: None, cell: growth::CELL }
+        Self { vigour: 1.0, condition: None, cell: growth::CELL, rigged: false }
     }
 }
 
@@ -144,7 +148,9 @@ pub fn grow_with(desc: &PlantDesc, stage: Stage, stream: &Stream, options: &Grow
     }
     for leaf in &mut growth.leaves {
         leaf.cell = options.cell.max(leaf.cell);
+        leaf.rigged = options.rigged;
     }
+    growth.rigged = options.rigged;
     let mut organs = organs_of(desc.form, &growth);
     inflorescence::grow(&mut organs, &growth, options.cell);
     let corners = || organs.iter().flat_map(|o| &o.mesh.positions);

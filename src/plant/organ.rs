@@ -1,5 +1,6 @@
 //! The words of botany: what a plant is made of. One organ is one geometry of the scene, so it is also the finest label.
 
+use super::rig::RigJoint;
 use super::skeleton::PlacedJoint;
 use crate::geometry::Mesh;
 use crate::math::Vec3;
@@ -80,6 +81,8 @@ pub struct LeafAxis {
     pub size: LeafSize,
     /// The joints of its kinematic tree, metres; those of a compound leaf along its rachis.
     pub joints: Vec<PlacedJoint>,
+    /// All its joints with their axes; none unless asked for by [`GrowOptions::rigged`](super::GrowOptions::rigged).
+    pub rig: Vec<RigJoint>,
 }
 
 impl LeafAxis {
@@ -89,6 +92,9 @@ impl LeafAxis {
         (self.base, self.tip) = (motion(self.base), motion(self.tip));
         for joint in &mut self.joints {
             joint.at = motion(joint.at);
+        }
+        for joint in &mut self.rig {
+            joint.moved(&motion);
         }
         self
     }

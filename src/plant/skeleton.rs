@@ -133,7 +133,7 @@ pub struct Measures {
 }
 
 /// The weights of up to four joints on one corner; they sum to one.
-pub type Weights = [(u16, f32); 4];
+pub type Weights = crate::geometry::JointWeights;
 
 /// A leaf's kinematic tree.
 #[derive(Clone, Debug)]

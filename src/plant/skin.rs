@@ -132,10 +132,11 @@ pub fn carried(skeleton: &Skeleton, motions: &[Pose], y: f32) -> Vec3 {
     weights.iter().map(|(k, w)| *w * motions[usize::from(*k)].point(vec3(0.0, y, 0.0))).sum()
 }
 
-/// The bent mesh, with smooth normals.
-pub fn skin(rest: Rest, motions: &[Pose]) -> Mesh {
+/// The bent mesh, with smooth normals; it keeps the weights of its corners where it is `rigged`.
+pub fn skin(rest: Rest, motions: &[Pose], rigged: bool) -> Mesh {
     let positions = bend(&rest, motions);
-    Mesh::smooth(positions, rest.uvs, rest.triangles)
+    let mesh = Mesh::smooth(positions, rest.uvs, rest.triangles);
+    if rigged { Mesh { weights: rest.weights, ..mesh } } else { mesh }
 }
 
 #[cfg(test)]

@@ -58,25 +58,41 @@ pub fn label(geometry: &dyn Intersect, parts: &[Part], camera: &Camera, window: 
     let rows = map.parts.par_chunks_mut(width).zip(map.tags.par_chunks_mut(width));
     let rows = rows.zip(map.depth.par_chunks_mut(width)).zip(map.normals.par_chunks_mut(width));
     rows.zip(window.y0..window.y1).for_each(|((((row, tags), depth), normals), y)| {
-        // Neighbours' rays go nearly the same way and are asked together.
-        for first in (0..width).step_by(PACKET) {
-            let mut rays = [None; PACKET];
-            for (x, ray) in (first..width).zip(&mut rays) {
-                let (origin, direction) = camera.centre_ray(window.x0 + x as u32, y);
-                *ray = Some(Ray::new(origin, direction));
-            }
-            let hits = geometry.closest_packet(&rays);
-            for (x, (ray, hit)) in (first..).zip(rays.iter().zip(&hits)) {
-                let (Some(ray), Some(hit)) = (ray, hit) else { continue };
-                let part = &parts[hit.part as usize];
-                row[x] = hit.part;
-                tags[x] = part.tag;
-                depth[x] = hit.t * ray.direction.dot(camera.pose().axes.z_axis);
-                normals[x] = facing(&part.mesh, hit, ray.direction);
-            }
-        }
+        row_hits(geometry, camera, window, y, |x, ray, hit| {
+            let part = &parts[hit.part as usize];
+            row[x] = hit.part;
+            tags[x] = part.tag;
+            depth[x] = hit.t * ray.direction.dot(camera.pose().axes.z_axis);
+            normals[x] = facing(&part.mesh, hit, ray.direction);
+        });
     });
     map
+}
+
+/// Tells `found` of each pixel of row `y` of a window, counted from the window's left, whose centre's ray meets something: what labels are
+/// made of.
+pub fn row_hits(
+    geometry: &dyn Intersect,
+    camera: &Camera,
+    window: Window,
+    y: u32,
+    mut found: impl FnMut(usize, &Ray, &Hit),
+) {
+    let width = window.width() as usize;
+    // Neighbours' rays go nearly the same way and are asked together.
+    for first in (0..width).step_by(PACKET) {
+        let mut rays = [None; PACKET];
+        for (x, ray) in (first..width).zip(&mut rays) {
+            let (origin, direction) = camera.centre_ray(window.x0 + x as u32, y);
+            *ray = Some(Ray::new(origin, direction));
+        }
+        let hits = geometry.closest_packet(&rays);
+        for (x, (ray, hit)) in (first..).zip(rays.iter().zip(&hits)) {
+            if let (Some(ray), Some(hit)) = (ray, hit) {
+                found(x, ray, hit);
+            }
+        }
+    }
 }
 
 /// The interpolated unit normal at a hit on the side that a ray along `direction` comes from. Near the outline of a curved

@@ -42,6 +42,8 @@ pub enum Purpose {
     Motion = 21,
     /// What is a camera's own: the fixed pattern of its sensor.
     Body = 22,
+    /// Where points lie on a field's surfaces.
+    Cloud = 23,
 }
 
 /// A stream of random numbers with an address.

@@ -279,6 +279,7 @@ mod tests {
             tip: part.mesh.positions[64 * 9 + 4],
             size,
             joints: Vec::new(),
+            rig: Vec::new(),
         }
     }
 

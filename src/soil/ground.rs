@@ -361,6 +361,7 @@ impl Ground {
             normals: self.slopes.iter().map(|s| up(*s)).collect(),
             uvs: Vec::with_capacity(columns * rows),
             triangles: self.grid.triangles(),
+            weights: Vec::new(),
         };
         for (j, y) in self.grid.y.at.iter().enumerate() {
             for (i, x) in self.grid.x.at.iter().enumerate() {

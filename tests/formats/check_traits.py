@@ -20,6 +20,14 @@ assert len(leaves) == sum(len(p["leaves"]) for i in images.values() for p in i.r
 assert list(plants.columns[:6]) == ["image", "split", "plant", "id", "class", "species"]
 assert list(leaves.columns[:5]) == ["image", "split", "plant", "leaf", "id"]
 
+table = pd.read_parquet(dataset / "traits" / "leaves.parquet")
+same = {"image": "image", "split": "split", "plant": "plant", "leaf": "leaf", "id": "id", "pixels": "visible_px"}
+traits = ("area_m2", "visible_area_m2", "length_m", "width_m", "petiole_m", "inclination_deg", "azimuth_deg", "top_m")
+assert len(table) == len(leaves)
+for ours, theirs in (same | {name: name for name in traits}).items():
+    if len(leaves):
+        assert (leaves[ours].to_numpy(table[theirs].dtype) == table[theirs].to_numpy()).all(), ours
+
 for row in plants.itertuples():
     shown = images[row.image].plants == row.plant
     assert row.pixels == shown.sum()

@@ -6,7 +6,7 @@ use furrow::ablation::FULL;
 use furrow::job::Threads;
 use furrow::output::{self, Export};
 use furrow::scene::Field;
-use furrow::{Result, cli};
+use furrow::{Error, Result, cli};
 use std::path::{Path, PathBuf};
 
 /// What to write, and how.
@@ -20,6 +20,12 @@ pub(crate) struct Args {
     /// Folder for the files; `out/`, the scene file's name and the format's unless given.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Keep the joints of leaves as skins with weights, so that leaves bend in the other program; with `--format gltf`.
+    #[arg(long)]
+    skins: bool,
+    /// Points a square metre of surface; with `--format ply`, 100000 unless given.
+    #[arg(long, value_name = "POINTS", value_parser = density)]
+    density: Option<f64>,
     /// Print nothing but errors and the paths of the files.
     #[arg(long)]
     quiet: bool,
@@ -32,12 +38,24 @@ enum Format {
     Gltf,
     /// Mitsuba 3: scene.xml with meshes, textures, lights and camera.
     Mitsuba,
+    /// A cloud of points on all surfaces, hidden ones too: points.ply with place, normal, colour and labels.
+    Ply,
+}
+
+/// Points a square metre where none are asked for: 3 mm apart.
+const DENSITY: f64 = 1e5;
+
+/// Points a square metre.
+fn density(text: &str) -> Result<f64, String> {
+    let points = text.parse().ok().filter(|points: &f64| (1.0..=1e9).contains(points));
+    points.ok_or_else(|| "write points/m² from 1 to 1000000000, such as 100000".into())
 }
 
 impl Format {
-    fn write(self, folder: &Path, field: &Field) -> Result<Export> {
+    fn write(self, folder: &Path, field: &Field, density: f64) -> Result<Export> {
         match self {
-            Self::Gltf => output::gltf::write(folder, &field.scene, &field.provenance()),
+            Self::Ply => output::cloud::write(folder, field, density),
+            Self::Gltf => output::gltf::write(folder, &field.scene, &field.plants, &field.provenance()),
             Self::Mitsuba => output::mitsuba::write(folder, &field.scene, &field.provenance()),
         }
     }
@@ -57,8 +75,18 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
             furrow::tell!("{words}");
         }
     };
-    let field = args.field.grow(&FULL, &Threads::all()?, tell)?;
-    let export = field.threads().install(|| args.format.write(&out, field.grown()))?;
+    if args.skins && !matches!(args.format, Format::Gltf) {
+        let words = format!("--skins says nothing with --format {}, which holds no joints", args.format.name());
+        return Err(Error::misuse(words).help("use --format gltf, or leave --skins out"));
+    }
+    if args.density.is_some() && !matches!(args.format, Format::Ply) {
+        let words = format!("--density says nothing with --format {}, which holds surfaces", args.format.name());
+        return Err(Error::misuse(words).help("use --format ply, or leave --density out"));
+    }
+    let density = args.density.unwrap_or(DENSITY);
+    let threads = Threads::all()?;
+    let field = args.field.grow_as(&FULL, |scene| scene.threads(&threads).rigged(args.skins), tell)?;
+    let export = field.threads().install(|| args.format.write(&out, field.grown(), density))?;
     for warning in &export.warnings {
         tell(&format!("warning: {warning}"));
     }

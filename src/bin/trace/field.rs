@@ -92,10 +92,20 @@ impl FieldArgs {
 
     /// Grows the field as an edit has it; its warnings are told as soon as they are known.
     pub(crate) fn grow(&self, edit: &'static Edit, threads: &Threads, tell: impl Fn(&str)) -> Result<Field> {
+        self.grow_as(edit, |scene| scene.threads(threads), tell)
+    }
+
+    /// The same of the scene file with other options.
+    pub(crate) fn grow_as(
+        &self,
+        edit: &'static Edit,
+        asked: impl FnOnce(SceneFile) -> SceneFile,
+        tell: impl Fn(&str),
+    ) -> Result<Field> {
         let tell = |warning: &String| tell(&format!("warning: {warning}"));
         let SceneArgs { seed, width, height, .. } = self.scene;
         let scene = SceneFile::edited(self.path(), edit)?.seed(seed).width(width).height(height);
-        let scene = scene.day(self.day).memory(self.memory.bytes).threads(threads);
+        let scene = asked(scene.day(self.day).memory(self.memory.bytes));
         let foretold = scene.foretold(self.index)?;
         foretold.iter().for_each(tell);
         let mut field = scene.field(self.index)?;

@@ -56,6 +56,11 @@ pub trait Format: Sync {
         false
     }
 
+    /// Whether it holds [`Rendered::damage`](crate::dataset::sample::Rendered::damage), which is worked out for it alone.
+    fn needs_damage(&self) -> bool {
+        false
+    }
+
     /// What it cannot hold, or what its readers expect otherwise: one sentence each, told once.
     fn warnings(&self, _recipe: &Recipe) -> Vec<String> {
         Vec::new()
@@ -97,6 +102,8 @@ formats! {
         r#"pycolmap.Reconstruction("colmap/000000")"#;
     "cropandweed" => cropandweed: "CropAndWeed: boxes with stems as CSV, label maps, parameters",
         r#"csv.reader(open("cropandweed/bboxes/CropAndWeed/ave-0000-0000.csv"))"#;
+    "damage" => damage: "Maps of chlorosis, necrosis, dust and edges of holes on leaves, exact shares at pixel centres",
+        r#"numpy.array(PIL.Image.open("damage/train/necrosis/000000.png"))"#;
     "flow" => flow: "OpenEXR: exact optical flow to the next frame and disparity to the other cameras, with what is hidden there",
         r#"OpenEXR.File("flow/000000.exr").channels()["next.x"].pixels"#;
     "imagefolder" => imagefolder: "Hugging Face ImageFolder: images, masks, metadata and card for `datasets`",

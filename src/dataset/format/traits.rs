@@ -1,10 +1,12 @@
-//! What phenotyping measures, one row each: `plants.csv`, `leaves.csv`, `images.csv`.
+//! What phenotyping measures, one row each: `plants.csv`, `leaves.csv`, `images.csv`, and leaves once more as `leaves.parquet`; plants and
+//! images as Parquet stand beside every dataset ([`crate::dataset::index`]).
 //!
 //! Areas, lengths and angles are those of [`crate::scene::traits`], of what grew, whether it is seen or not; plants and leaves that an image
 //! neither shows nor hides have no row. `visible_area_m2` is a leaf's area times the share of its pixels that the image shows: right
 //! for a leaf that is held alike all over. Cells of what is not known (models, imported images) are empty. The first row names the columns.
 
 use super::{Format, Whole};
+use crate::dataset::index::leaves;
 use crate::dataset::record::{Grown, Leaf, Plant, Record};
 use crate::dataset::set::{Set, Stream};
 use crate::scene::tag::Class;
@@ -90,7 +92,8 @@ impl Format for Writer {
             let leaves = record.plants.iter().flat_map(|plant| plant.leaves.iter().map(move |leaf| (plant, leaf)));
             leaves.into_iter().try_for_each(|(plant, leaf)| table.row(LeafRow::of(record, plant, leaf)))
         })?;
-        table::<ImageRow<'_>>(set, out, "images.csv", |record, table| table.row(ImageRow::of(record)))
+        table::<ImageRow<'_>>(set, out, "images.csv", |record, table| table.row(ImageRow::of(record)))?;
+        leaves::write(set, out, &format!("{FOLDER}/leaves.parquet"))
     }
 }
 

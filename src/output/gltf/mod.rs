@@ -1,7 +1,7 @@
 //! A scene as glTF 2.0, in one GLB file: for Blender, for viewers, and for scene files that place it again.
 //!
 //! One node and mesh a part, in the order of the scene, named by its label, which also stands in its `extras` as class, plant
-//! and leaf. Positions, normals, texture coordinates and indices are ours bit for bit; a node above them all turns z up into
+//! and leaf. Leaves that keep their joints have skins (`skins`). Positions, normals, texture coordinates and indices are ours bit for bit; a node above them all turns z up into
 //! the format's y up. Opacity is 0 or 255, cut at ½ and read without a filter: the masks are ours bit for bit, too.
 //!
 //! A leaf returns R and passes T in every band. `KHR_materials_diffuse_transmission` mixes the two by one share f: base colour
@@ -15,6 +15,7 @@
 
 mod look;
 mod pack;
+mod skins;
 
 use super::{Export, write_atomically};
 use crate::light::Light;
@@ -24,11 +25,12 @@ use crate::model::document::{
 };
 use crate::model::{Label, glb};
 use crate::scene::tag::Tag;
-use crate::scene::{Part, Scene};
+use crate::scene::{Part, PlantRecord, Scene};
 use crate::{Error, Result};
 use look::Looks;
 use pack::Pack;
 use serde_json::{Map, Value, json};
+use skins::Skins;
 use std::path::Path;
 
 /// The world's axes in the format's: x stays, z becomes y. Whole numbers, so that a reader's product with its opposite is exact.
@@ -40,17 +42,20 @@ const LUMENS: f64 = 683.0 * 106.857;
 /// Nearest depth that other programs should draw, metres.
 const NEAR: f64 = 0.01;
 
-/// Writes `scene.glb` into `folder`; `provenance` says where the scene came from.
-pub fn write(folder: &Path, scene: &Scene, provenance: &str) -> Result<Export> {
-    let (bytes, warnings) = encode(scene, provenance)?;
+/// Writes `scene.glb` into `folder`; `provenance` says where the scene came from. Leaves of `plants` that keep their joints get skins.
+pub fn write(folder: &Path, scene: &Scene, plants: &[PlantRecord], provenance: &str) -> Result<Export> {
+    let (bytes, warnings) = encode(scene, plants, provenance)?;
     let path = folder.join("scene.glb");
     write_atomically(&path, &bytes)?;
     Ok(Export { paths: vec![path], warnings })
 }
 
 /// The GLB file of a scene, and what it cannot hold.
-pub fn encode(scene: &Scene, provenance: &str) -> Result<(Vec<u8>, Vec<String>)> {
+pub fn encode(scene: &Scene, plants: &[PlantRecord], provenance: &str) -> Result<(Vec<u8>, Vec<String>)> {
     let mut pack = Pack::default();
+    let mut skins = Skins::new(plants);
+    // What stands below the first node.
+    let mut top = Vec::new();
     let mut looks = Looks::new(scene);
     let mut document = Document {
         asset: Asset {
@@ -70,11 +75,17 @@ pub fn encode(scene: &Scene, provenance: &str) -> Result<(Vec<u8>, Vec<String>)>
         let mesh = document.meshes.len() - 1;
         let extras = document.meshes[mesh].extras.clone();
         let name = document.meshes[mesh].name.clone();
-        document.nodes.push(Node { name, mesh: Some(mesh), extras, ..Node::default() });
+        let weighted = !part.mesh.weights.is_empty();
+        let called = name.as_deref().filter(|_| weighted).unwrap_or_default();
+        let skin = if weighted { skins.of(part.tag, called, &mut document, &mut pack, &mut top) } else { None };
+        top.push(document.nodes.len());
+        document.nodes.push(Node { name, mesh: Some(mesh), skin, extras, ..Node::default() });
     }
+    let others = document.nodes.len();
     document.nodes.push(camera(scene, &mut document.cameras));
     let lights = lights(scene, &mut document.nodes);
-    document.nodes[0].children = (1..document.nodes.len()).collect();
+    top.extend(others..document.nodes.len());
+    document.nodes[0].children = top;
     looks.write(&mut document, &mut pack)?;
     if !lights.is_empty() {
         document.extensions.insert(LIGHTS.into(), json!({ "lights": lights }));
@@ -100,11 +111,15 @@ fn name(tag: Tag) -> String {
 fn mesh(part: &Part, material: usize, pack: &mut Pack) -> Mesh {
     let tag = part.tag;
     let label = Label { class: tag.class.name().into(), plant: tag.plant, leaf: tag.leaf };
-    let attributes = [
+    let mut attributes = vec![
         ("POSITION", pack.positions(&part.mesh.positions)),
         ("NORMAL", pack.normals(&part.mesh.normals)),
         ("TEXCOORD_0", pack.uvs(&part.mesh.uvs)),
     ];
+    if !part.mesh.weights.is_empty() {
+        let [joints, weights] = pack.weights(&part.mesh.weights);
+        attributes.extend([("JOINTS_0", joints), ("WEIGHTS_0", weights)]);
+    }
     Mesh {
         name: Some(name(tag)),
         primitives: vec![Primitive {

@@ -1,8 +1,9 @@
 //! The one buffer of a GLB file: vertices, indices, pictures, each kind in a span of its own.
 
-use crate::math::{Vec2, Vec3};
+use crate::geometry::JointWeights;
+use crate::math::{DMat4, Vec2, Vec3};
 use crate::model::document::{
-    ARRAY_BUFFER, Accessor, Buffer, BufferView, Document, ELEMENT_ARRAY_BUFFER, FLOAT, UNSIGNED_INT,
+    ARRAY_BUFFER, Accessor, Buffer, BufferView, Document, ELEMENT_ARRAY_BUFFER, FLOAT, UNSIGNED_INT, UNSIGNED_SHORT,
 };
 
 /// Spans of the buffer while they grow, and who reads them.
@@ -13,6 +14,12 @@ pub(super) struct Pack {
     /// Texture coordinates, 8 bytes each.
     pairs: Vec<u8>,
     indices: Vec<u8>,
+    /// Numbers of joints, 8 bytes a corner.
+    joints: Vec<u8>,
+    /// Their weights, 16 bytes a corner.
+    weights: Vec<u8>,
+    /// 64 bytes each.
+    matrices: Vec<u8>,
     pictures: Vec<Vec<u8>>,
     accessors: Vec<Accessor>,
 }
@@ -21,14 +28,21 @@ pub(super) struct Pack {
 const TRIPLES: usize = 0;
 const PAIRS: usize = 1;
 const INDICES: usize = 2;
-const PICTURES: usize = 3;
+/// Of a pack with skins.
+const JOINTS: usize = 3;
+const WEIGHTS: usize = 4;
+const MATRICES: usize = 5;
 
 impl Pack {
     fn accessor(&mut self, view: usize, byte_offset: usize, count: usize, kind: &str) -> &mut Accessor {
         self.accessors.push(Accessor {
             buffer_view: Some(view),
             byte_offset,
-            component_type: if view == INDICES { UNSIGNED_INT } else { FLOAT },
+            component_type: match view {
+                INDICES => UNSIGNED_INT,
+                JOINTS => UNSIGNED_SHORT,
+                _ => FLOAT,
+            },
             count,
             kind: kind.into(),
             ..Accessor::default()
@@ -75,10 +89,33 @@ impl Pack {
         self.accessors.len() - 1
     }
 
-    /// Number of the view that holds these bytes of a picture.
+    /// Numbers of the accessors that read the joints of these and their weights: each joint once, unused ones 0.
+    pub(super) fn weights(&mut self, of: &[JointWeights]) -> [usize; 2] {
+        let (joints, weights) = (self.joints.len(), self.weights.len());
+        for corner in of {
+            let (numbers, shares) = tidy(corner);
+            self.joints.extend(numbers.into_iter().flat_map(u16::to_le_bytes));
+            self.weights.extend(shares.into_iter().flat_map(f32::to_le_bytes));
+        }
+        self.accessor(JOINTS, joints, of.len(), "VEC4");
+        self.accessor(WEIGHTS, weights, of.len(), "VEC4");
+        [self.accessors.len() - 2, self.accessors.len() - 1]
+    }
+
+    /// Number of the accessor that reads these.
+    pub(super) fn matrices(&mut self, of: &[DMat4]) -> usize {
+        let at = self.matrices.len();
+        let numbers = of.iter().flat_map(DMat4::to_cols_array).map(|number| number as f32);
+        self.matrices.extend(numbers.flat_map(f32::to_le_bytes));
+        self.accessor(MATRICES, at, of.len(), "MAT4");
+        self.accessors.len() - 1
+    }
+
+    /// Number of the view that holds these bytes of a picture. Nothing but pictures may be added after the first.
     pub(super) fn picture(&mut self, bytes: Vec<u8>) -> usize {
         self.pictures.push(bytes);
-        PICTURES + self.pictures.len() - 1
+        let first = if self.matrices.is_empty() { JOINTS } else { MATRICES + 1 };
+        first + self.pictures.len() - 1
     }
 
     /// Tells the document where everything lies, and returns the buffer.
@@ -90,8 +127,11 @@ impl Pack {
             (self.pairs, vertices(8)),
             (self.indices, (None, Some(ELEMENT_ARRAY_BUFFER))),
         ];
+        let skinned = !self.matrices.is_empty();
+        let skins = [(self.joints, vertices(8)), (self.weights, vertices(16)), (self.matrices, (None, None))];
+        let skins = skins.into_iter().filter(|_| skinned);
         let pictures = self.pictures.into_iter().map(|p| (p, (None, None)));
-        for (bytes, (byte_stride, target)) in spans.into_iter().chain(pictures) {
+        for (bytes, (byte_stride, target)) in spans.into_iter().chain(skins).chain(pictures) {
             document.buffer_views.push(BufferView {
                 buffer: 0,
                 byte_offset: buffer.len(),
@@ -106,4 +146,17 @@ impl Pack {
         document.buffers = vec![Buffer { byte_length: buffer.len(), uri: None }];
         buffer
     }
+}
+
+/// The joints of a corner with a weight, each once, and their weights, whose sum is 1.
+fn tidy(of: &JointWeights) -> ([u16; 4], [f32; 4]) {
+    let (mut numbers, mut shares, mut used) = ([0; 4], [0.0; 4], 0);
+    let sum: f32 = of.iter().map(|(_, weight)| weight).sum();
+    for (joint, weight) in of.iter().filter(|(_, weight)| *weight > 0.0) {
+        let place = numbers[..used].iter().position(|number| number == joint).unwrap_or(used);
+        used = used.max(place + 1);
+        numbers[place] = *joint;
+        shares[place] += weight / sum;
+    }
+    (numbers, shares)
 }

@@ -115,6 +115,7 @@ fn patch(p: Vec3, n: Vec3) -> Mesh {
         normals: vec![n; 3],
         uvs: vec![Vec2::ZERO, Vec2::Y, Vec2::X],
         triangles: vec![[0, 1, 2]],
+        weights: Vec::new(),
     }
 }
 

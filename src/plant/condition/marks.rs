@@ -3,6 +3,7 @@
 //! Places are mm on the flat leaf's image, x to the right of the midrib, y up from the image's lower edge, so that a hole of
 //! 2 mm is one on a leaf of any size. Nothing is stored as a picture: a few discs, cuts and noises answer for any place.
 
+mod edge;
 mod until;
 
 use super::Condition;
@@ -111,14 +112,15 @@ impl Tear {
         self.length + self.width + 1.0
     }
 
-    fn holds(&self, p: Vec2, noise: &Perlin) -> bool {
+    /// Whether a place lies in it, or within `beside` mm of its sides.
+    fn holds(&self, p: Vec2, noise: &Perlin, beside: f32) -> bool {
         let q = p - self.from;
         let s = q.dot(self.along) / self.length;
-        if !(-0.6..1.0).contains(&s) {
+        if !(-0.6..1.0 + beside / self.length).contains(&s) {
             return false;
         }
         let stray = 0.8 * noise.at2(f64::from(p.x * 0.35), f64::from(p.y * 0.35)) as f32 * s.max(0.0);
-        (q.perp_dot(self.along) + stray).abs() < 0.5 * self.width * (1.0 - s.max(0.0))
+        (q.perp_dot(self.along) + stray).abs() < 0.5 * self.width * (1.0 - s.max(0.0)) + beside
     }
 }
 
@@ -260,7 +262,7 @@ impl Marks {
             left.cut(self.about(hole.centre, hole.reach()), |uv| hole.at(self.place(uv), &noise) < 1.0);
         }
         for tear in &self.tears {
-            left.cut(self.about(tear.from, tear.reach()), |uv| tear.holds(self.place(uv), &noise));
+            left.cut(self.about(tear.from, tear.reach()), |uv| tear.holds(self.place(uv), &noise, 0.0));
         }
         // Holes seldom cut anything off; bites and tears may.
         if self.bites > 0 || !self.tears.is_empty() { left.hanging() } else { left }

@@ -251,6 +251,7 @@ impl<'a> Grower<'a, '_> {
                 twist: 0.0,
                 arch: 0.0,
                 cell: self.pen.cell,
+                rigged: self.growth.rigged,
                 stream: own,
             };
             let seat = leaf::Seat { point: point + out * (0.8 * radius), axis: along, out };

@@ -97,7 +97,8 @@ fn size(seedling: &Seedling, cell: f32) -> (f64, f64) {
     }
     // Holes and spots are looked at in many places of each leaf, and change none of its triangles.
     let healthy = Seedling { condition: None, ..seedling.clone() };
-    let (_, organs) = grow(&healthy, &Place { height: 0.0, normal: Vec3::Z, dust: LOESS, cell }, |_| true);
+    let place = Place { height: 0.0, normal: Vec3::Z, dust: LOESS, cell, rigged: false };
+    let (_, organs) = grow(&healthy, &place, |_| true);
     let organs = organs.unwrap_or_default();
     (organs.iter().map(|organ| organ.part.mesh.triangles.len()).sum::<usize>() as f64, organs.len() as f64)
 }

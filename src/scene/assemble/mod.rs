@@ -465,7 +465,7 @@ impl<'a> Builder<'a> {
             options.wanted()?;
             let Vec2 { x, y } = seedling.position;
             let (height, normal) = floor.map_or((0.0, Vec3::Z), |f| f.stance(x, y));
-            let place = Place { height, normal, dust, cell: cell(seedling.position) };
+            let place = Place { height, normal, dust, cell: cell(seedling.position), rigged: options.rigged };
             let known = options.preview.as_ref().and_then(|preview| preview.plant(seedling, &place));
             let known = known.filter(|known| known.organs.is_some() || !reaches(&known.record));
             Ok(known.unwrap_or_else(|| {

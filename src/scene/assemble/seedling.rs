@@ -63,6 +63,8 @@ pub(super) struct Place {
     pub(super) dust: Spectrum,
     /// Shortest cell of its mesh, metres.
     pub(super) cell: f32,
+    /// Whether its leaves keep their joints.
+    pub(super) rigged: bool,
 }
 
 /// Grows one plant, in its own stream, and stands it in its place. It has no number yet, and no organs where it is not `wanted`.
@@ -71,7 +73,7 @@ pub(super) fn grow(
     place: &Place,
     wanted: impl FnOnce(&PlantRecord) -> bool,
 ) -> (PlantRecord, Option<Vec<Grown>>) {
-    let Place { height: z, normal, dust, cell } = *place;
+    let Place { height: z, normal, dust, cell, rigged } = *place;
     let desc: &SpeciesDesc = &s.species.desc;
     let mut stream = s.stream.clone();
     let drawn = stage(s, &mut stream);
@@ -89,7 +91,7 @@ pub(super) fn grow(
         }
         vigour *= emerging(&desc.plant, days);
     }
-    let options = GrowOptions { vigour, condition: ailing.as_ref().map(Ailing::posture), cell };
+    let options = GrowOptions { vigour, condition: ailing.as_ref().map(Ailing::posture), cell, rigged };
     let plant = match &s.individual {
         Some(individual) => individual.plant(desc, stage, &stream, &options),
         None => plant::grow_with(&desc.plant, stage, &stream, &options),

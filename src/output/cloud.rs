@@ -1,0 +1,160 @@
+//! A field's surfaces as a cloud of points, seen by nobody: so many points a square metre, whatever hides them.
+//!
+//! On a part of area A lie n = ⌊A d⌋ or ⌈A d⌉ points, d points/m² on the mean. Point i falls into triangle and place by (i + ξ) n⁻¹ of the
+//! area as the triangles follow each other, so neighbouring triangles have neither gaps nor heaps; within the triangle it is uniform:
+//! (1 − √ξ₁, √ξ₁ ξ₂) (Turk 1990, "Generating random points in triangles", Graphics Gems). What a mask cuts out bears none.
+//!
+//! Colours are reflectances of the upper side seen along its normal, averaged over the mean distance of points, as 8-bit codes of sRGB; near
+//! infrared is encoded by the same curve.
+
+use super::{Export, write_atomically};
+use crate::geometry::{Hit, Interaction};
+use crate::sampling::{Purpose, Stream};
+use crate::scene::{Field, Part};
+use crate::texture::ColorSpace;
+use crate::{Error, Result};
+use std::path::Path;
+
+/// Names and types of a point's properties, in the order in which they are written.
+const PROPERTIES: [(&str, &str); 14] = [
+    ("float", "x"),
+    ("float", "y"),
+    ("float", "z"),
+    ("float", "nx"),
+    ("float", "ny"),
+    ("float", "nz"),
+    ("uchar", "red"),
+    ("uchar", "green"),
+    ("uchar", "blue"),
+    ("uchar", "nir"),
+    ("uchar", "class"),
+    ("uchar", "part"),
+    ("ushort", "plant"),
+    ("ushort", "leaf"),
+];
+
+/// Most points of a file: 3.4 GB.
+const MOST_POINTS: f64 = 1e8;
+
+/// The properties of one point.
+#[derive(Clone, Copy, Debug)]
+pub struct Point {
+    /// Where it is, metres, world.
+    pub at: [f32; 3],
+    /// Unit normal.
+    pub normal: [f32; 3],
+    /// 8-bit sRGB.
+    pub rgb: [u8; 3],
+    /// 8-bit near infrared.
+    pub nir: u8,
+    /// Class, and number among [`PartKind::NUMBERED`](crate::scene::PartKind::NUMBERED).
+    pub kind: [u8; 2],
+    /// Numbers of plant and leaf.
+    pub label: [u16; 2],
+}
+
+/// Points on their way into a PLY file, binary and little endian. Source: Turk 1994, "The PLY Polygon File Format".
+#[derive(Default)]
+pub struct Cloud {
+    bytes: Vec<u8>,
+    points: u64,
+}
+
+impl Cloud {
+    /// Adds a point.
+    pub fn add(&mut self, point: &Point) {
+        let Point { at, normal, rgb, nir, kind, label } = point;
+        self.bytes.extend(at.iter().chain(normal).flat_map(|number| number.to_le_bytes()));
+        self.bytes.extend(rgb);
+        self.bytes.push(*nir);
+        self.bytes.extend(kind);
+        self.bytes.extend(label.iter().flat_map(|number| number.to_le_bytes()));
+        self.points += 1;
+    }
+
+    /// Number of points.
+    #[must_use]
+    pub fn points(&self) -> u64 {
+        self.points
+    }
+
+    /// The file, which says that this version made it.
+    #[must_use]
+    pub fn file(self, version: &str) -> Vec<u8> {
+        let properties = PROPERTIES.map(|(kind, name)| format!("property {kind} {name}\n")).concat();
+        let points = self.points;
+        let mut file = format!(
+            "ply\nformat binary_little_endian 1.0\ncomment furrow {version}; world coordinates, metres, z up\nelement vertex {points}\n{properties}end_header\n"
+        )
+        .into_bytes();
+        file.extend(self.bytes);
+        file
+    }
+}
+
+/// Writes `points.ply` into `folder`: `density` points a square metre on all surfaces of a field.
+pub fn write(folder: &Path, field: &Field, density: f64) -> Result<Export> {
+    let cloud = sample(field, density)?;
+    let path = folder.join("points.ply");
+    write_atomically(&path, &cloud.file(env!("CARGO_PKG_VERSION")))?;
+    Ok(Export { paths: vec![path], warnings: Vec::new() })
+}
+
+/// `density` points a square metre on all surfaces of a field. An error where they are too many.
+pub fn sample(field: &Field, density: f64) -> Result<Cloud> {
+    let area: f64 = field.scene.parts.iter().map(|part| areas(part).last().copied().unwrap_or(0.0)).sum();
+    if area * density > MOST_POINTS {
+        let words = format!("{:.0} points on {area:.1} m² are more than {MOST_POINTS:.0}", area * density);
+        let help = format!("ask for a density of at most {:.0} points/m²", (MOST_POINTS / area).floor());
+        return Err(Error::input(words).help(help));
+    }
+    let mut cloud = Cloud::default();
+    for k in 0..field.scene.parts.len() {
+        let mut stream = Stream::of(field.seed, field.index, Purpose::Cloud, k as u64);
+        on_part(field, k, density, &mut stream, &mut cloud);
+    }
+    Ok(cloud)
+}
+
+/// Area of a part's triangles up to each of them, m².
+fn areas(part: &Part) -> Vec<f64> {
+    let mut sum = 0.0;
+    let triangles = 0..part.mesh.triangles.len() as u32;
+    let add = |i: u32| {
+        let [a, b, c] = part.mesh.corners(i);
+        sum += 0.5 * f64::from((b - a).cross(c - a).length());
+        sum
+    };
+    triangles.map(add).collect()
+}
+
+fn on_part(field: &Field, k: usize, density: f64, stream: &mut Stream, cloud: &mut Cloud) {
+    let part = &field.scene.parts[k];
+    let areas = areas(part);
+    let Some(area) = areas.last().copied().filter(|area| *area > 0.0) else { return };
+    let wanted = area * density;
+    let count = wanted.floor() as u64 + u64::from(stream.chance(wanted.fract()));
+    let material = &field.scene.materials[part.material as usize];
+    let apart = density.sqrt().recip() as f32;
+    let kind = [part.tag.class as u8, field.kinds[k].number()];
+    for i in 0..count {
+        let share = (i as f64 + stream.uniform()) / count as f64;
+        let (root, along) = (stream.uniform32().sqrt(), stream.uniform32());
+        let triangle = areas.partition_point(|sum| *sum <= share * area).min(areas.len() - 1) as u32;
+        let hit = Hit { part: k as u32, triangle, u: 1.0 - root, v: root * along, t: 0.0 };
+        let at = Interaction::new(&part.mesh, &hit, apart);
+        if part.mask.as_ref().is_some_and(|mask| !mask.opaque_at(at.uv)) {
+            continue;
+        }
+        let colors = material.scatter(&at, at.ng).0.reflectance(1.0).to_array();
+        let [r, g, b, nir] = colors.map(|linear| ColorSpace::Srgb.encode(linear));
+        cloud.add(&Point {
+            at: at.p.to_array(),
+            normal: at.ns.to_array(),
+            rgb: [r, g, b],
+            nir,
+            kind,
+            label: [part.tag.plant, part.tag.leaf],
+        });
+    }
+}

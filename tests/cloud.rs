@@ -1,0 +1,139 @@
+//! Clouds of points on a field's surfaces.
+//!
+//! Rationale: who measures a plant by its points must find the area that it has. Expected: as many points as area times density, on the mean of
+//! every part and every triangle; none where a mask is open; every point on its part, with its label. Bounds are 5 standard errors.
+
+mod common;
+
+use common::program::{SMALL, field, scratch, small_text, trace};
+use furrow::geometry::Mesh;
+use furrow::math::{Vec3, vec3};
+use furrow::output::cloud::{self, Cloud};
+use furrow::scene::Field;
+use furrow::scene::assemble::Options;
+use std::collections::BTreeMap;
+
+/// Bytes of a point, and of its place.
+const POINT: usize = 34;
+
+/// Places, normals and labels (plant, leaf) of a cloud's points.
+fn points(cloud: Cloud) -> Vec<(Vec3, Vec3, (u16, u16))> {
+    let count = cloud.points();
+    let file = cloud.file("test");
+    let header = file.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
+    let words = String::from_utf8_lossy(&file[..header]).into_owned();
+    assert!(words.contains(&format!("element vertex {count}\n")), "{words}");
+    let body = &file[header..];
+    assert_eq!(body.len(), count as usize * POINT);
+    let float = |p: &[u8], k: usize| f32::from_le_bytes(p[4 * k..4 * k + 4].try_into().unwrap());
+    let vector = |p: &[u8], k: usize| vec3(float(p, k), float(p, k + 1), float(p, k + 2));
+    let short = |p: &[u8], at: usize| u16::from_le_bytes([p[at], p[at + 1]]);
+    body.chunks_exact(POINT).map(|p| (vector(p, 0), vector(p, 3), (short(p, 30), short(p, 32)))).collect()
+}
+
+fn plants(text: &str) -> Field {
+    let text = format!(
+        "Field(
+            seed: 3,
+            camera: Pinhole(size: (64, 48), intrinsics: FieldOfView(horizontal_deg: 50), pose: Nadir(height_m: 1)),
+            lights: [Constant(radiance: (1, 1, 1, 1))],
+            plants: [{text}],
+        )"
+    );
+    field(&text, &Options::default())
+}
+
+/// Area of a mesh that its mask leaves, m²: each triangle's by a raster of places.
+fn left(mesh: &Mesh, mask: Option<&furrow::geometry::AlphaMask>) -> f64 {
+    let places: Vec<(f32, f32)> = (0..64).map(|i| ((i % 8) as f32 + 0.5, (i / 8) as f32 + 0.5)).collect();
+    let one = |i: u32| {
+        let [a, b, c] = mesh.corners(i);
+        let area = 0.5 * f64::from((b - a).cross(c - a).length());
+        let [ta, tb, tc] = mesh.triangles[i as usize].map(|k| mesh.uvs[k as usize]);
+        let there = |(x, y): &&(f32, f32)| {
+            let (u, v) = (x / 8.0, y / 8.0);
+            let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+            mask.is_none_or(|mask| mask.opaque_at(ta * (1.0 - u - v) + tb * u + tc * v))
+        };
+        area * places.iter().filter(there).count() as f64 / places.len() as f64
+    };
+    (0..mesh.triangles.len() as u32).map(one).sum()
+}
+
+#[test]
+fn leaves_bear_points_by_their_area_and_none_in_their_holes() {
+    let field = plants(
+        "(species: \"scenes/species/sugar_beet.ron\", growth: Bbch(16), position_m: (0, 0), condition: (holes: 6, bites: 2, wilt: 0))",
+    );
+    let density = 2e6;
+    let found = points(cloud::sample(&field, density).unwrap());
+    let (mut areas, mut whole) = (BTreeMap::new(), 0.0);
+    for part in &field.scene.parts {
+        *areas.entry((part.tag.plant, part.tag.leaf)).or_insert(0.0) += left(&part.mesh, part.mask.as_deref());
+        whole += f64::from(part.mesh.area());
+    }
+    let mut counts: BTreeMap<(u16, u16), usize> = BTreeMap::new();
+    for (_, normal, label) in &found {
+        *counts.entry(*label).or_default() += 1;
+        assert!((normal.length() - 1.0).abs() < 1e-3);
+    }
+    assert!(areas.len() > 4);
+    for (label, area) in &areas {
+        let (expected, count) = (area * density, counts.get(label).copied().unwrap_or(0) as f64);
+        // Masks are counted on a raster: 1 % beside chance.
+        assert!(
+            (count - expected).abs() < 5.0 * expected.sqrt() + 0.01 * expected,
+            "{label:?}: {count}, not {expected}"
+        );
+    }
+    assert!((found.len() as f64) < 0.98 * whole * density, "masks and holes cut something");
+}
+
+/// Expected: the two halves of each triangle, parted by its median, bear equally many points; all lie in it. The stem has no mask.
+#[test]
+fn points_are_uniform_on_their_triangles() {
+    let field = plants("(species: \"scenes/species/sugar_beet.ron\", growth: Bbch(16), position_m: (0, 0))");
+    let found = points(cloud::sample(&field, 1.2e7).unwrap());
+    // The stem: what belongs to no leaf.
+    let stem: Vec<&Mesh> = field.scene.parts.iter().filter(|part| part.tag.leaf == 0).map(|part| &*part.mesh).collect();
+    assert!(!stem.is_empty() && field.scene.parts.iter().all(|part| part.tag.leaf > 0 || part.mask.is_none()));
+    let own: Vec<Vec3> = found.iter().filter(|(_, _, (_, leaf))| *leaf == 0).map(|(at, ..)| *at).collect();
+    let (mut first, mut inside) = (0_u32, 0_u32);
+    for at in &own {
+        let corners = stem.iter().flat_map(|mesh| (0..mesh.triangles.len() as u32).map(|i| mesh.corners(i)));
+        let place = corners.filter_map(|corners| {
+            let [a, b, c] = corners.map(|corner| corner.as_dvec3());
+            let (e1, e2, p) = (b - a, c - a, at.as_dvec3() - a);
+            let n = e1.cross(e2);
+            let (u, v) = (p.cross(e2).dot(n) / n.length_squared(), e1.cross(p).dot(n) / n.length_squared());
+            let near = p.dot(n.normalize_or_zero()).abs() < 1e-7;
+            (near && u > -1e-3 && v > -1e-3 && u + v < 1.001).then_some(u > v)
+        });
+        if let Some(half) = place.into_iter().next() {
+            inside += 1;
+            first += u32::from(half);
+        }
+    }
+    assert!(f64::from(inside) > 0.999 * own.len() as f64, "{inside} of {}", own.len());
+    assert!(inside > 2000, "{inside} of {}", own.len());
+    let share = f64::from(first) / f64::from(inside);
+    assert!((share - 0.5).abs() < 2.5 / f64::from(inside).sqrt(), "{share} of {inside}");
+}
+
+#[test]
+fn the_same_field_has_the_same_points_and_too_many_are_refused() {
+    let grown = field(&small_text(), &Options::default());
+    let file = || cloud::sample(&grown, 3e4).unwrap().file("test");
+    assert!(file() == file());
+    let error = cloud::sample(&grown, 1e12).map(|_| ()).unwrap_err();
+    assert!(error.to_string().contains("points on"), "{error}");
+    let (_keep, folder) = scratch();
+    let export = |more: &[&str]| {
+        let mut command = trace(&["export", "--scene", SMALL, "--width", "32", "--density", "20000"]);
+        command.args(more).arg("--out").arg(&folder).output().unwrap()
+    };
+    assert!(!export(&["--format", "gltf"]).status.success());
+    let done = export(&["--format", "ply"]);
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    assert!(std::fs::read(folder.join("points.ply")).unwrap().starts_with(b"ply\nformat binary_little_endian"));
+}
