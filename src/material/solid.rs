@@ -2,7 +2,8 @@
 //!
 //! Water covers part of a piece with a film, which darkens it by internal reflection as it darkens soil (Lekner & Dorf 1988, see
 //! [`crate::optics::soil::wet`]) and adds a film's gloss: the wetter, the smoother the piece looks. Soil lies on what faces up, in
-//! patches, and is as wet as the piece.
+//! patches, and is as wet as the piece. Straw, wood and dead leaves also soak: water in their pores scatters less than air, so they darken
+//! further than a stone, about to half of what they reflect dry.
 
 use super::feature::Feature;
 use super::shading::frame;
@@ -21,6 +22,9 @@ const FILM_ROUGHNESS: (f32, f32) = (0.35, 0.22);
 const DRY: f32 = 0.04;
 /// Moisture from which on the pores of soil fill: a piece has none.
 const PORES: f32 = 0.9;
+/// Share of its reflectance that soaked dead matter loses within, when it is saturated. Estimate: with the film, wet straw reflects about half as much
+/// as dry straw, as plant litter does (Nagler, Daughtry & Goward 2000, "Plant litter and soil reflectance").
+const SOAKED: f32 = 0.32;
 /// Upward component of the normal from which on soil stays on a piece, and at which it has all of its cover.
 const TOP: (f32, f32) = (0.1, 0.75);
 /// Of the cover with soil, what the mean place has of the upper half.
@@ -34,6 +38,8 @@ pub struct Solid {
     sigma: f32,
     grain: Option<Grain>,
     dust: Option<Dust>,
+    /// Whether it soaks.
+    porous: bool,
     /// Share under a film of water, 0–1.
     film: f32,
 }
@@ -60,7 +66,7 @@ const APART: f32 = 40.0;
 impl Solid {
     /// `albedo` 0–1 per band, dry; `sigma`, the facets' slope angle, radians.
     pub fn new(albedo: Spectrum, sigma: f32) -> Self {
-        Self { albedo, sigma, grain: None, dust: None, film: 0.0 }
+        Self { albedo, sigma, grain: None, dust: None, porous: false, film: 0.0 }
     }
 
     /// With mottling of relative depth `depth` (0–1) over patches of `size` metres.
@@ -77,10 +83,17 @@ impl Solid {
         Self { dust: (cover > 0.0).then_some(dust), ..self }
     }
 
+    /// With pores that water fills: straw, wood, dead leaves.
+    #[must_use]
+    pub fn porous(self) -> Self {
+        Self { porous: true, ..self }
+    }
+
     /// As moist as the ground that it lies on, with the soil that lies on it: 0 air-dry, 1 saturated. Call it last.
     #[must_use]
     pub fn moist(self, moisture: f32) -> Self {
-        let (albedo, film) = wet(self.albedo, moisture.min(PORES));
+        let soaked = if self.porous { 1.0 - SOAKED * moisture.clamp(0.0, 1.0) } else { 1.0 };
+        let (albedo, film) = wet(self.albedo * soaked, moisture.min(PORES));
         let dust = self.dust.map(|d| Dust { soil: wet(d.soil, moisture).0, ..d });
         Self { albedo, dust, film, ..self }
     }
@@ -154,6 +167,21 @@ mod tests {
             }
             assert!(at(0.0).film == 0.0 && at(0.3).film < at(0.9).film);
         }
+    }
+
+    /// Rationale: straw soaks, stones do not. Expected: saturated straw reflects 0.4 to 0.65 of what it does dry, less than a stone of its colour;
+    /// dry both are the same. Source: Nagler et al. 2000.
+    #[test]
+    fn soaked_straw_is_darker_than_a_wet_stone() {
+        let stone = Solid::new(STRAW, 0.3);
+        let straw = stone.clone().porous();
+        assert_eq!(straw.clone().moist(0.0).albedo, stone.clone().moist(0.0).albedo);
+        for moisture in [0.3, 0.8, 1.0] {
+            let [soaked, film] = [&straw, &stone].map(|solid| solid.clone().moist(moisture).albedo);
+            assert!((0..4).all(|k| soaked.0[k] < film.0[k]), "{moisture}: {soaked:?} {film:?}");
+        }
+        let whole = straw.moist(1.0).albedo;
+        assert!((0..4).all(|k| (0.4..0.65).contains(&(whole.0[k] / STRAW.0[k]))), "{whole:?}");
     }
 
     /// Expected: the top of a dusty piece is nearer to the soil by about its cover, its sides and its lower side are its own; a piece without

@@ -45,7 +45,9 @@ fn of_axes(plant: &PlantDesc, stage: &StageDesc) -> f64 {
 /// That of a plant.
 pub fn most_triangles(desc: &PlantDesc) -> f64 {
     let largest = desc.kinds.values().map(of_leaf).fold(0.0, f64::max);
-    let leaves = |layers: f64| layers * largest + RING * 64.0;
+    // Stems that wind have more rings.
+    let rings = if desc.twine.is_some() { 256.0 } else { 64.0 };
+    let leaves = |layers: f64| layers * largest + RING * rings;
     let stages = desc.stages.iter().map(|stage| {
         let each = 1.0 + stage.branches.usual().1.min(SHOOTS);
         let side = if stage.tillers.usual().1 > 0.0 { 1.0 + SHOOTS * each } else { 1.0 };

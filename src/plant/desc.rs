@@ -4,6 +4,7 @@ use super::flower::desc::FlowerDesc;
 use super::inflorescence::check;
 use super::kind::LeafKind;
 use super::stage::StageDesc;
+use super::twine::TwineDesc;
 use crate::ron_file::{self, Finite, NonNegative, Num, Positive, Step, Vary};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
@@ -105,6 +106,11 @@ pub struct PlantDesc {
     /// Length over width at which a stem of a `Runner` or `Whorl` begins to sink under its own weight, and at which it lies on the soil.
     #[schemars(default = "lies_at")]
     pub lies_at: (Num<Positive>, Num<Positive>),
+    /// How shoots of a `Runner` wind upwards, round each other or round a support that is not seen; none unless given, and then all creep.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(default)]
+    #[schemars(extend("x-example" = "(share: 0.6, radius_mm: Uniform(2, 4), pitch_mm: Uniform(25, 45), height_mm: Uniform(80, 160))"))]
+    pub twine: Option<TwineDesc>,
     /// Material of the hypocotyl; empty: `"stalk"`.
     #[schemars(default)]
     #[schemars(extend("x-example" = "\"leaf\""))]
@@ -139,6 +145,8 @@ struct Written {
     lean_deg: Vary<Finite>,
     #[serde(default = "lies_at")]
     lies_at: (Num<Positive>, Num<Positive>),
+    #[serde(default)]
+    twine: Option<TwineDesc>,
     #[serde(default, alias = "hypocotyl_skin")]
     hypocotyl_material: String,
     #[serde(default, alias = "stem_skin")]
@@ -192,6 +200,7 @@ impl<'de> Deserialize<'de> for PlantDesc {
                 azimuth_deg: w.azimuth_deg,
                 lean_deg: w.lean_deg,
                 lies_at: w.lies_at,
+                twine: w.twine,
                 hypocotyl_material: w.hypocotyl_material,
                 stem_material: w.stem_material,
             };

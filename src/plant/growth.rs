@@ -67,6 +67,8 @@ pub(super) struct Growth<'a> {
     /// Width of the stem at the soil, metres.
     pub(super) stem: f32,
     pub(super) tillers: usize,
+    /// How far the side shoots of a grass have caught up with the main one, 0–1.
+    pub(super) tillers_grown: f32,
     /// Side shoots of each side shoot.
     pub(super) branches: usize,
     /// Layer and azimuth of each axil from below, of withered leaves too.
@@ -262,6 +264,7 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
         hypocotyl,
         stem,
         tillers,
+        tillers_grown: lerp(from.tiller_growth.f32(), to.tiller_growth.f32(), u),
         branches,
         axils,
         rise,

@@ -20,6 +20,7 @@
 //! | `inflorescence` | the axes that bear them, and where these begin |
 //! | `stipules` | what stands at the foot of a stalk |
 //! | `spines` | spines on a blade's margin |
+//! | `twine` | shoots that wind |
 //! | `condition` | age, health and damage of a plant and its leaves |
 //! | `rosette`, `whorl`, `erect`, `dissected`, `tuft`, `cane`, `runner` | growth forms |
 //!
@@ -55,6 +56,7 @@ mod stipules;
 pub mod table;
 mod tube;
 mod tuft;
+mod twine;
 mod whorl;
 
 pub use age::LeafAge;
@@ -68,6 +70,7 @@ pub use organ::{LeafAxis, LeafSize, Organ, OrganKind};
 pub use rig::RigJoint;
 pub use skeleton::PlacedJoint;
 pub use stage::{BUD, LayerDesc, StageDesc};
+pub use twine::TwineDesc;
 
 use crate::sampling::Stream;
 use growth::Growth;

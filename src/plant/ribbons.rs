@@ -3,15 +3,17 @@
 //! A ribbon is a narrow strip with a keel: three corners across, so that it catches light on two faces and is never a
 //! line when seen from its side. The blade's axis carries pairs of pinnae, each pinna pairs of lobes; lengths follow
 //! sin(πt)^0.7 along their axis, so that the whole has a leaf's outline. Pinnae stand out of the blade's plane by turns, as
-//! the leaves of mayweed do.
+//! the leaves of mayweed do, and curl: tips bend aside, up and down by the square of the distance from their foot.
 
 use super::blade::Rest;
 use super::growth::CELL;
 use super::skeleton::Skeleton;
 use crate::math::{Vec3, lerp, smoothstep, vec2, vec3};
-use crate::sampling::Stream;
+use crate::sampling::{Purpose, Stream};
 use std::f32::consts::PI;
 
+/// How far the tips of pinnae bend aside, of their length, at most; those of lobes up or down twice as far. An estimate from pictures of mayweed.
+const CURL: f32 = 0.2;
 /// The most ribbons of one blade: a guard against species files that ask for a million lobes.
 pub(super) const MOST: usize = 600;
 
@@ -91,10 +93,12 @@ impl Ribbons<'_> {
     /// A pinna with its lobes, the last of them being its own tip.
     fn pinna(&mut self, start: Vec3, along: Vec3, up: Vec3, lobes: usize, stream: &mut Stream) {
         let length = along.length();
-        let bow = up * (length * stream.range32(-0.12, 0.2));
-        self.strip(start, along, up, bow, self.width, 2);
         let ahead = along / length.max(1e-9);
         let right = ahead.cross(up);
+        let mut curls = stream.child(Purpose::Leaf, u64::from(stream.clone().seed32()));
+        let mut curl = |most: f32| curls.range32(-most, most);
+        let bow = (up * stream.range32(-0.12, 0.2) + right * curl(CURL)) * length;
+        self.strip(start, along, up, bow, self.width, 2);
         for k in 0..lobes {
             let s = lerp(0.18, 0.88, (k as f32 + 0.5) / lobes as f32) + stream.range32(-0.05, 0.05);
             for side in [-1.0_f32, 1.0] {
@@ -109,14 +113,16 @@ impl Ribbons<'_> {
                     + up * (spread.sin() * tilt.sin()))
                 .normalize_or(ahead);
                 let from = start + along * s + bow * (s * s);
-                self.strip(from, lobe * reach, up, Vec3::ZERO, 0.85 * self.width, 1);
+                let bend = (up * curl(2.0 * CURL) + right * curl(CURL)) * reach;
+                let pieces = if reach > 4.5 * self.width { 2 } else { 1 };
+                self.strip(from, lobe * reach, up, bend, 0.85 * self.width, pieces);
                 // A long lobe bears a tooth on its outer side: three times pinnate.
                 if reach > 4.5 * self.width {
                     let tooth =
                         (lobe * 0.8 - right * (side * 0.25) + up * stream.range32(-0.5, 0.6)).normalize_or(lobe);
                     let tooth = if k % 2 == 0 { tooth } else { (lobe + right * (side * 0.7)).normalize_or(lobe) };
                     self.strip(
-                        from + lobe * (0.45 * reach),
+                        from + lobe * (0.45 * reach) + bend * 0.2,
                         tooth * (0.45 * reach),
                         up,
                         Vec3::ZERO,
@@ -189,7 +195,6 @@ pub(super) fn blade(division: Division, width: f32, skeleton: &Skeleton, stream:
 mod tests {
     use super::super::skeleton::Measures;
     use super::*;
-    use crate::sampling::Purpose;
 
     /// Expected: below its first pinna a rachis is a thread no wider than a segment; with a long bare part the pinnae stand near the tip; without
     /// one they begin near the base.

@@ -2,14 +2,15 @@
 //! black bindweed, peanut.
 //!
 //! A stem carries itself up to some forty times its width ([`super::PlantDesc::lies_at`]); beyond that it sinks, creeps along the soil,
-//! and only its tip turns to the light. Along a creeping stem leaves turn to its two sides and face the sky, whatever their place on it.
+//! and only its tip turns to the light. A stem that twines ([`super::twine`]) does not lie. Along a creeping stem leaves turn to its two sides and face the sky, whatever their place on it.
 
 use super::axis;
 use super::growth::{Growth, LeafNow};
 use super::leaf::{self, Lower, Seat};
 use super::organ::{Organ, OrganKind};
 use super::tube::{self, Profile};
-use crate::math::{Vec3, direction, lerp, smoothstep};
+use super::twine::Helix;
+use crate::math::{Vec2, Vec3, direction, lerp, smoothstep};
 use crate::sampling::{Purpose, Stream};
 use std::f32::consts::{FRAC_PI_2, TAU};
 
@@ -25,6 +26,8 @@ const MOST: usize = 24;
 const PIECES: usize = 4;
 /// Width of a stem's top over that of its base.
 const TAPER: f32 = 0.6;
+/// Which of a stem's streams its helix is drawn from.
+const TWINE: u64 = 1 << 16;
 /// Cells of a side shoot's blades over those of the main shoot's: there are many of them.
 const SIDE_CELL: f32 = 1.2;
 
@@ -57,6 +60,7 @@ pub(super) fn shoots(growth: &Growth<'_>, habit: Habit) -> Vec<Organ> {
         growth,
         habit,
         number: growth.leaves.last().map_or(0, |leaf| leaf.number),
+        line: Vec2::ZERO,
     };
     let mut stream = growth.stream.child(Purpose::Plant, 1);
     let lean = growth.desc.lean_deg.draw32(&mut stream).to_radians();
@@ -64,6 +68,7 @@ pub(super) fn shoots(growth: &Growth<'_>, habit: Habit) -> Vec<Organ> {
     let upright = direction(lean, towards);
     let radius = (0.5 * growth.stem).max(2e-4);
     let foot = Foot { point: upright * growth.hypocotyl, along: upright, radius, length: growth.hypocotyl };
+    plant.line = foot.point.truncate();
     axis::hypocotyl(&mut plant.organs, growth, upright, radius);
     let nodes = plant.stem(&foot, &growth.rise, &mut stream);
     for leaf in &growth.leaves {
@@ -135,6 +140,8 @@ struct Shoots<'a> {
     habit: Habit,
     /// Leaves so far.
     number: u16,
+    /// Where the main shoot stands; what twines winds round it, metres.
+    line: Vec2,
 }
 
 impl Shoots<'_> {
@@ -144,6 +151,8 @@ impl Shoots<'_> {
         let (sinks, lies) = (self.growth.desc.lies_at.0.f32(), self.growth.desc.lies_at.1.f32());
         let whole = rise.last().copied().unwrap_or(0.0);
         let sunk = smoothstep(sinks, lies, (foot.length + whole) / (2.0 * foot.radius));
+        let mut own = stream.child(Purpose::Plant, TWINE);
+        let helix = self.growth.desc.twine.as_ref().and_then(|twine| Helix::draw(twine, self.line, &mut own));
         let start = foot.along.z.clamp(-1.0, 1.0).asin();
         let mut heading = foot.along.x.atan2(foot.along.y);
         let (mut point, mut along, mut below) = (foot.point, foot.along, 0.0);
@@ -151,11 +160,12 @@ impl Shoots<'_> {
         rings.push(axis::ring(point - along * (1.2 * foot.radius), along, foot.radius, profile));
         for rise in rise {
             let radius = foot.radius * lerp(1.0, TAPER, if whole > 0.0 { rise / whole } else { 0.0 });
-            let step = (rise - below) / PIECES as f32;
+            let pieces = helix.map_or(PIECES, |helix| helix.steps(rise - below).max(PIECES));
+            let step = (rise - below) / pieces as f32;
             let (swerve, sway) = (0.16 * stream.normal() as f32, 0.07 * stream.normal() as f32);
-            for piece in 1..=if step > 1e-6 { PIECES } else { 0 } {
+            for piece in 1..=if step > 1e-6 { pieces } else { 0 } {
                 let t = (below + step * piece as f32) / whole;
-                heading += swerve / PIECES as f32;
+                heading += swerve / pieces as f32;
                 // What stands turns to the light as it grows; what sinks does so from its foot, and only its tip stands up again.
                 let stands = start + (1.0 - sunk) * 0.6 * t * start.cos();
                 let lies = lerp(stands, CREEP, sunk * smoothstep(0.0, 0.45, t));
@@ -163,9 +173,12 @@ impl Shoots<'_> {
                 // It never goes into the soil.
                 let floor = (1.5 * radius + 1e-3 - point.z) / step;
                 let steep = elevation.min(FRAC_PI_2).sin().max(floor.clamp(-1.0, 0.5));
-                along = direction(FRAC_PI_2 - steep.asin(), heading);
+                along = match helix {
+                    Some(helix) => helix.next(point, foot.along, t * whole, step),
+                    None => direction(FRAC_PI_2 - steep.asin(), heading),
+                };
                 point += along * step;
-                let thick = if piece == PIECES { 1.12 } else { 1.0 };
+                let thick = if piece == pieces { 1.12 } else { 1.0 };
                 rings.push(axis::ring(point, along, thick * radius, profile));
             }
             nodes.push((point, along, radius));

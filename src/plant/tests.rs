@@ -483,7 +483,7 @@ fn triangles_stay_within_budget() {
             ("BEAVX", _) | ("ARHHY", 20..) | ("GALAP", 12..) => 40_000,
             // A mat: every side shoot branches again.
             ("STEME", 20..) => 60_000,
-            ("TRZAX", 22..) | ("ARHHY", 14..) | ("DAUCA" | "CIRAR" | "MATIN", _) => 24_000,
+            ("TRZAX", 22..) | ("ARHHY", 14..) | ("CONAR", 16..) | ("DAUCA" | "CIRAR" | "MATIN", _) => 24_000,
             ("BRSOB" | "CAPBP" | "ARHHY" | "GLXMA" | "SOLTU", _) => 14_000,
             _ => 9_000,
         };

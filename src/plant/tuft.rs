@@ -14,6 +14,11 @@ use std::f32::consts::{FRAC_PI_2, PI};
 
 /// Size of a side shoot over that of the main one.
 const TILLER: (f32, f32) = (0.45, 0.7);
+/// Angle between upright and a side shoot, radians, and that of one that has caught up with the main shoot.
+const SPREAD: (f32, f32) = (0.35, 0.75);
+const UPRIGHT: f32 = 0.1;
+/// Distance of a side shoot's foot from the main one's over the stem's width, and that of one that has caught up.
+const APART: (f32, f32) = (0.4, 1.1);
 /// Radius of the youngest sheath over that of the oldest.
 const TAPER: f32 = 0.5;
 /// Side shoots stop here, whatever a species file asks for.
@@ -28,14 +33,17 @@ pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {
     for k in 0..growth.tillers.min(MOST) {
         let mut stream = growth.stream.child(Purpose::Plant, 100 + k as u64);
         let size = stream.range32(TILLER.0, TILLER.1) * 0.93_f32.powi(k as i32);
+        let grown = growth.tillers_grown;
+        let size = lerp(size, 1.0, grown);
         // A side shoot breaks out of the axil of an older leaf, across the ranks.
         let towards =
             growth.leaves.first().map_or(0.0, |l| l.azimuth) + PI * (k % 2) as f32 + stream.range32(-0.7, 0.7);
-        let axis = direction(stream.range32(0.35, 0.75), towards);
-        let base = direction(FRAC_PI_2, towards) * (0.4 * growth.stem);
+        let axis = direction(lerp(stream.range32(SPREAD.0, SPREAD.1), UPRIGHT, grown), towards);
+        let base = direction(FRAC_PI_2, towards) * (lerp(APART.0, APART.1, grown) * growth.stem);
         let turn = FRAC_PI_2 + stream.range32(-0.5, 0.5);
         // Its leaves are as many as the main shoot has, less the oldest, which it had no time for.
-        let leaves: Vec<_> = growth.leaves.iter().skip(1 + growth.leaves.len() / 3).collect();
+        let missing = lerp((1 + growth.leaves.len() / 3) as f32, 1.0, grown).round() as usize;
+        let leaves: Vec<_> = growth.leaves.iter().skip(missing).collect();
         let leaves: Vec<LeafNow<'_>> = leaves
             .into_iter()
             .map(|leaf| {

@@ -3,9 +3,12 @@
 use crate::geometry::Mesh;
 use crate::math::{Vec3, direction};
 use crate::plant::growth::Growth;
-use crate::plant::organ::{LeafAxis, Organ, OrganKind};
+use crate::plant::organ::{Organ, OrganKind};
 use crate::sampling::Purpose;
 use std::f32::consts::{FRAC_PI_2, TAU};
+
+/// Cosine of the angle up to which two sheaths are parallel: half a degree.
+const PARALLEL: f32 = 0.999_96;
 
 /// A place that can bear an axis.
 #[derive(Clone, Copy, Debug)]
@@ -38,26 +41,37 @@ fn end_of(mesh: &Mesh) -> Option<Place> {
     Some(Place { point, along: (point - below).normalize_or(Vec3::Z), out: None })
 }
 
-/// The feet of a grass' shoots, whose culms are hidden in their sheaths: leaves whose sheaths begin at one place belong to one shoot,
-/// and its youngest sheath leads along it.
+/// A grass' shoot.
+struct Shoot {
+    /// Where its sheaths begin, the oldest first, metres.
+    feet: Vec<Vec3>,
+    along: Vec3,
+}
+
+/// The feet of a grass' shoots, whose culms are hidden in their sheaths: sheaths that are near each other and parallel belong to one shoot,
+/// in the middle of which the culm stands.
 fn culms(organs: &[Organ], growth: &Growth<'_>) -> Vec<Place> {
-    let mut shoots: Vec<(Vec3, &LeafAxis)> = Vec::new();
-    // Sheaths of a stout grass stand side by side within its stem.
-    let near = 0.6 * growth.stem + 1e-4;
+    let mut shoots: Vec<Shoot> = Vec::new();
+    // Sheaths stand on the two sides of a shoot, which is as wide as the stem.
+    let near = 1.05 * growth.stem + 1e-4;
     for axis in organs.iter().filter_map(|o| o.axis.as_ref()) {
         let Some(foot) = axis.joints.first().map(|joint| joint.at) else { continue };
-        match shoots.iter_mut().find(|(of, _)| of.distance(foot) < near) {
-            Some(shoot) => shoot.1 = axis,
-            None => shoots.push((foot, axis)),
+        let along = (axis.base - foot).normalize_or(Vec3::Z);
+        let same = |of: &&mut Shoot| of.feet[0].distance(foot) < near && of.along.dot(along) > PARALLEL;
+        match shoots.iter_mut().find(same) {
+            Some(shoot) => shoot.feet.push(foot),
+            None => shoots.push(Shoot { feet: vec![foot], along }),
         }
     }
     let mut stream = growth.stream.child(Purpose::Plant, 1);
     let lean = growth.desc.lean_deg.draw32(&mut stream).to_radians();
     let upright = direction(lean, stream.range32(0.0, TAU));
-    let culm = |(k, (foot, axis)): (usize, &(Vec3, &LeafAxis))| {
-        let along = if k == 0 { upright } else { (axis.base - *foot).normalize_or(upright) };
-        let foot = if k == 0 { Vec3::ZERO } else { *foot };
-        Place { point: foot, along, out: None }
+    let culm = |(k, shoot): (usize, &Shoot)| {
+        // The two oldest sheaths stand on either side.
+        let two = &shoot.feet[..shoot.feet.len().min(2)];
+        let foot = two.iter().sum::<Vec3>() / two.len() as f32;
+        let (point, along) = if k == 0 { (Vec3::ZERO, upright) } else { (foot, shoot.along) };
+        Place { point, along, out: None }
     };
     shoots.iter().enumerate().map(culm).collect()
 }

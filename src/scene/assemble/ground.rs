@@ -259,6 +259,7 @@ fn lay(floor: Floor<'_>, clods: Vec<Clods>, debris: Vec<Debris>, baked: Option<&
             continue;
         };
         let solid = Solid::new(thing.albedo * thing.tint, DEBRIS_SIGMA);
+        let solid = if thing.kind == DebrisKind::Stone { solid } else { solid.porous() };
         // A stone is of a piece; dead matter is mottled by what eats it.
         let patch = 0.5 * thing.radius.max(1e-3);
         let patch = if thing.kind == DebrisKind::Stone { patch } else { patch.min(MOTTLE) };

@@ -6,6 +6,7 @@ use super::canvas::Canvas;
 use super::cells::Cells;
 use super::drawn::{Drawn, Grey};
 use super::leaf_recipe::{LeafRecipe, LeafRelief};
+use super::lyrate::MOST_TEETH;
 use super::shape::{Margin, Shape};
 use super::tissue::Surface;
 use super::veins::{self, Segment, Veins};
@@ -39,7 +40,10 @@ pub(super) fn draw(recipe: &LeafRecipe) -> Result<Drawn> {
         Margin::Toothed { count, .. } => count.get(),
         Margin::Lobed { pairs, .. } => pairs.get(),
         Margin::Spined { lobes, .. } => lobes.get(),
-        Margin::Lyrate(plan) => plan.pairs.get().max(plan.teeth.0.get()),
+        Margin::Lyrate(plan) => {
+            let small = plan.lobe_teeth.map_or(0.0, |(count, _)| 2.0 * count.get().min(MOST_TEETH));
+            (plan.pairs.get() * (1.0 + small)).max(plan.teeth.0.get())
+        }
     };
     let marks = recipe.look.blotches.get().max(recipe.look.spots.get());
     for (what, asked, most) in [

@@ -26,16 +26,28 @@ pub struct Lyrate {
     pub rachis: Num<Fraction>,
     /// Blunt, uneven teeth on each side of the blade, and their depth, of the half-width.
     pub teeth: (Num<NonNegative>, Num<Fraction>),
+    /// How pointed the lobes are, and how far they turn to the tip: 0, the default, is round and spreading, 1 a sharp point.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pointed: Option<Num<Fraction>>,
+    /// Small pointed teeth on each side of each lobe, eight at most, and their length, of the lobe's; default none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lobe_teeth: Option<(Num<NonNegative>, Num<Fraction>)>,
 }
 
 /// The shortest blade at the end, of the leaf's length.
 const LEAST: f32 = 0.05;
+/// Most teeth on each side of a lobe.
+pub(super) const MOST_TEETH: f64 = 8.0;
+/// How much farther a pointed lobe turns to the tip than a round one, radians.
+const TURN: f32 = 0.4;
 
-/// A lobe: a blunt cone from its foot to its end, with the half-widths there.
+/// A lobe or a tooth: a cone from its foot to its end, with the half-widths there.
 struct Lobe {
     foot: Vec2,
     end: Vec2,
     radius: (f32, f32),
+    /// How far down the cone it keeps its width: 0 narrows evenly.
+    full: f32,
 }
 
 /// The silhouette of one.
@@ -44,7 +56,10 @@ pub(super) struct Silhouette {
     outline: Outline,
     half: f32,
     rachis: f32,
+    /// How pointed the lobes are.
+    pointed: f32,
     lobes: Vec<Lobe>,
+    lobe_teeth: Vec<Lobe>,
     /// Place along the blade and depth of each sinus between two teeth, by side.
     sinuses: [Vec<(f32, f32, f32)>; 2],
     /// Phases and heights of the slow waves of both margins.
@@ -60,7 +75,8 @@ impl Silhouette {
         let foot = 1.0 - terminal;
         let pairs = plan.pairs.f32() as u64;
         let pitch = 0.9 * foot / pairs.max(1) as f32;
-        let mut lobes = Vec::new();
+        let pointed = plan.pointed.map_or(0.0, Num::f32);
+        let (mut lobes, mut lobe_teeth) = (Vec::new(), Vec::new());
         for i in 0..pairs {
             for (k, side) in [-1.0_f32, 1.0].into_iter().enumerate() {
                 let k = 10 * k as u64;
@@ -70,11 +86,20 @@ impl Silhouette {
                 let share = (i as f32 + 0.75) / pairs as f32;
                 let y = 0.1 * foot + pitch * (i as f32 + 0.6 + 0.5 * random(i, k + 2));
                 let long = half * plan.lobe.f32() * lerp(0.35, 1.0, share) * (1.0 + 0.6 * random(i, k + 3));
-                let lean = 0.32 + 0.5 * random(i, k + 4);
+                let lean = 0.32 + 0.5 * random(i, k + 4) + TURN * pointed;
                 let thick = (0.46 * pitch * (1.0 + 0.4 * random(i, k + 5))).min(0.5 * long);
                 let axis = vec2(side * lean.cos(), lean.sin());
-                let end = vec2(0.0, y) + axis * (long - 0.7 * thick);
-                lobes.push(Lobe { foot: vec2(0.0, y - 0.15 * pitch), end, radius: (1.1 * thick, 0.7 * thick) });
+                let blunt = 0.7 * thick * (1.0 - pointed);
+                let end = vec2(0.0, y) + axis * (long - blunt);
+                let foot = vec2(0.0, y - 0.15 * pitch);
+                let wide = lerp(1.1, 0.6, pointed) * thick;
+                let lobe = Lobe { foot, end, radius: (wide, blunt), full: 1.2 * pointed };
+                if let Some((count, length)) = plan.lobe_teeth {
+                    lobe.toothed(count.get().min(MOST_TEETH) as u64, length.f32(), &mut lobe_teeth, |j| {
+                        random(20 * i + j, 60 + k)
+                    });
+                }
+                lobes.push(lobe);
             }
         }
         let count = plan.teeth.0.f32().min(200.0) as u64;
@@ -94,7 +119,9 @@ impl Silhouette {
             outline: Outline::Power { a, b },
             half,
             rachis: half * plan.rachis.f32(),
+            pointed,
             lobes,
+            lobe_teeth,
             sinuses,
             waves,
         }
@@ -132,8 +159,13 @@ impl Silhouette {
             let kept = self.wave(side, t) * (1.0 - self.bite(side, s));
             d = smooth_max(d, self.blade(p.x.abs(), t, kept), 0.02);
         }
+        // Sinuses between pointed lobes are narrow, those between round ones are filled up.
+        let fillet = lerp(0.025, 0.008, self.pointed);
         for lobe in &self.lobes {
-            d = smooth_max(d, lobe.inside(p), 0.025);
+            d = smooth_max(d, lobe.inside(p), fillet);
+        }
+        for tooth in &self.lobe_teeth {
+            d = smooth_max(d, tooth.inside(p), 0.004);
         }
         d.min(self.half - p.x.abs())
     }
@@ -169,9 +201,29 @@ impl Silhouette {
 }
 
 impl Lobe {
+    /// Half-width at a share of its length.
+    fn half_width(&self, s: f32) -> f32 {
+        lerp(self.radius.0, self.radius.1, if self.full > 0.0 { s.powf(1.0 + self.full) } else { s })
+    }
+
     fn inside(&self, p: Vec2) -> f32 {
         let axis = self.end - self.foot;
         let s = ((p - self.foot).dot(axis) / axis.length_squared().max(1e-9)).clamp(0.0, 1.0);
-        lerp(self.radius.0, self.radius.1, s) - p.distance(self.foot + axis * s)
+        self.half_width(s) - p.distance(self.foot + axis * s)
+    }
+
+    /// Adds `count` teeth on each of its sides, about `length` of it long, that lean to its end.
+    fn toothed(&self, count: u64, length: f32, teeth: &mut Vec<Self>, random: impl Fn(u64) -> f32) {
+        let axis = self.end - self.foot;
+        let (ahead, out) = (axis.normalize_or(Vec2::Y), axis.perp().normalize_or(Vec2::X));
+        for j in 0..2 * count {
+            let side = if j % 2 == 0 { -1.0 } else { 1.0 };
+            // Beyond what the midrib's wing covers, short of the end.
+            let s = lerp(0.35, 0.8, ((j / 2) as f32 + 0.5 + 0.5 * random(2 * j)) / count as f32);
+            let long = length * axis.length() * (1.0 + 0.8 * random(2 * j + 1));
+            let foot = self.foot + axis * s;
+            let end = foot + (ahead * 0.7 + out * (side * 0.7)) * (self.half_width(s) + long);
+            teeth.push(Self { foot, end, radius: (0.6 * long, 0.0), full: 0.0 });
+        }
     }
 }

@@ -30,12 +30,12 @@ use std::path::{Path, PathBuf};
 
 /// Angle of view: narrow, so that near and far leaves have nearly one scale.
 const VIEW_DEG: f32 = 12.0;
-/// The farthest that a camera stands: beyond that the ground ends, and the angle of view grows instead, metres.
-const FARTHEST: f32 = 1.5;
+/// From farther than this a field is as fine as its pixels, metres: what a tall plant covers is seen from far.
+const FAR: f32 = 3.0;
 /// How far above the ground the second camera looks from.
 const SIDE_DEG: f32 = 30.0;
 /// Room around a plant.
-const ROOM: f32 = 1.15;
+const ROOM: f32 = 1.1;
 /// The smallest half-width of a view, metres.
 const LEAST: f32 = 0.004;
 
@@ -186,12 +186,19 @@ impl Args {
     /// The field with one plant, on bare ground where somebody looks, else on none.
     fn field(&self, (page, seed): (&Path, u64), bbch: u32, view: Option<&View>) -> Result<Field> {
         let text = |path: &Path| format!("{:?}", path.to_string_lossy());
-        let (angle, pose, soil) = view.map_or((VIEW_DEG, "Nadir(height_m: 1)".to_owned(), String::new()), |view| {
+        let none = || (VIEW_DEG, "Nadir(height_m: 1)".to_owned(), String::new());
+        let (angle, pose, soil) = view.map_or_else(none, |view| {
             // One that ships: a species file may lie anywhere.
             let layer = r#"(albedo: "dirt.png", height: "dirt.height.png", size_m: 0.5, height_mm: (-0.6, 0.6))"#;
             let bare = "relief: (rms_mm: 0.4, tilt_deg: 0), moisture: (mean: 0.25), clods: (over_5mm_per_m2: 0), \
                         litter: (straw_cover: 0, sticks_per_m2: 0, bits_per_m2: 0)";
-            (view.angle_deg, view.pose(), format!("soil: (layers: [{layer}], {bare}),"))
+            // The camera's foot stands nearly as far from the plant as the camera, and the ground behind is seen too.
+            let far = if view.distance > FAR {
+                format!("reach_m: {}, detail: ByPixel,", (3.0 * view.distance).min(100.0))
+            } else {
+                String::new()
+            };
+            (view.angle_deg, view.pose(), format!("{far} soil: (layers: [{layer}], {bare}),"))
         });
         let size = self.size;
         let scene = format!(
@@ -239,9 +246,9 @@ fn contains(bytes: &[u8], part: &[u8]) -> bool {
     bytes.windows(part.len()).any(|w| w == part)
 }
 
-/// How far from its foot a plant reaches, metres: it also leans, and what is high looks larger from above.
+/// How far from its foot a plant reaches, metres: it also leans, and stands on uneven ground.
 fn reach(plant: &PlantRecord) -> f32 {
-    plant.radius + 0.12 * plant.height
+    plant.radius + plant.height * (plant.axis.truncate().length() + 0.03)
 }
 
 impl View {
@@ -252,23 +259,24 @@ impl View {
 
     /// From straight above.
     fn above(plant: &PlantRecord) -> Self {
-        Self::of(reach(plant), 90.0, 0.0)
+        Self::of((reach(plant), plant.height), 90.0)
     }
 
     /// From the side, high enough to see into the plant.
     fn aside(plant: &PlantRecord) -> Self {
-        let (sin, cos) = SIDE_DEG.to_radians().sin_cos();
-        let reach = reach(plant);
-        let view = Self::of(reach.max(0.5 * plant.height * cos + reach * sin), SIDE_DEG, 0.5 * plant.height);
-        // A wide view from low down would see where the ground ends.
-        let higher = 0.3 * (view.angle_deg - VIEW_DEG);
-        Self { elevation_deg: SIDE_DEG + higher, ..view }
+        Self::of((reach(plant), plant.height), SIDE_DEG)
     }
 
-    fn of(half: f32, elevation_deg: f32, target: f32) -> Self {
-        let half = (half * ROOM).max(LEAST);
-        let distance = (half / (0.5 * VIEW_DEG).to_radians().tan()).min(FARTHEST);
-        Self { distance, angle_deg: 2.0 * (half / distance).atan().to_degrees(), elevation_deg, target }
+    /// A view of all of the upright cylinder that is `reach` metres wide about the foot and `height` metres high. From above the foot is looked at,
+    /// from the side the middle.
+    fn of((reach, height): (f32, f32), elevation_deg: f32) -> Self {
+        let (sin, cos) = if elevation_deg < 90.0 { elevation_deg.to_radians().sin_cos() } else { (1.0, 0.0) };
+        let target = if elevation_deg < 90.0 { 0.5 * height } else { 0.0 };
+        let above = height - target;
+        // From the line of sight to the farthest part, and how much nearer to the camera than the target the nearest part is.
+        let (half, nearer) = (reach.max(above * cos + reach * sin), above * sin + reach * cos);
+        let distance = nearer + (half * ROOM).max(LEAST) / (0.5 * VIEW_DEG).to_radians().tan();
+        Self { distance, angle_deg: VIEW_DEG, elevation_deg, target }
     }
 
     /// Its camera's pose, as a scene file writes it.
@@ -279,5 +287,45 @@ impl View {
         let (sin, cos) = self.elevation_deg.to_radians().sin_cos();
         let (y, z) = (-self.distance * cos, self.distance * sin + self.target);
         format!("LookAt(position_m: (0, {y}, {z}), target_m: (0, 0, {}))", self.target)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rationale: tall plants were cut off from above, where the camera stood among their leaves. Expected: no pixel of the picture's rim is of
+    /// the plant, and the plant reaches a quarter of the way from the middle to the rim at least, also one whose only blade points away.
+    #[test]
+    fn whole_plants_are_in_the_picture() {
+        let args = Args {
+            out: PathBuf::new(),
+            species: Vec::new(),
+            species_dir: None,
+            beside: None,
+            spp: 1,
+            size: 64,
+            seed: 3,
+            threads: 1,
+            quiet: true,
+        };
+        for (name, bbch) in
+            [("maize", 63), ("sunflower", 65), ("wheat", 65), ("sugar_beet", 65), ("galium", 15), ("poa", 11)]
+        {
+            let page = PathBuf::from(SPECIES).join(name).with_extension("ron");
+            let plant = args.field((&page, args.seed), bbch, None).unwrap().plants.remove(0);
+            for view in View::both(&plant) {
+                let field = args.field((&page, args.seed), bbch, Some(&view)).unwrap();
+                let geometry = EmbreeAccel::build(&field.scene.surfaces(), 1).unwrap();
+                let window = Window::full(args.size, args.size);
+                let labels = render::label(&geometry, &field.scene.parts, &field.scene.camera, window);
+                let at = |k: usize| ((k % 64), (k / 64));
+                let is: Vec<(usize, usize)> = (0..64 * 64).filter(|k| labels.tags[*k].plant > 0).map(at).collect();
+                let what = format!("{name} {bbch} from {}°", view.elevation_deg);
+                assert!(is.iter().all(|(x, y)| (1..63).contains(x) && (1..63).contains(y)), "{what}: cut off");
+                let away = |(x, y): &(usize, usize)| x.abs_diff(32).max(y.abs_diff(32));
+                assert!(is.iter().map(away).max().unwrap_or(0) >= 8, "{what}: small");
+            }
+        }
     }
 }
