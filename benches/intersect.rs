@@ -77,7 +77,7 @@ fn main() {
     prepare_thread();
     let field = field();
     let masked = EmbreeAccel::build(&field.scene.surfaces(), 0).expect("an accelerator");
-    let bare: Vec<Surface<'_>> = field.scene.parts.iter().map(|p| Surface { mesh: &p.mesh, mask: None }).collect();
+    let bare: Vec<Surface<'_>> = field.scene.parts.iter().map(|p| Surface { mask: None, ..p.surface() }).collect();
     let opaque = EmbreeAccel::build(&bare, 0).expect("an accelerator");
     let image = rays(&field, &masked, STRIDE, |_| true);
     let leaves = rays(&field, &opaque, 1, |part| part.mask.is_some());

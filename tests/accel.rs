@@ -85,7 +85,7 @@ fn thicket() -> Vec<(Mesh, Option<Arc<AlphaMask>>)> {
 }
 
 fn surfaces(of: &[(Mesh, Option<Arc<AlphaMask>>)]) -> Vec<Surface<'_>> {
-    of.iter().map(|(mesh, mask)| Surface { mesh, mask: mask.as_ref() }).collect()
+    of.iter().map(|(mesh, mask)| Surface { mesh, mask: mask.as_ref(), instance: None }).collect()
 }
 
 /// Whether another answer is excusable: a ray moved by `by` metres, at most what single precision loses, gets it from the oracle.
@@ -375,7 +375,7 @@ fn a_build_that_is_not_wanted_is_given_up() {
     };
     let uvs = vec![vec2(0.0, 0.0); positions.len()];
     let mesh = Mesh::smooth(positions, uvs, (0..SIDE * SIDE).flat_map(cell).collect());
-    let surfaces = [Surface { mesh: &mesh, mask: None }];
+    let surfaces = [Surface { mesh: &mesh, mask: None, instance: None }];
     let build = |raised: bool| EmbreeAccel::build_until(&surfaces, 2, Some(&AtomicBool::new(raised)), None);
     assert_eq!(build(true).err().map(|e| e.kind()), Some(furrow::error::Kind::Interrupted));
     let down = Ray::new(vec3(3.3, 4.4, 10.0), vec3(0.0, 0.0, -1.0));

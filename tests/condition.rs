@@ -98,7 +98,7 @@ fn labels_lose_what_is_eaten_and_nothing_else() {
     let (mut lost, mut shown) = (0, 0);
     let surfaces = eaten.scene.surfaces();
     let unmasked: Vec<furrow::accel::Surface<'_>> =
-        surfaces.iter().map(|s| furrow::accel::Surface { mesh: s.mesh, mask: None }).collect();
+        surfaces.iter().map(|s| furrow::accel::Surface { mask: None, ..*s }).collect();
     let brute = Brute::new(&unmasked);
     for y in 0..camera.height() {
         for x in 0..camera.width() {

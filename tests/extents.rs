@@ -37,8 +37,7 @@ fn full(scene: &Scene) -> Window {
 
 /// Pixel centres of a set of parts alone, by Embree: those in the window, and all of them.
 fn alone(scene: &Scene, window: Window, is: impl Fn(&Part) -> bool) -> [u32; 2] {
-    let surfaces: Vec<Surface<'_>> =
-        scene.parts.iter().filter(|p| is(p)).map(|p| Surface { mesh: &p.mesh, mask: p.mask.as_ref() }).collect();
+    let surfaces: Vec<Surface<'_>> = scene.parts.iter().filter(|p| is(p)).map(Part::surface).collect();
     let geometry = EmbreeAccel::build(&surfaces, 1).expect("an accelerator");
     let (camera, mut counts) = (&scene.camera, [0; 2]);
     let (w, h) = (camera.width() as i32, camera.height() as i32);
@@ -163,7 +162,13 @@ fn squares(parts: &[(Vec3, f32, u16, u16)]) -> Scene {
     let eye = camera((100, 80), vec3(0.0, 0.0, 0.5), Vec3::ZERO, fov);
     let part = |&(centre, side, plant, leaf): &(Vec3, f32, u16, u16)| {
         let class = if plant > 0 { Class::Crop } else { Class::Soil };
-        Part { mesh: Arc::new(square(centre, side)), mask: None, material: 0, tag: Tag { class, plant, leaf } }
+        Part {
+            mesh: Arc::new(square(centre, side)),
+            mask: None,
+            material: 0,
+            tag: Tag { class, plant, leaf },
+            instance: None,
+        }
     };
     let parts = parts.iter().map(part).collect();
     Scene { parts, materials: Vec::new(), lights: Vec::new(), camera: eye, filter: Filter::Box.footprint() }

@@ -33,7 +33,7 @@ use std::sync::Arc;
 const DOUBT: f64 = 1e-3;
 
 fn part(mesh: Mesh, mask: Option<Arc<AlphaMask>>, tag: Tag) -> Part {
-    Part { mesh: Arc::new(mesh), mask, material: 0, tag }
+    Part { mesh: Arc::new(mesh), mask, material: 0, tag, instance: None }
 }
 
 fn scene(parts: Vec<Part>, camera: Camera) -> Scene {

@@ -59,7 +59,8 @@ fn sheets() -> Scene {
     let green = Bsdf::Leaf(Leaf::bare(Spectrum::new(0.1, 0.2, 0.05, 0.45), Spectrum::new(0.08, 0.25, 0.03, 0.5)));
     let pale = Bsdf::Leaf(Leaf::bare(Spectrum::new(0.3, 0.6, 0.2, 0.7), Spectrum::new(0.1, 0.1, 0.3, 0.2)));
     let mask = mask();
-    let mut parts = vec![Part { mesh: Arc::new(square(2.0)), mask: None, material: 0, tag: Tag::default() }];
+    let mut parts =
+        vec![Part { mesh: Arc::new(square(2.0)), mask: None, material: 0, tag: Tag::default(), instance: None }];
     for (i, (x, y, z, turn)) in
         [(-0.1, -0.08, 0.05, 0.5), (0.12, -0.05, 0.08, -0.6), (-0.05, 0.1, 0.12, 2.6), (0.05, 0.04, 0.16, 0.1)]
             .into_iter()
@@ -69,7 +70,13 @@ fn sheets() -> Scene {
         let rotation = Mat3::from_rotation_z(i as f32) * Mat3::from_rotation_x(turn);
         mesh.transform(rotation, vec3(x, y, z));
         let tag = Tag { class: [Class::Crop, Class::Weed][i % 2], plant: i as u16 + 1, leaf: 1 };
-        parts.push(Part { mesh: Arc::new(mesh), mask: Some(mask.clone()), material: 1 + i as u32 % 2, tag });
+        parts.push(Part {
+            mesh: Arc::new(mesh),
+            mask: Some(mask.clone()),
+            material: 1 + i as u32 % 2,
+            tag,
+            instance: None,
+        });
     }
     let (sun, dome) = daylight(40.0, 130.0, 3.0, 0.2);
     let lights = vec![Light::Sun(sun.expect("a sun")), Light::Sky(Box::new(dome.expect("a sky")))];
@@ -90,12 +97,13 @@ fn lamps() -> Scene {
         lamp(Outline::Disc(0.05), vec3(-0.2, -0.3, 0.4), Spectrum::new(4.0, 8.0, 16.0, 3.0)),
     ];
     let parts = vec![
-        Part { mesh: Arc::new(square(1.0)), mask: None, material: 0, tag: Tag::default() },
+        Part { mesh: Arc::new(square(1.0)), mask: None, material: 0, tag: Tag::default(), instance: None },
         Part {
             mesh: Arc::new(common::scenes::sphere(vec3(0.05, 0.0, 0.06), 0.06, 32)),
             mask: None,
             material: 1,
             tag: Tag { class: Class::Crop, plant: 7, leaf: 0 },
+            instance: None,
         },
     ];
     let pose = Pose::look_at(vec3(0.1, -0.3, 0.5), vec3(0.0, 0.0, 0.0)).expect("a direction");
@@ -279,7 +287,13 @@ fn large_and_small() -> Scene {
     let part = |half: f32, at: Vec3, leaf| {
         let mut mesh = square(half);
         mesh.transform(Mat3::IDENTITY, at);
-        Part { mesh: Arc::new(mesh), mask: None, material: 0, tag: Tag { class: Class::Crop, plant: 1, leaf } }
+        Part {
+            mesh: Arc::new(mesh),
+            mask: None,
+            material: 0,
+            tag: Tag { class: Class::Crop, plant: 1, leaf },
+            instance: None,
+        }
     };
     let parts = vec![part(0.1, vec3(-0.1, 0.0, 0.0), 1), part(0.025, vec3(0.1, 0.0, 0.0), 2)];
     let lights = vec![Light::Constant(Constant::new(Spectrum::ONE))];

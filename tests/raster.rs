@@ -103,7 +103,7 @@ fn plane(bsdf: Bsdf, lights: Vec<Light>, distortion: Distortion) -> Scene {
     let camera = Camera::new((64, 48), [80.0; 2], [32.0, 24.0], distortion, pose).expect("a camera");
     let tag = Tag { class: Class::Crop, plant: 1, leaf: 0 };
     Scene {
-        parts: vec![Part { mesh: Arc::new(square(Vec3::ZERO, 4.0)), mask: None, material: 0, tag }],
+        parts: vec![Part { mesh: Arc::new(square(Vec3::ZERO, 4.0)), mask: None, material: 0, tag, instance: None }],
         materials: vec![Material::Plain(bsdf)],
         lights,
         camera,

@@ -19,7 +19,7 @@ impl<'a> Brute<'a> {
     /// The hit with one triangle, if the ray meets it where its mask is opaque.
     pub fn triangle(&self, ray: &Ray, part: u32, triangle: u32) -> Option<Hit> {
         let surface = &self.surfaces[part as usize];
-        let (t, u, v) = intersect(ray, surface.mesh.corners(triangle))?;
+        let (t, u, v) = intersect(ray, surface.corners(triangle))?;
         if let Some(mask) = surface.mask {
             let [a, b, c] = surface.mesh.triangles[triangle as usize].map(|k| surface.mesh.uvs[k as usize]);
             let (u, v) = (u as f32, v as f32);

@@ -3,7 +3,7 @@
 //! Asked by the rays that labels are made of, so nothing is filtered, and answered by the functions that the leaf's light is made by
 //! ([`crate::material::Damage`]).
 
-use crate::geometry::{Interaction, Intersect, Window};
+use crate::geometry::{Intersect, Window};
 use crate::material::Damage;
 use crate::render::label;
 use crate::scene::Scene;
@@ -17,7 +17,7 @@ pub fn damage(scene: &Scene, geometry: &dyn Intersect) -> Vec<Damage> {
     all.par_chunks_mut(camera.width() as usize).zip(0..camera.height()).for_each(|(row, y)| {
         label::row_hits(geometry, camera, window, y, |x, ray, hit| {
             let part = &scene.parts[hit.part as usize];
-            let at = Interaction::new(&part.mesh, hit, 0.0);
+            let at = part.interaction(hit, 0.0);
             row[x] = scene.materials[part.material as usize].damage(&at, ray.direction);
         });
     });

@@ -1,6 +1,6 @@
 //! A hit, worked out: where, which way the surface faces, and how its texture lies on it.
 
-use super::{Hit, Mesh, Ray};
+use super::{Hit, Mesh, Placement, Ray};
 use crate::math::{Vec2, Vec3};
 
 /// A point of a surface that a ray met.
@@ -46,6 +46,15 @@ impl Interaction {
             triangle: hit.triangle,
             footprint,
         }
+    }
+
+    /// The same of a mesh that stands elsewhere.
+    #[inline]
+    #[must_use]
+    pub fn placed(self, placement: &Placement) -> Self {
+        let edges = self.edges.map(|(edge, uv)| (placement.direction(edge), uv));
+        let [ng, ns] = [self.ng, self.ns].map(|normal| placement.direction(normal));
+        Self { p: placement.point(self.p), ng, ns, edges, ..self }
     }
 
     /// ∂p/∂u and ∂p/∂v, metres; zero where the texture coordinates are degenerate.

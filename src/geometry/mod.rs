@@ -6,6 +6,7 @@ mod interaction;
 mod margin;
 pub mod mesh;
 pub mod outline;
+mod placement;
 mod ray;
 mod window;
 
@@ -14,5 +15,6 @@ pub use cost::Cost;
 pub use interaction::Interaction;
 pub use margin::Margin;
 pub use mesh::{JointWeights, Mesh};
+pub use placement::Placement;
 pub use ray::{Hit, Intersect, PACKET, Ray};
 pub use window::Window;

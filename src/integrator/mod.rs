@@ -33,7 +33,7 @@ impl World<'_> {
     /// A hit, worked out; `footprint` in metres.
     #[inline]
     fn at(&self, hit: &Hit, footprint: f32) -> Interaction {
-        Interaction::new(&self.scene.parts[hit.part as usize].mesh, hit, footprint)
+        self.scene.parts[hit.part as usize].interaction(hit, footprint)
     }
 }
 

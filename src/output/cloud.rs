@@ -8,7 +8,7 @@
 //! infrared is encoded by the same curve.
 
 use super::{Export, write_atomically};
-use crate::geometry::{Hit, Interaction};
+use crate::geometry::Hit;
 use crate::sampling::{Purpose, Stream};
 use crate::scene::{Field, Part};
 use crate::texture::ColorSpace;
@@ -121,7 +121,7 @@ fn areas(part: &Part) -> Vec<f64> {
     let mut sum = 0.0;
     let triangles = 0..part.mesh.triangles.len() as u32;
     let add = |i: u32| {
-        let [a, b, c] = part.mesh.corners(i);
+        let [a, b, c] = part.corners(i);
         sum += 0.5 * f64::from((b - a).cross(c - a).length());
         sum
     };
@@ -142,7 +142,7 @@ fn on_part(field: &Field, k: usize, density: f64, stream: &mut Stream, cloud: &m
         let (root, along) = (stream.uniform32().sqrt(), stream.uniform32());
         let triangle = areas.partition_point(|sum| *sum <= share * area).min(areas.len() - 1) as u32;
         let hit = Hit { part: k as u32, triangle, u: 1.0 - root, v: root * along, t: 0.0 };
-        let at = Interaction::new(&part.mesh, &hit, apart);
+        let at = part.interaction(&hit, apart);
         if part.mask.as_ref().is_some_and(|mask| !mask.opaque_at(at.uv)) {
             continue;
         }

@@ -41,7 +41,7 @@ impl Vertices {
         let mut all = Self { of_sheet: vec![0..0; sheets], ..Self::default() };
         for part in order {
             let begin = all.indices.len() as u32;
-            all.add(&scene.parts[part].mesh, part as u32, &scene.camera);
+            all.add(&scene.parts[part].in_world(), part as u32, &scene.camera);
             let span = &mut all.of_sheet[worn[part]];
             if span.start == span.end {
                 *span = begin..begin;

@@ -7,8 +7,8 @@
 
 use super::LabelMap;
 use crate::accel::Brute;
-use crate::geometry::{Mesh, Ray, Window};
-use crate::math::vec3;
+use crate::geometry::{Ray, Window};
+use crate::math::{Vec3, vec3};
 use crate::scene::Scene;
 use crate::scene::tag::Tag;
 use crate::sensor::{Camera, PixelBox};
@@ -48,7 +48,7 @@ pub fn extents(scene: &Scene, labels: &LabelMap) -> BTreeMap<(u16, u16), Extent>
     let reach = reach(&scene.camera);
     let mut things: BTreeMap<(u16, u16), Thing> = BTreeMap::new();
     for (i, part) in scene.parts.iter().enumerate().filter(|(_, p)| p.tag.plant > 0) {
-        let area = image_of(&part.mesh, &scene.camera).meet(reach);
+        let area = image_of(part.bounds(), &scene.camera).meet(reach);
         things.entry((part.tag.plant, part.tag.leaf)).or_default().add(i as u32, area);
     }
     for (key, (_, area)) in &seen {
@@ -163,11 +163,11 @@ fn reach(camera: &Camera) -> Area {
     Area { x0: -w, y0: -h, x1: 2 * w, y1: 2 * h }
 }
 
-/// The pixels about a mesh: those of the box that holds it.
-fn image_of(mesh: &Mesh, camera: &Camera) -> Area {
+/// The pixels about a box from its smallest to its largest corner.
+fn image_of(bounds: Option<(Vec3, Vec3)>, camera: &Camera) -> Area {
     /// The corners of a box's faces, as numbers whose bits choose between its ends on x, y and z.
     const FACES: [[u8; 4]; 6] = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
-    let Some((lo, hi)) = mesh.bounds() else { return Area::default() };
+    let Some((lo, hi)) = bounds else { return Area::default() };
     let corner = |bits: u8| {
         let end = |axis: usize| if bits >> axis & 1 == 0 { lo[axis] } else { hi[axis] };
         vec3(end(0), end(1), end(2))
@@ -200,9 +200,9 @@ impl Thing {
             (tag.plant, tag.leaf) == key
         });
         for part in &self.parts {
-            let mesh = &scene.parts[*part as usize].mesh;
-            for triangle in 0..mesh.triangles.len() as u32 {
-                let Some(outline) = scene.camera.triangle_outline(mesh.corners(triangle)) else { continue };
+            let it = &scene.parts[*part as usize];
+            for triangle in 0..it.mesh.triangles.len() as u32 {
+                let Some(outline) = scene.camera.triangle_outline(it.corners(triangle)) else { continue };
                 mask.fill(Area::within(outline.bounds).meet(self.area), |x, y| {
                     // Of most pixels in a small triangle's box its edges tell that it is not there, for less than a ray costs.
                     if !outline.may_hold([f64::from(x) + 0.5, f64::from(y) + 0.5]) {

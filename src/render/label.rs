@@ -63,7 +63,10 @@ pub fn label(geometry: &dyn Intersect, parts: &[Part], camera: &Camera, window: 
             row[x] = hit.part;
             tags[x] = part.tag;
             depth[x] = hit.t * ray.direction.dot(camera.pose().axes.z_axis);
-            normals[x] = facing(&part.mesh, hit, ray.direction);
+            normals[x] = match &part.instance {
+                None => facing(&part.mesh, hit, ray.direction),
+                Some(at) => at.direction(facing(&part.mesh, hit, at.to_mesh(ray.direction))),
+            };
         });
     });
     map

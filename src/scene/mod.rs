@@ -7,6 +7,7 @@ pub mod drive;
 pub mod estimate;
 mod growing;
 mod library;
+mod part;
 mod part_kind;
 pub mod record;
 pub mod shipped;
@@ -17,30 +18,16 @@ pub mod traits;
 
 use crate::accel::Surface;
 use crate::film::Footprint;
-use crate::geometry::{AlphaMask, Mesh};
 use crate::light::Light;
 use crate::material::Material;
 use crate::math::Vec3;
 use crate::plant::{Condition, LeafAxis};
 use crate::sensor::Camera;
-use std::sync::Arc;
 use tag::{Class, Tag};
 
 pub use assemble::Field;
+pub use part::Part;
 pub use part_kind::PartKind;
-
-/// One organ of one plant, one stone, the ground: a mesh with a material and a name.
-#[derive(Clone, Debug)]
-pub struct Part {
-    /// Its triangles, in the world.
-    pub mesh: Arc<Mesh>,
-    /// Where they are there at all; `None` for everywhere.
-    pub mask: Option<Arc<AlphaMask>>,
-    /// Index into [`Scene::materials`].
-    pub material: u32,
-    /// Who it is.
-    pub tag: Tag,
-}
 
 /// What is known of one plant.
 #[derive(Clone, Debug, PartialEq)]
@@ -96,7 +83,7 @@ pub struct Scene {
 impl Scene {
     /// The parts as the accelerators see them.
     pub fn surfaces(&self) -> Vec<Surface<'_>> {
-        self.parts.iter().map(|p| Surface { mesh: &p.mesh, mask: p.mask.as_ref() }).collect()
+        self.parts.iter().map(Part::surface).collect()
     }
 
     /// One tag a part.
@@ -104,7 +91,7 @@ impl Scene {
         self.parts.iter().map(|p| p.tag).collect()
     }
 
-    /// Number of triangles.
+    /// Number of triangles; of a mesh that several parts share in each of them.
     pub fn triangles(&self) -> usize {
         self.parts.iter().map(|p| p.mesh.triangles.len()).sum()
     }

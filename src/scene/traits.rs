@@ -102,7 +102,7 @@ impl Canopy {
         let unknown =
             field.scene.parts.iter().zip(&field.kinds).any(|(part, kind)| part.tag.plant > 0 && kind.organ().is_none());
         let over = |organ: &Organ<'_>| {
-            let middle = |i: u32| organ.part.mesh.corners(i).into_iter().sum::<Vec3>() / 3.0;
+            let middle = |i: u32| organ.part.corners(i).into_iter().sum::<Vec3>() / 3.0;
             (0..).zip(&organ.areas).filter(|(i, _)| within(&border, middle(*i))).map(|(_, area)| area).sum()
         };
         let areas: Vec<f64> = organs.par_iter().map(over).collect();
@@ -124,7 +124,7 @@ fn organ<'a>((part, kind): (&'a Part, &PartKind)) -> Option<Organ<'a>> {
     let Part { mesh, mask, .. } = part;
     let area = |(i, corners): (u32, &[u32; 3])| {
         let share = mask.as_ref().map_or(1.0, |mask| mask.share(corners.map(|k| mesh.uvs[k as usize])));
-        0.5 * f64::from(normal(mesh.corners(i)).length()) * share
+        0.5 * f64::from(normal(part.corners(i)).length()) * share
     };
     let blade = matches!(kind, OrganKind::Blade | OrganKind::Cotyledon);
     let areas = if blade { (0..).zip(&mesh.triangles).map(area).collect() } else { Vec::new() };
@@ -143,9 +143,9 @@ fn measure(organs: &[&Organ<'_>], axes: &[LeafAxis], foot: Vec3) -> (PlantTraits
     for axis in axes {
         let (mut area, mut tilted, mut top) = (0.0, 0.0, f32::MIN);
         for Organ { part, areas } in organs.iter().filter(|organ| organ.part.tag.leaf == axis.leaf) {
-            top = part.mesh.positions.iter().fold(top, |top, p| top.max(p.z));
+            top = part.positions().fold(top, |top, p| top.max(p.z));
             for (i, piece) in (0..).zip(areas) {
-                let normal = normal(part.mesh.corners(i)).normalize_or_zero();
+                let normal = normal(part.corners(i)).normalize_or_zero();
                 area += piece;
                 tilted += piece * f64::from(normal.z.abs().clamp(0.0, 1.0).acos());
             }
@@ -163,7 +163,7 @@ fn measure(organs: &[&Organ<'_>], axes: &[LeafAxis], foot: Vec3) -> (PlantTraits
         total += area;
         leaves.insert(axis.leaf, leaf);
     }
-    let corners = organs.iter().flat_map(|organ| &organ.part.mesh.positions);
+    let corners = organs.iter().flat_map(|organ| organ.part.positions());
     let top = corners.fold(foot.z, |top, p| top.max(p.z));
     let plant = PlantTraits { leaf_area_m2: total as f32, cover_m2: cover(organs) as f32, top_m: top - foot.z };
     (plant, leaves)
@@ -176,7 +176,7 @@ const CELLS: f32 = 512.0;
 
 /// Ground below organs, m²: cells whose middle lies under one of them.
 fn cover(organs: &[&Organ<'_>]) -> f64 {
-    let corners = || organs.iter().flat_map(|organ| &organ.part.mesh.positions).map(|p| p.truncate());
+    let corners = || organs.iter().flat_map(|organ| organ.part.positions()).map(|p| p.truncate());
     let Some(first) = corners().next() else { return 0.0 };
     let (lo, hi) = corners().fold((first, first), |(lo, hi), p| (lo.min(p), hi.max(p)));
     let side = ((hi - lo).max_element() / CELLS).max(1e-5);
@@ -185,7 +185,7 @@ fn cover(organs: &[&Organ<'_>]) -> f64 {
     let mut covered = vec![false; columns * rows];
     for Organ { part, .. } in organs {
         for (i, corners) in (0..).zip(&part.mesh.triangles) {
-            let triangle = part.mesh.corners(i).map(|p| (p.truncate() - lo) / side);
+            let triangle = part.corners(i).map(|p| (p.truncate() - lo) / side);
             let mask = part.mask.as_deref().map(|mask| (mask, corners.map(|k| part.mesh.uvs[k as usize])));
             shade(&mut covered, (columns, rows), triangle, mask);
         }
@@ -268,7 +268,7 @@ mod tests {
         }
         let mesh = Mesh::smooth(positions, uvs, triangles);
         let tag = Tag { class: Class::Crop, plant: 1, leaf: 1 };
-        Part { mesh: Arc::new(mesh), mask: mask.map(Arc::new), material: 0, tag }
+        Part { mesh: Arc::new(mesh), mask: mask.map(Arc::new), material: 0, tag, instance: None }
     }
 
     fn axis(part: &Part) -> LeafAxis {

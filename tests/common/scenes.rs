@@ -62,6 +62,7 @@ pub fn scene(parts: Vec<(Mesh, Bsdf)>, lights: Vec<Light>, camera: Camera) -> Sc
         mask: None,
         material: i as u32,
         tag: Tag::default(),
+        instance: None,
     };
     let parts = parts.into_iter().enumerate().map(part).collect();
     Scene { parts, materials, lights, camera, filter: Filter::Box.footprint() }

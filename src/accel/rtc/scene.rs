@@ -21,7 +21,9 @@ pub(in crate::accel) trait Filter: Send + Sync {
 /// A hit in Embree's numbers.
 #[derive(Clone, Copy)]
 pub(in crate::accel) struct Hit {
-    /// Its place among the geometries of [`Scene::build`].
+    /// The instance that was hit, by its place among the geometries of [`Scene::build`].
+    pub(in crate::accel) instance: Option<u32>,
+    /// Its place among the geometries of [`Scene::build`]; of an instance among those of its scene.
     pub(in crate::accel) geometry: u32,
     /// Which of its triangles.
     pub(in crate::accel) primitive: u32,
@@ -102,11 +104,13 @@ unsafe extern "C" fn wanted(flag: *mut c_void, _: f64) -> bool {
     !unsafe { &*flag.cast::<AtomicBool>() }.load(Ordering::Relaxed)
 }
 
-/// Triangles with a filter, which nothing changes any more.
+/// Triangles with a filter, or a scene that stands somewhere, which nothing changes any more.
 pub(in crate::accel) struct Geometry<F> {
     handle: *mut sys::RTCGeometry,
     /// What the filter functions point to: it lives as long as the geometry, and does not move.
     filter: Option<Arc<F>>,
+    /// The scene of an instance: Embree counts it, and this keeps what its filters point to.
+    shared: Option<Arc<Scene<F>>>,
     /// Released after the geometry.
     device: Arc<Device>,
 }
@@ -137,7 +141,7 @@ impl<F: Filter> Geometry<F> {
         // SAFETY: the device lives; the number is among the headers' values.
         let handle = unsafe { sys::rtcNewGeometry(device.handle(), sys::RTC_GEOMETRY_TYPE_TRIANGLE) };
         let handle = device.made(handle)?;
-        let mut geometry = Self { handle, filter: filter.map(Arc::new), device: device.clone() };
+        let mut geometry = Self { handle, filter: filter.map(Arc::new), shared: None, device: device.clone() };
         let (points, count) = (corners.len().max(1), triangles.len().max(1));
         let to = geometry.buffer(sys::RTC_BUFFER_TYPE_VERTEX, sys::RTC_FORMAT_FLOAT3, points)?;
         fill(to, corners.iter().map(Vec3::to_array));
@@ -158,6 +162,24 @@ impl<F: Filter> Geometry<F> {
         // SAFETY: the geometry lives.
         unsafe { sys::rtcCommitGeometry(handle) };
         device.check()?;
+        Ok(geometry)
+    }
+
+    /// An instance of a scene: its points p stand at `columns` · (p, 1) in the scene that this is attached to.
+    pub(in crate::accel) fn instance(of: &Arc<Scene<F>>, columns: [Vec3; 4]) -> Result<Self> {
+        let device = of.device.clone();
+        // SAFETY: the device lives; the number is among the headers' values.
+        let handle = device.made(unsafe { sys::rtcNewGeometry(device.handle(), sys::RTC_GEOMETRY_TYPE_INSTANCE) })?;
+        let geometry = Self { handle, filter: None, shared: Some(of.clone()), device };
+        let columns = columns.map(|column| column.to_array());
+        // SAFETY: geometry and scene live, are of one device, and the scene is committed. The format has 3 × 4 floats, which Embree copies.
+        unsafe {
+            sys::rtcSetGeometryInstancedScene(handle, of.handle);
+            let format = sys::RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR;
+            sys::rtcSetGeometryTransform(handle, 0, format, columns.as_ptr().cast::<c_void>());
+            sys::rtcCommitGeometry(handle);
+        }
+        geometry.device.check()?;
         Ok(geometry)
     }
 
@@ -212,7 +234,7 @@ impl<F> Scene<F> {
         // SAFETY: a `Scene` is committed, and nothing changes it. So below.
         unsafe { query::intersect1(self.handle, &mut query) };
         let sys::RTCRayHit { ray, hit } = query;
-        found(hit.geomID, hit.primID, hit.u, hit.v, ray.tfar)
+        found([hit.instID[0], hit.geomID, hit.primID], hit.u, hit.v, ray.tfar)
     }
 
     /// Whether anything is hit.
@@ -230,7 +252,9 @@ impl<F> Scene<F> {
         let mut query = sys::RTCRayHit8 { ray, hit: NO_HITS };
         unsafe { query::intersect8(self.handle, &lanes, &mut query) };
         let sys::RTCRayHit8 { ray, hit } = query;
-        std::array::from_fn(|i| found(hit.geomID[i], hit.primID[i], hit.u[i], hit.v[i], ray.tfar[i]))
+        std::array::from_fn(|i| {
+            found([hit.instID[0][i], hit.geomID[i], hit.primID[i]], hit.u[i], hit.v[i], ray.tfar[i])
+        })
     }
 
     /// Whether rays that go nearly the same way hit anything.
@@ -264,8 +288,9 @@ const NO_HITS: sys::RTCHit8 = sys::RTCHit8 {
 
 /// A hit, unless it has the mark of a miss.
 #[inline]
-fn found(geometry: u32, primitive: u32, u: f32, v: f32, t: f32) -> Option<Hit> {
-    (geometry != RTC_INVALID_GEOMETRY_ID).then_some(Hit { geometry, primitive, u, v, t })
+fn found([instance, geometry, primitive]: [u32; 3], u: f32, v: f32, t: f32) -> Option<Hit> {
+    let instance = (instance != RTC_INVALID_GEOMETRY_ID).then_some(instance);
+    (geometry != RTC_INVALID_GEOMETRY_ID).then_some(Hit { instance, geometry, primitive, u, v, t })
 }
 
 #[inline]

@@ -20,10 +20,12 @@ opaque! { RTCDevice RTCScene RTCGeometry }
 pub(super) const RTC_INVALID_GEOMETRY_ID: c_uint = c_uint::MAX;
 pub(super) const RTC_DEVICE_PROPERTY_VERSION: c_uint = 0;
 pub(super) const RTC_GEOMETRY_TYPE_TRIANGLE: c_uint = 0;
+pub(super) const RTC_GEOMETRY_TYPE_INSTANCE: c_uint = 121;
 pub(super) const RTC_BUFFER_TYPE_INDEX: c_uint = 0;
 pub(super) const RTC_BUFFER_TYPE_VERTEX: c_uint = 1;
 pub(super) const RTC_FORMAT_UINT3: c_uint = 0x5003;
 pub(super) const RTC_FORMAT_FLOAT3: c_uint = 0x9003;
+pub(super) const RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR: c_uint = 0x9234;
 pub(super) const RTC_BUILD_QUALITY_LOW: c_uint = 0;
 pub(super) const RTC_BUILD_QUALITY_MEDIUM: c_uint = 1;
 pub(super) const RTC_SCENE_FLAG_ROBUST: c_uint = 1 << 2;
@@ -131,6 +133,13 @@ unsafe extern "C" {
         stride: usize,
         count: usize,
     ) -> *mut c_void;
+    pub(super) fn rtcSetGeometryInstancedScene(geometry: *mut RTCGeometry, scene: *mut RTCScene);
+    pub(super) fn rtcSetGeometryTransform(
+        geometry: *mut RTCGeometry,
+        time_step: c_uint,
+        format: c_uint,
+        transform: *const c_void,
+    );
     pub(super) fn rtcSetGeometryUserData(geometry: *mut RTCGeometry, data: *mut c_void);
     pub(super) fn rtcSetGeometryIntersectFilterFunction(geometry: *mut RTCGeometry, filter: RTCFilterFunctionN);
     pub(super) fn rtcSetGeometryOccludedFilterFunction(geometry: *mut RTCGeometry, filter: RTCFilterFunctionN);

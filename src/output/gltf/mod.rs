@@ -111,20 +111,21 @@ fn name(tag: Tag) -> String {
 fn mesh(part: &Part, material: usize, pack: &mut Pack) -> Mesh {
     let tag = part.tag;
     let label = Label { class: tag.class.name().into(), plant: tag.plant, leaf: tag.leaf };
+    let mesh = part.in_world();
     let mut attributes = vec![
-        ("POSITION", pack.positions(&part.mesh.positions)),
-        ("NORMAL", pack.normals(&part.mesh.normals)),
-        ("TEXCOORD_0", pack.uvs(&part.mesh.uvs)),
+        ("POSITION", pack.positions(&mesh.positions)),
+        ("NORMAL", pack.normals(&mesh.normals)),
+        ("TEXCOORD_0", pack.uvs(&mesh.uvs)),
     ];
-    if !part.mesh.weights.is_empty() {
-        let [joints, weights] = pack.weights(&part.mesh.weights);
+    if !mesh.weights.is_empty() {
+        let [joints, weights] = pack.weights(&mesh.weights);
         attributes.extend([("JOINTS_0", joints), ("WEIGHTS_0", weights)]);
     }
     Mesh {
         name: Some(name(tag)),
         primitives: vec![Primitive {
             attributes: attributes.into_iter().map(|(what, accessor)| (what.to_owned(), accessor)).collect(),
-            indices: Some(pack.indices(&part.mesh.triangles)),
+            indices: Some(pack.indices(&mesh.triangles)),
             material: Some(material),
             ..Primitive::default()
         }],

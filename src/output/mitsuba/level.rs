@@ -26,7 +26,7 @@ impl Leveled {
         let of_parts = scene.parts.iter().map(|part| {
             let material = &scene.materials[part.material as usize];
             let level = match material.varies() {
-                Varies::Picture(w, h) => Some(level(&part.mesh, w.max(h), &scene.camera)),
+                Varies::Picture(w, h) => Some(level(&part.in_world(), w.max(h), &scene.camera)),
                 Varies::Nowhere | Varies::Raster(..) | Varies::Place => None,
             };
             *known.entry((part.material, level)).or_insert_with(|| {

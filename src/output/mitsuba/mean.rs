@@ -126,13 +126,13 @@ fn pieces(scene: &Scene) -> Vec<Piece> {
     let inside = |at: Vec3| at.truncate().cmpge(lo).all() && at.truncate().cmple(hi).all();
     let piece = |part: &Part, triangle: u32| {
         let hit = Hit { part: 0, triangle, u: 1.0 / 3.0, v: 1.0 / 3.0, t: 0.0 };
-        let [a, b, c] = part.mesh.triangles[triangle as usize].map(|corner| part.mesh.positions[corner as usize]);
+        let [a, b, c] = part.corners(triangle);
         let at = (a + b + c) / 3.0;
         let to_eye = (eye - at).normalize_or_zero();
         let seen = 0.5 * (b - a).cross(c - a).dot(to_eye);
         // With its relief, which is finer than the mesh.
         let normal = || {
-            let point = Interaction::new(&part.mesh, &hit, (eye - at).length() * camera.pixel_angle());
+            let point = part.interaction(&hit, (eye - at).length() * camera.pixel_angle());
             scene.materials[part.material as usize].scatter(&point, to_eye).1.z
         };
         (seen > 0.0 && inside(at)).then(|| Piece { at, normal: normal(), to_eye, seen })

@@ -131,7 +131,7 @@ fn groups(scene: &Scene, leveled: &Leveled) -> Result<Vec<Group>> {
     let parts = scene.parts.iter().zip(&leveled.of_parts);
     for (part, &index) in parts.filter(|(p, _)| !p.mesh.triangles.is_empty()) {
         let material = &leveled.materials[index as usize];
-        let colors = (material.varies() == Varies::Place).then(|| look::colors(material, &part.mesh));
+        let colors = (material.varies() == Varies::Place).then(|| look::colors(material, &part.in_world()));
         let look = match &colors {
             None => Ok(index),
             Some(_) => Err(surface::rough(&Look::of(material))?),
@@ -140,7 +140,7 @@ fn groups(scene: &Scene, leveled: &Leveled) -> Result<Vec<Group>> {
         match known.entry(key) {
             Entry::Occupied(place) => {
                 let group = &mut groups[*place.get()];
-                group.mesh.append(&part.mesh);
+                group.mesh.append(&part.in_world());
                 if let (Some(all), Some(more)) = (&mut group.colors, colors) {
                     all.extend(more);
                 }
@@ -151,7 +151,7 @@ fn groups(scene: &Scene, leveled: &Leveled) -> Result<Vec<Group>> {
                     name: format!("{}-{}-{number}", key.class, key.plant),
                     material: index,
                     mask: part.mask.clone(),
-                    mesh: Mesh::clone(&part.mesh),
+                    mesh: part.in_world().into_owned(),
                     colors,
                 });
             }
@@ -308,7 +308,7 @@ mod tests {
         let part = |k: usize| {
             let class = if k.is_multiple_of(2) { Class::Crop } else { Class::Weed };
             let tag = Tag { class, plant: (k / 2 + 1) as u16, leaf: 0 };
-            Part { mesh: Arc::new(mesh.clone()), mask: None, material: 0, tag }
+            Part { mesh: Arc::new(mesh.clone()), mask: None, material: 0, tag, instance: None }
         };
         let parts = (0..plants).chain(0..plants).map(part).collect();
         let pose = Pose::look_at(vec3(0.0, -1.0, 1.0), Vec3::ZERO).unwrap();

@@ -1,6 +1,7 @@
 //! What a field under way will take: film, ground, what lies on it, plants, models.
 
 use super::PLANT_MARGIN;
+use super::bank::Member;
 use super::builder::Builder;
 use super::census::Population;
 use super::preview::Counted;
@@ -16,6 +17,7 @@ use crate::ron_file::Step;
 use crate::scene::estimate::{Estimate, Share};
 use crate::soil::Expected;
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// Bytes of a pixel beside the film's: labels, photographs, and the files before they are written.
@@ -28,6 +30,12 @@ const LOOKED_AT: usize = 4;
 const LOOKED_AT_PLACED: usize = 16;
 /// Most triangles that a plant may have to be grown for that.
 const TRIED: f64 = 2e7;
+/// Bytes of an instance of a plant beside its organs, in the kernels and in the records.
+const BYTES_PER_INSTANCE: f64 = 1800.0;
+/// Bytes of each organ of an instance: its part, and what is known of its leaf.
+const BYTES_PER_INSTANCED_ORGAN: f64 = 500.0;
+/// Seconds of one core to stand an instance in its place.
+const SECONDS_PER_INSTANCE: f64 = 1e-5;
 /// Seconds of one core for each triangle of a plant.
 const SECONDS_PER_TRIANGLE: f64 = 2e-6;
 
@@ -59,8 +67,9 @@ impl Builder<'_> {
         for (population, range) in populations {
             let (at, advice) = population.place();
             let number = range.len();
-            let some = self.count(&seedlings, population, range);
-            add(&at, expected(&some, number), &format!("{advice}, or lower the camera"));
+            let some = self.count(&seedlings, population, range.clone());
+            let shared = seedlings[range].iter().filter_map(|s| s.member).collect::<Vec<_>>();
+            add(&at, expected(&some, number, &shared), &format!("{advice}, or lower the camera"));
             counted.extend(some);
         }
         if let Some(preview) = &self.options.preview {
@@ -103,9 +112,12 @@ fn size(seedling: &Seedling, cell: f32) -> (f64, f64) {
     (organs.iter().map(|organ| organ.part.mesh.triangles.len()).sum::<usize>() as f64, organs.len() as f64)
 }
 
-/// What so many plants take of which these are some.
-fn expected(some: &[Counted], number: usize) -> Cost {
+/// What so many plants take of which these are some, and those of `shared` are instances.
+fn expected(some: &[Counted], number: usize, shared: &[Member]) -> Cost {
     let (triangles, organs) = some.iter().fold((0.0, 0.0), |(a, b), Counted { size: (t, o), .. }| (a + t, b + o));
     let each = Cost::of(triangles, organs) + Cost::work(0.0, triangles * SECONDS_PER_TRIANGLE);
-    each * (number as f64 / some.len().max(1) as f64)
+    let meshes = number - shared.len() + shared.iter().collect::<BTreeSet<_>>().len();
+    let of = some.len().max(1) as f64;
+    let instances = Cost::work(BYTES_PER_INSTANCE + organs / of * BYTES_PER_INSTANCED_ORGAN, SECONDS_PER_INSTANCE);
+    each * (meshes as f64 / of) + instances * shared.len() as f64
 }

@@ -145,7 +145,7 @@ impl Builder<'_> {
         });
         let (coarsest, smallest_mm) = match self.desc.detail {
             Detail::Full => (4e-3, 0.0),
-            Detail::ByPixel => (f32::INFINITY, 1e3 * things * pixel),
+            Detail::ByPixel | Detail::Instanced => (f32::INFINITY, 1e3 * things * pixel),
         };
         Site {
             area: view.near.grown(GROUND_MARGIN),
@@ -190,7 +190,7 @@ impl Builder<'_> {
     fn cover(&self, desc: &SoilDesc, Earth { ground, pile, stones: debris }: &mut Earth) -> Vec<Clods> {
         let mut canopy = Canopy::none(ground);
         for part in self.scene.parts.iter().filter(|_| !desc.flat) {
-            canopy.add(&part.mesh);
+            canopy.add(&part.in_world());
         }
         let clods = soil::clods(ground, pile, &canopy);
         debris.extend(soil::litter(&desc.litter, ground, pile, &self.stream(Purpose::Debris, LITTER)));
@@ -243,7 +243,13 @@ fn lay(floor: Floor<'_>, clods: Vec<Clods>, debris: Vec<Debris>, baked: Option<&
         let material_of = laid.materials.len() as u32;
         laid.materials.push(material);
         laid.kinds.push(kind);
-        laid.parts.push(Part { mesh: Arc::new(mesh), mask: None, material: material_of, tag: Tag::default() });
+        laid.parts.push(Part {
+            mesh: Arc::new(mesh),
+            mask: None,
+            material: material_of,
+            tag: Tag::default(),
+            instance: None,
+        });
     };
     let mesh = if floor.flat { floor.ground.levelled().mesh() } else { floor.ground.mesh() };
     let shown = baked.map(|baked| Material::Ground(GroundMaterial::new(baked.ground.clone())));

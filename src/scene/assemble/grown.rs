@@ -23,7 +23,7 @@ impl Grown {
     /// The same of another shape.
     pub(super) fn with(&self, mesh: Mesh) -> Self {
         let Part { mask, material, tag, .. } = &self.part;
-        let part = Part { mesh: Arc::new(mesh), mask: mask.clone(), material: *material, tag: *tag };
+        let part = Part { mesh: Arc::new(mesh), mask: mask.clone(), material: *material, tag: *tag, instance: None };
         Self { part, key: self.key.clone(), material: self.material.clone(), ..*self }
     }
 }

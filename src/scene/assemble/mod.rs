@@ -1,5 +1,6 @@
 //! Scene file + seed + index → one field.
 
+mod bank;
 mod builder;
 mod census;
 mod condition;
@@ -20,6 +21,7 @@ mod preview;
 mod rig;
 mod season;
 mod seedling;
+mod stand;
 mod today;
 mod unlikely;
 mod view;
@@ -29,11 +31,9 @@ use super::estimate::{Estimate, usual_memory};
 pub use super::growing::Growing;
 use super::library::{Library, Species};
 use super::record::Conditions;
-use super::tag::Tag;
-use super::{Part, PartKind, PlantRecord, Scene};
+use super::{PartKind, PlantRecord, Scene};
 use crate::input::Scope;
 use crate::light::LightDesc;
-use crate::material::Material;
 use crate::math::{Spectrum, Vec2, Vec3, vec2};
 use crate::optics::soil::LOESS;
 use crate::plant::{ConditionDesc, GrowOptions};
@@ -51,10 +51,8 @@ pub use lighting::Lighting;
 use lighting::Listed;
 pub use options::Options;
 pub use preview::Preview;
-use preview::Standing;
-use rayon::prelude::*;
 pub use season::Season;
-use seedling::{Place, Seedling, grow};
+use seedling::Seedling;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use today::Today;
@@ -62,8 +60,6 @@ use view::View;
 
 /// Room around the view in which plants are grown: they lean in and throw shadows.
 const PLANT_MARGIN: f32 = 0.35;
-/// Length of the longest shadow that counts, in plant heights: that of a sun 20° above the horizon.
-const SHADOW: f32 = 2.75;
 /// Address of the season's stream, behind those of any number of lights.
 const SEASON: u64 = 1 << 32;
 /// Address of the first of the streams from which lists of lights are drawn, one for each place among the scene file's lights.
@@ -251,7 +247,7 @@ impl<'a> Builder<'a> {
         let usual = GrowOptions::default().cell;
         let by_pixel = match self.desc.detail {
             _ if self.options.preview.is_some() => 4.0 * self.ground_pixel(),
-            Detail::ByPixel => 1.5 * self.pixel_at(at),
+            Detail::ByPixel | Detail::Instanced => 1.5 * self.pixel_at(at),
             Detail::Full => 0.0,
         };
         usual.max(by_pixel)
@@ -370,7 +366,7 @@ impl<'a> Builder<'a> {
         let mut all = Vec::new();
         let area = area.corners();
         let (desc, page) = (self.desc, self.page);
-        let mut census = Census::new(page, desc.detail == Detail::ByPixel);
+        let mut census = Census::new(page, desc.detail != Detail::Full);
         for k in self.sown.clone() {
             let crop = &desc.crops[k];
             let species = self.library.species(page, &crop.species)?;
@@ -414,6 +410,7 @@ impl<'a> Builder<'a> {
                 vigour: placed.vigour.clone(),
                 condition: species.desc.condition.clone(),
                 id: identity::of(self.seed, self.index, identity::PLACED, k as u64),
+                member: None,
             };
             all.push(seedling.tended(&placed.vigour, placed.condition.as_ref()));
         }
@@ -423,6 +420,7 @@ impl<'a> Builder<'a> {
     }
 
     fn seedling(&self, species: &Arc<Species>, growth: &Growth, spot: Spot, population: u64) -> Seedling {
+        let stream = self.stream(Purpose::Plant, population).child(Purpose::Plant, spot.key);
         Seedling {
             species: species.clone(),
             growth: growth.clone(),
@@ -431,7 +429,8 @@ impl<'a> Builder<'a> {
             position: spot.at,
             turn: 0.0,
             only_leaf: None,
-            stream: self.stream(Purpose::Plant, population).child(Purpose::Plant, spot.key),
+            member: self.member(population, &stream, spot.at),
+            stream,
             individual: Individual::of(&species.desc, (self.seed, self.index)),
             vigour: Vary::fixed(1.0),
             condition: species.desc.condition.clone(),
@@ -445,68 +444,5 @@ impl<'a> Builder<'a> {
             Some(layer) => Ok(self.library.layer(self.page, layer)?.mean()),
             None => Ok(LOESS),
         }
-    }
-
-    /// Grows every plant and stands it on the ground.
-    fn plant(
-        &mut self,
-        seedlings: &[Seedling],
-        floor: Option<Floor<'_>>,
-        view: Option<Rect>,
-    ) -> Result<Vec<PlantRecord>> {
-        let (dust, options) = (self.dust()?, self.options);
-        let cell = |at: Vec2| self.cell(at);
-        // Grown to know its size, left bare where neither it nor its shadow reaches the view.
-        let reaches = |plant: &PlantRecord| {
-            let reach = plant.radius + SHADOW * plant.height;
-            view.is_none_or(|v| v.grown(reach).contains(plant.position.truncate()))
-        };
-        let stand = |seedling: &Seedling| {
-            options.wanted()?;
-            let Vec2 { x, y } = seedling.position;
-            let (height, normal) = floor.map_or((0.0, Vec3::Z), |f| f.stance(x, y));
-            let place = Place { height, normal, dust, cell: cell(seedling.position), rigged: options.rigged };
-            let known = options.preview.as_ref().and_then(|preview| preview.plant(seedling, &place));
-            let known = known.filter(|known| known.organs.is_some() || !reaches(&known.record));
-            Ok(known.unwrap_or_else(|| {
-                let (record, organs) = grow(seedling, &place, reaches);
-                Arc::new(Standing { seedling: seedling.clone(), place, record, organs })
-            }))
-        };
-        let grown: Vec<Arc<Standing>> = seedlings.par_iter().map(stand).collect::<Result<_>>()?;
-        if let Some(preview) = &options.preview {
-            preview.keep_plants(&grown);
-        }
-        let mut records = Vec::with_capacity(grown.len());
-        for (number, grown) in (1..).zip(grown) {
-            let (true, Some(organs)) = (reaches(&grown.record), &grown.organs) else { continue };
-            let record = PlantRecord { number, ..grown.record.clone() };
-            // One material a plant and key: plants differ in their green, and leaves that have met something in more.
-            let mut made: Vec<(&str, usize, u32)> = Vec::new();
-            for organ in organs {
-                if let Some(fault) = organ.part.mesh.fault() {
-                    let (species, number) = (&record.species, record.number);
-                    return Err(Error::input(format!(
-                        "{}: plant {number}, a {species}, grew a broken mesh: {fault}",
-                        self.page.path.display()
-                    ))
-                    .help("look for extreme sizes in its species file"));
-                }
-                let same = |m: &&(&str, usize, u32)| !organ.own && m.0 == organ.key && m.1 == organ.choice;
-                let known = made.iter().find(same).map(|m| m.2);
-                let material = known.unwrap_or_else(|| {
-                    let material = self.material(Material::Leaf(organ.material.clone()));
-                    if !organ.own {
-                        made.push((&organ.key, organ.choice, material));
-                    }
-                    material
-                });
-                self.organs.push(organ.kind);
-                let tag = Tag { plant: number, ..organ.part.tag };
-                self.scene.parts.push(Part { material, tag, ..organ.part.clone() });
-            }
-            records.push(record);
-        }
-        Ok(records)
     }
 }

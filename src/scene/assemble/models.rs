@@ -75,7 +75,7 @@ impl Builder<'_> {
                 plants.entry(tag.plant).or_default().push(self.scene.parts.len());
             }
             let mask = model.surfaces[part.surface].mask.clone();
-            self.scene.parts.push(Part { mesh, mask, material: materials[part.surface], tag });
+            self.scene.parts.push(Part { mesh, mask, material: materials[part.surface], tag, instance: None });
         }
         let plants = plants.into_iter().map(|(number, parts)| {
             // What of the model it is, whatever the number of plants before it.

@@ -1,5 +1,6 @@
 //! A plant to be grown, and how it grows in its place.
 
+use super::bank::Member;
 use super::condition::{Ailing, Bare};
 use super::grown::Grown;
 use super::individual::Individual;
@@ -42,6 +43,8 @@ pub(super) struct Seedling {
     pub(super) condition: Option<ConditionDesc>,
     /// See [`super::identity::of`].
     pub(super) id: u32,
+    /// What it is an instance of.
+    pub(super) member: Option<Member>,
 }
 
 impl Seedling {
@@ -139,6 +142,7 @@ pub(super) fn grow(
                 mask: if cut { chosen.mask.clone() } else { None },
                 material: 0,
                 tag: Tag { class, plant: 0, leaf: organ.leaf },
+                instance: None,
             },
             kind: organ.kind,
             key: organ.material,

@@ -1,0 +1,136 @@
+//! Plants are grown and stand in the field: each with meshes of its own, or as an instance of a plant of a bank.
+
+use super::bank::Member;
+use super::builder::{Builder, Floor};
+use super::grown::Grown;
+use super::preview::Standing;
+use super::seedling::{Place, Seedling, grow};
+use crate::geometry::Placement;
+use crate::material::Material;
+use crate::math::{Vec2, Vec3};
+use crate::scene::tag::Tag;
+use crate::scene::{Part, PlantRecord};
+use crate::soil::Rect;
+use crate::{Error, Result};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+use std::sync::Arc;
+
+/// Length of the longest shadow that counts, in plant heights: that of a sun 20° above the horizon.
+const SHADOW: f32 = 2.75;
+
+/// A plant in its place.
+enum Stands {
+    /// With meshes of its own.
+    Own(Arc<Standing>),
+    /// As an instance.
+    Shared(PlantRecord, Member, Placement),
+}
+
+impl Stands {
+    fn own(&self) -> Option<Arc<Standing>> {
+        match self {
+            Self::Own(plant) => Some(plant.clone()),
+            Self::Shared(..) => None,
+        }
+    }
+}
+
+impl Builder<'_> {
+    /// Grows every plant and stands it on the ground.
+    fn plant(
+        &mut self,
+        seedlings: &[Seedling],
+        floor: Option<Floor<'_>>,
+        view: Option<Rect>,
+    ) -> Result<Vec<PlantRecord>> {
+        let (dust, options) = (self.dust()?, self.options);
+        let bank = self.bank(seedlings, dust)?;
+        let cell = |at: Vec2| self.cell(at);
+        // Grown to know its size, left bare where neither it nor its shadow reaches the view.
+        let reaches = |plant: &PlantRecord| {
+            let reach = plant.radius + SHADOW * plant.height;
+            view.is_none_or(|v| v.grown(reach).contains(plant.position.truncate()))
+        };
+        let stand = |seedling: &Seedling| {
+            options.wanted()?;
+            let Vec2 { x, y } = seedling.position;
+            let (height, normal) = floor.map_or((0.0, Vec3::Z), |f| f.stance(x, y));
+            if let Some(member) = seedling.member {
+                let (record, at) = bank[&member].stand(seedling, seedling.position.extend(height), normal);
+                return Ok(Stands::Shared(record, member, at));
+            }
+            let place = Place { height, normal, dust, cell: cell(seedling.position), rigged: options.rigged };
+            let known = options.preview.as_ref().and_then(|preview| preview.plant(seedling, &place));
+            let known = known.filter(|known| known.organs.is_some() || !reaches(&known.record));
+            Ok(Stands::Own(known.unwrap_or_else(|| {
+                let (record, organs) = grow(seedling, &place, reaches);
+                Arc::new(Standing { seedling: seedling.clone(), place, record, organs })
+            })))
+        };
+        let grown: Vec<Stands> = seedlings.par_iter().map(stand).collect::<Result<_>>()?;
+        if let Some(preview) = &options.preview {
+            preview.keep_plants(&grown.iter().filter_map(Stands::own).collect::<Vec<_>>());
+        }
+        let mut records = Vec::with_capacity(grown.len());
+        let mut worn: BTreeMap<Member, Vec<u32>> = BTreeMap::new();
+        for (number, stands) in (1..).zip(grown) {
+            match stands {
+                Stands::Own(plant) => {
+                    let (true, Some(organs)) = (reaches(&plant.record), &plant.organs) else { continue };
+                    let record = PlantRecord { number, ..plant.record.clone() };
+                    let materials = self.dress(&record, organs)?;
+                    self.put_organs(number, organs, &materials, None);
+                    records.push(record);
+                }
+                Stands::Shared(record, member, at) => {
+                    let (true, Some(organs)) = (reaches(&record), &bank[&member].organs) else { continue };
+                    let record = PlantRecord { number, ..record };
+                    if let Entry::Vacant(first) = worn.entry(member) {
+                        first.insert(self.dress(&record, organs)?);
+                    }
+                    self.put_organs(number, organs, &worn[&member], Some(&Arc::new(at)));
+                    records.push(record);
+                }
+            }
+        }
+        Ok(records)
+    }
+
+    /// The materials of a plant's organs, which are made here.
+    fn dress(&mut self, record: &PlantRecord, organs: &[Grown]) -> Result<Vec<u32>> {
+        // One material a plant and key: plants differ in their green, and leaves that have met something in more.
+        let mut made: Vec<(&str, usize, u32)> = Vec::new();
+        let mut materials = Vec::with_capacity(organs.len());
+        for organ in organs {
+            if let Some(fault) = organ.part.mesh.fault() {
+                let (species, number) = (&record.species, record.number);
+                return Err(Error::input(format!(
+                    "{}: plant {number}, a {species}, grew a broken mesh: {fault}",
+                    self.page.path.display()
+                ))
+                .help("look for extreme sizes in its species file"));
+            }
+            let same = |m: &&(&str, usize, u32)| !organ.own && m.0 == organ.key && m.1 == organ.choice;
+            let known = made.iter().find(same).map(|m| m.2);
+            materials.push(known.unwrap_or_else(|| {
+                let material = self.material(Material::Leaf(organ.material.clone()));
+                if !organ.own {
+                    made.push((&organ.key, organ.choice, material));
+                }
+                material
+            }));
+        }
+        Ok(materials)
+    }
+
+    /// Puts a plant's organs into the scene: meshes of the world, or of a bank's plant that stands as an instance.
+    fn put_organs(&mut self, number: u16, organs: &[Grown], materials: &[u32], instance: Option<&Arc<Placement>>) {
+        for (organ, material) in organs.iter().zip(materials) {
+            self.organs.push(organ.kind);
+            let tag = Tag { plant: number, ..organ.part.tag };
+            self.scene.parts.push(Part { material: *material, tag, instance: instance.cloned(), ..organ.part.clone() });
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! What rays can hit.
+
+use super::tag::Tag;
+use crate::accel::Surface;
+use crate::geometry::{AlphaMask, Hit, Interaction, Mesh, Placement};
+use crate::math::Vec3;
+use std::borrow::Cow;
+use std::sync::Arc;
+
+/// One organ of one plant, one stone, the ground: a mesh with a material and a name.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// Its triangles: in the world, or where [`Part::instance`] puts them.
+    pub mesh: Arc<Mesh>,
+    /// Where they are there at all; `None` for everywhere.
+    pub mask: Option<Arc<AlphaMask>>,
+    /// Index into [`Scene::materials`](super::Scene::materials).
+    pub material: u32,
+    /// Who it is.
+    pub tag: Tag,
+    /// Where a mesh stands that other parts have, too. Parts of one plant, which follow each other, have one placement.
+    pub instance: Option<Arc<Placement>>,
+}
+
+impl Part {
+    /// As the accelerators see it.
+    pub fn surface(&self) -> Surface<'_> {
+        Surface { mesh: &self.mesh, mask: self.mask.as_ref(), instance: self.instance.as_ref() }
+    }
+
+    /// Its mesh in the world.
+    pub fn in_world(&self) -> Cow<'_, Mesh> {
+        match &self.instance {
+            None => Cow::Borrowed(&self.mesh),
+            Some(placement) => {
+                let mut mesh = Mesh::clone(&self.mesh);
+                mesh.transform(placement.rotation, placement.offset);
+                Cow::Owned(mesh)
+            }
+        }
+    }
+
+    /// Corners of triangle `i` in the world, metres.
+    #[inline]
+    pub fn corners(&self, i: u32) -> [Vec3; 3] {
+        self.surface().corners(i)
+    }
+
+    /// All corners in the world, metres.
+    pub fn positions(&self) -> impl Iterator<Item = Vec3> + '_ {
+        let placement = self.instance.as_deref();
+        self.mesh.positions.iter().map(move |p| placement.map_or(*p, |placement| placement.point(*p)))
+    }
+
+    /// Smallest and largest corner in the world, metres; `None` without triangles.
+    pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
+        self.positions().map(|p| (p, p)).reduce(|(lo, hi), (p, _)| (lo.min(p), hi.max(p)))
+    }
+
+    /// A hit on it, worked out in the world; `footprint` in metres.
+    #[inline]
+    pub fn interaction(&self, hit: &Hit, footprint: f32) -> Interaction {
+        let at = Interaction::new(&self.mesh, hit, footprint);
+        match &self.instance {
+            None => at,
+            Some(placement) => at.placed(placement),
+        }
+    }
+}
