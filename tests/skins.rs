@@ -42,6 +42,9 @@ struct Corner {
     weights: Vec<(usize, f64)>,
 }
 
+/// A vertex as the file has it: place and texture coordinates.
+type Vertex = ([f32; 3], [f32; 2]);
+
 /// A mesh with a skin: its name, its corners, its joints' nodes and inverse bind matrices.
 struct Skinned {
     name: String,
@@ -88,7 +91,7 @@ fn skinned(file: &Gltf) -> Vec<Skinned> {
         let joints = reader.read_joints(0).unwrap().into_u16();
         let uvs = reader.read_tex_coords(0).unwrap().into_f32();
         let corners = reader.read_positions().unwrap().zip(uvs).zip(joints.zip(weights));
-        let corner = |((at, uv), (joints, weights)): (([f32; 3], [f32; 2]), ([u16; 4], [f32; 4]))| {
+        let corner = |((at, uv), (joints, weights)): (Vertex, ([u16; 4], [f32; 4]))| {
             let sum: f32 = weights.iter().sum();
             assert!((sum - 1.0).abs() < 1e-6, "weights sum to {sum}");
             let used: Vec<(usize, f64)> = joints

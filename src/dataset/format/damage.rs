@@ -21,8 +21,11 @@ pub(super) struct Writer;
 
 const FOLDER: &str = "damage";
 
+/// What a map holds of a place, from 0 to 1.
+type Share = fn(&Damage) -> f32;
+
 /// The maps: their names, and what they hold of a place.
-const MAPS: [(&str, fn(&Damage) -> f32); 4] = [
+const MAPS: [(&str, Share); 4] = [
     ("chlorosis", |damage| damage.chlorosis),
     ("necrosis", |damage| damage.necrosis),
     ("dust", |damage| damage.soil),
@@ -33,7 +36,7 @@ impl Format for Writer {
     fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
         let record = &sample.record;
         let damage = &sample.rendered(FOLDER)?.damage;
-        let map = |(map, share): (&str, fn(&Damage) -> f32)| {
+        let map = |(map, share): (&str, Share)| {
             let values: Vec<u8> = damage.iter().map(|at| (share(at).clamp(0.0, 1.0) * 255.0).round() as u8).collect();
             let path = format!("{FOLDER}/{}/{map}/{}.png", record.split.name(), record.name);
             picture::file(sample, path, &Picture::Gray(&values))

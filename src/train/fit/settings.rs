@@ -204,7 +204,7 @@ pub fn defaults() -> Vec<(&'static str, String)> {
         ("encoder_rate", hyper.encoder_rate.to_string()),
         ("ema", hyper.ema.to_string()),
         ("resize", hyper.resize.name()),
-        ("refine", hyper.refine.name().into()),
+        ("refine", hyper.refine.name()),
         ("augment", hyper.augment.to_string()),
         ("normalization", hyper.normalization.name().into()),
         ("validate_every", hyper.validate_every.to_string()),

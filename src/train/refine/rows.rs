@@ -171,7 +171,9 @@ impl Cells {
         let total: f64 = places.iter().map(|(_, _, weight)| weight).sum();
         let profile = |angle: &f64| {
             let (mut bins, turned) = ([0.0; BINS], angle.sin_cos());
-            places.iter().for_each(|(x, y, weight)| bins[self.bin((*x, *y), turned)] += weight / total);
+            for (x, y, weight) in places {
+                bins[self.bin((*x, *y), turned)] += weight / total;
+            }
             bins
         };
         angles.iter().map(profile).collect()
