@@ -243,7 +243,7 @@ fn edits_do_what_their_names_say() {
     }
     assert!(groups.len() <= 3 && alike.plants.len() > 4, "{} groups of {}", groups.len(), alike.plants.len());
     for plants in groups.values() {
-        let area = |number: u16| -> Vec<f32> {
+        let area = |number: u32| -> Vec<f32> {
             let parts = alike.scene.parts.iter().filter(|p| p.tag.plant == number);
             parts.map(|p| p.mesh.area()).collect()
         };

@@ -14,10 +14,10 @@ use furrow::scene::assemble::Options;
 use std::collections::BTreeMap;
 
 /// Bytes of a point, and of its place.
-const POINT: usize = 34;
+const POINT: usize = 36;
 
 /// Places, normals and labels (plant, leaf) of a cloud's points.
-fn points(cloud: Cloud) -> Vec<(Vec3, Vec3, (u16, u16))> {
+fn points(cloud: Cloud) -> Vec<(Vec3, Vec3, (u32, u16))> {
     let count = cloud.points();
     let file = cloud.file("test");
     let header = file.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
@@ -27,8 +27,8 @@ fn points(cloud: Cloud) -> Vec<(Vec3, Vec3, (u16, u16))> {
     assert_eq!(body.len(), count as usize * POINT);
     let float = |p: &[u8], k: usize| f32::from_le_bytes(p[4 * k..4 * k + 4].try_into().unwrap());
     let vector = |p: &[u8], k: usize| vec3(float(p, k), float(p, k + 1), float(p, k + 2));
-    let short = |p: &[u8], at: usize| u16::from_le_bytes([p[at], p[at + 1]]);
-    body.chunks_exact(POINT).map(|p| (vector(p, 0), vector(p, 3), (short(p, 30), short(p, 32)))).collect()
+    let label = |p: &[u8]| (u32::from_le_bytes(p[30..34].try_into().unwrap()), u16::from_le_bytes([p[34], p[35]]));
+    body.chunks_exact(POINT).map(|p| (vector(p, 0), vector(p, 3), label(p))).collect()
 }
 
 fn plants(text: &str) -> Field {
@@ -72,7 +72,7 @@ fn leaves_bear_points_by_their_area_and_none_in_their_holes() {
         *areas.entry((part.tag.plant, part.tag.leaf)).or_insert(0.0) += left(&part.mesh, part.mask.as_deref());
         whole += f64::from(part.mesh.area());
     }
-    let mut counts: BTreeMap<(u16, u16), usize> = BTreeMap::new();
+    let mut counts: BTreeMap<(u32, u16), usize> = BTreeMap::new();
     for (_, normal, label) in &found {
         *counts.entry(*label).or_default() += 1;
         assert!((normal.length() - 1.0).abs() < 1e-3);

@@ -70,7 +70,7 @@ fn flag() -> Scene {
     let eye = camera((24, 20), vec3(0.1, -0.4, 0.6), Vec3::ZERO, 60.0);
     let mut scene = scene(vec![(first, bsdf), (third, bsdf), (fourth, bsdf)], Vec::new(), eye);
     for (part, (class, leaf)) in scene.parts.iter_mut().zip([(Class::Crop, 1), (Class::Weed, 1), (Class::Weed, 2)]) {
-        part.tag = Tag { class, plant: class as u16, leaf };
+        part.tag = Tag { class, plant: class as u32, leaf };
     }
     scene
 }

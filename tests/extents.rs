@@ -24,7 +24,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
 
-type Extents = BTreeMap<(u16, u16), Extent>;
+type Extents = BTreeMap<(u32, u16), Extent>;
 
 fn labels_of(scene: &Scene, window: Window) -> LabelMap {
     let geometry = EmbreeAccel::build(&scene.surfaces(), 1).expect("an accelerator");
@@ -57,7 +57,7 @@ fn alone(scene: &Scene, window: Window, is: impl Fn(&Part) -> bool) -> [u32; 2] 
 
 /// Whether numbers are ordered, leaves lie in plants, and the visible ones are those of the labels.
 fn check_order(found: &Extents, labels: &LabelMap) {
-    let mut pixels: BTreeMap<(u16, u16), u32> = BTreeMap::new();
+    let mut pixels: BTreeMap<(u32, u16), u32> = BTreeMap::new();
     for tag in labels.tags.iter().filter(|t| t.plant > 0) {
         *pixels.entry((tag.plant, 0)).or_default() += 1;
         if tag.leaf > 0 {
@@ -79,7 +79,7 @@ fn check(scene: &Scene, window: Window) -> Extents {
     let found = extents(scene, &labels);
     check_order(&found, &labels);
     let (mut compared, mut doubtful) = (0, 0);
-    let plants: BTreeSet<u16> = scene.parts.iter().map(|p| p.tag.plant).filter(|p| *p > 0).collect();
+    let plants: BTreeSet<u32> = scene.parts.iter().map(|p| p.tag.plant).filter(|p| *p > 0).collect();
     for plant in plants {
         let leaves: BTreeSet<u16> = scene.parts.iter().filter(|p| p.tag.plant == plant).map(|p| p.tag.leaf).collect();
         let whole = alone(scene, window, |p| p.tag.plant == plant);
@@ -157,10 +157,15 @@ fn a_crop_cuts_what_lies_outside_of_it() {
 }
 
 /// A scene of squares with tags, 0.5 m below a camera of 100 × 80 pixels that sees 2 mm a pixel there.
-fn squares(parts: &[(Vec3, f32, u16, u16)]) -> Scene {
-    let fov = 2.0 * (0.1_f64 / 0.5).atan().to_degrees();
-    let eye = camera((100, 80), vec3(0.0, 0.0, 0.5), Vec3::ZERO, fov);
-    let part = |&(centre, side, plant, leaf): &(Vec3, f32, u16, u16)| {
+fn squares(parts: &[(Vec3, f32, u32, u16)]) -> Scene {
+    squares_in((100, 80), parts)
+}
+
+/// The same for a camera of so many pixels.
+fn squares_in(size: (u32, u32), parts: &[(Vec3, f32, u32, u16)]) -> Scene {
+    let fov = 2.0 * (0.001 * f64::from(size.0) / 0.5).atan().to_degrees();
+    let eye = camera(size, vec3(0.0, 0.0, 0.5), Vec3::ZERO, fov);
+    let part = |&(centre, side, plant, leaf): &(Vec3, f32, u32, u16)| {
         let class = if plant > 0 { Class::Crop } else { Class::Soil };
         Part {
             mesh: Arc::new(square(centre, side)),
@@ -225,13 +230,32 @@ fn a_plant_cut_by_the_frame_counts_beyond_it() {
     let found = extents(&scene, &labels);
     check_order(&found, &labels);
     // All lie in one plane: what is seen where they overlap is for the labels to say.
-    let hidden = |key: (u16, u16)| (found[&key].unoccluded, found[&key].whole);
+    let hidden = |key: (u32, u16)| (found[&key].unoccluded, found[&key].whole);
     assert_eq!(hidden((1, 1)), (100, 400));
     assert_eq!(hidden((1, 2)), (0, 100));
     assert_eq!(hidden((1, 0)), (100, 500));
     assert_eq!(found[&(1, 0)].inside_fraction(), 0.2);
     assert_eq!(hidden((3, 1)), (100 * 80, 300 * 240));
     assert_eq!(found.keys().map(|k| k.0).collect::<BTreeSet<_>>(), [1, 3].into());
+}
+
+/// Rationale: a hectare has more plants than 16 bits number. Expected: of 72,000 plants, one a pixel, labels show each once, and each has an
+/// extent of that pixel; none is taken for the one whose number is less by 65,536.
+#[test]
+fn plants_beyond_16_bits_are_told_apart() {
+    let (w, h) = (300, 240);
+    let at = |k: u32, n: u32| (k as f32 + 0.5 - 0.5 * n as f32) * 0.002;
+    let plant = |k: u32| (vec3(at(k % w, w), at(k / w, h), 0.0), 0.0018, k + 1, 1);
+    let parts: Vec<_> = (0..w * h).map(plant).collect();
+    let scene = squares_in((w, h), &parts);
+    let labels = labels_of(&scene, full(&scene));
+    let mut shown: Vec<u32> = labels.tags.iter().map(|tag| tag.plant).collect();
+    shown.sort_unstable();
+    assert!(shown.iter().copied().eq(1..=w * h), "{} of {} plants", shown.len(), w * h);
+    let found = extents(&scene, &labels);
+    let one = Extent { visible: 1, unoccluded: 1, whole: 1 };
+    let expected = (1..=w * h).flat_map(|number| [((number, 0), one), ((number, 1), one)]);
+    assert!(found.into_iter().eq(expected));
 }
 
 /// A plant that reaches past the lens must neither stop the count nor make it endless.

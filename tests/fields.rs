@@ -711,7 +711,7 @@ fn a_front_camera_shows_the_same_field_by_pixel() {
     }
     assert!(ground.positions.iter().any(|p| p.y > 190.0), "it ends at the horizon");
     let cells = |field: &Field, far: bool| {
-        let plant = |tag: u16| field.plants.iter().find(|p| p.number == tag).map(|p| p.position.y);
+        let plant = |tag: u32| field.plants.iter().find(|p| p.number == tag).map(|p| p.position.y);
         let of = field.scene.parts.iter().zip(&field.kinds).filter(|(part, kind)| {
             matches!(kind, PartKind::Organ(OrganKind::Blade)) && plant(part.tag.plant).is_some_and(|y| (y > 3.0) == far)
         });

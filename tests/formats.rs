@@ -188,13 +188,13 @@ fn every_format_comes_out_the_same_from_the_native_files() {
     }
 }
 
-/// Imported images have pixels without a label, vegetation of no plant, and plants of which nothing more is known.
-#[test]
-fn every_format_takes_an_image_that_little_is_known_of() {
+/// An imported image of two plants of these numbers, with pixels without a label and vegetation of no plant, in all formats: the folder
+/// that holds the files, and itself.
+fn little_known(numbers: [u32; 2]) -> (tempfile::TempDir, PathBuf, Sample) {
     let (mut recipe, _) = samples(&FIELD);
     recipe.made = Made::Imported { from: "masks".into(), source_sha256: String::new() };
     recipe.species.clear();
-    let (none, ignore) = (0, IGNORE);
+    let [crop, weed] = numbers;
     let mut sample = Sample {
         record: Record {
             index: 2,
@@ -215,11 +215,11 @@ fn every_format_takes_an_image_that_little_is_known_of() {
         },
         rgb: vec![[90, 80, 70]; 8],
         nir: Vec::new(),
-        semantics: vec![0, 1, 1, ignore, 2, 2, 0, 1],
+        semantics: vec![0, 1, 1, IGNORE, 2, 2, 0, 1],
         species: Vec::new(),
         parts: Vec::new(),
-        plants: vec![none, 7, 7, none, 9, 9, none, none],
-        leaves: vec![none; 8],
+        plants: vec![0, crop, crop, 0, weed, weed, 0, 0],
+        leaves: vec![0; 8],
         coverage: Vec::new(),
         depth: Vec::new(),
         normals: Vec::new(),
@@ -229,18 +229,27 @@ fn every_format_takes_an_image_that_little_is_known_of() {
     sample.record.plants = annotate::plants(&sample);
     assert_eq!((sample.record.ignored, sample.record.plants.len()), (1, 2));
     let (folder, written) = common::program::scratch();
+    let mut files = native::files(&recipe, &sample, "").unwrap();
     for (name, _) in NAMES {
         let writer = format::named(name).unwrap();
         if writer.needs_film() {
             continue;
         }
-        for file in writer.image(&recipe, &sample).unwrap() {
-            assert!(!file.bytes.is_empty(), "{}", file.path);
-            let path = written.join(&file.path);
-            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-            std::fs::write(path, &file.bytes).unwrap();
-        }
+        files.extend(writer.image(&recipe, &sample).unwrap());
     }
+    for file in files {
+        assert!(!file.bytes.is_empty(), "{}", file.path);
+        let path = written.join(&file.path);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, &file.bytes).unwrap();
+    }
+    (folder, written, sample)
+}
+
+/// Imported images have pixels without a label, vegetation of no plant, and plants of which nothing more is known.
+#[test]
+fn every_format_takes_an_image_that_little_is_known_of() {
+    let (folder, written, _) = little_known([7, 9]);
     let gray16 = |path: &str| output::read_gray16(&written.join(path)).unwrap().2;
     assert_eq!(gray16("phenobench/val/semantics/000002.png"), [0, 1, 1, 255, 2, 2, 0, 1]);
     let instances = gray16("cityscapes/gtFine/val/masks/masks_000000_000002_gtFine_instanceIds.png");
@@ -253,6 +262,31 @@ fn every_format_takes_an_image_that_little_is_known_of() {
     let (_, _, labels) =
         output::read_gray(&written.join("cropandweed/labelIds/CropAndWeed/ave-0000-0002.png")).unwrap();
     assert_eq!(labels, [0, 255, 255, 0, 255, 255, 0, 0]);
+    drop(folder);
+}
+
+/// Rationale: a field may have more plants than 16 bits number. Expected: the image comes back as it was; each format tells the plants apart, by
+/// their own numbers where it can hold them: three bytes as in COCO panoptic, whose other segments come behind them; PhenoBench, of
+/// 16 bits, counts from 1.
+#[test]
+fn every_format_takes_numbers_beyond_16_bits() {
+    let (folder, written, sample) = little_known([7, 70_000]);
+    assert_eq!(native::read(&written, "000002").unwrap(), sample);
+    let plants = [0, 7, 7, 0, 70_000, 70_000, 0, 0];
+    let numbers = |path: &str| output::read_numbers(&written.join(path)).unwrap().2;
+    assert_eq!(numbers("images/000002/plants.png"), plants);
+    assert_eq!(numbers("imagefolder/val/plants/000002.png"), plants);
+    assert_eq!(numbers("phenobench/val/plant_instances/000002.png"), [0, 1, 1, 0, 2, 2, 0, 0]);
+    let instances = numbers("cityscapes/gtFine/val/masks/masks_000000_000002_gtFine_instanceIds.png");
+    assert_eq!(instances, [0, 1000, 1000, 255, 2000, 2000, 0, 1]);
+    let segments = numbers("panoptic/annotations/panoptic_val/000002.png");
+    let (soil, crowd) = (70_001 + 4, 70_001 + 1);
+    assert_eq!(segments, [soil, 7, 7, 0, 70_000, 70_000, soil, crowd]);
+    let told = std::fs::read_to_string(written.join("panoptic/segments/val/000002.json")).unwrap();
+    let told: serde_json::Value = serde_json::from_str(&told).unwrap();
+    let crowds: Vec<_> = told.as_array().unwrap().iter().map(|s| (s["id"].as_u64(), s["iscrowd"].as_u64())).collect();
+    let expected = [(7, 0), (70_000, 0), (crowd, 1), (soil, 0)].map(|(id, is)| (Some(u64::from(id)), Some(is)));
+    assert_eq!(crowds, expected);
     drop(folder);
 }
 

@@ -225,7 +225,7 @@ fn named<'a>(samples: &'a [Sample], name: &str) -> Option<&'a Sample> {
 
 /// Checks that two maps of leaves draw the same borders on every plant of these classes, whatever the numbers.
 fn same_leaves(name: &str, before: &Sample, after: &Sample, classes: &[Class]) {
-    let mut pairs: BTreeSet<((u16, u16), (u16, u16))> = BTreeSet::new();
+    let mut pairs: BTreeSet<((u32, u16), (u32, u16))> = BTreeSet::new();
     for i in 0..before.pixels() {
         if classes.iter().any(|c| *c as u8 == before.semantics[i]) {
             pairs.insert(((before.plants[i], before.leaves[i]), (after.plants[i], after.leaves[i])));
@@ -271,7 +271,7 @@ fn coco_comes_back_as_it_was_written() {
         assert_eq!((&back.rgb, &back.semantics, &back.plants), (&sample.rgb, &sample.semantics, &sample.plants));
         assert_eq!(back.record.split, sample.record.split);
         same_leaves(&sample.record.name, sample, back, &[Class::Crop, Class::Weed]);
-        let stems = |r: &Record| -> Vec<(u16, i64)> {
+        let stems = |r: &Record| -> Vec<(u32, i64)> {
             let stem = |p: &furrow::dataset::record::Plant| Some((p.number, (p.stem?.x * 100.0).round() as i64));
             r.seen().filter_map(stem).collect()
         };
@@ -285,6 +285,48 @@ fn coco_comes_back_as_it_was_written() {
         assert_eq!(tips(&sample.record), tips(&back.record), "{}: tips of leaves", sample.record.name);
     }
     assert!(points > 3, "{points} stems came back");
+}
+
+/// Rationale: plants of large fields have numbers beyond 16 bits. Expected: those that COCO's attributes tell come in, through the formats that hold them
+/// and back.
+#[test]
+fn plants_beyond_16_bits_come_in_and_back() {
+    let (kept, out) = scratch();
+    let root = kept.path();
+    write_png(&root.join("x.png"), W, H, &Picture::Rgb(&photo(3)), "").unwrap();
+    let square = |x: u32, plant: u32| {
+        json!({
+            "id": plant, "image_id": 5, "category_id": 1, "iscrowd": 0, "attributes": { "plant": plant },
+            "segmentation": [[x, 2, x + 3, 2, x + 3, 7, x, 7]],
+        })
+    };
+    let document = json!({
+        "images": [{ "id": 5, "file_name": "x.png", "width": W, "height": H }],
+        "categories": [{ "id": 1, "name": "crop" }],
+        "annotations": [square(1, 4464), square(6, 70_000)],
+    });
+    let file = root.join("a.json");
+    std::fs::write(&file, document.to_string()).unwrap();
+    let (_, samples) = imported(&out, &["--format", "coco", "--from", text(&file)]);
+    // 4464 is what 16 bits leave of 70,000.
+    let shown: BTreeSet<u32> = samples[0].plants.iter().copied().collect();
+    assert_eq!(shown, [0, 4464, 70_000].into());
+    let formats = "coco,imagefolder,panoptic,phenobench,yolo";
+    let finished = trace(&["dataset", "finish", text(&out), "--format", formats, "--quiet"]).output().unwrap();
+    assert!(finished.status.success(), "{}", String::from_utf8_lossy(&finished.stderr));
+    let (_, back) = imported(&root.join("back"), &["--format", "coco", "--from", text(&out.join("coco"))]);
+    assert_eq!(back[0].plants, samples[0].plants);
+    let Some(python) = common::python::python("import numpy, PIL") else { return };
+    let module = Path::new(env!("CARGO_MANIFEST_DIR")).join("python");
+    let words = "import furrow, sys; plants = furrow.Dataset(sys.argv[1])[0]['plants']; print(plants.dtype, *sorted(set(plants.flat)))";
+    let read =
+        std::process::Command::new(python).args(["-c", words]).arg(&out).env("PYTHONPATH", module).output().unwrap();
+    assert_eq!(
+        String::from_utf8_lossy(&read.stdout),
+        "int32 0 4464 70000\n",
+        "{}",
+        String::from_utf8_lossy(&read.stderr)
+    );
 }
 
 #[test]
@@ -316,10 +358,10 @@ fn coco_of_others_comes_in_with_polygons_runs_and_crowds() {
     let expected: Vec<u8> = classes().iter().map(|c| if *c == 255 { 0 } else { *c }).collect();
     assert_eq!(sample.semantics, expected);
     let crop = |x: u32, y: u32| (2..=5).contains(&x) && (2..=6).contains(&y);
-    let at = |map: &[u16], x: u32, y: u32| map[(y * W + x) as usize];
+    let at = |x: u32, y: u32| (y * W + x) as usize;
     for (x, y) in (0..H).flat_map(|y| (0..W).map(move |x| (x, y))) {
-        assert_eq!(at(&sample.plants, x, y), u16::from(crop(x, y)), "plant at {x},{y}");
-        assert_eq!(at(&sample.leaves, x, y), u16::from(crop(x, y) && x >= 4), "leaf at {x},{y}");
+        assert_eq!(sample.plants[at(x, y)], u32::from(crop(x, y)), "plant at {x},{y}");
+        assert_eq!(sample.leaves[at(x, y)], u16::from(crop(x, y) && x >= 4), "leaf at {x},{y}");
     }
     assert_eq!(sample.record.warnings.len(), 1, "the leaf reaches beyond its plant: {:?}", sample.record.warnings);
     let another = root.join("another");

@@ -443,11 +443,11 @@ fn label_files_read_back_as_the_label_map() {
     output::write_files(&out, &output::image_files(&film, &map, &photograph, &provenance).unwrap()).unwrap();
     let (sw, sh, classes) = output::read_indexed(&out.join("semantics.png")).unwrap();
     assert_eq!((sw, sh), (w, h));
-    let of = |f: fn(&Tag) -> u16| map.tags.iter().map(f).collect::<Vec<u16>>();
-    assert_eq!(classes.iter().map(|c| u16::from(*c)).collect::<Vec<_>>(), of(|t| t.class as u16));
+    let of = |f: fn(&Tag) -> u32| map.tags.iter().map(f).collect::<Vec<u32>>();
+    assert_eq!(classes.iter().map(|c| u32::from(*c)).collect::<Vec<_>>(), of(|t| t.class as u32));
     assert_eq!(palette(&out.join("semantics.png")), [0, 0, 0, 0, 255, 0, 255, 0, 0]);
-    assert_eq!(output::read_gray16(&out.join("plants.png")).unwrap(), (w, h, of(|t| t.plant)));
-    assert_eq!(output::read_gray16(&out.join("leaves.png")).unwrap(), (w, h, of(|t| t.leaf)));
+    assert_eq!(output::read_numbers(&out.join("plants.png")).unwrap(), (w, h, of(|t| t.plant)));
+    assert_eq!(output::read_numbers(&out.join("leaves.png")).unwrap(), (w, h, of(|t| u32::from(t.leaf))));
     let areas = Class::ALL.map(|c| map.tags.iter().filter(|t| t.class == c).count());
     assert_eq!(areas.iter().sum::<usize>(), (w * h) as usize, "{areas:?}");
     assert!(areas.iter().all(|a| *a > 20), "{areas:?}: a class is missing");

@@ -79,7 +79,7 @@ fn ask(name: &str, film: &Film, labels: &LabelMap, tags: &[Tag]) {
     eprintln!("{}", String::from_utf8_lossy(&output.stdout));
 }
 
-fn tag(class: Class, plant: u16, leaf: u16) -> Tag {
+fn tag(class: Class, plant: u32, leaf: u16) -> Tag {
     Tag { class, plant, leaf }
 }
 
@@ -93,7 +93,7 @@ fn row(pixels: &[&[(u32, u32)]]) -> (Film, LabelMap, Vec<Tag>) {
     let window = Window::full(pixels.len() as u32, 1);
     let film = Film { window, pixels: pixels.iter().map(pixel).collect() };
     let mut tags = vec![tag(Class::Soil, 0, 0)];
-    tags.extend((1..=12).map(|k| tag(if k % 2 == 0 { Class::Crop } else { Class::Weed }, k, k % 3)));
+    tags.extend((1..=12).map(|k| tag(if k % 2 == 0 { Class::Crop } else { Class::Weed }, k, k as u16 % 3)));
     let n = pixels.len();
     // Ids as large as 32 bits hold them, beside "no part".
     let parts = (0..n).map(|k| if k == 0 { u32::MAX } else { 3_999_999_990 + k as u32 }).collect();

@@ -146,7 +146,7 @@ proptest! {
         let (w, h) = (23, 17);
         let truth = random_map(&mut stream, w, h, true);
         let predicted = random_answer(&mut stream, &truth);
-        let numbers: Vec<u16> = (0..w * h).map(|at| (at % w / 6) as u16).collect();
+        let numbers: Vec<u32> = (0..w * h).map(|at| (at % w / 6) as u32).collect();
         let sizes = Sizes::of(&PLANTS, (w, h), &truth, &predicted, numbered.then_some(&numbers[..]));
         let mut matrix = Confusion::new(3);
         matrix.add(&truth, &predicted).unwrap();
@@ -239,7 +239,7 @@ fn small_plants_and_large_ones_are_told_apart() {
 #[test]
 fn plants_that_touch_are_told_apart_by_their_numbers() {
     let truth = map(&["11111111", "11111111"]);
-    let numbers: Vec<u16> = (0..16).map(|at| if at % 8 < 2 { 7 } else { 3 }).collect();
+    let numbers: Vec<u32> = (0..16).map(|at| if at % 8 < 2 { 7 } else { 3 }).collect();
     // The small plant of 4 is found; of the one of 12, five.
     let answer = map(&["11110000", "11111000"]);
     let bins = Sizes::of(&PLANTS, (8, 2), &truth, &answer, Some(&numbers)).bins(1);
@@ -249,7 +249,7 @@ fn plants_that_touch_are_told_apart_by_their_numbers() {
     let bins = Sizes::of(&PLANTS, (8, 2), &truth, &answer, None).bins(1);
     assert_eq!((bins[0].from_pixels, bins[0].plants, bins[0].detected), (16, 1, 1));
     // What bears no number hangs together as far as it does.
-    let mixed: Vec<u16> = numbers.iter().map(|n| if *n == 7 { 7 } else { 0 }).collect();
+    let mixed: Vec<u32> = numbers.iter().map(|n| if *n == 7 { 7 } else { 0 }).collect();
     let bins = Sizes::of(&PLANTS, (8, 2), &truth, &answer, Some(&mixed)).bins(1);
     assert_eq!(bins[0].plants, 2);
 }

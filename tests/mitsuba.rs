@@ -69,7 +69,7 @@ fn sheets() -> Scene {
         let mut mesh = square(0.11);
         let rotation = Mat3::from_rotation_z(i as f32) * Mat3::from_rotation_x(turn);
         mesh.transform(rotation, vec3(x, y, z));
-        let tag = Tag { class: [Class::Crop, Class::Weed][i % 2], plant: i as u16 + 1, leaf: 1 };
+        let tag = Tag { class: [Class::Crop, Class::Weed][i % 2], plant: i as u32 + 1, leaf: 1 };
         parts.push(Part {
             mesh: Arc::new(mesh),
             mask: Some(mask.clone()),
@@ -136,7 +136,7 @@ fn prepare(name: &str, scene: &Scene, spp: u32) -> PathBuf {
     });
     let mut bytes = Vec::new();
     for (pixel, tag) in film.pixels.iter().zip(&labels.tags) {
-        let ids = [tag.class as u8 as f32, f32::from(tag.plant), f32::from(tag.leaf)];
+        let ids = [tag.class as u8 as f32, tag.plant as f32, f32::from(tag.leaf)];
         let numbers = pixel.mean.to_array().into_iter().chain(pixel.variance.to_array()).chain(ids);
         bytes.extend(numbers.flat_map(f32::to_le_bytes));
     }

@@ -77,7 +77,7 @@ fn an_exported_field_reads_back_bit_for_bit_with_the_same_label_map() {
     assert_eq!(hash(numbers(&before)), hash(numbers(&after)));
     assert!(numbers(&after).iter().any(|n| *n > 0), "nothing was labelled");
     // Its plants are known by the numbers that they had.
-    let seen: Vec<u16> = again.plants.iter().map(|p| p.number).collect();
+    let seen: Vec<u32> = again.plants.iter().map(|p| p.number).collect();
     assert_eq!(seen, field.plants.iter().map(|p| p.number).collect::<Vec<_>>());
 }
 

@@ -102,7 +102,7 @@ fn weeds_emerge_in_flushes() {
 
 /// Where leaves are cut, on a raster of each leaf's own image.
 fn cut(field: &Field) -> BTreeMap<(u32, u16), Vec<bool>> {
-    let ids: BTreeMap<u16, u32> = field.plants.iter().map(|p| (p.number, p.id)).collect();
+    let ids: BTreeMap<u32, u32> = field.plants.iter().map(|p| (p.number, p.id)).collect();
     let at = |i: usize| vec2(((i % 64) as f32 + 0.5) / 64.0, ((i / 64) as f32 + 0.5) / 64.0);
     let parts = field.scene.parts.iter().filter(|part| part.mask.is_some());
     let of = |part: &furrow::scene::Part| {
@@ -245,7 +245,7 @@ fn images_of_days_do_not_depend_on_the_others() {
         let time = f64::from(k / 4) * 12.0 * 86_400.0 + f64::from(k / 2 % 2) * 0.1;
         assert!((capture.time_s - time).abs() < 1e-6, "{}", capture.time_s);
     }
-    let told = |record: &Record| -> BTreeMap<u32, (u16, f32)> {
+    let told = |record: &Record| -> BTreeMap<u32, (u32, f32)> {
         record.plants.iter().map(|p| (p.id.unwrap(), (p.number, p.grown.as_ref().unwrap().age_days))).collect()
     };
     let (early, late) = (told(&records[0]), told(&records[4]));

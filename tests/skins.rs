@@ -145,7 +145,7 @@ fn a_joint_moves_what_lies_beyond_it_and_nothing_else() {
     let named: BTreeMap<String, gltf::Node<'_>> =
         file.nodes().filter_map(|node| Some((node.name()?.to_owned(), node.clone()))).collect();
     let beets = field.plants.iter().filter(|plant| plant.species.contains("beet"));
-    let numbers: BTreeSet<u16> = beets.map(|plant| plant.number).collect();
+    let numbers: BTreeSet<u32> = beets.map(|plant| plant.number).collect();
     let all = skinned(&file);
     let of_beets = |one: &&Skinned| numbers.iter().any(|n| one.name.starts_with(&format!("crop {n} leaf")));
     let mut tested = 0;

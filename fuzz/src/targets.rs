@@ -88,6 +88,7 @@ fn png(bytes: &[u8]) {
     let _ = output::read_map(&path);
     let _ = output::read_rgb(&path);
     let _ = output::read_gray16(&path);
+    let _ = output::read_numbers(&path);
     let _ = output::read_photo(&path);
 }
 

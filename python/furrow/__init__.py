@@ -65,10 +65,15 @@ def _read(file: Union[Path, IO[bytes]], kind: type[np.generic], name: object = N
     """A picture's values, in memory that may be written; `name` is what errors call the file."""
     try:
         with Image.open(file) as picture:
-            return np.array(picture).astype(kind)
+            values = np.array(picture)
     # What Pillow raises for files that are no pictures, or are cut short.
     except (OSError, SyntaxError, ValueError) as error:
         raise Error(f"{name or file}: {error}") from error
+    if kind is np.int32 and values.ndim == 3:
+        # Numbers beyond 16 bits: R + 256 G + 65536 B.
+        red, green, blue = (values[..., k].astype(kind) for k in range(3))
+        return red | green << 8 | blue << 16
+    return values.astype(kind)
 
 
 def _object(text: Union[str, bytes], name: object) -> Dict[str, Any]:

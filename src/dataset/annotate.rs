@@ -11,10 +11,10 @@ use crate::sensor::Camera;
 use std::collections::BTreeMap;
 
 /// Pixels and box of every plant (leaf 0) and every leaf (plant, leaf) that the maps show.
-type Counted = BTreeMap<(u16, u16), (u32, Box2)>;
+type Counted = BTreeMap<(u32, u16), (u32, Box2)>;
 
 /// Counts the pixels of plants and leaves.
-fn count(width: u32, plants: &[u16], leaves: &[u16]) -> Counted {
+fn count(width: u32, plants: &[u32], leaves: &[u16]) -> Counted {
     let mut all = Counted::new();
     // Runs of one leaf are counted at once.
     let mut from = 0;
@@ -52,7 +52,7 @@ pub fn plants(sample: &Sample) -> Vec<Plant> {
     let (plants, leaves) = (&sample.plants, &sample.leaves);
     let counted = count(width, plants, leaves);
     let at = |x: u32, y: u32| (y * width + x) as usize;
-    let seen = |(plant, leaf): (u16, u16), (pixels, bounds): (u32, Box2)| {
+    let seen = |(plant, leaf): (u32, u16), (pixels, bounds): (u32, Box2)| {
         let inside = |x: u32, y: u32| plants[at(x, y)] == plant && (leaf == 0 || leaves[at(x, y)] == leaf);
         let mask = Some(Rle::encode(width, height, bounds, inside));
         Seen { pixels, unoccluded: None, whole: None, bounds: Some(bounds), mask }

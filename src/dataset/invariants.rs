@@ -73,7 +73,7 @@ fn sizes(sample: &Sample, labels_only: bool) -> Vec<String> {
 
 /// A leaf lies in its plant, a plant in its class and its species; without a plant nothing has either.
 fn nesting(sample: &Sample, rendered: bool) -> Vec<String> {
-    let mut of_plant: BTreeMap<u16, (u8, Option<u8>)> = BTreeMap::new();
+    let mut of_plant: BTreeMap<u32, (u8, Option<u8>)> = BTreeMap::new();
     let (mut loose, mut mixed, mut bare, mut unknown) = (0_u64, 0_u64, 0_u64, 0_u64);
     for i in 0..sample.pixels() {
         let (class, plant, leaf) = (sample.semantics[i], sample.plants[i], sample.leaves[i]);

@@ -6,7 +6,8 @@
 //! | `semantics.png` | class, indexed: 0 soil, 1 crop, 2 weed, 255 no label |
 //! | `species.png` | number of the species in `dataset.json`, 8 bit, 0 for none |
 //! | `parts.png` | what is there, indexed: organs and things on the ground, as `parts/names.json` of the format parts; where classes need it |
-//! | `plants.png`, `leaves.png` | number of the plant, of the leaf on it; 16 bit, 0 for none |
+//! | `plants.png` | number of the plant, 0 for none; 16 bit, or R + 256 G + 65536 B where the image shows a plant above 65,535 |
+//! | `leaves.png` | number of the leaf on its plant, 0 for none; 16 bit |
 //! | `coverage.png` | share of soil, crop, weed in the pixel as R, G, B; sums to 255 |
 //! | `geometry.exr` | `depth.Z` (metres along the optical axis), `normal.X/Y/Z` (world), in the precision that the recipe keeps |
 //! | `record.json` | what is known in words and numbers |
@@ -63,7 +64,7 @@ pub fn files(recipe: &Recipe, sample: &Sample, text: &str) -> Result<Vec<File>> 
     if !sample.parts.is_empty() {
         add("parts.png", png(&Picture::Indexed(&sample.parts, &PartKind::palette()))?);
     }
-    add("plants.png", png(&Picture::Gray16(&sample.plants))?);
+    add("plants.png", png(&Picture::Numbers(&sample.plants))?);
     add("leaves.png", png(&Picture::Gray16(&sample.leaves))?);
     if !sample.coverage.is_empty() {
         add("coverage.png", png(&Picture::Linear(&sample.coverage))?);
@@ -170,6 +171,12 @@ impl<'a, F: Files + ?Sized> Image<'a, F> {
         output::decode_gray16(&place, &bytes)
     }
 
+    /// A picture of plants' numbers.
+    pub(crate) fn numbers(&self, file: &str) -> Result<(u32, u32, Vec<u32>)> {
+        let (place, bytes) = self.needed(file)?;
+        output::decode_numbers(&place, &bytes)
+    }
+
     /// An 8-bit indexed picture.
     pub(crate) fn indexed(&self, file: &str) -> Result<(u32, u32, Vec<u8>)> {
         let (place, bytes) = self.needed(file)?;
@@ -212,7 +219,7 @@ pub(super) fn sample(files: &(impl Files + ?Sized), name: &str) -> Result<Sample
         semantics: sized(&image, "semantics.png", size, image.indexed("semantics.png")?)?,
         species,
         parts,
-        plants: sized(&image, "plants.png", size, image.gray16("plants.png")?)?,
+        plants: sized(&image, "plants.png", size, image.numbers("plants.png")?)?,
         leaves: sized(&image, "leaves.png", size, image.gray16("leaves.png")?)?,
         coverage,
         depth,

@@ -115,7 +115,7 @@ pub struct ClassShare {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plant {
     /// Its number in `plants.png`.
-    pub number: u16,
+    pub number: u32,
     /// Its identity, 32 bit and never 0: the same in every image of its field, whatever the camera, the resolution and the other
     /// plants in view; no other plant or leaf of the field has it. Null in older records and for an imported plant.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -189,8 +189,8 @@ fn labelled(recipe: &Recipe, index: u64, of: &Field, labels: LabelMap) -> Result
         Vec::new()
     };
     let tags = field.scene.tags();
-    let kinds: BTreeMap<u16, u16> = field.plants.iter().map(|p| (p.number, p.kind)).collect();
-    let kind = |plant: u16| kinds.get(&plant).copied().unwrap_or(0);
+    let kinds: BTreeMap<u32, u16> = field.plants.iter().map(|p| (p.number, p.kind)).collect();
+    let kind = |plant: u32| kinds.get(&plant).copied().unwrap_or(0);
     let mut sample = Sample {
         record: Record {
             index,
@@ -258,7 +258,7 @@ fn taken(recipe: &Recipe, field: &scene::Field) -> CaptureRecord {
 fn plants(field: &scene::Field, traits: &Traits, labels: &LabelMap, sample: &Sample) -> Vec<Plant> {
     let extents = render::extents(&field.scene, labels);
     let camera = &field.scene.camera;
-    let mut shown: BTreeMap<u16, Plant> = annotate::plants(sample).into_iter().map(|p| (p.number, p)).collect();
+    let mut shown: BTreeMap<u32, Plant> = annotate::plants(sample).into_iter().map(|p| (p.number, p)).collect();
     let mut all = Vec::new();
     for grown in &field.plants {
         let Some(extent) = extents.get(&(grown.number, 0)).filter(|e| e.unoccluded > 0) else { continue };

@@ -22,7 +22,7 @@ pub struct Sample {
     /// Number of what is there among [`PartKind::NUMBERED`](crate::scene::PartKind::NUMBERED), 0 for nothing.
     pub parts: Vec<u8>,
     /// Number of the plant, 0 for none.
-    pub plants: Vec<u16>,
+    pub plants: Vec<u32>,
     /// Number of the leaf on its plant, 0 for none.
     pub leaves: Vec<u16>,
     /// Share of soil, crop and weed in the pixel, of 255; they sum to 255.
@@ -92,13 +92,13 @@ impl Sample {
 
     /// A number for every leaf that is unique in the image, 0 for none: leaves count through the image by plant and leaf.
     pub fn leaf_instances(&self) -> Vec<u32> {
-        let numbers: BTreeMap<(u16, u16), u32> = self
+        let numbers: BTreeMap<(u32, u16), u32> = self
             .record
             .leaves()
             .enumerate()
             .map(|(i, (plant, leaf))| ((plant.number, leaf.number), i as u32 + 1))
             .collect();
-        let of = |(plant, leaf): (&u16, &u16)| numbers.get(&(*plant, *leaf)).copied().unwrap_or(0);
+        let of = |(plant, leaf): (&u32, &u16)| numbers.get(&(*plant, *leaf)).copied().unwrap_or(0);
         self.plants.iter().zip(&self.leaves).map(of).collect()
     }
 }

@@ -62,7 +62,7 @@ pub struct Label {
     pub class: String,
     /// Number of its plant, from 1; 0 for none.
     #[serde(default)]
-    pub plant: u16,
+    pub plant: u32,
     /// Number of its leaf, from 1; 0 for none.
     #[serde(default)]
     pub leaf: u16,

@@ -29,7 +29,7 @@ const PROPERTIES: [(&str, &str); 14] = [
     ("uchar", "nir"),
     ("uchar", "class"),
     ("uchar", "part"),
-    ("ushort", "plant"),
+    ("uint", "plant"),
     ("ushort", "leaf"),
 ];
 
@@ -49,8 +49,10 @@ pub struct Point {
     pub nir: u8,
     /// Class, and number among [`PartKind::NUMBERED`](crate::scene::PartKind::NUMBERED).
     pub kind: [u8; 2],
-    /// Numbers of plant and leaf.
-    pub label: [u16; 2],
+    /// Number of the plant.
+    pub plant: u32,
+    /// Number of the leaf on it.
+    pub leaf: u16,
 }
 
 /// Points on their way into a PLY file, binary and little endian. Source: Turk 1994, "The PLY Polygon File Format".
@@ -63,12 +65,13 @@ pub struct Cloud {
 impl Cloud {
     /// Adds a point.
     pub fn add(&mut self, point: &Point) {
-        let Point { at, normal, rgb, nir, kind, label } = point;
+        let Point { at, normal, rgb, nir, kind, plant, leaf } = point;
         self.bytes.extend(at.iter().chain(normal).flat_map(|number| number.to_le_bytes()));
         self.bytes.extend(rgb);
         self.bytes.push(*nir);
         self.bytes.extend(kind);
-        self.bytes.extend(label.iter().flat_map(|number| number.to_le_bytes()));
+        self.bytes.extend(plant.to_le_bytes());
+        self.bytes.extend(leaf.to_le_bytes());
         self.points += 1;
     }
 
@@ -154,7 +157,8 @@ fn on_part(field: &Field, k: usize, density: f64, stream: &mut Stream, cloud: &m
             rgb: [r, g, b],
             nir,
             kind,
-            label: [part.tag.plant, part.tag.leaf],
+            plant: part.tag.plant,
+            leaf: part.tag.leaf,
         });
     }
 }

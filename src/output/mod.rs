@@ -26,8 +26,8 @@ pub use self::exr::{
     Geometry, Precision, decode_geometry, encode_geometry, encode_layers, encode_planes, half, read_geometry,
 };
 pub use self::png::{
-    Map, Picture, decode_gray, decode_gray16, decode_indexed, decode_rgb, encode as encode_png, read_gray, read_gray16,
-    read_indexed, read_map, read_rgb,
+    Map, Picture, decode_gray, decode_gray16, decode_indexed, decode_numbers, decode_rgb, encode as encode_png, packed,
+    read_gray, read_gray16, read_indexed, read_map, read_numbers, read_rgb,
 };
 pub use denoise::Denoiser;
 pub use photo::{encode_jpeg, photo_size, read_color_photo, read_gray_photo, read_photo, resize_gray, shrink, shrunk};
@@ -122,7 +122,7 @@ pub fn image_files(film: &Film, labels: &LabelMap, photograph: &Photograph, prov
     let text = provenance.text();
     let classes: Vec<u8> = labels.tags.iter().map(|t| t.class as u8).collect();
     let palette: Vec<[u8; 3]> = Class::ALL.iter().map(|c| c.color()).collect();
-    let plants: Vec<u16> = labels.tags.iter().map(|t| t.plant).collect();
+    let plants: Vec<u32> = labels.tags.iter().map(|t| t.plant).collect();
     let leaves: Vec<u16> = labels.tags.iter().map(|t| t.leaf).collect();
     let rgb = photograph.rgb.as_chunks::<3>().0;
     let overlay = overlay::draw(rgb, labels);
@@ -131,7 +131,7 @@ pub fn image_files(film: &Film, labels: &LabelMap, photograph: &Photograph, prov
         ("nir.png", png::encode(w, h, &Picture::Gray(&photograph.nir), &text)?),
         ("radiance.exr", exr::encode(film, labels, matches!(provenance.spp, Spp::Adaptive { .. }), &text)?),
         ("semantics.png", png::encode(w, h, &Picture::Indexed(&classes, &palette), &text)?),
-        ("plants.png", png::encode(w, h, &Picture::Gray16(&plants), &text)?),
+        ("plants.png", png::encode(w, h, &Picture::Numbers(&plants), &text)?),
         ("leaves.png", png::encode(w, h, &Picture::Gray16(&leaves), &text)?),
         ("overlay.png", png::encode(w, h, &Picture::Rgb(&overlay), &text)?),
     ];

@@ -15,14 +15,15 @@ pub(super) fn draw(rgb: &[[u8; 3]], labels: &LabelMap) -> Vec<[u8; 3]> {
         for x in 0..w {
             let here = tag(x, y);
             // An outline pixel lies inside the region whose right or lower neighbour is another.
-            let other = |f: fn(Tag) -> u16| {
+            let other = |f: fn(Tag) -> u32| {
                 (x + 1 < w && f(tag(x + 1, y)) != f(here)) || (y + 1 < h && f(tag(x, y + 1)) != f(here))
             };
             let pixel = &mut out[y * w + x];
             if other(|t| t.plant) {
                 *pixel = [255, 255, 0];
             } else if here.class != Class::Soil {
-                let (color, tint) = if other(|t| t.leaf) { ([255; 3], 0.6) } else { (here.class.color(), TINT) };
+                let (color, tint) =
+                    if other(|t| u32::from(t.leaf)) { ([255; 3], 0.6) } else { (here.class.color(), TINT) };
                 *pixel = std::array::from_fn(|i| {
                     (f32::from(pixel[i]) * (1.0 - tint) + f32::from(color[i]) * tint).round() as u8
                 });

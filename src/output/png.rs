@@ -1,5 +1,6 @@
 //! PNG in the shapes that labels and pictures need, through the `png` crate: indexed and 16-bit images keep their bits.
 
+use crate::scene::tag::MOST_PLANTS;
 use crate::{Error, Result, input};
 use png::{BitDepth, ColorType};
 use std::path::Path;
@@ -18,6 +19,9 @@ pub enum Picture<'a> {
     Gray(&'a [u8]),
     /// 16-bit gray: numbers, not brightness.
     Gray16(&'a [u16]),
+    /// Numbers up to [`MOST_PLANTS`]: 16-bit gray where all of them fit, else 8-bit RGB of R + 256 G + 65536 B, as COCO panoptic has
+    /// them.
+    Numbers(&'a [u32]),
     /// Indices and the sRGB colours they stand for.
     Indexed(&'a [u8], &'a [[u8; 3]]),
 }
@@ -60,6 +64,18 @@ pub fn encode(width: u32, height: u32, picture: &Picture<'_>, text: &str) -> Res
             encoder.set_depth(BitDepth::Sixteen);
             pixels.iter().flat_map(|p| p.to_be_bytes()).collect()
         }
+        Picture::Numbers(numbers) => match numbers.iter().copied().max().unwrap_or(0) {
+            most if most <= u32::from(u16::MAX) => {
+                encoder.set_color(ColorType::Grayscale);
+                encoder.set_depth(BitDepth::Sixteen);
+                numbers.iter().flat_map(|n| (*n as u16).to_be_bytes()).collect()
+            }
+            most if most <= MOST_PLANTS => {
+                encoder.set_color(ColorType::Rgb);
+                numbers.iter().flat_map(|n| packed(*n)).collect()
+            }
+            most => return Err(failed(format!("its numbers reach {most}, and it holds {MOST_PLANTS}"))),
+        },
         Picture::Indexed(pixels, palette) => {
             encoder.set_color(ColorType::Indexed);
             encoder.set_palette(palette.as_flattened().to_vec());
@@ -73,18 +89,39 @@ pub fn encode(width: u32, height: u32, picture: &Picture<'_>, text: &str) -> Res
     Ok(bytes)
 }
 
-fn decode(path: &Path, bytes: &[u8], depth: BitDepth, color: ColorType, what: &str) -> Result<(u32, u32, Vec<u8>)> {
+/// A number of 24 bits as R, G, B: R + 256 G + 65536 B.
+pub fn packed(number: u32) -> [u8; 3] {
+    let [r, g, b, _] = number.to_le_bytes();
+    [r, g, b]
+}
+
+/// The number that R, G, B stand for.
+fn unpacked([r, g, b]: [u8; 3]) -> u32 {
+    u32::from_le_bytes([r, g, b, 0])
+}
+
+/// Width, height, whether it is in colour, values as they lie in the file.
+type Decoded = (u32, u32, bool, Vec<u8>);
+
+/// The values of a picture of one of these kinds, which `what` names.
+fn decode_any(path: &Path, bytes: &[u8], kinds: &[(BitDepth, ColorType)], what: &str) -> Result<Decoded> {
     let wrong = |e: &dyn std::fmt::Display| Error::input(e.to_string()).in_file(path);
     let mut decoder = png::Decoder::new(std::io::Cursor::new(bytes));
     decoder.set_transformations(png::Transformations::IDENTITY);
     let mut reader = decoder.read_info().map_err(|e| wrong(&e))?;
     let (w, h) = (reader.info().width, reader.info().height);
-    if reader.info().bit_depth != depth || reader.info().color_type != color {
+    let kind = (reader.info().bit_depth, reader.info().color_type);
+    if !kinds.contains(&kind) {
         return Err(wrong(&format!("it is not {what}")));
     }
     let size = plausible(reader.output_buffer_size(), (w, h), bytes.len() as u64).map_err(|what| wrong(&what))?;
     let mut data = vec![0; size];
     reader.next_frame(&mut data).map_err(|e| wrong(&e))?;
+    Ok((w, h, kind.1 == ColorType::Rgb, data))
+}
+
+fn decode(path: &Path, bytes: &[u8], depth: BitDepth, color: ColorType, what: &str) -> Result<(u32, u32, Vec<u8>)> {
+    let (w, h, _, data) = decode_any(path, bytes, &[(depth, color)], what)?;
     Ok((w, h, data))
 }
 
@@ -141,6 +178,23 @@ pub fn read_gray16(path: &Path) -> Result<(u32, u32, Vec<u16>)> {
 pub fn decode_gray16(path: &Path, bytes: &[u8]) -> Result<(u32, u32, Vec<u16>)> {
     let (w, h, bytes) = decode(path, bytes, BitDepth::Sixteen, ColorType::Grayscale, "a 16-bit gray PNG")?;
     Ok((w, h, bytes.chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]])).collect()))
+}
+
+/// Reads a PNG of numbers, written as [`Picture::Numbers`]: width, height, numbers.
+pub fn read_numbers(path: &Path) -> Result<(u32, u32, Vec<u32>)> {
+    decode_numbers(path, &whole(path)?)
+}
+
+/// The same from its bytes; errors name `path`.
+pub fn decode_numbers(path: &Path, bytes: &[u8]) -> Result<(u32, u32, Vec<u32>)> {
+    let kinds = [(BitDepth::Sixteen, ColorType::Grayscale), (BitDepth::Eight, ColorType::Rgb)];
+    let (w, h, in_color, bytes) = decode_any(path, bytes, &kinds, "a PNG of 16-bit gray or 8-bit RGB")?;
+    let numbers = if in_color {
+        bytes.as_chunks().0.iter().map(|rgb| unpacked(*rgb)).collect()
+    } else {
+        bytes.as_chunks().0.iter().map(|b| u32::from(u16::from_be_bytes(*b))).collect()
+    };
+    Ok((w, h, numbers))
 }
 
 /// What other people's masks hold.
@@ -214,4 +268,37 @@ fn unpack(data: &[u8], in_row: usize, bits: u8) -> Vec<u16> {
         u16::from(row[k / per_byte]) >> shift & mask
     };
     data.chunks_exact(in_row.div_ceil(per_byte)).flat_map(|row| (0..in_row).map(move |k| value(row, k))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(numbers: &[u32]) -> Result<Vec<u8>> {
+        encode(numbers.len() as u32, 1, &Picture::Numbers(numbers), "")
+    }
+
+    /// Rationale: datasets of fields with few plants keep their bytes. Expected: those of a 16-bit gray picture up to its greatest number.
+    #[test]
+    fn numbers_of_16_bits_are_gray() {
+        for numbers in [vec![0], vec![0, 1, 65_535, 256]] {
+            let short: Vec<u16> = numbers.iter().map(|n| *n as u16).collect();
+            let gray = encode(short.len() as u32, 1, &Picture::Gray16(&short), "").unwrap();
+            assert_eq!(of(&numbers).unwrap(), gray);
+            assert_eq!(decode_numbers(Path::new("a.png"), &gray).unwrap().2, numbers);
+        }
+    }
+
+    /// Expected: R + 256 G + 65536 B, which is `id2rgb` of panopticapi; what 24 bits do not hold is refused, and a picture of another kind too.
+    #[test]
+    fn greater_numbers_are_three_bytes() {
+        let numbers = [0, 65_536, 70_000, MOST_PLANTS];
+        let path = Path::new("a.png");
+        let bytes = of(&numbers).unwrap();
+        assert_eq!(decode_rgb(path, &bytes).unwrap().2, [[0; 3], [0, 0, 1], [0x70, 0x11, 1], [255; 3]]);
+        assert_eq!(decode_numbers(path, &bytes).unwrap(), (4, 1, numbers.to_vec()));
+        assert!(of(&[MOST_PLANTS + 1]).is_err());
+        let eight = encode(1, 1, &Picture::Gray(&[7]), "").unwrap();
+        assert!(decode_numbers(path, &eight).unwrap_err().message().contains("16-bit gray or 8-bit RGB"));
+    }
 }

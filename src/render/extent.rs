@@ -42,11 +42,11 @@ impl Extent {
 /// The extents of all plants that lie in the labels' window, by plant and leaf; leaf 0 stands for the plant with all its
 /// parts, leaves included. Plants that reach no pixel centre of the window even alone are left out, and so are leaves that
 /// reach none anywhere. Call it inside a pool.
-pub fn extents(scene: &Scene, labels: &LabelMap) -> BTreeMap<(u16, u16), Extent> {
+pub fn extents(scene: &Scene, labels: &LabelMap) -> BTreeMap<(u32, u16), Extent> {
     let window = Area::of(labels.window);
     let seen = visible(labels);
     let reach = reach(&scene.camera);
-    let mut things: BTreeMap<(u16, u16), Thing> = BTreeMap::new();
+    let mut things: BTreeMap<(u32, u16), Thing> = BTreeMap::new();
     for (i, part) in scene.parts.iter().enumerate().filter(|(_, p)| p.tag.plant > 0) {
         let area = image_of(part.bounds(), &scene.camera).meet(reach);
         things.entry((part.tag.plant, part.tag.leaf)).or_default().add(i as u32, area);
@@ -57,7 +57,7 @@ pub fn extents(scene: &Scene, labels: &LabelMap) -> BTreeMap<(u16, u16), Extent>
             thing.area = thing.area.join(*area);
         }
     }
-    let mut plants: BTreeMap<u16, Area> = BTreeMap::new();
+    let mut plants: BTreeMap<u32, Area> = BTreeMap::new();
     for ((plant, _), thing) in &things {
         let area = plants.entry(*plant).or_default();
         *area = area.join(thing.area);
@@ -92,8 +92,8 @@ pub fn extents(scene: &Scene, labels: &LabelMap) -> BTreeMap<(u16, u16), Extent>
 }
 
 /// Number of pixels of each plant's leaves, and of what is no leaf of it (0), and the area that holds them.
-fn visible(labels: &LabelMap) -> BTreeMap<(u16, u16), (u32, Area)> {
-    let mut seen: BTreeMap<(u16, u16), (u32, Area)> = BTreeMap::new();
+fn visible(labels: &LabelMap) -> BTreeMap<(u32, u16), (u32, Area)> {
+    let mut seen: BTreeMap<(u32, u16), (u32, Area)> = BTreeMap::new();
     let Window { x0, y0, .. } = labels.window;
     for (row, y) in labels.tags.chunks(labels.window.width() as usize).zip(y0 as i32..) {
         let mut x = x0 as i32;
@@ -192,7 +192,7 @@ impl Thing {
     }
 
     /// The pixels at whose centres it lies.
-    fn mask(&self, key: (u16, u16), scene: &Scene, brute: &Brute<'_>, labels: &LabelMap) -> Mask {
+    fn mask(&self, key: (u32, u16), scene: &Scene, brute: &Brute<'_>, labels: &LabelMap) -> Mask {
         let mut mask = Mask::new(self.area);
         let window = Area::of(labels.window);
         mask.fill(self.area.meet(window), |x, y| {

@@ -4,8 +4,8 @@ use super::histogram::{Bins, DECIMALS, Histogram};
 
 /// Fewest and most bars that a chart is cut into where its values are spread over as many bins.
 const BARS: (f64, f64) = (10.0, 24.0);
-/// Bins of counts of things: numbers of plants and of leaves have 16 bits.
-const THINGS: usize = 1 << 16;
+/// Bins of counts of things: a hectare of sugar beet has some 100,000 plants.
+const THINGS: usize = 1 << 18;
 /// Bins of sizes: numbers of pixels have 32 bits.
 const SIZES: usize = 128;
 
@@ -37,7 +37,7 @@ impl Tally {
         Self::new(Bins::Linear { from, width, count: ((to - from) / width).round() as usize, slack: DECIMALS })
     }
 
-    /// For numbers of things, up to 65535.
+    /// For numbers of things, told apart up to 262,143.
     pub fn whole() -> Self {
         Self::linear(0.0, THINGS as f64, 1.0)
     }

@@ -67,7 +67,7 @@ impl Estimate {
 }
 
 /// Bytes in words.
-fn gib(bytes: f64) -> String {
+pub(super) fn gib(bytes: f64) -> String {
     let gib = bytes / (1_u64 << 30) as f64;
     if gib < 1e4 { format!("{gib:.1} GiB") } else { format!("{gib:.0e} GiB") }
 }

@@ -33,7 +33,7 @@ pub use part_kind::PartKind;
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlantRecord {
     /// Its number in the labels, from 1: dense, so it depends on which others the view holds.
-    pub number: u16,
+    pub number: u32,
     /// Its identity in its field, never 0: the same whatever the camera, the resolution and the other plants in view.
     pub id: u32,
     /// The identities of its leaves, that of leaf n at place n − 1; no two of a field's plants and leaves are equal.

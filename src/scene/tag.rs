@@ -71,13 +71,16 @@ pub mod lowercase {
     }
 }
 
+/// Greatest number of a plant: what three 8-bit channels of a picture hold, and single precision tells apart.
+pub const MOST_PLANTS: u32 = (1 << 24) - 1;
+
 /// Who a part is. Zero means none: soil has no plant, a stem has no leaf.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tag {
     /// Its class.
     pub class: Class,
     /// Number of its plant in the field, from 1.
-    pub plant: u16,
+    pub plant: u32,
     /// Number of its leaf in the plant, from 1.
     pub leaf: u16,
 }

@@ -58,9 +58,9 @@ pub struct Canopy {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Traits {
     /// By the plant's number.
-    pub plants: BTreeMap<u16, PlantTraits>,
+    pub plants: BTreeMap<u32, PlantTraits>,
     /// By the numbers of plant and leaf.
-    pub leaves: BTreeMap<(u16, u16), LeafTraits>,
+    pub leaves: BTreeMap<(u32, u16), LeafTraits>,
     /// The canopy over what the camera sees; none where it sees beyond the horizon.
     pub canopy: Option<Canopy>,
 }
@@ -77,7 +77,7 @@ impl Traits {
         // Looked at once: a mask is asked about each triangle that it may cut.
         let organs: Vec<Organ<'_>> = field.scene.parts.par_iter().zip(&field.kinds).filter_map(organ).collect();
         let canopy = Canopy::of(field, &organs);
-        let mut by_plant: BTreeMap<u16, Vec<&Organ<'_>>> = BTreeMap::new();
+        let mut by_plant: BTreeMap<u32, Vec<&Organ<'_>>> = BTreeMap::new();
         for organ in &organs {
             by_plant.entry(organ.part.tag.plant).or_default().push(organ);
         }

@@ -13,6 +13,12 @@ def picture(path):
     return np.array(Image.open(path))
 
 
+def numbers(path):
+    """Numbers of plants: 16-bit grey, or R + 256 G + 65536 B."""
+    found = picture(path).astype(int)
+    return found @ [1, 1 << 8, 1 << 16] if found.ndim == 3 else found
+
+
 class Native:
     """One image: record and maps as they were written."""
 
@@ -22,7 +28,7 @@ class Native:
         self.split = self.record["split"]
         self.rgb = picture(folder / "rgb.png")
         self.semantics = picture(folder / "semantics.png")
-        self.plants = picture(folder / "plants.png").astype(int)
+        self.plants = numbers(folder / "plants.png")
         self.leaves = picture(folder / "leaves.png").astype(int)
 
     def seen(self):

@@ -72,7 +72,7 @@ Files of an image:
   rgb.png, nir.png   photographs in colour and near infrared, 8 bit
   radiance.exr       linear radiance in R, G, B, NIR; variance, albedo, normal, depth, ids
   semantics.png      class of each pixel: 0 soil, 1 crop, 2 weed (indexed, with a palette)
-  plants.png         number of its plant, 16 bit, 0 for none
+  plants.png         number of its plant, 0 for none; 16 bit, or R + 256 G + 65536 B where one is above 65535
   leaves.png         number of its leaf on that plant, 16 bit, 0 for none
   overlay.png        labels drawn over the photograph, to look at
   *_denoised.png, denoised.exr   with --denoise

@@ -40,7 +40,7 @@ impl Format for Writer {
         let labels = |suffix: &str| picture::file(sample, at("gtFine", suffix), &Picture::Gray(&classes));
         let numbers = numbers(&of_set, record);
         // A pixel may be of another class than its plant, where organs have classes.
-        let instance = |(class, plant): (&u8, &u16)| match numbers.get(plant) {
+        let instance = |(class, plant): (&u8, &u32)| match numbers.get(plant) {
             Some((of, k)) if of == class => u16::from(*class) * MOST as u16 + k,
             _ => u16::from(*class),
         };
@@ -104,7 +104,7 @@ fn ordered<'r>(labels: &Labels<'_>, record: &'r Record, class: u8) -> Vec<&'r Pl
 }
 
 /// The class of each plant and its place among those of its class; plants beyond [`MOST`] have none.
-fn numbers(labels: &Labels<'_>, record: &Record) -> BTreeMap<u16, (u8, u16)> {
+fn numbers(labels: &Labels<'_>, record: &Record) -> BTreeMap<u32, (u8, u16)> {
     let mut all = BTreeMap::new();
     for class in labels.of_plants() {
         for (k, plant) in (0..).zip(ordered(labels, record, class).into_iter().take(MOST)) {
@@ -117,7 +117,7 @@ fn numbers(labels: &Labels<'_>, record: &Record) -> BTreeMap<u16, (u8, u16)> {
 /// The plants of each class that have no number.
 fn groups(labels: &Labels<'_>, record: &Record) -> Vec<serde_json::Value> {
     let of_class = |class: u8| {
-        let rest: Vec<u16> = ordered(labels, record, class).iter().skip(MOST).map(|p| p.number).collect();
+        let rest: Vec<u32> = ordered(labels, record, class).iter().skip(MOST).map(|p| p.number).collect();
         let name = &labels.classes()[usize::from(class)].name;
         (!rest.is_empty()).then(|| json!({ "image": record.name, "class": name, "plants": rest }))
     };
@@ -132,13 +132,13 @@ mod tests {
     use crate::dataset::split::Split;
 
     /// An image with this many weeds, each a pixel larger than the one before.
-    fn weeds(count: u16) -> Record {
-        let weed = |number: u16| Plant {
+    fn weeds(count: u32) -> Record {
+        let weed = |number: u32| Plant {
             number,
             id: None,
             class: Class::Weed,
             kind: 0,
-            seen: Seen { pixels: u32::from(number), ..Seen::default() },
+            seen: Seen { pixels: number, ..Seen::default() },
             stem: None,
             grown: None,
             leaves: Vec::new(),

@@ -80,7 +80,7 @@ impl Format for Writer {
         let jpeg = output::encode_jpeg(width, height, &sample.rgb, QUALITY)?;
         let mut rows = csv::WriterBuilder::new().has_headers(false).from_writer(Vec::new());
         let mut of_plant = BTreeMap::new();
-        let listed: BTreeSet<u16> = labels::Labels::of(recipe)?.plants(record).map(|(plant, _)| plant.number).collect();
+        let listed: BTreeSet<u32> = labels::Labels::of(recipe)?.plants(record).map(|(plant, _)| plant.number).collect();
         for plant in record.seen() {
             let label = labels.of_plant(plant);
             of_plant.insert(plant.number, label);

@@ -5,7 +5,7 @@
 //! lacks is null there, and one that a whole split lacks is no column at all.
 //!
 //! Source: Hugging Face datasets documentation, "Create an image dataset", ImageFolder with metadata, and "Dataset cards"; read with
-//! datasets 5.2.0, in which 16-bit masks keep their numbers.
+//! datasets 5.2.0, in which 16-bit masks keep their numbers, and those of three bytes.
 
 use super::conditions::Brief;
 use super::{Format, Whole, picture};
@@ -36,7 +36,7 @@ impl Format for Writer {
             picture::photograph(sample, at("images"))?,
             // Numbers, not palette colours: a reader that turns pictures into RGB would lose them.
             file("masks", &Picture::Gray(&Labels::of(recipe)?.pixels(sample)))?,
-            file("plants", &Picture::Gray16(&sample.plants))?,
+            file("plants", &Picture::Numbers(&sample.plants))?,
             file("leaves", &Picture::Gray16(&sample.leaves))?,
         ];
         if !sample.species.is_empty() {
@@ -184,7 +184,8 @@ const COLUMNS: &str = "\
 |---|---|
 | `image`, `nir` | the photographs: colour, near infrared |
 | `mask` | class of each pixel: {classes}, 255 no label |
-| `plants`, `leaves` | number of the plant, of the leaf on it; 16 bit, 0 for none |
+| `plants` | number of the plant, 0 for none; 16 bit, or R + 256 G + 65536 B where one is above 65535 |
+| `leaves` | number of the leaf on its plant, 0 for none; 16 bit |
 | `species` | number of the species, 0 for none |
 | `soil_pixels`, `crop_pixels`, `weed_pixels` | pixels of each class |
 | `crops`, `weeds`, `leaves_seen`, `species_names` | what the image shows |

@@ -2,8 +2,8 @@
 //! panopticapi read it.
 //!
 //! A pixel's segment is R + 256 G + 65536 B, 0 for none. A plant's segment is its number in `plants.png`; what belongs to no plant is
-//! 65536 + category: soil, and crop or weed that an imported mask gives no plant or that is too small to be listed, which is a crowd. Soil is
-//! stuff, plants are things. Categories are those of COCO instances, and 4 for soil, for 0 is no category.
+//! 65536 + category: soil, and crop or weed that an imported mask gives no plant or that is too small to be listed, which is a crowd. In an
+//! image that shows plants above 65535 it is the greatest of their numbers + 1 + category. Soil is stuff, plants are things. Categories are those of COCO instances, and 4 for soil, for 0 is no category.
 //!
 //! Boxes of segments without a plant stand in no record, so each image's `segments_info` is written with the image, to
 //! `segments/SPLIT/NAME.json`, and gathered in the end.
@@ -19,7 +19,8 @@ use crate::dataset::sample::{IGNORE, Sample};
 use crate::dataset::set::Set;
 use crate::dataset::split::Split;
 use crate::dataset::File;
-use crate::output::Picture;
+use crate::output::{Picture, packed};
+use crate::scene::tag::MOST_PLANTS;
 use crate::{Error, Result};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -28,15 +29,15 @@ pub(super) struct Writer;
 
 const FOLDER: &str = "panoptic";
 
-/// Segments without a plant begin here, behind all numbers of plants.
+/// Segments without a plant begin here, behind numbers of plants of 16 bits.
 const STUFF: u32 = 1 << 16;
 
 impl Format for Writer {
     fn image(&self, recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
         let Record { name, split, .. } = &sample.record;
         let split = split.name();
-        let (ids, segments) = segments(&Labels::of(recipe)?, sample);
-        let colors: Vec<[u8; 3]> = ids.iter().map(|id| [*id as u8, (id >> 8) as u8, (id >> 16) as u8]).collect();
+        let (ids, segments) = segments(&Labels::of(recipe)?, sample)?;
+        let colors: Vec<[u8; 3]> = ids.iter().map(|id| packed(*id)).collect();
         Ok(vec![
             picture::photograph(sample, format!("{FOLDER}/images/{split}/{name}.png"))?,
             picture::file(
@@ -101,10 +102,17 @@ fn categories(labels: &Labels<'_>) -> Value {
 
 /// The segment of each pixel, and what is known of each segment. A pixel is of its plant's class where it has one, and of its own where that is no
 /// plant's, such as an organ's.
-fn segments(labels: &Labels<'_>, sample: &Sample) -> (Vec<u32>, Value) {
+fn segments(labels: &Labels<'_>, sample: &Sample) -> Result<(Vec<u32>, Value)> {
     let width = sample.record.width;
     let things = labels.of_plants();
-    let of_plant: BTreeMap<u16, u8> = labels.plants(&sample.record).map(|(plant, class)| (plant.number, class)).collect();
+    let most = sample.plants.iter().copied().max().unwrap_or(0);
+    let stuff = STUFF.max(most + 1);
+    let last = (0..labels.classes().len() as u8).map(|class| stuff + category(labels, class)).max();
+    if last.is_some_and(|last| last > MOST_PLANTS) {
+        let words = format!("image {} has a plant of number {most}; segments of COCO panoptic have 24 bits", sample.record.name);
+        return Err(Error::input(words).help(format!("sow fewer plants, or leave out --format {FOLDER}")));
+    }
+    let of_plant: BTreeMap<u32, u8> = labels.plants(&sample.record).map(|(plant, class)| (plant.number, class)).collect();
     let mut ids = Vec::with_capacity(sample.pixels());
     let mut found: BTreeMap<u32, (u8, u32, Box2)> = BTreeMap::new();
     for (i, (class, plant)) in labels.pixels(sample).iter().zip(&sample.plants).enumerate() {
@@ -113,8 +121,8 @@ fn segments(labels: &Labels<'_>, sample: &Sample) -> (Vec<u32>, Value) {
             continue;
         }
         let (class, id) = match of_plant.get(plant).filter(|_| things.contains(class)) {
-            Some(of_plant) => (*of_plant, u32::from(*plant)),
-            None => (*class, STUFF + category(labels, *class)),
+            Some(of_plant) => (*of_plant, *plant),
+            None => (*class, stuff + category(labels, *class)),
         };
         let (x, y) = (i as u32 % width, i as u32 / width);
         let (_, area, bounds) = found.entry(id).or_insert((class, 0, Box2::of(x, y)));
@@ -123,11 +131,11 @@ fn segments(labels: &Labels<'_>, sample: &Sample) -> (Vec<u32>, Value) {
         ids.push(id);
     }
     let info = |(id, (class, area, bounds)): (u32, (u8, u32, Box2))| {
-        let crowd = id >= STUFF && things.contains(&class);
+        let crowd = id >= stuff && things.contains(&class);
         let category = category(labels, class);
         json!({ "id": id, "category_id": category, "iscrowd": u32::from(crowd), "area": area, "bbox": bounds })
     };
-    (ids, found.into_iter().map(info).collect())
+    Ok((ids, found.into_iter().map(info).collect()))
 }
 
 fn annotation(set: &Set, record: &Record) -> Result<Value> {

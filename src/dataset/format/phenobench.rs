@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `images` | the photograph; `test` has nothing else, as in the original |
 //! | `semantics` | 16 bit: 0 soil, 1 crop, 2 weed, 3 and 4 the same of partial plants, 255 no label |
-//! | `plant_instances` | 16 bit: number of the plant, unique over crop and weed; 0 for none |
+//! | `plant_instances` | 16 bit: number of the plant, unique over crop and weed; 0 for none. An image that shows a plant above 65535 counts its plants from 1 |
 //! | `leaf_instances` | 16 bit: number of the crop leaf, unique in the image; weeds' leaves have none, as in the original |
 //! | `plant_visibility`, `leaf_visibility` | 8 bit, one value an instance: share of it within the frame, of 255 |
 //!
@@ -25,7 +25,7 @@ use crate::dataset::File;
 use crate::output::Picture;
 use crate::scene::tag::Class;
 use crate::{Error, Result};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 pub(super) struct Writer;
 
@@ -45,19 +45,19 @@ impl Format for Writer {
         if record.split == Split::Test {
             return Ok(files);
         }
-        let plants: BTreeMap<u16, &Plant> = record.seen().map(|p| (p.number, p)).collect();
+        let plants: BTreeMap<u32, &Plant> = record.seen().map(|p| (p.number, p)).collect();
         let leaves = crop_leaves(sample)?;
         let pixels = sample.plants.iter().zip(&sample.leaves);
-        let leaf_of = |(plant, leaf): (&u16, &u16)| leaves.get(&(*plant, *leaf));
-        let semantics = |(class, plant): (&u8, &u16)| semantics(*class, plants.get(plant).copied());
+        let leaf_of = |(plant, leaf): (&u32, &u16)| leaves.get(&(*plant, *leaf));
+        let semantics = |(class, plant): (&u8, &u32)| semantics(*class, plants.get(plant).copied());
         let gray16 = |kind: &str, map: &[u16]| picture::file(sample, at(kind), &Picture::Gray16(map));
         let gray = |kind: &str, map: &[u8]| picture::file(sample, at(kind), &Picture::Gray(map));
         let semantics: Vec<u16> = sample.semantics.iter().zip(&sample.plants).map(semantics).collect();
         files.push(gray16("semantics", &semantics)?);
-        files.push(gray16("plant_instances", &sample.plants)?);
+        files.push(gray16("plant_instances", &plant_numbers(sample)?)?);
         let numbers: Vec<u16> = pixels.clone().map(|p| leaf_of(p).map_or(0, |l| l.number)).collect();
         files.push(gray16("leaf_instances", &numbers)?);
-        let seen = |plant: &u16| plants.get(plant).map_or(0, |p| visibility(&p.seen));
+        let seen = |plant: &u32| plants.get(plant).map_or(0, |p| visibility(&p.seen));
         let shown: Vec<u8> = sample.plants.iter().map(seen).collect();
         files.push(gray("plant_visibility", &shown)?);
         let shown: Vec<u8> = pixels.map(|p| leaf_of(p).map_or(0, |l| l.visibility)).collect();
@@ -92,17 +92,29 @@ struct CropLeaf {
 }
 
 /// The crop leaves that the image shows by plant and leaf, numbered from 1.
-fn crop_leaves(sample: &Sample) -> Result<BTreeMap<(u16, u16), CropLeaf>> {
+fn crop_leaves(sample: &Sample) -> Result<BTreeMap<(u32, u16), CropLeaf>> {
     let mut all = BTreeMap::new();
     for (plant, leaf) in sample.record.leaves().filter(|(p, _)| p.class == Class::Crop) {
-        let number = u16::try_from(all.len() + 1).map_err(|_| too_many(&sample.record.name))?;
+        let number = u16::try_from(all.len() + 1).map_err(|_| too_many(&sample.record.name, "crop leaves"))?;
         all.insert((plant.number, leaf.number), CropLeaf { number, visibility: visibility(&leaf.seen) });
     }
     Ok(all)
 }
 
-fn too_many(name: &str) -> Error {
-    Error::input(format!("image {name} shows more than the {} crop leaves that PhenoBench's 16 bits number", u16::MAX)).help(format!("sow fewer plants, or leave out \
+/// The plants' numbers as they are where 16 bits hold them, else counted from 1 in their order.
+fn plant_numbers(sample: &Sample) -> Result<Vec<u16>> {
+    let own: Option<Vec<u16>> = sample.plants.iter().map(|plant| u16::try_from(*plant).ok()).collect();
+    if let Some(own) = own {
+        return Ok(own);
+    }
+    let shown: BTreeSet<u32> = sample.plants.iter().copied().filter(|plant| *plant != 0).collect();
+    let number = |(k, plant)| u16::try_from(k).map(|k| (plant, k)).map_err(|_| too_many(&sample.record.name, "plants"));
+    let numbers: BTreeMap<u32, u16> = (1_u32..).zip(shown).map(number).collect::<Result<_>>()?;
+    Ok(sample.plants.iter().map(|plant| numbers.get(plant).copied().unwrap_or(0)).collect())
+}
+
+fn too_many(name: &str, what: &str) -> Error {
+    Error::input(format!("image {name} shows more than the {} {what} that PhenoBench's 16 bits number", u16::MAX)).help(format!("sow fewer plants, or leave out \
          --format {FOLDER}"))
 }
 

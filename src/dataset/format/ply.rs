@@ -7,7 +7,8 @@
 //! | `red green blue nir` | uchar | the photograph |
 //! | `class` | uchar | 0 soil, 1 crop, 2 weed |
 //! | `part` | uchar | what it is, with the numbers of the format `parts` |
-//! | `plant leaf` | ushort | numbers of `plants.png` and `leaves.png` |
+//! | `plant` | uint | number of `plants.png` |
+//! | `leaf` | ushort | number of `leaves.png` |
 //!
 //! Binary, little endian. Points are in the order of the pixels; a second image of the same field adds to the same world.
 //!
@@ -44,7 +45,8 @@ impl Format for Writer {
                 rgb: sample.rgb[i],
                 nir: sample.nir[i],
                 kind: [sample.semantics[i], parts[i]],
-                label: [sample.plants[i], sample.leaves[i]],
+                plant: sample.plants[i],
+                leaf: sample.leaves[i],
             });
         }
         let path = format!("{FOLDER}/{}/{}.ply", record.split.name(), record.name);

@@ -28,7 +28,7 @@ struct Skeletons {
 
 #[derive(Serialize)]
 struct PlantSkeleton {
-    plant: u16,
+    plant: u32,
     id: Option<u32>,
     leaves: Vec<LeafSkeleton>,
 }
@@ -77,9 +77,10 @@ impl Format for Writer {
 }
 
 /// The joints of a leaf; none of a model's.
-fn joints(rendered: &Rendered, plant: u16, leaf: u16) -> &[PlacedJoint] {
-    let grown = rendered.plants.iter().find(|grown| grown.number == plant);
-    let axis = grown.and_then(|grown| grown.leaf_axes.iter().find(|axis| axis.leaf == leaf));
+fn joints(rendered: &Rendered, plant: u32, leaf: u16) -> &[PlacedJoint] {
+    // By rising number, as they are made.
+    let place = rendered.plants.binary_search_by_key(&plant, |grown| grown.number);
+    let axis = place.ok().and_then(|place| rendered.plants.get(place)).and_then(|grown| grown.leaf_axes.iter().find(|axis| axis.leaf == leaf));
     axis.map_or(&[], |axis| &axis.joints)
 }
 

@@ -21,7 +21,7 @@ const FOLDER: &str = "traits";
 struct PlantRow<'a> {
     image: &'a str,
     split: &'static str,
-    plant: u16,
+    plant: u32,
     id: Option<u32>,
     class: &'static str,
     species: Option<&'a str>,
@@ -46,7 +46,7 @@ struct PlantRow<'a> {
 struct LeafRow<'a> {
     image: &'a str,
     split: &'static str,
-    plant: u16,
+    plant: u32,
     leaf: u16,
     id: Option<u32>,
     species: Option<&'a str>,

@@ -62,7 +62,7 @@ impl Format for Writer {
         }
         text += "</annotation>\n";
         let classes = labels.pixels(sample);
-        let object = |(plant, class): (&u16, &u8)| match numbers.get(plant) {
+        let object = |(plant, class): (&u32, &u8)| match numbers.get(plant) {
             Some(number) => *number,
             None if *class == IGNORE => IGNORE,
             None => 0,

@@ -27,7 +27,7 @@ const FOLDER: &str = "yolo";
 #[derive(Serialize, Deserialize)]
 struct Loss {
     /// Number of the plant in `plants.png`.
-    plant: u16,
+    plant: u32,
     /// Intersection over union of its mask and what Ultralytics paints.
     iou: f64,
 }

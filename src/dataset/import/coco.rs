@@ -298,7 +298,7 @@ impl Source for Coco {
     }
 }
 
-type Points = BTreeMap<(u16, u16), [Option<Keypoint>; 3]>;
+type Points = BTreeMap<(u32, u16), [Option<Keypoint>; 3]>;
 
 /// Classes, plants and leaves of an image, and their points.
 fn painted(image: &Annotated) -> Result<(Vec<u8>, Instances, Points)> {

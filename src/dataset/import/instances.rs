@@ -6,17 +6,17 @@
 
 use crate::Result;
 use crate::error::Error;
-use crate::scene::tag::Class;
+use crate::scene::tag::{Class, MOST_PLANTS};
 use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Numbers of plants and leaves, one a pixel.
 pub(super) struct Instances {
-    pub(super) plants: Vec<u16>,
+    pub(super) plants: Vec<u32>,
     pub(super) leaves: Vec<u16>,
     pub(super) warnings: Vec<String>,
     /// New numbers of plant and leaf by those of the source; leaf 0 is the plant itself.
-    pub(super) numbers: BTreeMap<(u32, u32), (u16, u16)>,
+    pub(super) numbers: BTreeMap<(u32, u32), (u32, u16)>,
 }
 
 /// From a source's class, plant and leaf of each pixel, 0 for none; leaves may count through the image. `path` is what an error names.
@@ -28,7 +28,7 @@ pub(super) fn instances(path: &Path, semantics: &[u8], plants: &[u32], leaves: &
         .map(|(class, plant)| if vegetation(*class) { (*class, *plant) } else { (*class, 0) })
         .collect();
     let numbers = plant_numbers(path, &kept)?;
-    let mut of_leaf: BTreeMap<(u16, u32), u16> = BTreeMap::new();
+    let mut of_leaf: BTreeMap<(u32, u32), u16> = BTreeMap::new();
     let plant_of = |(class, plant): (u8, u32)| if plant == 0 { 0 } else { numbers[&(plant, class)] };
     for (place, leaf) in kept.iter().zip(leaves).filter(|(place, leaf)| place.1 != 0 && **leaf != 0) {
         of_leaf.insert((plant_of(*place), *leaf), 0);
@@ -38,7 +38,7 @@ pub(super) fn instances(path: &Path, semantics: &[u8], plants: &[u32], leaves: &
     for ((plant, _), number) in &mut of_leaf {
         next = if *plant == plant_before { next + 1 } else { 1 };
         plant_before = *plant;
-        *number = u16::try_from(next).map_err(|_| too_many(path, "leaves of a plant"))?;
+        *number = u16::try_from(next).map_err(|_| too_many(path, "leaves of a plant", u32::from(u16::MAX)))?;
     }
     let mut all = Instances { plants: Vec::new(), leaves: Vec::new(), warnings: Vec::new(), numbers: BTreeMap::new() };
     let mut lost = [0_u64; 2];
@@ -69,28 +69,29 @@ pub(super) fn instances(path: &Path, semantics: &[u8], plants: &[u32], leaves: &
 }
 
 /// A number for every plant and class: the source's where it fits and is not taken, else the next free one.
-fn plant_numbers(path: &Path, kept: &[(u8, u32)]) -> Result<BTreeMap<(u32, u8), u16>> {
-    let mut numbers: BTreeMap<(u32, u8), u16> = BTreeMap::new();
+fn plant_numbers(path: &Path, kept: &[(u8, u32)]) -> Result<BTreeMap<(u32, u8), u32>> {
+    let mut numbers: BTreeMap<(u32, u8), u32> = BTreeMap::new();
     for (class, plant) in kept.iter().filter(|(_, plant)| *plant != 0) {
         numbers.insert((*plant, *class), 0);
     }
     let mut before = 0;
-    let mut last = numbers.keys().filter_map(|(plant, _)| u16::try_from(*plant).ok()).max().unwrap_or(0);
+    let mut last = numbers.keys().map(|(plant, _)| *plant).filter(|plant| *plant <= MOST_PLANTS).max().unwrap_or(0);
     for ((plant, _), number) in &mut numbers {
-        *number = match u16::try_from(*plant) {
-            Ok(own) if *plant != before => own,
-            _ => {
-                last = last.checked_add(1).ok_or_else(|| too_many(path, "plants"))?;
-                last
-            }
+        *number = if *plant <= MOST_PLANTS && *plant != before {
+            *plant
+        } else if last < MOST_PLANTS {
+            last += 1;
+            last
+        } else {
+            return Err(too_many(path, "plants", MOST_PLANTS));
         };
         before = *plant;
     }
     Ok(numbers)
 }
 
-fn too_many(path: &Path, what: &str) -> Error {
-    Error::input(format!("it has more {what} than 16 bits number; cut the image in two")).in_file(path)
+fn too_many(path: &Path, what: &str, most: u32) -> Error {
+    Error::input(format!("it has more {what} than labels can number, {most}; cut the image in two")).in_file(path)
 }
 
 #[cfg(test)]
@@ -117,7 +118,14 @@ mod tests {
         assert_eq!(all.plants, [3, 4, 0, 0, 0]);
         assert_eq!(all.leaves, [1, 1, 0, 0, 0]);
         assert_eq!(all.warnings.len(), 3);
-        // A number that 16 bits do not hold gets one that they do.
-        assert_eq!(of(&[1, 1], &[70_000, 2], &[0, 0]).plants, [3, 2]);
+    }
+
+    /// Expected: what 24 bits hold stays; what they do not gets the next number, and is refused where there is none.
+    #[test]
+    fn numbers_that_labels_hold_stay() {
+        assert_eq!(of(&[1, 1, 2], &[70_000, 2, MOST_PLANTS], &[0; 3]).plants, [70_000, 2, MOST_PLANTS]);
+        assert_eq!(of(&[1, 1], &[MOST_PLANTS + 1, 2], &[0; 2]).plants, [3, 2]);
+        let error = instances(Path::new("a.png"), &[1, 1], &[MOST_PLANTS + 1, MOST_PLANTS], &[0; 2]).err().unwrap();
+        assert!(error.message().contains("more plants than labels can number, 16777215"), "{error}");
     }
 }

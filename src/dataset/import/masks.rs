@@ -158,8 +158,8 @@ impl Source for Masks {
             }
             None => Vec::new(),
         };
-        let none = vec![0; semantics.len()];
-        Ok(Labelled { size: (w, h), rgb, nir, semantics, plants: none.clone(), leaves: none, ..Labelled::default() })
+        let (plants, leaves) = (vec![0; semantics.len()], vec![0; semantics.len()]);
+        Ok(Labelled { size: (w, h), rgb, nir, semantics, plants, leaves, ..Labelled::default() })
     }
 }
 

@@ -77,11 +77,11 @@ pub struct Labelled {
     /// Class, or [`super::sample::IGNORE`].
     pub semantics: Vec<u8>,
     /// Number of the plant, 0 for none.
-    pub plants: Vec<u16>,
+    pub plants: Vec<u32>,
     /// Number of the leaf on its plant, 0 for none.
     pub leaves: Vec<u16>,
     /// Stem of a plant (leaf 0), base and tip of a leaf: by plant and leaf.
-    pub points: BTreeMap<(u16, u16), [Option<Keypoint>; 3]>,
+    pub points: BTreeMap<(u32, u16), [Option<Keypoint>; 3]>,
     /// What the user should know.
     pub warnings: Vec<String>,
 }

@@ -44,7 +44,7 @@ fn row((name, split, index): (&str, Split, u64), plant: &Plant, leaf: &Leaf) -> 
         ("image", name.into()),
         ("number", count(index).into()),
         ("split", split.name().into()),
-        ("plant", plant.number.into()),
+        ("plant", plant.number.cast_signed().into()),
         ("leaf", leaf.number.into()),
         ("id", leaf.id.into()),
         ("class", plant.class.name().into()),

@@ -159,7 +159,7 @@ fn of_plant(name: &str, split: Split, index: u64, plant: &Plant) -> Row {
         ("image", name.into()),
         ("number", count(index).into()),
         ("split", split.name().into()),
-        ("plant", plant.number.into()),
+        ("plant", plant.number.cast_signed().into()),
         ("id", plant.id.into()),
         ("class", plant.class.name().into()),
         ("species", aged.map(|grown| grown.eppo.as_str()).into()),

@@ -164,7 +164,10 @@ pub(super) fn reading(recipe: &Recipe, nir: bool) -> Markup {
     if rendered {
         rows.push(("species.png", html! { "number of the species in the table above, 0 for none" }));
     }
-    rows.push(("plants.png", html! { "number of the plant, 16 bit, 0 for none" }));
+    rows.push((
+        "plants.png",
+        html! { "number of the plant, 0 for none; 16 bit, or R + 256 G + 65536 B where one is above 65535" },
+    ));
     rows.push(("leaves.png", html! { "number of the leaf on its plant, 16 bit, 0 for none" }));
     if recipe.keeps(Kept::Coverage) && rendered {
         let coverage = "share of soil, crop, weed in the pixel as R, G, B; they sum to 255";
@@ -212,6 +215,8 @@ read = lambda name: archive.extractfile(f\"000000.{name}\")
 
 const EXAMPLE: &str = "semantics = np.array(Image.open(read(\"semantics.png\")))
 plants = np.array(Image.open(read(\"plants.png\")))
+if plants.ndim == 3:  # numbers beyond 16 bits
+    plants = plants @ [1, 1 << 8, 1 << 16]
 record = json.load(read(\"record.json\"))
 for plant in record[\"plants\"]:
     print(plant[\"number\"], plant[\"class\"], plant[\"seen\"][\"pixels\"], np.sum(plants == plant[\"number\"]))

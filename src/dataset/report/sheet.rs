@@ -218,10 +218,10 @@ fn overlay(sample: &Sample, w: u32, h: u32) -> Vec<[u8; 4]> {
 }
 
 /// The colour over a pixel of a class and a plant.
-fn tint((class, plant): (u8, u16), edge: bool) -> [u8; 4] {
+fn tint((class, plant): (u8, u32), edge: bool) -> [u8; 4] {
     const CROP: [[u8; 3]; 3] = [[40, 200, 80], [20, 160, 120], [130, 210, 50]];
     const WEED: [[u8; 3]; 3] = [[235, 60, 50], [215, 50, 120], [250, 125, 40]];
-    let shade = usize::from(plant % 3);
+    let shade = (plant % 3) as usize;
     let color = match class {
         c if c == Class::Crop as u8 => CROP[shade],
         c if c == Class::Weed as u8 => WEED[shade],

@@ -93,7 +93,7 @@ fn channels(film: &Film, labels: &LabelMap, with_spp: bool) -> Channels {
     channels.push(channel("depth.Z", FlatSamples::F32(pixels.iter().map(|p| p.depth).collect())));
     let ids = [
         ("class", labels.tags.iter().map(|t| t.class as u32).collect()),
-        ("plant", labels.tags.iter().map(|t| u32::from(t.plant)).collect()),
+        ("plant", labels.tags.iter().map(|t| t.plant).collect()),
         ("leaf", labels.tags.iter().map(|t| u32::from(t.leaf)).collect()),
         ("part", labels.parts.iter().map(|p| if *p == NONE { 0 } else { p + 1 }).collect::<Vec<u32>>()),
     ];

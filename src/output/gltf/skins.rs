@@ -16,9 +16,9 @@ use std::collections::BTreeMap;
 /// The skins of a document while it grows.
 pub(super) struct Skins<'a> {
     /// Joints by plant and leaf.
-    rigs: BTreeMap<(u16, u16), &'a [RigJoint]>,
+    rigs: BTreeMap<(u32, u16), &'a [RigJoint]>,
     /// Numbers of those that are written.
-    written: BTreeMap<(u16, u16), usize>,
+    written: BTreeMap<(u32, u16), usize>,
 }
 
 impl<'a> Skins<'a> {

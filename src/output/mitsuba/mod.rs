@@ -66,7 +66,7 @@ struct Group {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 struct Key {
     class: &'static str,
-    plant: u16,
+    plant: u32,
     /// The material on its level, or its roughness and film where the corners hold the colour.
     look: Result<u32, [u32; 4]>,
     /// Address of the mask.
@@ -307,7 +307,7 @@ mod tests {
         mesh.normals = vec![Vec3::Z; 3];
         let part = |k: usize| {
             let class = if k.is_multiple_of(2) { Class::Crop } else { Class::Weed };
-            let tag = Tag { class, plant: (k / 2 + 1) as u16, leaf: 0 };
+            let tag = Tag { class, plant: (k / 2 + 1) as u32, leaf: 0 };
             Part { mesh: Arc::new(mesh.clone()), mask: None, material: 0, tag, instance: None }
         };
         let parts = (0..plants).chain(0..plants).map(part).collect();

@@ -18,8 +18,6 @@ use std::sync::Arc;
 
 /// Farthest that a model or a camera may be from the world's origin along an axis, metres: single precision tells 0.06 mm apart there.
 pub(super) const FARTHEST: f32 = 1000.0;
-/// Most plants that a field can number.
-pub(super) const MOST_PLANTS: usize = u16::MAX as usize;
 
 /// A field under way.
 pub(super) struct Builder<'a> {

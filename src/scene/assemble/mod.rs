@@ -231,6 +231,11 @@ impl<'a> Builder<'a> {
         Stream::of(self.seed, self.index, purpose, index)
     }
 
+    /// Bytes that the field may take.
+    fn memory(&self) -> u64 {
+        self.options.memory.unwrap_or_else(usual_memory)
+    }
+
     /// Side of the smallest pixel on the ground in an image's middle, metres; 1 mm where no camera looks down.
     fn ground_pixel(&self) -> f32 {
         let side = |camera: &Camera| {
@@ -281,8 +286,7 @@ impl<'a> Builder<'a> {
     /// The field, and the library with whatever was read for it.
     fn build(mut self) -> Result<(Field, Library)> {
         let view = self.looked_at()?;
-        let memory = self.options.memory.unwrap_or_else(usual_memory);
-        self.estimate(view)?.check(memory).map_err(|(at, error)| self.page.blame(&at, error))?;
+        self.estimate(view)?.check(self.memory()).map_err(|(at, error)| self.page.blame(&at, error))?;
         let shown = self.has_ground().then_some(view.area);
         self.warn_of_camera();
         self.warn_of_plants()?;
@@ -366,7 +370,7 @@ impl<'a> Builder<'a> {
         let mut all = Vec::new();
         let area = area.corners();
         let (desc, page) = (self.desc, self.page);
-        let mut census = Census::new(page, desc.detail != Detail::Full);
+        let mut census = Census::new(page, desc.detail != Detail::Full, self.memory());
         for k in self.sown.clone() {
             let crop = &desc.crops[k];
             let species = self.library.species(page, &crop.species)?;
@@ -376,6 +380,7 @@ impl<'a> Builder<'a> {
                 if !self.may_be_seen(spot.at) {
                     continue;
                 }
+                census.close(all.len())?;
                 let seedling = self.seedling(&species, &crop.growth, spot, 1 + k as u64);
                 all.push(seedling.tended(&crop.vigour, crop.condition.as_ref()));
             }
@@ -388,6 +393,7 @@ impl<'a> Builder<'a> {
                 if !self.may_be_seen(spot.at) {
                     continue;
                 }
+                census.close(all.len())?;
                 let seedling = self.seedling(&species, &weed.growth, spot, 1001 + k as u64);
                 all.push(seedling.tended(&weed.vigour, weed.condition.as_ref()));
             }

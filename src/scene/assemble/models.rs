@@ -1,6 +1,6 @@
 //! Models from disk, stood on the ground and labelled.
 
-use super::builder::{Builder, FARTHEST, Floor, MOST_PLANTS};
+use super::builder::{Builder, FARTHEST, Floor};
 use super::identity;
 use super::preview::Stood;
 use crate::geometry::Mesh;
@@ -10,7 +10,7 @@ use crate::model::{self, Label, Model};
 use crate::ron_file::{Num, Step};
 use crate::sampling::Purpose;
 use crate::scene::desc::ModelDesc;
-use crate::scene::tag::{Class, Tag};
+use crate::scene::tag::{Class, MOST_PLANTS, Tag};
 use crate::scene::{Part, PlantRecord};
 use crate::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet};
@@ -24,7 +24,7 @@ impl Builder<'_> {
         let mut last = numbered;
         for (k, desc) in self.desc.models.iter().enumerate() {
             let found = self.place(k, desc, last, floor)?;
-            last = found.iter().map(|r| usize::from(r.number)).max().unwrap_or(last);
+            last = found.iter().map(|r| r.number as usize).max().unwrap_or(last);
             records.extend(found);
         }
         Ok(records)
@@ -56,7 +56,7 @@ impl Builder<'_> {
         };
         let materials: Vec<u32> =
             model.surfaces.iter().map(|s| self.material(Material::Painted(Painted::new(s, &repaint)))).collect();
-        let mut plants: BTreeMap<u16, Vec<usize>> = BTreeMap::new();
+        let mut plants: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
         let meshes = self.meshes(k, &Stood { model: model.clone(), turn, scale, foot });
         for (part, mesh) in model.parts.iter().zip(meshes) {
             let tag = tag(desc.class, part.label.as_ref(), numbered).ok_or_else(|| {
@@ -109,7 +109,7 @@ impl Builder<'_> {
     }
 
     /// What is known of a plant that is a model, or a part of one.
-    fn record(&self, (number, id): (u16, u32), parts: &[usize], file: &str, foot: Vec3, model: &Model) -> PlantRecord {
+    fn record(&self, (number, id): (u32, u32), parts: &[usize], file: &str, foot: Vec3, model: &Model) -> PlantRecord {
         let parts: Vec<&Part> = parts.iter().map(|i| &self.scene.parts[*i]).collect();
         let mut all = Mesh::default();
         for part in &parts {
@@ -153,14 +153,12 @@ fn known(label: Option<&Label>) -> Option<(Class, &Label)> {
 
 /// The tag of a part: the scene file's class, else the file's; `None` where plants run out of numbers.
 fn tag(class: Option<Class>, label: Option<&Label>, numbered: usize) -> Option<Tag> {
-    let number = |n: usize| u16::try_from(numbered + n).ok();
+    let number = |n: usize| u32::try_from(numbered + n).ok().filter(|number| *number <= MOST_PLANTS);
     let label = known(label);
     match (class, label) {
         (Some(Class::Soil), _) | (None, None) => Some(Tag::default()),
         (Some(class), label) => Some(Tag { class, plant: number(1)?, leaf: label.map_or(0, |(_, l)| l.leaf) }),
-        (None, Some((class, l))) if l.plant > 0 => {
-            Some(Tag { class, plant: number(usize::from(l.plant))?, leaf: l.leaf })
-        }
+        (None, Some((class, l))) if l.plant > 0 => Some(Tag { class, plant: number(l.plant as usize)?, leaf: l.leaf }),
         (None, Some((class, l))) => Some(Tag { class, plant: 0, leaf: l.leaf }),
     }
 }

@@ -39,7 +39,7 @@ pub struct Example {
     /// Class of each pixel, [`IGNORE`] for none.
     pub labels: Vec<u8>,
     /// Number of the plant of each pixel, 0 for none; empty unless asked for.
-    pub plants: Vec<u16>,
+    pub plants: Vec<u32>,
 }
 
 impl Example {
@@ -90,7 +90,7 @@ impl Example {
         let mut plants = Vec::new();
         if with_plants {
             let file = "plants.png";
-            let (lw, lh, numbers) = image.gray16(file)?;
+            let (lw, lh, numbers) = image.numbers(file)?;
             same(file, (lw, lh))?;
             plants = numbers;
         }
@@ -113,7 +113,7 @@ impl Example {
 
     /// Bytes that it takes in memory.
     pub fn bytes(&self) -> u64 {
-        (self.planes.iter().map(Vec::len).sum::<usize>() + self.labels.len() + 2 * self.plants.len()) as u64
+        (self.planes.iter().map(Vec::len).sum::<usize>() + self.labels.len() + 4 * self.plants.len()) as u64
     }
 
     /// Pixels of each of `classes` classes.

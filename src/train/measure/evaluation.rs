@@ -26,7 +26,7 @@ pub struct Prediction<'a> {
     /// Predicted class of each pixel.
     pub predicted: &'a [u8],
     /// Number of each pixel's plant, 0 of none, where the set tells plants apart.
-    pub plants: Option<&'a [u16]>,
+    pub plants: Option<&'a [u32]>,
     /// How long the prediction took, seconds.
     pub seconds: Option<f64>,
 }
@@ -85,7 +85,7 @@ impl Evaluation {
         let maps = [
             ("truth", truth.len()),
             ("prediction", predicted.len()),
-            ("map of plants", plants.map_or(w * h, <[u16]>::len)),
+            ("map of plants", plants.map_or(w * h, <[u32]>::len)),
         ];
         if let Some((map, n)) = maps.into_iter().find(|(_, n)| *n != w * h) {
             return Err(wrong(format!("the {map} has {n} pixels, an image of {w} × {h} has {}", w * h)));

@@ -19,6 +19,7 @@ use super::components::Components;
 use super::scores::ratio;
 use crate::dataset::sample::IGNORE;
 use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
 
 /// Bins: the last holds all that a picture of 2³² pixels can.
 const BINS: usize = 16;
@@ -88,7 +89,7 @@ impl Sizes {
         (width, height): (usize, usize),
         truth: &[u8],
         predicted: &[u8],
-        numbers: Option<&[u16]>,
+        numbers: Option<&[u32]>,
     ) -> Self {
         let is_plant = |class: u8| plant_classes.get(usize::from(class)) == Some(&true);
         let (owners, mut plants) = plants(plant_classes, (width, height), truth, numbers);
@@ -165,21 +166,21 @@ fn plants(
     plant_classes: &[bool],
     (width, height): (usize, usize),
     truth: &[u8],
-    numbers: Option<&[u16]>,
+    numbers: Option<&[u32]>,
 ) -> (Vec<u32>, Vec<Plant>) {
     let is_plant = |class: u8| plant_classes.get(usize::from(class)) == Some(&true);
     let number = |at: usize| numbers.map_or(0, |numbers| numbers[at]);
     let loose = Components::of(width, height, |at| Some(truth[at]).filter(|c| is_plant(*c) && number(at) == 0));
     let mut plants: Vec<Plant> = Vec::new();
     // One plant a number and class: sets by other hands may give one number to two classes.
-    let mut named = vec![0_u32; if numbers.is_some() { (1 << 16) * plant_classes.len() } else { 0 }];
+    let mut named: HashMap<(u32, u8), u32> = HashMap::new();
     let mut of_region = vec![0_u32; loose.areas.len()];
     let mut owners = vec![0_u32; truth.len()];
     for at in (0..truth.len()).filter(|at| is_plant(truth[*at])) {
         let class = truth[at];
         let owner = match number(at) {
             0 => &mut of_region[loose.labels[at] as usize - 1],
-            n => &mut named[usize::from(n) * plant_classes.len() + usize::from(class)],
+            n => named.entry((n, class)).or_default(),
         };
         if *owner == 0 {
             plants.push(Plant { class, pixels: 0, found: 0 });
