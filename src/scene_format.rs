@@ -41,6 +41,8 @@ pub use crate::sensor::{
     MotionDesc, NoiseDesc, PoseDesc, PsfDesc, SensorDesc, SharpenDesc, Tone, WhiteBalanceDesc,
 };
 #[doc(inline)]
+pub use crate::sensor::{BeamsDesc, LidarDesc, PulsesDesc, Returns};
+#[doc(inline)]
 pub use crate::soil::{
     BlendDesc, ClodsDesc, CrumbsDesc, LayerDesc as SoilLayerDesc, LitterDesc, MoistureDesc, ReliefDesc, RowReliefDesc,
     SoilColor, SoilDesc, StonesDesc, WheelDesc,

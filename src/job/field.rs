@@ -5,9 +5,10 @@ use crate::ablation::Edit;
 use crate::accel::{Before, EmbreeAccel};
 use crate::geometry::Window;
 use crate::integrator::World;
-use crate::render::{self, LabelMap};
+use crate::render::{self, Echo, LabelMap};
 use crate::scene;
 use crate::scene::assemble::Options;
+use crate::sensor::Lidar;
 use crate::{Error, Result};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
@@ -97,6 +98,18 @@ impl Field {
         let (scene, geometry) = (&self.grown.scene, self.geometry()?);
         let window = Window::full(scene.camera.width(), scene.camera.height());
         Ok(self.threads.install(|| render::label(geometry, &scene.parts, &scene.camera, window)))
+    }
+
+    /// What its LiDAR measures in a turn that begins at the frame of the image; of a field that was grown for a [scan](super::SceneFile::scanned).
+    ///
+    /// # Errors
+    /// Where it was grown for its cameras.
+    pub fn scan(&self) -> Result<(&Lidar, Vec<Echo>)> {
+        let (lidar, stream) = self.grown.scanner().ok_or_else(|| {
+            Error::misuse("the field was grown for its cameras, not for a LiDAR").help("ask `SceneFile::scanned` first")
+        })?;
+        let world = self.world()?;
+        Ok((lidar, self.threads.install(|| render::scan(&world, lidar, &stream))))
     }
 
     /// Scene and geometry, as integrators take them.

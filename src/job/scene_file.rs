@@ -5,7 +5,7 @@ use super::threads::Threads;
 use crate::Result;
 use crate::ablation::{Edit, FULL};
 use crate::input::Scope;
-use crate::scene::assemble::{Options, Preview, Source};
+use crate::scene::assemble::{Options, Preview, Scanner, Source};
 use crate::scene::estimate::Estimate;
 use std::path::Path;
 use std::sync::Arc;
@@ -126,6 +126,14 @@ impl SceneFile {
     #[must_use]
     pub fn rigged(mut self, rigged: bool) -> Self {
         self.options.rigged = rigged;
+        self
+    }
+
+    /// With fields that are grown for a LiDAR: as far and as finely as it sees them, not as their cameras do. Plants, and their identities, are
+    /// the same; their numbers count those that are there.
+    #[must_use]
+    pub fn scanned(mut self, scanner: Scanner) -> Self {
+        self.options.scan = Some(scanner);
         self
     }
 

@@ -55,14 +55,93 @@ pub struct Point {
     pub leaf: u16,
 }
 
+/// A property of a cloud's points beyond those of a [`Point`].
+#[derive(Clone, Copy, Debug)]
+pub struct Column {
+    kind: &'static str,
+    name: &'static str,
+}
+
+impl Column {
+    /// A number in single precision.
+    pub const fn float(name: &'static str) -> Self {
+        Self { kind: "float", name }
+    }
+
+    /// A whole number of 32 bits.
+    pub const fn uint(name: &'static str) -> Self {
+        Self { kind: "uint", name }
+    }
+
+    /// One of 16 bits.
+    pub const fn ushort(name: &'static str) -> Self {
+        Self { kind: "ushort", name }
+    }
+
+    /// One of 8 bits.
+    pub const fn uchar(name: &'static str) -> Self {
+        Self { kind: "uchar", name }
+    }
+}
+
+/// A point's value in a [`Column`] of its type.
+#[derive(Clone, Copy, Debug)]
+pub enum Value {
+    /// In single precision.
+    Float(f32),
+    /// 32 bits.
+    Uint(u32),
+    /// 16 bits.
+    Ushort(u16),
+    /// 8 bits.
+    Uchar(u8),
+}
+
+impl Value {
+    fn kind(self) -> &'static str {
+        match self {
+            Self::Float(_) => "float",
+            Self::Uint(_) => "uint",
+            Self::Ushort(_) => "ushort",
+            Self::Uchar(_) => "uchar",
+        }
+    }
+}
+
 /// Points on their way into a PLY file, binary and little endian. Source: Turk 1994, "The PLY Polygon File Format".
 #[derive(Default)]
 pub struct Cloud {
+    columns: &'static [Column],
+    comments: Vec<String>,
     bytes: Vec<u8>,
     points: u64,
 }
 
 impl Cloud {
+    /// A cloud whose points have further properties.
+    pub fn with(columns: &'static [Column]) -> Self {
+        Self { columns, ..Self::default() }
+    }
+
+    /// Says something of the file in its header, line by line.
+    pub fn comment(&mut self, text: &str) {
+        self.comments.extend(text.lines().map(str::to_owned));
+    }
+
+    /// Adds a point with its values in the cloud's further columns, in their order.
+    pub fn add_with(&mut self, point: &Point, values: &[Value]) {
+        debug_assert!(values.iter().map(|v| v.kind()).eq(self.columns.iter().map(|c| c.kind)));
+        self.add(point);
+        for value in values {
+            match value {
+                Value::Float(v) => self.bytes.extend(v.to_le_bytes()),
+                Value::Uint(v) => self.bytes.extend(v.to_le_bytes()),
+                Value::Ushort(v) => self.bytes.extend(v.to_le_bytes()),
+                Value::Uchar(v) => self.bytes.push(*v),
+            }
+        }
+    }
+
     /// Adds a point.
     pub fn add(&mut self, point: &Point) {
         let Point { at, normal, rgb, nir, kind, plant, leaf } = point;
@@ -84,10 +163,13 @@ impl Cloud {
     /// The file, which says that this version made it.
     #[must_use]
     pub fn file(self, version: &str) -> Vec<u8> {
-        let properties = PROPERTIES.map(|(kind, name)| format!("property {kind} {name}\n")).concat();
+        let further = self.columns.iter().map(|Column { kind, name }| (*kind, *name));
+        let properties = PROPERTIES.into_iter().chain(further).map(|(kind, name)| format!("property {kind} {name}\n"));
+        let properties: String = properties.collect();
+        let comments: String = self.comments.iter().map(|line| format!("comment {line}\n")).collect();
         let points = self.points;
         let mut file = format!(
-            "ply\nformat binary_little_endian 1.0\ncomment furrow {version}; world coordinates, metres, z up\nelement vertex {points}\n{properties}end_header\n"
+            "ply\nformat binary_little_endian 1.0\ncomment furrow {version}; world coordinates, metres, z up\n{comments}element vertex {points}\n{properties}end_header\n"
         )
         .into_bytes();
         file.extend(self.bytes);

@@ -10,6 +10,7 @@ pub mod mitsuba;
 mod overlay;
 mod photo;
 mod png;
+pub mod scan;
 
 use crate::Result;
 use crate::film::Film;

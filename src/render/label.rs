@@ -101,7 +101,7 @@ pub fn row_hits(
 /// The interpolated unit normal at a hit on the side that a ray along `direction` comes from. Near the outline of a curved
 /// surface it may point away from the eye, which the triangle's own normal never does.
 #[inline]
-fn facing(mesh: &Mesh, hit: &Hit, direction: Vec3) -> Vec3 {
+pub(super) fn facing(mesh: &Mesh, hit: &Hit, direction: Vec3) -> Vec3 {
     let corners = mesh.triangles[hit.triangle as usize].map(|i| i as usize);
     let [a, b, c] = corners.map(|i| mesh.positions[i]);
     let [na, nb, nc] = corners.map(|i| mesh.normals[i]);

@@ -6,6 +6,7 @@ mod explain;
 mod extent;
 pub mod label;
 mod progressive;
+pub mod scan;
 mod tiles;
 
 use crate::accel::prepare_thread;
@@ -25,6 +26,7 @@ pub use explain::explain;
 pub use extent::{Extent, extents};
 pub use label::{LabelMap, label};
 pub use progressive::{Progressive, timed};
+pub use scan::{Echo, scan};
 
 /// What to render.
 #[derive(Clone, Copy, Debug)]

@@ -44,6 +44,8 @@ pub enum Purpose {
     Body = 22,
     /// Where points lie on a field's surfaces.
     Cloud = 23,
+    /// What a LiDAR's ranges err by.
+    Lidar = 24,
 }
 
 /// A stream of random numbers with an address.

@@ -11,7 +11,7 @@ use crate::scatter::{RowsDesc, WeedsDesc};
 use crate::scene::days::DaysDesc;
 use crate::scene::drive::{DriveDesc, MountedDesc};
 use crate::scene::tag::Class;
-use crate::sensor::{CameraDesc, SensorDesc};
+use crate::sensor::{CameraDesc, LidarDesc, SensorDesc};
 use crate::soil::SoilDesc;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -44,6 +44,10 @@ pub struct FieldDesc {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-example" = "(frames: 20, path: AlongRows(speed_m_s: 0.5))"))]
     pub drive: Option<DriveDesc>,
+    /// A rotating LiDAR, carried with the cameras; `trace scan` writes its points. Images do not depend on it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "Vlp16(position_m: (0, 0, 1.5))"))]
+    pub lidar: Option<LidarDesc>,
     /// Days on which all images are taken again, while the field grows; as the growth of its plants says unless given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-example" = "(from: 8, to: 40, every: 4)"))]
@@ -54,7 +58,7 @@ pub struct FieldDesc {
     /// How finely the field is made.
     #[serde(default, skip_serializing_if = "Detail::is_full")]
     pub detail: Detail,
-    /// How far from the point below each camera the field is grown, metres to the east, north, west and south; at most 100.
+    /// How far from the point below each camera, and for a scan below the LiDAR, the field is grown, metres to the east, north, west and south; at most 100.
     #[serde(default = "reach", skip_serializing_if = "is_reach")]
     pub reach_m: Num<Positive>,
     /// How a pixel gathers light.

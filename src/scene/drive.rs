@@ -9,7 +9,7 @@
 use crate::math::{Mat3, Vec2, Vec3, vec2, vec3};
 use crate::ron_file::{Finite, NonNegative, Num, Positive, PositiveCount, Vary};
 use crate::sampling::Stream;
-use crate::sensor::{Camera, Pose};
+use crate::sensor::{Camera, Lidar, Pose};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -148,11 +148,13 @@ pub struct Capture {
     pub time_s: f64,
     /// The camera at its place.
     pub camera: Camera,
+    /// The vehicle that carries it.
+    pub vehicle: Moment,
 }
 
 /// Where a vehicle is, at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Moment {
+pub struct Moment {
     time_s: f64,
     /// From where it set out to where it is: first this turn, then this way.
     turn: Mat3,
@@ -192,7 +194,7 @@ pub(super) fn captures(
     let taken = |(frame, at): (usize, Moment)| {
         cameras.iter().map(move |(name, camera)| {
             let camera = if desc.is_some() { at.carry(camera) } else { *camera };
-            Capture { name: name.clone(), frame: frame as u32, time_s: at.time_s, camera }
+            Capture { name: name.clone(), frame: frame as u32, time_s: at.time_s, camera, vehicle: at }
         })
     };
     Ok(moments.into_iter().enumerate().flat_map(taken).collect())
@@ -204,6 +206,11 @@ impl Moment {
         let Pose { position, axes } = *camera.pose();
         let pose = Pose { position: self.turn * position + self.way, axes: self.turn * axes };
         camera.with_pose(pose).with_velocity(self.velocity)
+    }
+
+    /// The same of a LiDAR.
+    pub(super) fn carry_lidar(&self, lidar: &Lidar) -> Lidar {
+        lidar.carried(self.turn, self.way, self.velocity)
     }
 }
 

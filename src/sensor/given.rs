@@ -1,5 +1,7 @@
 //! What a scene file gives of a thing whose other values come from a preset.
 
+use crate::ron_file::{self, Fault};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer};
 
 /// A value that a scene file may leave to its preset.
@@ -20,9 +22,33 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Given<T> {
 
 impl<T> Given<T> {
     /// The value, or the preset's.
-    pub(super) fn over(self, preset: T) -> T {
+    pub(in crate::sensor) fn over(self, preset: T) -> T {
         self.0.unwrap_or(preset)
     }
+}
+
+/// Reads a name with or without brackets, or brackets alone: the preset of that name, empty where there is none, and what the brackets give.
+/// `what` is such a thing and several of them in words; `preset` knows the struct's own name too, before which text is read as it is.
+pub(in crate::sensor) fn over_a_name<W: DeserializeOwned + Default, T>(
+    raw: &str,
+    (one, several): (&str, &str),
+    names: &[&str],
+    preset: impl Fn(&str) -> Option<T>,
+) -> Result<(T, W), Fault> {
+    let start = raw.len() - raw.trim_start().len();
+    let len = raw[start..].find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(raw.len() - start);
+    let name = &raw[start..start + len];
+    let Some(preset) = preset(name) else {
+        let help = ron_file::choose(several, names, name);
+        return Err(Fault { end: start + len, ..ron_file::whole(raw, format!("unknown {one} `{name}`"), help) });
+    };
+    if !names.contains(&name) {
+        return Ok((preset, ron_file::parse_in(raw)?));
+    }
+    // Spaces for the name keep the places of what follows.
+    let fields = [" ".repeat(start + len).as_str(), &raw[start + len..]].concat();
+    let written = if fields.trim().is_empty() { W::default() } else { ron_file::parse_in(&fields)? };
+    Ok((preset, written))
 }
 
 /// A struct, and beside it what a scene file gives of it: each field with its type and how it is given, which is [`Given`] or the second
@@ -55,4 +81,4 @@ macro_rules! layered {
     };
 }
 
-pub(super) use layered;
+pub(in crate::sensor) use layered;

@@ -1,4 +1,4 @@
-//! The camera: which ray belongs to a pixel, which pixel to a point; and the sensor that turns radiance into bytes.
+//! The camera: which ray belongs to a pixel, which pixel to a point; and the sensor that turns radiance into bytes. And the LiDAR.
 //!
 //! | file | idea |
 //! |---|---|
@@ -6,6 +6,7 @@
 //! | `chip` | exposure, noise, mosaic, whole numbers |
 //! | `develop` | white balance, colour matrix, tone curve, sharpening, JPEG |
 //! | `chain` | the sensor: its steps in their order |
+//! | `lidar` | a rotating LiDAR: its pulses, their width, the echoes that it tells |
 //! | `settings`, `preset`, `given` | a sensor as a scene file writes it, sensors by their names, and values left to them |
 //! | `record` | a sensor as it was drawn |
 //!
@@ -17,6 +18,7 @@ mod chip;
 mod develop;
 mod given;
 mod lens;
+mod lidar;
 mod preset;
 mod record;
 mod settings;
@@ -34,6 +36,7 @@ pub use lens::{
     Aperture, ApertureDesc, ApertureRecord, Camera, CameraDesc, CameraModel, CameraRecord, Distortion, DistortionDesc,
     IntrinsicsDesc, Motion, MotionDesc, MotionRecord, PixelBox, Pose, PoseDesc, Psf, PsfDesc,
 };
+pub use lidar::{BeamRay, BeamsDesc, LIDARS, Lidar, LidarDesc, Pulse, PulsesDesc, Returns};
 pub use preset::PRESETS;
 pub use record::SensorRecord;
 pub use settings::SensorDesc;

@@ -2,6 +2,7 @@
 
 use super::chip::{AdcDesc, Demosaic, MosaicDesc, NoiseDesc, Pattern};
 use super::develop::{JpegDesc, MatrixDesc, SharpenDesc, Tone, WhiteBalanceDesc};
+use super::given;
 use super::lens::PsfDesc;
 use super::settings::{SensorDesc, SensorWritten};
 use crate::ron_file::{self, Num, Vary};
@@ -24,24 +25,12 @@ fn sensor(name: &str) -> Option<SensorDesc> {
 impl<'de> Deserialize<'de> for SensorDesc {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         ron_file::from_raw(deserializer, |raw| {
-            let start = raw.len() - raw.trim_start().len();
-            let len = raw[start..].find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(raw.len() - start);
-            let name = &raw[start..start + len];
-            if name.is_empty() || name == "SensorDesc" {
-                return ron_file::parse_in(raw).map(|written: SensorWritten| written.over(Self::default()));
-            }
-            let Some(preset) = sensor(name) else {
-                let help = ron_file::choose("sensors", &PRESETS, name);
-                return Err(ron_file::Fault {
-                    end: start + len,
-                    ..ron_file::whole(raw, format!("unknown sensor `{name}`"), help)
-                });
+            let preset = |name: &str| match name {
+                "" | "SensorDesc" => Some(Self::default()),
+                name => sensor(name),
             };
-            // Spaces for the name keep the places of what follows.
-            let fields = [" ".repeat(start + len).as_str(), &raw[start + len..]].concat();
-            let written =
-                if fields.trim().is_empty() { SensorWritten::default() } else { ron_file::parse_in(&fields)? };
-            Ok(written.over(preset))
+            let (preset, written) = given::over_a_name(raw, ("sensor", "sensors"), &PRESETS, preset)?;
+            Ok(SensorWritten::over(written, preset))
         })
     }
 }

@@ -19,6 +19,7 @@ mod pages;
 mod preview;
 mod quality;
 mod render;
+mod scan;
 mod sequence;
 mod stream;
 mod texture;
@@ -58,6 +59,7 @@ Examples:
   trace sequence --scene scenes/09-drive.ron --out drive          a stereo pair that drives along a row
   trace sequence --scene scenes/03-one-row.ron --days 8..32/8 --out row    one field while it grows
   trace ablate --scene scenes/field.ron --count 100 --out ab      the same hundred with one thing changed at a time
+  trace scan --scene scenes/field.ron --lidar Vlp16     what a LiDAR measures there, as a cloud of labelled points
   trace export --scene scenes/field.ron --format gltf   the same field for another program
   trace compare out/field out/noisy                     how far one image is from another: PSNR, SSIM, FLIP, by class
   trace compare --real photos --synthetic data          how far a dataset is from photographs: colour, spectra, noise, plants
@@ -96,6 +98,8 @@ enum Verb {
     Sequence(Box<sequence::Args>),
     /// Make a dataset, and the same again with one thing changed at a time: what does each matter to a network?
     Ablate(Box<ablate::Args>),
+    /// Scan a field with a rotating LiDAR: points with ranges, intensities and labels.
+    Scan(scan::Args),
     /// Write a field as a scene of another program.
     Export(export::Args),
     /// Draw several fields of a scene file on one sheet, each with its index.
@@ -134,6 +138,7 @@ fn main() -> ExitCode {
         Some(Verb::Sequence(args)) => sequence::run(&args, &signals),
         Some(Verb::Stream(args)) => stream::run(&args, &signals),
         Some(Verb::Export(args)) => export::run(&args),
+        Some(Verb::Scan(args)) => scan::run(&args),
         Some(Verb::Texture(args)) => texture::run(&args),
         Some(Verb::Leaf(args)) => leaf::run(&args),
         Some(Verb::Explain(args)) => explain::run(&args),

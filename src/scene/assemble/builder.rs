@@ -13,6 +13,7 @@ use crate::scene::desc::FieldDesc;
 use crate::scene::drive::Capture;
 use crate::scene::library::{Layer, Library};
 use crate::scene::{PartKind, Scene};
+use crate::sensor::Lidar;
 use crate::soil::Ground;
 use std::sync::Arc;
 
@@ -38,6 +39,8 @@ pub(super) struct Builder<'a> {
     pub(super) scene: Scene,
     /// The images that are taken of it.
     pub(super) captures: Vec<Capture>,
+    /// The LiDAR at each frame, for a scan; none for images.
+    pub(super) scanners: Vec<Lidar>,
     /// The ground in each of them, once it was looked at.
     pub(super) seen: Vec<GroundView>,
     /// What the parts of the ground are, in the order of the parts.

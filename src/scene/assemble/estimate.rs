@@ -46,7 +46,12 @@ impl Builder<'_> {
         let pixels = f64::from(camera.width()) * f64::from(camera.height());
         let film = Cost::work(pixels * (size_of::<Pixel>() as f64 + BYTES_BESIDE), pixels * SECONDS_PER_PIXEL);
         let mut shares = Vec::new();
-        let fewer = if self.desc.drive.is_some() { "take fewer frames, or " } else { "" };
+        let fewer = match (self.desc.drive.is_some(), self.scanners.is_empty()) {
+            (false, true) => "",
+            (true, true) => "take fewer frames, or ",
+            (false, false) => "lower reach_m, or ",
+            (true, false) => "take fewer frames, lower reach_m, or ",
+        };
         let mut add = |at: &[Step<'static>], cost, advice: &str| {
             shares.push(Share { at: at.to_vec(), cost, advice: format!("{fewer}{advice}") });
         };

@@ -59,7 +59,7 @@ fn expected_plants(builder: &mut Builder<'_>) -> Result<f64> {
         .zip(1000..)
         .map(|(weed, k)| f64::from(WeedsRecord::draw(&weed.spread, &builder.stream(Purpose::Scatter, k)).per_m2));
     let per_m2: f64 = crops.chain(weeds).sum();
-    let view = builder.view()?;
+    let view = builder.looked_at()?;
     let area = match &builder.seen[..] {
         [seen] if view.is_graded() => seen.area(),
         _ => view.area.area(),

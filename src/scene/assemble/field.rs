@@ -7,7 +7,7 @@ use crate::sampling::{Purpose, Stream};
 use crate::scene::drive::Capture;
 use crate::scene::record::{Conditions, SpeciesRecord};
 use crate::scene::{PartKind, PlantRecord, Scene};
-use crate::sensor::{Linear, Photograph, SensorDesc};
+use crate::sensor::{Lidar, Linear, Photograph, SensorDesc};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -17,6 +17,8 @@ pub struct Field {
     pub scene: Scene,
     /// The images that are taken of it as it is, one at least.
     pub captures: Vec<Capture>,
+    /// The LiDAR at each frame, where it was grown for a scan.
+    pub scanners: Vec<Lidar>,
     /// The day on which it is as it is, where it has days.
     pub day: Option<u32>,
     /// Place of the one whose camera the scene has.
@@ -64,6 +66,14 @@ impl Field {
     /// Number of the image among all that may be taken of the field, on any day.
     fn shot(&self) -> u64 {
         self.day.map_or(0, |day| (1 + u64::from(day)) << 32) + self.capture as u64
+    }
+
+    /// The LiDAR at the frame of the image, and the random numbers of its scan.
+    pub fn scanner(&self) -> Option<(&Lidar, Stream)> {
+        let frame = self.captures.get(self.capture)?.frame;
+        let day = self.day.map_or(0, |day| (1 + u64::from(day)) << 32);
+        let stream = Stream::of(self.seed, self.index, Purpose::Lidar, day + u64::from(frame));
+        Some((self.scanners.get(frame as usize)?, stream))
     }
 
     /// Where the field came from, one `key: value` a line: program, scene files, seed, index.

@@ -19,6 +19,7 @@ mod models;
 mod options;
 mod preview;
 mod rig;
+mod scanner;
 mod season;
 mod seedling;
 mod stand;
@@ -49,7 +50,7 @@ pub use field::Field;
 use individual::Individual;
 pub use lighting::Lighting;
 use lighting::Listed;
-pub use options::Options;
+pub use options::{Options, Scanner};
 pub use preview::Preview;
 pub use season::Season;
 use seedling::Seedling;
@@ -206,6 +207,7 @@ impl<'a> Builder<'a> {
             Stream::of(seed, index, purpose, k)
         })?;
         let scene = Scene { camera: captures.first().map_or(camera, |first| first.camera), ..scene };
+        let scanners = scanner::at_frames(page, desc, options.scan.as_ref(), (&camera, &captures), (seed, index))?;
         Ok(Self {
             page,
             desc,
@@ -220,6 +222,7 @@ impl<'a> Builder<'a> {
             lighting,
             scene,
             captures,
+            scanners,
             seen: Vec::new(),
             ground: Vec::new(),
             organs: Vec::new(),
@@ -238,6 +241,9 @@ impl<'a> Builder<'a> {
 
     /// Side of the smallest pixel on the ground in an image's middle, metres; 1 mm where no camera looks down.
     fn ground_pixel(&self) -> f32 {
+        if let Some(spacing) = self.scanned_ground() {
+            return spacing;
+        }
         let side = |camera: &Camera| {
             let (origin, direction) = camera.centre_ray(camera.width() / 2, camera.height() / 2);
             (direction.z < -0.05).then(|| origin.z / -direction.z * camera.pixel_angle())
@@ -260,6 +266,9 @@ impl<'a> Builder<'a> {
 
     /// Side of the smallest pixel on a plant at a place in any image, metres, across the line of sight.
     fn pixel_at(&self, at: Vec2) -> f32 {
+        if let Some(spacing) = self.scanned_at(at) {
+            return spacing;
+        }
         let side = |camera: &Camera| {
             let distance = camera.pose().position.distance(at.extend(0.0)) - PLANT_MARGIN;
             distance.max(0.0) * camera.pixel_angle()
@@ -269,6 +278,9 @@ impl<'a> Builder<'a> {
 
     /// Side of the smallest pixel on the ground in any image, metres; 1 mm where no camera looks down.
     fn finest_pixel(&self) -> f32 {
+        if let Some(spacing) = self.scanned_ground() {
+            return spacing;
+        }
         let finest = |camera: &Camera| {
             let corner = |k: u32| (k % 3 * (camera.width() - 1) / 2, k / 3 * (camera.height() - 1) / 2);
             let rays = (0..9).map(corner).map(|(x, y)| camera.centre_ray(x, y));
@@ -322,6 +334,7 @@ impl<'a> Builder<'a> {
         let field = Field {
             scene: self.scene,
             captures: self.captures,
+            scanners: self.scanners,
             day: self.today.map(|today| today.day),
             capture: 0,
             kinds,

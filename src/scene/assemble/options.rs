@@ -1,6 +1,7 @@
 //! What is asked of a field beyond its scene file.
 
 use super::preview::Preview;
+use crate::sensor::LidarDesc;
 use crate::{Error, Result};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -30,6 +31,17 @@ pub struct Options {
     pub unlit: bool,
     /// Whether leaves keep the joints by which they bend ([`LeafAxis::rig`](crate::plant::LeafAxis::rig)) and the weights of their corners.
     pub rigged: bool,
+    /// Given for a scan: the field is grown as far and as finely as a LiDAR sees it, not its cameras.
+    pub scan: Option<Scanner>,
+}
+
+/// Which LiDAR scans a field.
+#[derive(Clone, Debug)]
+pub enum Scanner {
+    /// The scene file's.
+    OfScene,
+    /// This one, where the first camera is; of a scene file that has none.
+    AtCamera(LidarDesc),
 }
 
 impl Options {

@@ -20,7 +20,11 @@ const HIGH_M: f32 = 5.0;
 impl Builder<'_> {
     /// Warnings about the camera and the sensor.
     pub(super) fn warn_of_camera(&mut self) {
-        let height = self.scene.camera.pose().height();
+        let height = match self.scanners.first() {
+            None => self.scene.camera.pose().height(),
+            // It is not the camera that looks.
+            Some(_) => 0.0,
+        };
         // Who asks for a drone's detail means it.
         if height > HIGH_M && self.desc.detail == Detail::Full {
             self.warnings.push(format!(
@@ -83,9 +87,10 @@ impl Builder<'_> {
         if plants.iter().filter(near).any(|plant| plant.class == Class::Crop) {
             return;
         }
-        self.warnings.push(
-            "no crop stands in the camera's view; rows.offset_m moves the rows, spacing_m and in_row_m bring plants closer".into(),
-        );
+        let whose = if self.scanners.is_empty() { "the camera's view" } else { "view of the LiDAR" };
+        self.warnings.push(format!(
+            "no crop stands in {whose}; rows.offset_m moves the rows, spacing_m and in_row_m bring plants closer"
+        ));
     }
 }
 

@@ -14,7 +14,7 @@ use crate::soil::Rect;
 use crate::{Error, Result};
 
 /// The longest reach of a field, metres.
-const LONGEST_REACH: f32 = 100.0;
+pub(super) const LONGEST_REACH: f32 = 100.0;
 /// Below this sine of the angle under the horizon a ray is said to see the horizon.
 const HORIZON: f32 = 0.05;
 /// Sides of the raster of rays by which the share of bare ground is estimated.
@@ -54,7 +54,7 @@ impl View {
     }
 
     /// The least rectangle that holds both.
-    fn join(self, other: Self) -> Self {
+    pub(super) fn join(self, other: Self) -> Self {
         let (area, near) = (around(self.area, other.area), around(self.near, other.near));
         Self { area, near, open: self.open || other.open }
     }
@@ -68,13 +68,16 @@ fn around(a: Rect, b: Rect) -> Rect {
 }
 
 /// Where a ray meets the plane z = 0: at a place, or where it says that it sees the horizon; `None` for a ray above it.
-fn meets(origin: Vec3, direction: Vec3) -> Option<Vec2> {
+pub(super) fn meets(origin: Vec3, direction: Vec3) -> Option<Vec2> {
     (direction.z < 0.0 && origin.z > 0.0).then(|| (origin + direction * (origin.z / -direction.z)).truncate())
 }
 
 impl Builder<'_> {
     /// The ground that all images see together, with a warning where some of it is not planted.
     pub(super) fn view(&mut self) -> Result<View> {
+        if !self.scanners.is_empty() {
+            return self.scanned();
+        }
         let cameras: Vec<Camera> = self.captures.iter().map(|capture| capture.camera).collect();
         let mut whole: Option<View> = None;
         self.seen.clear();
@@ -96,7 +99,7 @@ impl Builder<'_> {
     }
 
     /// How far from the point below a camera the field is grown, metres.
-    fn reach(&self) -> Result<f32> {
+    pub(super) fn reach(&self) -> Result<f32> {
         let reach = self.desc.reach_m.f32();
         if reach > LONGEST_REACH {
             let error = Error::input(format!("reach_m is {reach}, more than {LONGEST_REACH}")).help("lower it");
@@ -168,10 +171,15 @@ impl Builder<'_> {
 impl Builder<'_> {
     /// What of a camera's ground is made of even cells.
     fn near(&self, camera: &Camera, area: Rect) -> Rect {
+        self.nearest(raster(camera), area)
+    }
+
+    /// The same of what rays see, each with its start and its direction.
+    pub(super) fn nearest(&self, rays: impl Iterator<Item = (Vec3, Vec3)>, area: Rect) -> Rect {
         if self.desc.detail == Detail::Full {
             return area;
         }
-        let seen: Vec<(Vec2, f32)> = raster(camera)
+        let seen: Vec<(Vec2, f32)> = rays
             .filter_map(|(origin, direction)| Some((meets(origin, direction)?, origin.z / -direction.z)))
             .filter(|(at, _)| area.contains(*at))
             .collect();

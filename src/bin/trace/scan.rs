@@ -1,0 +1,51 @@
+//! `trace scan`: what a LiDAR measures of one field.
+
+use crate::field::FieldArgs;
+use clap::builder::PossibleValuesParser;
+use furrow::ablation::FULL;
+use furrow::job::Threads;
+use furrow::output;
+use furrow::scene::assemble::Scanner;
+use furrow::sensor::{LIDARS, LidarDesc};
+use furrow::{Result, cli};
+use std::path::PathBuf;
+
+/// Which field, and with which LiDAR.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    field: FieldArgs,
+    /// A LiDAR at the place of the first camera, upright, for a scene file without `lidar`.
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(LIDARS))]
+    lidar: Option<String>,
+    /// Folder for `scan.ply`; `out/`, the scene file's name and `scan` unless given.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print nothing but errors and the path of the file.
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// Grows a field about its LiDAR and scans it; returns the path of the file.
+pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
+    args.field.check()?;
+    let out = args.out.clone().unwrap_or_else(|| args.field.default_folder().join("scan"));
+    cli::check_folder(&out)?;
+    let tell = |words: &str| {
+        if !args.quiet {
+            furrow::tell!("{words}");
+        }
+    };
+    let threads = Threads::all()?;
+    let named = args.lidar.as_deref().and_then(LidarDesc::named);
+    let scanner = named.map_or(Scanner::OfScene, Scanner::AtCamera);
+    let field = args.field.grow_as(&FULL, |scene| scene.threads(&threads).scanned(scanner), tell)?;
+    let (lidar, echoes) = field.scan()?;
+    if echoes.is_empty() {
+        tell("warning: no pulse came back; see range, beams and min_intensity of the LiDAR: trace explain lidar");
+    }
+    let paths = output::scan::write(&out, field.grown(), lidar, &echoes)?;
+    let pulses = u64::from(lidar.columns()) * u64::from(lidar.beams());
+    tell(&format!("{}: {} echoes of {pulses} pulses in {}", args.field.path().display(), echoes.len(), out.display()));
+    Ok(paths)
+}

@@ -1,0 +1,131 @@
+//! What a LiDAR measures of a field: echoes with ranges, intensities and exact labels.
+//!
+//! The pulse of a beam is a bundle of rays, each with a share w of its energy ([`Lidar::rays`]). A ray that meets a surface at the range r brings back
+//!
+//! ```text
+//! w π f cos θ / r²
+//! ```
+//!
+//! where f is the surface's BSDF in near infrared for light that leaves as it came, and cos θ that of the ray to the normal: the LiDAR equation of targets that
+//! are larger than the beam, without what air takes, with 1 for a white, matt surface met squarely at 1 m. Rays whose ranges differ by less than half the
+//! length of the pulse make one echo: its intensity is their sum, its range their mean, weighed by what they bring, and its normal, labels and reflectance
+//! are those of the ray that brings most. The range errs by a normal number of the pulse's own.
+//!
+//! Sources: Wagner, Ullrich, Ducic, Melzer & Studnicka 2006, "Gaussian decomposition and calibration of a novel small-footprint full-waveform digitising airborne
+//! laser scanner", ISPRS Journal 60; Jelalian 1992, "Laser Radar Systems".
+
+use super::label::facing;
+use crate::geometry::{Hit, PACKET, Ray};
+use crate::integrator::World;
+use crate::math::{Spectrum, Vec3};
+use crate::sampling::{Purpose, Stream};
+use crate::sensor::{BeamRay, Lidar, Pulse};
+use rayon::prelude::*;
+
+/// One echo of one pulse.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Echo {
+    /// The pulse.
+    pub pulse: Pulse,
+    /// As it was measured, metres.
+    pub range: f32,
+    /// Of the LiDAR equation: 1 for a white, matt surface met squarely at 1 m.
+    pub intensity: f32,
+    /// Its place among the pulse's echoes that were detected, from 1 for the nearest, and their number.
+    pub number: u8,
+    /// Number of echoes that were detected of the pulse, told or not.
+    pub count: u8,
+    /// Index of the part that brings most of it.
+    pub part: u32,
+    /// Unit shading normal of its mesh there, on the side that the LiDAR sees.
+    pub normal: Vec3,
+    /// Its reflectance there.
+    pub reflectance: Spectrum,
+}
+
+impl Echo {
+    /// Where the LiDAR finds it: on the pulse's axis.
+    pub fn at(&self) -> Vec3 {
+        self.pulse.origin + self.pulse.direction * self.range
+    }
+}
+
+/// What one ray of a pulse brings back.
+struct Glint {
+    range: f32,
+    energy: f32,
+    ray: usize,
+    hit: Hit,
+    reflectance: Spectrum,
+}
+
+/// The echoes of one turn of a LiDAR, column by column and beam by beam. Ranges err by numbers of `stream`. Call it inside a pool.
+pub fn scan(world: &World<'_>, lidar: &Lidar, stream: &Stream) -> Vec<Echo> {
+    let beams = u64::from(lidar.beams());
+    let column = |column: u32| {
+        (0..lidar.beams()).flat_map(move |beam| {
+            let address = u64::from(column) * beams + u64::from(beam);
+            let mut errors = stream.child(Purpose::Lidar, address);
+            echoes(world, lidar, lidar.pulse(column, beam), &mut errors)
+        })
+    };
+    (0..lidar.columns()).into_par_iter().flat_map_iter(column).collect()
+}
+
+/// The echoes that a LiDAR tells of one pulse, by rising range.
+fn echoes(world: &World<'_>, lidar: &Lidar, pulse: Pulse, errors: &mut Stream) -> Vec<Echo> {
+    let rays = lidar.rays(&pulse);
+    let mut glints = glints(world, lidar, &rays);
+    glints.sort_by(|a, b| a.range.total_cmp(&b.range).then(a.ray.cmp(&b.ray)));
+    let clusters = glints.chunk_by(|near, far| far.range - near.range <= lidar.separation);
+    let mut all: Vec<Echo> = clusters.filter_map(|cluster| echo(world, lidar, pulse, &rays, cluster)).collect();
+    let count = all.len() as u8;
+    for (number, echo) in (1..).zip(&mut all) {
+        echo.range += (lidar.noise * errors.normal()) as f32;
+        (echo.number, echo.count) = (number, count);
+    }
+    let intensities: Vec<f32> = all.iter().map(|echo| echo.intensity).collect();
+    lidar.returns.told(&intensities).into_iter().map(|k| all[k]).collect()
+}
+
+/// What a pulse's rays bring back, in their order.
+fn glints(world: &World<'_>, lidar: &Lidar, rays: &[BeamRay]) -> Vec<Glint> {
+    let mut all = Vec::with_capacity(rays.len());
+    for (packet, some) in rays.chunks(PACKET).enumerate() {
+        let mut asked = [None; PACKET];
+        for (ray, asked) in some.iter().zip(&mut asked) {
+            *asked = Some(Ray::until(ray.origin, ray.direction, lidar.range[1]));
+        }
+        for (k, (hit, asked)) in world.geometry.closest_packet(&asked).into_iter().zip(&asked).enumerate() {
+            let (Some(hit), Some(asked)) = (hit, asked) else { continue };
+            let (back, reflectance) = world.backscatter(asked, &hit, lidar.spacing(hit.t));
+            let [.., nir] = back.to_array();
+            let energy = some[k].share * nir / (hit.t * hit.t);
+            all.push(Glint { range: hit.t, energy, ray: packet * PACKET + k, hit, reflectance });
+        }
+    }
+    all
+}
+
+/// The echo of what comes back at about one time; `None` where it is not detected.
+fn echo(world: &World<'_>, lidar: &Lidar, pulse: Pulse, rays: &[BeamRay], cluster: &[Glint]) -> Option<Echo> {
+    let energy: f32 = cluster.iter().map(|glint| glint.energy).sum();
+    let range = cluster.iter().map(|glint| glint.energy * glint.range).sum::<f32>() / energy;
+    // Nothing comes back of what is black, and then there is no range.
+    let [near, far] = lidar.range;
+    if !(energy > 0.0 && energy >= lidar.least && (near..=far).contains(&range)) {
+        return None;
+    }
+    let most = cluster.iter().reduce(|a, b| if b.energy > a.energy { b } else { a })?;
+    let mesh = &world.scene.parts[most.hit.part as usize].mesh;
+    Some(Echo {
+        pulse,
+        range,
+        intensity: energy,
+        number: 1,
+        count: 1,
+        part: most.hit.part,
+        normal: facing(mesh, &most.hit, rays[most.ray].direction),
+        reflectance: most.reflectance,
+    })
+}
