@@ -34,7 +34,7 @@ pub fn cloud(field: &Field, lidar: &Lidar, echoes: &[Echo]) -> Cloud {
         cloud.comment(&vector(name, axis));
     }
     cloud.comment(&vector("velocity_m_s", lidar.velocity));
-    let ids: BTreeMap<u16, u32> = field.plants.iter().map(|plant| (plant.number, plant.id)).collect();
+    let ids: BTreeMap<u32, u32> = field.plants.iter().map(|plant| (plant.number, plant.id)).collect();
     for echo in echoes {
         let part = &field.scene.parts[echo.part as usize];
         let [r, g, b, nir] = echo.reflectance.to_array().map(|linear| ColorSpace::Srgb.encode(linear));
@@ -44,7 +44,8 @@ pub fn cloud(field: &Field, lidar: &Lidar, echoes: &[Echo]) -> Cloud {
             rgb: [r, g, b],
             nir,
             kind: [part.tag.class as u8, field.kinds[echo.part as usize].number()],
-            label: [part.tag.plant, part.tag.leaf],
+            plant: part.tag.plant,
+            leaf: part.tag.leaf,
         };
         let pulse = &echo.pulse;
         cloud.add_with(

@@ -110,7 +110,7 @@ pub(in crate::accel) struct Geometry<F> {
     /// What the filter functions point to: it lives as long as the geometry, and does not move.
     filter: Option<Arc<F>>,
     /// The scene of an instance: Embree counts it, and this keeps what its filters point to.
-    shared: Option<Arc<Scene<F>>>,
+    _shared: Option<Arc<Scene<F>>>,
     /// Released after the geometry.
     device: Arc<Device>,
 }
@@ -141,7 +141,7 @@ impl<F: Filter> Geometry<F> {
         // SAFETY: the device lives; the number is among the headers' values.
         let handle = unsafe { sys::rtcNewGeometry(device.handle(), sys::RTC_GEOMETRY_TYPE_TRIANGLE) };
         let handle = device.made(handle)?;
-        let mut geometry = Self { handle, filter: filter.map(Arc::new), shared: None, device: device.clone() };
+        let mut geometry = Self { handle, filter: filter.map(Arc::new), _shared: None, device: device.clone() };
         let (points, count) = (corners.len().max(1), triangles.len().max(1));
         let to = geometry.buffer(sys::RTC_BUFFER_TYPE_VERTEX, sys::RTC_FORMAT_FLOAT3, points)?;
         fill(to, corners.iter().map(Vec3::to_array));
@@ -170,7 +170,7 @@ impl<F: Filter> Geometry<F> {
         let device = of.device.clone();
         // SAFETY: the device lives; the number is among the headers' values.
         let handle = device.made(unsafe { sys::rtcNewGeometry(device.handle(), sys::RTC_GEOMETRY_TYPE_INSTANCE) })?;
-        let geometry = Self { handle, filter: None, shared: Some(of.clone()), device };
+        let geometry = Self { handle, filter: None, _shared: Some(of.clone()), device };
         let columns = columns.map(|column| column.to_array());
         // SAFETY: geometry and scene live, are of one device, and the scene is committed. The format has 3 × 4 floats, which Embree copies.
         unsafe {

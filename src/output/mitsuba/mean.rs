@@ -5,7 +5,7 @@
 //! that each gives. What hides them from either, and light that was scattered before, are left out.
 
 use crate::bsdf::SurfaceLayer;
-use crate::geometry::{Hit, Interaction};
+use crate::geometry::Hit;
 use crate::math::{Spectrum, Vec2, Vec3, vec2};
 use crate::scene::tag::Class;
 use crate::scene::{Part, Scene};

@@ -39,7 +39,7 @@ impl Stands {
 
 impl Builder<'_> {
     /// Grows every plant and stands it on the ground.
-    fn plant(
+    pub(super) fn plant(
         &mut self,
         seedlings: &[Seedling],
         floor: Option<Floor<'_>>,
@@ -126,7 +126,7 @@ impl Builder<'_> {
     }
 
     /// Puts a plant's organs into the scene: meshes of the world, or of a bank's plant that stands as an instance.
-    fn put_organs(&mut self, number: u16, organs: &[Grown], materials: &[u32], instance: Option<&Arc<Placement>>) {
+    fn put_organs(&mut self, number: u32, organs: &[Grown], materials: &[u32], instance: Option<&Arc<Placement>>) {
         for (organ, material) in organs.iter().zip(materials) {
             self.organs.push(organ.kind);
             let tag = Tag { plant: number, ..organ.part.tag };
