@@ -1,0 +1,286 @@
+//! Plants that share their meshes are plants like any other.
+//!
+//! Rationale: a hectare fits into memory only where its plants share meshes, and a label, a shadow or a trait of one that is wrong is not seen
+//! among a hundred thousand. Expected: rays meet the same parts at the same distances as on copies of the meshes in the world; a field of instances
+//! has the plants, places, rows and cover of one whose plants have shapes of their own; nothing depends on threads or on what else is in view.
+//! Source: `accel::brute`, Möller & Trumbore 1997 in double precision, over the copies; the same scene file in other detail.
+
+mod common;
+
+use common::program::{field, hash, shoot};
+use common::scenes::square;
+use furrow::accel::{Brute, EmbreeAccel, Surface};
+use furrow::geometry::{AlphaMask, Interaction, Intersect, Mesh, PACKET, Placement, Ray};
+use furrow::math::{Mat3, Vec3, vec2, vec3};
+use furrow::sampling::{Purpose, Stream};
+use furrow::scene::assemble::Options;
+use furrow::scene::tag::Class;
+use furrow::scene::traits::Traits;
+use furrow::scene::{Field, Part, PlantRecord};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+fn stream(index: u64) -> Stream {
+    Stream::of(23, 0, Purpose::Test, index)
+}
+
+fn unit(s: &mut Stream) -> Vec3 {
+    vec3(s.normal() as f32, s.normal() as f32, s.normal() as f32).normalize()
+}
+
+fn point(s: &mut Stream, reach: f32) -> Vec3 {
+    vec3(s.range32(-reach, reach), s.range32(-reach, reach), s.range32(-reach, reach))
+}
+
+/// One organ: its mesh and mask.
+type Organ = (Arc<Mesh>, Option<Arc<AlphaMask>>);
+
+/// Two plants of three and two organs: bent sheets with a mask of stripes, and without.
+fn plants() -> [Vec<Organ>; 2] {
+    let stripes = Arc::new(AlphaMask::new(32, 32, |x, y| x % 8 < 5 && y % 16 < 11));
+    let mut s = stream(0);
+    let mut sheet = |mask: Option<&Arc<AlphaMask>>| {
+        let n = 5;
+        let mut mesh = Mesh::default();
+        for i in 0..=n {
+            for j in 0..=n {
+                let (u, v) = (j as f32 / n as f32, i as f32 / n as f32);
+                mesh.positions.push(vec3(u - 0.5, v - 0.5, 0.4 * v * v - 0.1 * (9.0 * u).sin()) * 0.5);
+                mesh.uvs.push(vec2(u, v));
+                if i < n && j < n {
+                    let (a, b) = (i * (n + 1) + j, (i + 1) * (n + 1) + j);
+                    mesh.triangles.extend([[a, a + 1, b], [a + 1, b + 1, b]]);
+                }
+            }
+        }
+        mesh.recompute_normals();
+        mesh.transform(Mat3::from_axis_angle(unit(&mut s), s.range32(0.0, 3.0)), point(&mut s, 0.2));
+        (Arc::new(mesh), mask.cloned())
+    };
+    [vec![sheet(Some(&stripes)), sheet(None), sheet(Some(&stripes))], vec![sheet(None), sheet(Some(&stripes))]]
+}
+
+/// Parts of a stand: a sheet of its own, seven instances of the two plants in turn, another sheet; and the same as copies in the world.
+fn stand() -> (Vec<Part>, Vec<Part>) {
+    let mut s = stream(1);
+    let part = |mesh: Arc<Mesh>, mask: Option<Arc<AlphaMask>>, instance: Option<Arc<Placement>>| {
+        let tag = furrow::scene::tag::Tag { class: Class::Crop, plant: 1, leaf: 1 };
+        Part { mesh, mask, material: 0, tag, instance }
+    };
+    let own = |z: f32| part(Arc::new(square(vec3(0.0, 0.0, z), 0.6)), None, None);
+    let mut all = vec![own(0.8)];
+    let plants = plants();
+    for k in 0..7 {
+        let rotation = Mat3::from_axis_angle(unit(&mut s), s.range32(0.0, 6.0));
+        let at = Arc::new(Placement { rotation, offset: point(&mut s, 0.8) });
+        all.extend(plants[k % 2].iter().map(|(mesh, mask)| part(mesh.clone(), mask.clone(), Some(at.clone()))));
+    }
+    all.push(own(-0.8));
+    let copy = |p: &Part| Part { mesh: Arc::new(p.in_world().into_owned()), instance: None, ..p.clone() };
+    let copies = all.iter().map(copy).collect();
+    (all, copies)
+}
+
+fn surfaces(parts: &[Part]) -> Vec<Surface<'_>> {
+    parts.iter().map(Part::surface).collect()
+}
+
+/// A ray from anywhere toward the stand or anywhere.
+fn ray(s: &mut Stream, toward: bool) -> Ray {
+    let origin = point(s, 1.6);
+    Ray::new(origin, if toward { (point(s, 0.9) - origin).normalize() } else { unit(s) })
+}
+
+/// Expected: the same part and triangle at the same distance, the same shadow, place and normals, but where a ray that is moved by what single
+/// precision loses in a rotation answers otherwise.
+#[test]
+fn instances_meet_what_their_copies_meet() {
+    let (parts, copies) = stand();
+    let [instanced, plain] = [&parts, &copies].map(|parts| EmbreeAccel::build(&surfaces(parts), 1).unwrap());
+    let all = surfaces(&copies);
+    let brute = Brute::new(&all);
+    let mut s = stream(2);
+    let (mut met, mut masked, mut close) = (0, 0, 0);
+    for i in 0..60_000 {
+        let ray = ray(&mut s, i % 2 == 0);
+        let (got, expected) = (instanced.closest(&ray), brute.closest(&ray));
+        assert_eq!(instanced.occluded(&ray), got.is_some(), "{ray:?}: occluded and closest disagree");
+        match (got, expected) {
+            (Some(g), Some(e)) if g.part == e.part && (g.t - e.t).abs() <= 2e-5 => {
+                met += 1;
+                masked += usize::from(parts[g.part as usize].mask.is_some());
+                let Some(p) = plain.closest(&ray).filter(|p| (p.part, p.triangle) == (g.part, g.triangle)) else {
+                    continue;
+                };
+                let at = parts[g.part as usize].interaction(&g, 1e-3);
+                let copy: Interaction = copies[p.part as usize].interaction(&p, 1e-3);
+                assert!(at.p.distance(copy.p) < 5e-5, "{ray:?}: {} and {}", at.p, copy.p);
+                assert!(at.p.distance(ray.origin + ray.direction * g.t) < 5e-5);
+                assert!(at.ng.dot(copy.ng) > 0.99999 && at.ns.dot(copy.ns) > 0.99999);
+                // A ray that leaves it does not meet it again at once.
+                let away = at.ray(at.ng, 1e-3);
+                assert!(instanced.closest(&away).is_none_or(|h| h.part != g.part), "{away:?} meets what it leaves");
+            }
+            (None, None) => {}
+            _ => {
+                let frame = furrow::math::Frame::about(ray.direction);
+                let moved = |angle: u32| {
+                    let (sin, cos) = (angle as f32 * std::f32::consts::FRAC_PI_4).sin_cos();
+                    Ray { origin: ray.origin + (frame.x * cos + frame.y * sin) * 4e-6, ..ray }
+                };
+                let excusable = (0..8).any(|k| brute.closest(&moved(k)).map(|h| h.part) == got.map(|h| h.part));
+                assert!(excusable, "{ray:?}: instances {got:?}, every triangle {expected:?}");
+                close += 1;
+            }
+        }
+    }
+    assert!(met > 12_000 && masked > 5_000, "{met} hits, {masked} of them masked: that tests little");
+    assert!(close <= 30, "{close} rays too close to an edge: single precision is not that bad");
+}
+
+#[test]
+fn packets_meet_instances_as_single_rays_do() {
+    let (parts, _) = stand();
+    let embree = EmbreeAccel::build(&surfaces(&parts), 2).unwrap();
+    let mut s = stream(3);
+    let (mut met, mut dark) = (0, 0);
+    for i in 0..8000 {
+        let first = ray(&mut s, true);
+        let rays: [Option<Ray>; PACKET] = std::array::from_fn(|_| {
+            let apart = if i % 3 == 0 { ray(&mut s, true) } else { first };
+            let direction = (apart.direction + unit(&mut s) * 0.01).normalize();
+            (s.uniform32() > 0.2).then_some(Ray::until(apart.origin, direction, 3.0))
+        });
+        let (hits, shadows) = (embree.closest_packet(&rays), embree.occluded_packet(&rays));
+        for ((ray, hit), shadow) in rays.iter().zip(hits).zip(shadows) {
+            let alone = ray.and_then(|ray| embree.closest(&ray));
+            assert_eq!(hit.map(|h| (h.part, h.triangle)), alone.map(|h| (h.part, h.triangle)), "{ray:?}");
+            assert_eq!(shadow, ray.is_some_and(|ray| embree.occluded(&ray)), "{ray:?}");
+            met += usize::from(hit.is_some());
+            dark += usize::from(shadow);
+        }
+    }
+    assert!(met > 10_000 && dark > 10_000, "{met} met, {dark} dark");
+}
+
+/// A field from 14 m: pixels of more than 4 mm, plants of two populations.
+fn meadow(detail: &str, x: f32) -> Field {
+    let text = format!(
+        r#"Field(
+            seed: 31,
+            detail: {detail},
+            reach_m: 6,
+            camera: Pinhole(size: (240, 240), intrinsics: FieldOfView(horizontal_deg: 16), pose: LookAt(position_m: ({x}, -0.01, 14), target_m: ({x}, 0, 0))),
+            lights: [Daylight(sun: Angles(elevation_deg: 47, azimuth_deg: 150), turbidity: 3.5)],
+            soil: (
+                layers: [(albedo: "textures/soil/dirt.png", height: "textures/soil/dirt.height.png", size_m: 0.5, height_mm: (-4, 8))],
+                moisture: (mean: 0.35),
+            ),
+            crops: [(species: "scenes/species/sugar_beet.ron", growth: Bbch(18), rows: (in_row_m: 0.18))],
+            weeds: [(species: "scenes/species/chenopodium.ron", growth: AgeDays(Uniform(14, 30)), spread: (per_m2: 12))],
+        )"#
+    );
+    field(&text, &Options::default())
+}
+
+fn distinct(field: &Field) -> usize {
+    field.scene.parts.iter().map(|part| Arc::as_ptr(&part.mesh)).collect::<BTreeSet<_>>().len()
+}
+
+/// Expected: plants of the same identities at the same places, as high, as wide and with as many leaves in the mean; pixels of crop and of weed as
+/// many as where plants have own shapes within a tenth; each labelled pixel within its plant's radius; fewer meshes.
+#[test]
+fn a_field_of_instances_has_the_plants_of_the_field() {
+    let [own, shared] = ["ByPixel", "Instanced"].map(|detail| meadow(detail, 0.0));
+    assert!(shared.scene.parts.iter().any(|part| part.instance.is_some()));
+    assert!(own.scene.parts.iter().all(|part| part.instance.is_none()));
+    let places = |field: &Field| field.plants.iter().map(|p| (p.id, p.position)).collect::<BTreeMap<_, _>>();
+    let (a, b) = (places(&own), places(&shared));
+    let both: Vec<u32> = a.keys().filter(|id| b.contains_key(id)).copied().collect();
+    // Those whose shadows alone reach the view may differ with their heights.
+    assert!(
+        both.len() > 150 && both.len() * 20 > 19 * a.len().max(b.len()),
+        "{} of {} and {}",
+        both.len(),
+        a.len(),
+        b.len()
+    );
+    assert!(both.iter().all(|id| a[id].distance(b[id]) < 1e-6));
+    let mean = |field: &Field, of: fn(&PlantRecord) -> f32| {
+        let beets: Vec<f32> = field.plants.iter().filter(|p| p.eppo == "BEAVX").map(of).collect();
+        beets.iter().sum::<f32>() / beets.len() as f32
+    };
+    let sizes: [fn(&PlantRecord) -> f32; 3] = [|p| p.radius, |p| p.height, |p| p.leaves as f32];
+    for of in sizes {
+        let (own, shared) = (mean(&own, of), mean(&shared, of));
+        assert!((own / shared - 1.0).abs() < 0.06, "{own} and {shared}");
+    }
+    assert!(distinct(&shared) < distinct(&own), "{} and {}", distinct(&shared), distinct(&own));
+
+    let [(_, own_labels), (_, labels)] = [&own, &shared].map(|field| shoot(field, 1, 2));
+    let pixels = |labels: &furrow::render::LabelMap, class: Class| {
+        labels.tags.iter().filter(|tag| tag.class == class).count() as f32
+    };
+    for class in [Class::Crop, Class::Weed] {
+        let (own, shared) = (pixels(&own_labels, class), pixels(&labels, class));
+        assert!(own > 500.0 && (own / shared - 1.0).abs() < 0.1, "{class:?}: {own} and {shared}");
+    }
+    // The camera looks straight down: 14 m · 2 tan 8° over 240 pixels.
+    let pixel = 14.0 * 2.0 * 8.0_f32.to_radians().tan() / 240.0;
+    let plant: BTreeMap<u32, _> = shared.plants.iter().map(|p| (p.number, p)).collect();
+    for (k, tag) in labels.tags.iter().enumerate().filter(|(_, tag)| tag.plant > 0) {
+        let at = vec2((k % 240) as f32 - 119.5, 119.5 - (k / 240) as f32) * pixel;
+        let p = plant[&tag.plant];
+        // What lies h over the ground is seen up to h · tan 11° farther out.
+        let off = at.distance(p.position.truncate());
+        assert!(
+            off < 1.05 * p.radius + 0.2 * p.height + 2.0 * pixel,
+            "plant {} is seen {off} m from its foot",
+            tag.plant
+        );
+    }
+}
+
+/// Expected: the same bits on one and on two threads; the plants that two views share have the same meshes, turned in the same way.
+#[test]
+fn instances_do_not_depend_on_threads_or_the_view() {
+    let field = meadow("Instanced", 0.0);
+    let bits = |threads: usize| {
+        let (film, labels) = shoot(&field, 2, threads);
+        let pixels = film.pixels.iter().flat_map(|p| p.mean.to_array().map(f32::to_bits));
+        (hash(pixels), hash(labels.tags.iter().map(|tag| tag.plant)))
+    };
+    assert_eq!(bits(1), bits(2));
+    let shapes = |field: &Field| {
+        let ids: BTreeMap<u32, u32> = field.plants.iter().map(|p| (p.number, p.id)).collect();
+        let mut of: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        for part in field.scene.parts.iter().filter(|part| part.instance.is_some()) {
+            let ends = part.bounds().map(|(lo, hi)| [lo, hi].map(|p| p.to_array().map(f32::to_bits)));
+            of.entry(ids[&part.tag.plant]).or_default().extend(ends.iter().flatten().flatten());
+        }
+        of
+    };
+    let (here, there) = (shapes(&field), shapes(&meadow("Instanced", 0.7)));
+    let both: Vec<u32> = here.keys().filter(|id| there.contains_key(id)).copied().collect();
+    assert!(both.len() > 100, "{}", both.len());
+    // Plants near the far edge of one view may be of another octave there: their meshes differ, their choice does not.
+    let same = both.iter().filter(|id| here[id] == there[id]).count();
+    assert!(same * 10 >= 9 * both.len(), "{same} of {}", both.len());
+}
+
+/// Expected: leaf area, height and cover of a field of instances are those of its copies in the world.
+#[test]
+fn traits_of_instances_are_those_of_their_copies() {
+    let field = meadow("Instanced", 0.0);
+    let copy = |p: &Part| Part { mesh: Arc::new(p.in_world().into_owned()), instance: None, ..p.clone() };
+    let mut copies = meadow("Instanced", 0.0);
+    copies.scene.parts = copies.scene.parts.iter().map(copy).collect();
+    let (shared, own) = (Traits::of(&field), Traits::of(&copies));
+    assert!(shared.plants.len() > 150 && shared.plants.keys().eq(own.plants.keys()));
+    for (number, plant) in &shared.plants {
+        let copy = &own.plants[number];
+        let near = |a: f32, b: f32| (a - b).abs() <= 2e-3 * b.abs() + 1e-6;
+        assert!(near(plant.leaf_area_m2, copy.leaf_area_m2) && near(plant.top_m, copy.top_m), "plant {number}");
+        assert!((plant.cover_m2 - copy.cover_m2).abs() <= 0.02 * copy.cover_m2 + 1e-6, "plant {number}");
+    }
+}
