@@ -102,7 +102,7 @@ fn points_are_uniform_on_their_triangles() {
     for at in &own {
         let corners = stem.iter().flat_map(|mesh| (0..mesh.triangles.len() as u32).map(|i| mesh.corners(i)));
         let place = corners.filter_map(|corners| {
-            let [a, b, c] = corners.map(|corner| corner.as_dvec3());
+            let [a, b, c] = corners.map(Vec3::as_dvec3);
             let (e1, e2, p) = (b - a, c - a, at.as_dvec3() - a);
             let n = e1.cross(e2);
             let (u, v) = (p.cross(e2).dot(n) / n.length_squared(), e1.cross(p).dot(n) / n.length_squared());

@@ -17,7 +17,7 @@ const NEAR: f64 = 0.3;
 /// Surplus of the rows' score, standard deviations, at which they are as likely as not.
 const LIKELY: f64 = 2.0;
 /// Surplus below which lines are no rows and places count nothing.
-const CHANCE: f64 = 0.5;
+const CHANCE: f64 = 1.0;
 /// Probability that is added to both classes' means over a region: what is sure stays finite.
 const SURE: f64 = 0.02;
 
@@ -71,6 +71,7 @@ fn arranged(regions: &Components, size: (usize, usize), sums: &[f64]) -> Vec<usi
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sampling::{Purpose, Stream};
 
     /// Expected: of a plant said to be crop, weed, crop all is crop, by its sums; one apart from it stays weed; soil stays soil. Source: the rule.
     #[test]
@@ -108,11 +109,12 @@ mod tests {
         p
     }
 
-    /// Expected: of equal squares that a network takes for rather crop, those between rows are weeds and those in rows crop; where they stand
-    /// in no rows all stay what the network says, bit for bit; of two squares that stand alone the small one is a weed where the network
-    /// is of two minds, and stays crop where it is sure. Source: the rule.
+    /// Expected: of equal squares that a network takes for rather crop, those between rows are weeds and those in rows crop; where plants
+    /// stand at random and the network is sure, lines are found by chance in one picture of six, the upper tail of a normal number above 1,
+    /// which is 6.3 of 40 with a standard deviation of 2.3, and all else stays what the network says, bit for bit; of two squares that stand
+    /// alone the small one is a weed where the network is of two minds, and stays crop where it is sure. Source: the rule.
     #[test]
-    fn weeds_are_found_between_rows_and_stay_what_they_are_without_rows() {
+    fn weeds_are_found_between_rows_and_seldom_where_there_are_none() {
         let class = |p: &[f32], (x, y, _): &(usize, usize, usize)| {
             let at = y * 300 + x;
             if p[90_000 + at] > p[180_000 + at] { 1 } else { 2 }
@@ -123,24 +125,19 @@ mod tests {
         refine((300, 300), &mut p, None, true);
         assert!(crops.iter().all(|plant| class(&p, plant) == 1) && weeds.iter().all(|plant| class(&p, plant) == 2));
 
-        // Halton's points: spread evenly, in no rows.
-        let radical = |k: usize, base: usize| {
-            let (mut rest, mut share, mut value) = (k, 1.0, 0.0);
-            while rest > 0 {
-                share /= base as f64;
-                value += share * (rest % base) as f64;
-                rest /= base;
-            }
-            (6.0 + 288.0 * value) as usize
+        let plants_of = |picture: u64| -> Vec<_> {
+            let mut s = Stream::of(11, picture, Purpose::Test, 0);
+            (0..30).map(|_| (6 + s.index(288), 6 + s.index(288), 3)).collect()
         };
-        let anywhere: Vec<_> = (1..=30).map(|k| (radical(k, 2), radical(k, 3), 3)).collect();
-        for (crop, weed) in [(0.75, 0.05), (0.05, 0.75)] {
-            let mut p = squares(&anywhere, crop, weed);
+        let changed = |picture: &u64| {
+            let mut p = squares(&plants_of(*picture), 0.75, 0.05);
             let mut voted = p.clone();
             refine((300, 300), &mut voted, None, false);
             refine((300, 300), &mut p, None, true);
-            assert!(p == voted);
-        }
+            p != voted
+        };
+        let changed = (0..40).filter(changed).count();
+        assert!(changed <= 14, "{changed} of 40");
 
         let two = [(100, 150, 20), (250, 60, 5)];
         for (crop, expected) in [(0.45, 2), (0.88, 1)] {
