@@ -63,10 +63,7 @@ pub fn label(geometry: &dyn Intersect, parts: &[Part], camera: &Camera, window: 
             row[x] = hit.part;
             tags[x] = part.tag;
             depth[x] = hit.t * ray.direction.dot(camera.pose().axes.z_axis);
-            normals[x] = match &part.instance {
-                None => facing(&part.mesh, hit, ray.direction),
-                Some(at) => at.direction(facing(&part.mesh, hit, at.to_mesh(ray.direction))),
-            };
+            normals[x] = normal(part, hit, ray.direction);
         });
     });
     map
@@ -98,10 +95,18 @@ pub fn row_hits(
     }
 }
 
+/// The normal of a part's mesh at a hit, world, on the side that a ray along `direction` comes from.
+pub(super) fn normal(part: &Part, hit: &Hit, direction: Vec3) -> Vec3 {
+    match &part.instance {
+        None => facing(&part.mesh, hit, direction),
+        Some(at) => at.direction(facing(&part.mesh, hit, at.to_mesh(direction))),
+    }
+}
+
 /// The interpolated unit normal at a hit on the side that a ray along `direction` comes from. Near the outline of a curved
 /// surface it may point away from the eye, which the triangle's own normal never does.
 #[inline]
-pub(super) fn facing(mesh: &Mesh, hit: &Hit, direction: Vec3) -> Vec3 {
+fn facing(mesh: &Mesh, hit: &Hit, direction: Vec3) -> Vec3 {
     let corners = mesh.triangles[hit.triangle as usize].map(|i| i as usize);
     let [a, b, c] = corners.map(|i| mesh.positions[i]);
     let [na, nb, nc] = corners.map(|i| mesh.normals[i]);

@@ -8,19 +8,25 @@
 //!
 //! where f is the surface's BSDF in near infrared for light that leaves as it came, and cos θ that of the ray to the normal: the LiDAR equation of targets that
 //! are larger than the beam, without what air takes, with 1 for a white, matt surface met squarely at 1 m. Rays whose ranges differ by less than half the
-//! length of the pulse make one echo: its intensity is their sum, its range their mean, weighed by what they bring, and its normal, labels and reflectance
-//! are those of the ray that brings most. The range errs by a normal number of the pulse's own.
+//! length of the pulse make one echo: its intensity is their sum, its range their mean, weighed by what they bring, and its labels are those of the leaf, or
+//! whatever else has a label of its own, that brings most of it; normal and reflectance are those where that is brightest. Neighbouring rays on one leaf, or
+//! both on the soil, may lie as much farther apart as that surface stretches along them between their distances across, d tan θ: a slope is one long echo.
+//! The range of each echo errs by a normal number of its own; what is then out of the range that the LiDAR tells is not told.
 //!
 //! Sources: Wagner, Ullrich, Ducic, Melzer & Studnicka 2006, "Gaussian decomposition and calibration of a novel small-footprint full-waveform digitising airborne
 //! laser scanner", ISPRS Journal 60; Jelalian 1992, "Laser Radar Systems".
 
-use super::label::facing;
-use crate::geometry::{Hit, PACKET, Ray};
+use super::label::normal;
+use crate::geometry::{PACKET, Ray};
 use crate::integrator::World;
 use crate::math::{Spectrum, Vec3};
 use crate::sampling::{Purpose, Stream};
+use crate::scene::Part;
 use crate::sensor::{BeamRay, Lidar, Pulse};
 use rayon::prelude::*;
+
+/// Least cosine by which a surface is taken to stretch along a ray.
+const LEAST_COS: f32 = 5e-3;
 
 /// One echo of one pulse.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,7 +41,7 @@ pub struct Echo {
     pub number: u8,
     /// Number of echoes that were detected of the pulse, told or not.
     pub count: u8,
-    /// Index of the part that brings most of it.
+    /// Index of the part with its label, that of what brings most of it; the part that shows the brightest of that.
     pub part: u32,
     /// Unit shading normal of its mesh there, on the side that the LiDAR sees.
     pub normal: Vec3,
@@ -53,9 +59,11 @@ impl Echo {
 /// What one ray of a pulse brings back.
 struct Glint {
     range: f32,
+    /// How much deeper than it is wide: range over which the surface stretches within the width of the ray, metres.
+    depth: f32,
     energy: f32,
-    ray: usize,
-    hit: Hit,
+    part: u32,
+    normal: Vec3,
     reflectance: Spectrum,
 }
 
@@ -74,14 +82,23 @@ pub fn scan(world: &World<'_>, lidar: &Lidar, stream: &Stream) -> Vec<Echo> {
 
 /// The echoes that a LiDAR tells of one pulse, by rising range.
 fn echoes(world: &World<'_>, lidar: &Lidar, pulse: Pulse, errors: &mut Stream) -> Vec<Echo> {
-    let rays = lidar.rays(&pulse);
-    let mut glints = glints(world, lidar, &rays);
-    glints.sort_by(|a, b| a.range.total_cmp(&b.range).then(a.ray.cmp(&b.ray)));
-    let clusters = glints.chunk_by(|near, far| far.range - near.range <= lidar.separation);
-    let mut all: Vec<Echo> = clusters.filter_map(|cluster| echo(world, lidar, pulse, &rays, cluster)).collect();
+    let parts = &world.scene.parts;
+    let mut glints = glints(world, lidar, &lidar.rays(&pulse));
+    glints.sort_by(|a, b| a.range.total_cmp(&b.range));
+    let clusters = glints.chunk_by(|near, far| {
+        let same = parts[near.part as usize].tag == parts[far.part as usize].tag;
+        let stretched = if same { 0.5 * (near.depth + far.depth) } else { 0.0 };
+        far.range - near.range <= lidar.separation + stretched
+    });
+    let mut all: Vec<Echo> = clusters.filter_map(|cluster| echo(parts, lidar, pulse, cluster)).collect();
+    for echo in &mut all {
+        echo.range += (lidar.noise * errors.normal()) as f32;
+    }
+    // What is told is what was measured: its order too, and none beyond the range.
+    all.retain(|echo| lidar.tells(echo.range));
+    all.sort_by(|a, b| a.range.total_cmp(&b.range));
     let count = all.len() as u8;
     for (number, echo) in (1..).zip(&mut all) {
-        echo.range += (lidar.noise * errors.normal()) as f32;
         (echo.number, echo.count) = (number, count);
     }
     let intensities: Vec<f32> = all.iter().map(|echo| echo.intensity).collect();
@@ -91,41 +108,52 @@ fn echoes(world: &World<'_>, lidar: &Lidar, pulse: Pulse, errors: &mut Stream) -
 /// What a pulse's rays bring back, in their order.
 fn glints(world: &World<'_>, lidar: &Lidar, rays: &[BeamRay]) -> Vec<Glint> {
     let mut all = Vec::with_capacity(rays.len());
-    for (packet, some) in rays.chunks(PACKET).enumerate() {
+    for some in rays.chunks(PACKET) {
         let mut asked = [None; PACKET];
         for (ray, asked) in some.iter().zip(&mut asked) {
             *asked = Some(Ray::until(ray.origin, ray.direction, lidar.range[1]));
         }
-        for (k, (hit, asked)) in world.geometry.closest_packet(&asked).into_iter().zip(&asked).enumerate() {
+        let hits = world.geometry.closest_packet(&asked);
+        for ((beam, asked), hit) in some.iter().zip(&asked).zip(hits) {
             let (Some(hit), Some(asked)) = (hit, asked) else { continue };
-            let (back, reflectance) = world.backscatter(asked, &hit, lidar.spacing(hit.t));
+            let width = lidar.spacing(hit.t);
+            let (back, reflectance) = world.backscatter(asked, &hit, width);
             let [.., nir] = back.to_array();
-            let energy = some[k].share * nir / (hit.t * hit.t);
-            all.push(Glint { range: hit.t, energy, ray: packet * PACKET + k, hit, reflectance });
+            let normal = normal(&world.scene.parts[hit.part as usize], &hit, asked.direction);
+            let cos = normal.dot(asked.direction).abs().clamp(LEAST_COS, 1.0);
+            all.push(Glint {
+                range: hit.t,
+                depth: width * (1.0 - cos * cos).sqrt() / cos,
+                energy: beam.share * nir / (hit.t * hit.t),
+                part: hit.part,
+                normal,
+                reflectance,
+            });
         }
     }
     all
 }
 
 /// The echo of what comes back at about one time; `None` where it is not detected.
-fn echo(world: &World<'_>, lidar: &Lidar, pulse: Pulse, rays: &[BeamRay], cluster: &[Glint]) -> Option<Echo> {
+fn echo(parts: &[Part], lidar: &Lidar, pulse: Pulse, cluster: &[Glint]) -> Option<Echo> {
     let energy: f32 = cluster.iter().map(|glint| glint.energy).sum();
     let range = cluster.iter().map(|glint| glint.energy * glint.range).sum::<f32>() / energy;
     // Nothing comes back of what is black, and then there is no range.
-    let [near, far] = lidar.range;
-    if !(energy > 0.0 && energy >= lidar.least && (near..=far).contains(&range)) {
+    if !(energy > 0.0 && energy >= lidar.least && lidar.tells(range)) {
         return None;
     }
-    let most = cluster.iter().reduce(|a, b| if b.energy > a.energy { b } else { a })?;
-    let mesh = &world.scene.parts[most.hit.part as usize].mesh;
+    let tag = |glint: &Glint| parts[glint.part as usize].tag;
+    let of_its_kind = |glint: &Glint| cluster.iter().filter(|g| tag(g) == tag(glint)).map(|g| g.energy).sum::<f32>();
+    let rank = |glint: &Glint| (of_its_kind(glint), glint.energy);
+    let most = cluster.iter().reduce(|a, b| if rank(b) > rank(a) { b } else { a })?;
     Some(Echo {
         pulse,
         range,
         intensity: energy,
         number: 1,
         count: 1,
-        part: most.hit.part,
-        normal: facing(mesh, &most.hit, rays[most.ray].direction),
+        part: most.part,
+        normal: most.normal,
         reflectance: most.reflectance,
     })
 }

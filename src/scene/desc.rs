@@ -44,7 +44,8 @@ pub struct FieldDesc {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-example" = "(frames: 20, path: AlongRows(speed_m_s: 0.5))"))]
     pub drive: Option<DriveDesc>,
-    /// A rotating LiDAR, carried with the cameras; `trace scan` writes its points. Images do not depend on it.
+    /// A rotating LiDAR, carried with the cameras; `trace scan` writes its points, of a field that is made as finely as its beams are wide. Images
+    /// do not depend on it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-example" = "Vlp16(position_m: (0, 0, 1.5))"))]
     pub lidar: Option<LidarDesc>,

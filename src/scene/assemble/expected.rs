@@ -35,7 +35,8 @@ impl Source {
     pub(super) fn ask<T>(&self, options: &Options, question: impl FnOnce(&mut Builder<'_>) -> Result<T>) -> Result<T> {
         let held = || self.library.lock().unwrap_or_else(PoisonError::into_inner);
         let library = held().clone();
-        let mut builder = Builder::new(&self.page, &self.desc, options, library)?;
+        let desc = super::scanner::grown(&self.desc, options.scan.as_ref());
+        let mut builder = Builder::new(&self.page, &desc, options, library)?;
         let answer = question(&mut builder)?;
         // What was read is read once.
         *held() = builder.library;

@@ -154,7 +154,8 @@ impl Source {
         let held = || self.library.lock().unwrap_or_else(PoisonError::into_inner);
         // A copy of names and references: fields that are built at once do not wait for each other.
         let library = held().clone();
-        let (field, library) = Builder::new(&self.page, &self.desc, options, library)?.build()?;
+        let desc = scanner::grown(&self.desc, options.scan.as_ref());
+        let (field, library) = Builder::new(&self.page, &desc, options, library)?.build()?;
         *held() = library;
         Ok(field)
     }

@@ -7,11 +7,13 @@ use super::view::{LONGEST_REACH, View, meets};
 use crate::math::{Vec2, Vec3};
 use crate::ron_file::{RonFile, Step};
 use crate::sampling::{Purpose, Stream};
+use crate::scene::desc::Detail;
 use crate::scene::desc::FieldDesc;
 use crate::scene::drive::{Capture, FIRST};
 use crate::sensor::{Camera, LIDARS, Lidar};
 use crate::soil::Rect;
 use crate::{Error, Result};
+use std::borrow::Cow;
 
 /// Address of the stream from which the LiDAR is drawn, behind those of cameras and drives.
 const LIDAR: u64 = 5 << 32;
@@ -20,6 +22,14 @@ const LOOKED_AT: u32 = 120;
 
 /// The field at which an error about the LiDAR points.
 const AT: [Step<'static>; 1] = [Step::Field("lidar")];
+
+/// A scene file as it is grown: for a scan as finely as the LiDAR's beams are wide where it says nothing of detail.
+pub(super) fn grown<'a>(desc: &'a FieldDesc, scan: Option<&Scanner>) -> Cow<'a, FieldDesc> {
+    match desc.detail {
+        Detail::Full if scan.is_some() => Cow::Owned(FieldDesc { detail: Detail::ByPixel, ..desc.clone() }),
+        _ => Cow::Borrowed(desc),
+    }
+}
 
 /// The LiDAR at each frame of a field's drive; none unless it is scanned. `first` is the first camera as it is written.
 pub(super) fn at_frames(
@@ -50,8 +60,9 @@ pub(super) fn at_frames(
     let frames = captures.iter().filter(|capture| capture.name == FIRST);
     let carried = |capture: &Capture| {
         let lidar = capture.vehicle.carry_lidar(&lidar);
-        let Vec3 { z, .. } = lidar.position;
-        if !(z > 0.0) || lidar.position.abs().max_element() > FARTHEST {
+        // Where the turn begins, and where it ends.
+        let way = [lidar.position, lidar.pulse(lidar.columns() - 1, 0).origin];
+        if way.iter().any(|at| !(at.z > 0.0 && at.abs().max_element() <= FARTHEST)) {
             let words = format!("the LiDAR lies under the ground or more than {FARTHEST} m from the field's origin");
             let frame = format!("in frame {}: {}", capture.frame, lidar.position);
             return Err(blame(Error::input(format!("{words}, {frame}")).help("lengths are in metres")));

@@ -12,7 +12,7 @@ const RINGS: [u32; 3] = [1, 6, 12];
 /// From ring to ring, in units of ρ.
 const STEP: f64 = 0.4;
 /// Finest distance of rays that anything is made for, metres.
-const FINEST: f32 = 2e-4;
+const FINEST: f32 = 2e-3;
 
 /// One ray of a pulse.
 #[derive(Clone, Copy, Debug, PartialEq)]

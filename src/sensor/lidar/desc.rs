@@ -11,7 +11,9 @@ use serde::{Deserialize, Serialize};
 /// Most beams of a LiDAR.
 const MOST_BEAMS: usize = 1024;
 /// Most pulses of a turn.
-const MOST_PULSES: f64 = 2e7;
+const MOST_PULSES: f64 = 1e7;
+/// Widest beam, full angle, milliradians, and where it leaves, millimetres.
+const WIDEST: [f64; 2] = [100.0, 1000.0];
 
 layered! {
     /// A rotating LiDAR: a name, `Vlp16` or `Os164`, or a name whose values any field replaces. Without a name the values are those of `Vlp16`.
@@ -67,7 +69,7 @@ layered! {
         pub divergence_mrad: Num<NonNegative> = Given<Num<NonNegative>>,
         /// The same diameter where a beam leaves, millimetres; default 12.7.
         pub exit_mm: Num<NonNegative> = Given<Num<NonNegative>>,
-        /// Standard deviation of a range, metres; default 0.01.
+        /// Standard deviation of a range, metres; default 0.01. What is measured nearer than `min_m` or farther than `max_m` is not told.
         pub range_noise_m: Num<NonNegative> = Given<Num<NonNegative>>,
         /// Shortest range, metres; default 1.
         pub min_m: Num<NonNegative> = Given<Num<NonNegative>>,
@@ -176,6 +178,14 @@ impl LidarDesc {
             return Err(Error::input(words)
                 .help(format!("at most {MOST_PULSES:.0}: take fewer beams or a larger step in `pulses`")));
         }
+        let width = [self.divergence_mrad.get(), self.exit_mm.get()];
+        if width[0] > WIDEST[0] || width[1] > WIDEST[1] {
+            let [mrad, mm] = width;
+            let words = format!("a beam of {mrad} mrad and {mm} mm where it leaves is too wide");
+            let [mrad, mm] = WIDEST;
+            return Err(Error::input(words)
+                .help(format!("divergence_mrad goes up to {mrad}, exit_mm up to {mm}; 3 and 10 are usual")));
+        }
         let (near, far) = (self.min_m.get(), self.max_m.get());
         if near >= far {
             return Err(Error::input(format!("min_m, {near}, is not below max_m, {far}"))
@@ -251,6 +261,12 @@ mod tests {
             ("(azimuth_deg: (60, -60))", "from 60 to -60"),
             ("(azimuth_deg: (0, 400))", "from 0 to 400"),
             ("(pulses: StepDeg(0.0001))", "pulses in a turn are too many"),
+            ("(pulses: PerSecond(1000000000))", "1600000000 pulses"),
+            ("(divergence_mrad: 3000)", "a beam of 3000 mrad"),
+            ("(exit_mm: 2000)", "and 2000 mm where it leaves"),
+            ("(range_noise_m: NaN)", "NaN"),
+            ("(pulses: StepDeg(0))", "above 0"),
+            ("(beams: Fan(count: 0, from_deg: 0, to_deg: 10))", "whole number from 1"),
             ("(min_m: 5, max_m: 2)", "min_m, 5, is not below max_m, 2"),
             ("(beams: Angles([-95]))", "between -90 and 90"),
             ("Vlp17", "unknown LiDAR `Vlp17`"),

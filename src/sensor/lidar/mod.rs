@@ -101,6 +101,11 @@ impl Lidar {
         }
     }
 
+    /// Whether it tells a range.
+    pub fn tells(&self, range: f32) -> bool {
+        (self.range[0]..=self.range[1]).contains(&range)
+    }
+
     /// The same LiDAR on a vehicle that has moved: turned, then carried along.
     #[must_use]
     pub fn carried(&self, turn: Mat3, way: Vec3, velocity: Vec3) -> Self {
