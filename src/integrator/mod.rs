@@ -1,5 +1,6 @@
 //! How much light comes back along a ray.
 
+mod backscatter;
 mod falsecolor;
 mod path;
 mod roulette;
@@ -12,7 +13,6 @@ use crate::scene::Scene;
 
 pub use falsecolor::FalseColor;
 pub use path::{PathTracer, Technique};
-use vertex::Vertex;
 
 /// A scene and what answers its rays.
 #[derive(Clone, Copy)]
@@ -29,14 +29,6 @@ impl World<'_> {
     pub fn interact(&self, ray: &Ray, width: f32, spread: f32) -> Option<(Hit, Interaction)> {
         let hit = self.geometry.closest(ray)?;
         Some((hit, self.at(&hit, width + spread * hit.t)))
-    }
-
-    /// What goes straight back along a ray from its hit, as a share of what a white, matt surface sends back that it meets squarely: π f cos θ,
-    /// with f for light that leaves as it came. And the reflectance seen from there, about. The ray is `footprint` metres wide at the hit.
-    pub fn backscatter(&self, ray: &Ray, hit: &Hit, footprint: f32) -> (Spectrum, Spectrum) {
-        let vertex = Vertex::new(self, ray, hit, self.at(hit, footprint));
-        let (back, _) = vertex.eval_pdf(-ray.direction);
-        (back * std::f32::consts::PI, vertex.albedo())
     }
 
     /// A hit, worked out; `footprint` in metres.

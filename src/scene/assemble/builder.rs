@@ -20,6 +20,9 @@ use std::sync::Arc;
 /// Farthest that a model or a camera may be from the world's origin along an axis, metres: single precision tells 0.06 mm apart there.
 pub(super) const FARTHEST: f32 = 1000.0;
 
+/// Room around the view in which plants are grown, metres: they lean in and throw shadows.
+pub(super) const PLANT_MARGIN: f32 = 0.35;
+
 /// A field under way.
 pub(super) struct Builder<'a> {
     pub(super) page: &'a RonFile,

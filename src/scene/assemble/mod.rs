@@ -45,7 +45,7 @@ use crate::scatter::{self, Disc, Spot};
 use crate::sensor::Camera;
 use crate::soil::Rect;
 use crate::{Error, Result};
-use builder::{Builder, Floor};
+use builder::{Builder, Floor, PLANT_MARGIN};
 use census::{Census, Members, Population};
 pub use field::Field;
 use individual::Individual;
@@ -60,8 +60,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 use today::Today;
 use view::View;
 
-/// Room around the view in which plants are grown: they lean in and throw shadows.
-const PLANT_MARGIN: f32 = 0.35;
 /// Address of the season's stream, behind those of any number of lights.
 const SEASON: u64 = 1 << 32;
 /// Address of the first of the streams from which lists of lights are drawn, one for each place among the scene file's lights.

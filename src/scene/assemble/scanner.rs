@@ -1,6 +1,6 @@
 //! The LiDAR of a field that is scanned: where it is at each frame, and the ground that it sees, which is grown for it.
 
-use super::builder::{Builder, FARTHEST};
+use super::builder::{Builder, FARTHEST, PLANT_MARGIN};
 use super::ground_view::GroundView;
 use super::options::Scanner;
 use super::view::{LONGEST_REACH, View, meets};
@@ -85,7 +85,7 @@ impl Builder<'_> {
     /// The same on a plant at a place.
     pub(super) fn scanned_at(&self, at: Vec2) -> Option<f32> {
         let on = |lidar: &Lidar| {
-            let distance = lidar.position.distance(at.extend(0.0)) - super::PLANT_MARGIN;
+            let distance = lidar.position.distance(at.extend(0.0)) - PLANT_MARGIN;
             lidar.spacing(distance.max(lidar.range[0]))
         };
         self.scanners.iter().map(on).reduce(f32::min)
