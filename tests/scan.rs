@@ -1,0 +1,454 @@
+//! What a LiDAR measures of a field: ranges, intensities, echoes and labels.
+//!
+//! Rationale: who simulates a robot's LiDAR trusts its ranges, its brightness and its labels; each is known in closed form on planes, and by a ray of
+//! one's own in a field. Expected: the LiDAR equation for targets larger than the beam, a cos θ / r² (Wagner et al. 2006); normal errors of the
+//! range; two echoes at an edge, with the shares of a Gaussian beam; the labels of the geometry. Statistical bounds are 5 standard errors: false alarms of 6e-7.
+
+mod common;
+
+use common::dataset::fail;
+use common::program::{names, scratch, small_text, trace};
+use common::scenes::{camera, scene, square, with_world};
+use furrow::bsdf::{Bsdf, OrenNayar};
+use furrow::geometry::{Intersect, Mesh, Ray};
+use furrow::job::{Field, SceneFile, Threads};
+use furrow::math::{Spectrum, Vec2, Vec3, vec3};
+use furrow::output;
+use furrow::render::{self, Echo};
+use furrow::ron_file::RonFile;
+use furrow::sampling::{Purpose, Stream};
+use furrow::scene::Scene;
+use furrow::scene::assemble::Scanner;
+use furrow::scene::tag::{Class, Tag};
+use furrow::sensor::{Lidar, LidarDesc};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// A LiDAR of the field of [`page`]: one ray a pulse, without errors.
+const RAYS: &str = "lidar: (position_m: (0.05, 0.02, 0.9), beams: Fan(count: 16, from_deg: -88, to_deg: -40), pulses: StepDeg(3), \
+                    min_m: 0.2, divergence_mrad: 0, exit_mm: 0, range_noise_m: 0),";
+
+fn lidar(text: &str) -> Lidar {
+    let desc: LidarDesc = RonFile::of(text).parse().unwrap_or_else(|e| panic!("{e}"));
+    desc.build(&mut Stream::of(1, 0, Purpose::Test, 0)).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn matt(albedo: f32) -> Bsdf {
+    Bsdf::OrenNayar(OrenNayar::new(Spectrum::splat(albedo), 0.0))
+}
+
+/// Matt surfaces with these labels. No light: a LiDAR brings its own.
+fn stage(parts: Vec<(Mesh, f32, Tag)>) -> Scene {
+    let look = camera((8, 8), vec3(0.0, 0.0, 1.0), vec3(0.0, 0.1, 0.0), 40.0);
+    let tags: Vec<Tag> = parts.iter().map(|(.., tag)| *tag).collect();
+    let mut stage = scene(parts.into_iter().map(|(mesh, albedo, _)| (mesh, matt(albedo))).collect(), Vec::new(), look);
+    for (part, tag) in stage.parts.iter_mut().zip(tags) {
+        part.tag = tag;
+    }
+    stage
+}
+
+fn ground(albedo: f32, side: f32) -> Scene {
+    stage(vec![(square(Vec3::ZERO, side), albedo, Tag::default())])
+}
+
+fn scanned(stage: &Scene, lidar: &Lidar) -> Vec<Echo> {
+    with_world(stage, 2, |world, _| render::scan(world, lidar, &Stream::of(1, 0, Purpose::Test, 0)))
+}
+
+/// Expected: at the height h and an elevation e below the horizon r = h / sin e, and intensity albedo · sin e / r²; without width and errors to single
+/// precision. Of a beam with width the mean over its Gaussian: of 1/r² and of r by less than 1e-4 of the value at the axis, where it is 1 mrad wide.
+#[test]
+fn a_matt_plane_is_as_far_and_as_bright_as_the_lidar_equation_says() {
+    let (height, albedo) = (3.0_f32, 0.6);
+    let plane = ground(albedo, 60.0);
+    for (width, bound) in [("divergence_mrad: 0, exit_mm: 0", 1e-5), ("divergence_mrad: 1, exit_mm: 0", 1e-4)] {
+        let lidar = lidar(&format!(
+            "(position_m: (0, 0, {height}), beams: Angles([-90, -60, -30, -10, 20]), pulses: StepDeg(10), range_noise_m: 0, {width})"
+        ));
+        let echoes = scanned(&plane, &lidar);
+        assert_eq!(echoes.len(), 4 * 36, "the beam above the horizon meets nothing");
+        for echo in &echoes {
+            let down = [90.0, 60.0, 30.0, 10.0_f32][usize::from(echo.pulse.beam)].to_radians().sin();
+            let (range, intensity) = (height / down, albedo * down * (down / height).powi(2));
+            assert!((echo.range / range - 1.0).abs() < bound, "{width}: {} m, not {range}", echo.range);
+            assert!(echo.at().z.abs() < 1e-4 * range, "{}", echo.at());
+            let off = (echo.intensity / intensity - 1.0).abs();
+            assert!(off < 10.0 * bound, "{width}: intensity {}, not {intensity}", echo.intensity);
+            assert!((echo.number, echo.count) == (1, 1) && (echo.normal - Vec3::Z).length() < 1e-6);
+        }
+    }
+}
+
+/// Expected: ranges that err by a normal number, of mean 0 and the standard deviation σ that was asked for: means within 5 σ/√n, deviations within
+/// 5 σ/√(2n); a different error of each pulse; and none beyond the ranges that are told.
+#[test]
+fn ranges_err_by_the_noise_that_was_asked_for() {
+    let (height, sigma) = (3.0, 0.02);
+    let aimed = |noise: f64, more: &str| {
+        let text = format!(
+            "(position_m: (0, 0, {height}), beams: Angles([-90]), pulses: StepDeg(0.03), range_noise_m: {noise}, {more})"
+        );
+        scanned(&ground(0.6, 10.0), &lidar(&text))
+    };
+    let echoes = aimed(sigma, "");
+    let n = echoes.len() as f64;
+    assert_eq!(echoes.len(), 12_000);
+    let errors: Vec<f64> = echoes.iter().map(|echo| f64::from(echo.range) - height).collect();
+    let mean = errors.iter().sum::<f64>() / n;
+    let deviation = (errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / n).sqrt();
+    assert!(mean.abs() < 5.0 * sigma / n.sqrt(), "{mean}");
+    assert!((deviation - sigma).abs() < 5.0 * sigma / (2.0 * n).sqrt(), "{deviation}, not {sigma}");
+    let different: BTreeSet<u32> = echoes.iter().map(|echo| echo.range.to_bits()).collect();
+    assert!(different.len() > 11_000, "{}", different.len());
+    // Half of them lie beyond, and are not told.
+    let near = aimed(sigma, "max_m: 3");
+    assert!(near.iter().all(|echo| echo.range <= 3.0), "told beyond its range");
+    let share = near.len() as f64 / n;
+    assert!((share - 0.5).abs() < 2.5 / n.sqrt(), "{share}");
+    let wild = aimed(1e6, "min_m: 0");
+    assert!(wild.iter().all(|echo| (0.0..=100.0).contains(&echo.range)));
+}
+
+/// A leaf at 1 m, whose edge runs north at `edge` m, over ground; seen from 5 m.
+fn leaf_over_ground(edge: f32) -> Scene {
+    let leaf = Tag { class: Class::Crop, plant: 7, leaf: 3 };
+    let mesh = square(vec3(edge + 0.5, 0.0, 1.0), 1.0);
+    stage(vec![(square(Vec3::ZERO, 10.0), 0.2, Tag::default()), (mesh, 0.5, leaf)])
+}
+
+/// Share of a Gaussian beam beyond the distance `d` from its axis, in units of half its 1/e² width, of what lies within that: by sums.
+fn share_beyond(d: f64) -> f64 {
+    let (mut beyond, mut all) = (0.0, 0.0);
+    let n = 400;
+    for (i, j) in (0..n * n).map(|k| (k % n, k / n)) {
+        let at = |k: i32| (2.0 * f64::from(k) + 1.0) / f64::from(n) - 1.0;
+        let (x, y) = (at(i), at(j));
+        let rho = x * x + y * y;
+        if rho < 1.0 {
+            let weight = (-2.0 * rho).exp();
+            all += weight;
+            beyond += if x > d { weight } else { 0.0 };
+        }
+    }
+    beyond / all
+}
+
+/// Expected: leaf and ground 1 m apart are two echoes of a pulse of 0.5 m, at 4 m and 5 m; what each brings, over what it would bring of the whole beam,
+/// sums to 1, and is the share of a Gaussian beam on the leaf within what 19 rays can tell, the weight of a few of them; first and last are told as asked. A pulse of 1.5 m makes one echo of both:
+/// their sum, at their mean.
+#[test]
+fn a_beam_over_the_edge_of_a_leaf_has_two_echoes() {
+    let aimed = |returns: &str, pulse_ns: f32| {
+        lidar(&format!(
+            "(position_m: (0, 0, 5), beams: Angles([-90]), azimuth_deg: (0, 1), pulses: StepDeg(1), divergence_mrad: 6, exit_mm: 10, \
+             range_noise_m: 0, min_intensity: 0, returns: {returns}, pulse_ns: {pulse_ns})"
+        ))
+    };
+    let half = 0.5 * (0.01 + 0.006 * 4.0);
+    for beyond in [-0.55_f32, -0.15, 0.1, 0.5] {
+        let stage = leaf_over_ground(beyond * half);
+        let both = scanned(&stage, &aimed("All", 3.33));
+        let [leaf, soil] = both[..] else { panic!("{} echoes", both.len()) };
+        assert!((leaf.range - 4.0).abs() < 1e-4 && (soil.range - 5.0).abs() < 1e-4, "{} {}", leaf.range, soil.range);
+        assert_eq!([leaf.number, leaf.count, soil.number, soil.count], [1, 2, 2, 2]);
+        let labels = [leaf, soil].map(|echo| stage.parts[echo.part as usize].tag);
+        assert_eq!(labels, [Tag { class: Class::Crop, plant: 7, leaf: 3 }, Tag::default()]);
+        let shares = [leaf.intensity * 16.0 / 0.5, soil.intensity * 25.0 / 0.2];
+        assert!((shares[0] + shares[1] - 1.0).abs() < 1e-4, "{shares:?}");
+        let expected = share_beyond(f64::from(beyond));
+        assert!((f64::from(shares[0]) - expected).abs() < 0.12, "{beyond}: {}, not {expected}", shares[0]);
+        // The same echoes, by what is asked of them.
+        let brightest = if leaf.intensity > soil.intensity { leaf } else { soil };
+        for (returns, told) in [
+            ("First", vec![leaf]),
+            ("Last", vec![soil]),
+            ("Strongest", vec![brightest]),
+            ("FirstAndLast", vec![leaf, soil]),
+        ] {
+            assert_eq!(scanned(&stage, &aimed(returns, 3.33)), told, "{returns}");
+        }
+        let long = scanned(&stage, &aimed("All", 10.0));
+        let [one] = long[..] else { panic!("{} echoes of a long pulse", long.len()) };
+        let sum = leaf.intensity + soil.intensity;
+        let mean = (leaf.intensity * leaf.range + soil.intensity * soil.range) / sum;
+        assert!((one.intensity / sum - 1.0).abs() < 1e-5 && (one.range - mean).abs() < 1e-4 && one.count == 1);
+        assert_eq!(one.part, brightest.part);
+    }
+}
+
+/// Rationale: a slope spreads a beam over metres of range, which is one long echo and no row of them. Expected: one echo of each pulse on a plane however
+/// flat it is met and however short the pulse; as bright as the LiDAR equation says of the whole beam, to second order in its width.
+#[test]
+fn a_plane_that_is_met_flatly_is_one_echo() {
+    for pulse_ns in ["0", "1", "6.67"] {
+        let lidar = lidar(&format!(
+            "(position_m: (0, 0, 1.2), beams: Angles([-45, -10, -3, -1.5]), pulses: StepDeg(10), range_noise_m: 0, min_intensity: 0, \
+             returns: All, pulse_ns: {pulse_ns})"
+        ));
+        let echoes = scanned(&ground(0.4, 400.0), &lidar);
+        assert_eq!(echoes.len(), 4 * 36, "pulses of {pulse_ns} ns");
+        for echo in &echoes {
+            let down = [45.0, 10.0, 3.0, 1.5_f32][usize::from(echo.pulse.beam)].to_radians().sin();
+            let (range, intensity) = (1.2 / down, 0.4 * down * (down / 1.2).powi(2));
+            assert!((echo.range / range - 1.0).abs() < 0.01, "{} m, not {range}", echo.range);
+            assert!((echo.intensity / intensity - 1.0).abs() < 0.03, "{}, not {intensity}", echo.intensity);
+        }
+    }
+}
+
+/// The small page with `more` in it, as a file of its own.
+fn page(folder: &Path, name: &str, more: &str) -> PathBuf {
+    std::fs::create_dir_all(folder).unwrap();
+    let root = env!("CARGO_MANIFEST_DIR");
+    let text = small_text().replacen("lights:", &format!("reach_m: 1.5,\n    {more}\n    lights:"), 1);
+    let text =
+        text.replace("\"textures/", &format!("\"{root}/textures/")).replace("\"scenes/", &format!("\"{root}/scenes/"));
+    let path = folder.join(name);
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+fn grown(page: &Path, threads: usize) -> Field {
+    let threads = Threads::new(threads).unwrap();
+    SceneFile::open(page).unwrap().threads(&threads).scanned(Scanner::OfScene).field(0).unwrap()
+}
+
+/// Columns of a PLY file by their names, and its comments; read by its header alone.
+fn columns(file: &[u8]) -> (BTreeMap<String, Vec<f64>>, Vec<String>) {
+    let end = file.windows(11).position(|w| w == b"end_header\n").expect("a header") + 11;
+    let header = std::str::from_utf8(&file[..end]).unwrap();
+    assert!(header.starts_with("ply\nformat binary_little_endian 1.0\n"), "{header}");
+    let mut comments = Vec::new();
+    let (mut count, mut properties) = (0_usize, Vec::new());
+    for line in header.lines() {
+        match line.split(' ').collect::<Vec<_>>()[..] {
+            ["comment", ..] => comments.push(line.trim_start_matches("comment ").to_owned()),
+            ["element", "vertex", n] => count = n.parse().unwrap(),
+            ["property", kind, name] => properties.push((kind.to_owned(), name.to_owned())),
+            _ => {}
+        }
+    }
+    let mut found: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+    let mut at = end;
+    let mut take = |n: usize| {
+        at += n;
+        &file[at - n..at]
+    };
+    for _ in 0..count {
+        for (kind, name) in &properties {
+            let value = match kind.as_str() {
+                "float" => f64::from(f32::from_le_bytes(take(4).try_into().unwrap())),
+                "uint" => f64::from(u32::from_le_bytes(take(4).try_into().unwrap())),
+                "ushort" => f64::from(u16::from_le_bytes(take(2).try_into().unwrap())),
+                "uchar" => f64::from(take(1)[0]),
+                other => panic!("a property of type {other}"),
+            };
+            found.entry(name.clone()).or_default().push(value);
+        }
+    }
+    assert_eq!(at, file.len(), "the file is as long as its header says");
+    (found, comments)
+}
+
+/// Expected: a ray of one's own along each pulse meets what the echo says, at that range, or nothing where there is none; the file holds the same
+/// labels, and the identity of the plant; plants of both classes and soil are among them.
+#[test]
+fn every_echo_has_the_labels_of_a_ray_of_its_own() {
+    let (_keep, folder) = scratch();
+    let field = grown(&page(&folder, "rays.ron", RAYS), 2);
+    let (lidar, echoes) = field.scan().unwrap();
+    let (geometry, parts) = (field.geometry().unwrap(), &field.grown().scene.parts);
+    let pulses = (0..lidar.columns()).flat_map(|c| (0..lidar.beams()).map(move |b| lidar.pulse(c, b)));
+    let met: Vec<_> = pulses.filter_map(|p| Some((p, geometry.closest(&Ray::new(p.origin, p.direction))?))).collect();
+    assert_eq!(met.len(), echoes.len());
+    let file = output::scan::cloud(field.grown(), lidar, &echoes).file("test");
+    let (columns, _) = columns(&file);
+    let ids: BTreeMap<u32, u32> = field.grown().plants.iter().map(|plant| (plant.number, plant.id)).collect();
+    let mut seen = BTreeMap::new();
+    for (k, ((pulse, hit), echo)) in met.iter().zip(&echoes).enumerate() {
+        assert_eq!((*pulse, hit.part), (echo.pulse, echo.part));
+        assert!((hit.t - echo.range).abs() < 1e-6 * hit.t, "{} {}", hit.t, echo.range);
+        let tag = parts[hit.part as usize].tag;
+        *seen.entry(tag.class as u8).or_insert(0) += 1;
+        let told = |name: &str| columns[name][k];
+        assert_eq!(
+            [told("class"), told("plant"), told("leaf")],
+            [f64::from(tag.class as u8), f64::from(tag.plant), f64::from(tag.leaf)]
+        );
+        assert_eq!(told("plant_id"), f64::from(ids.get(&tag.plant).copied().unwrap_or(0)));
+        let at = pulse.origin + pulse.direction * hit.t;
+        for (name, expected) in
+            [("x", at.x), ("y", at.y), ("z", at.z), ("range", hit.t), ("azimuth", pulse.azimuth_deg)]
+        {
+            assert!((told(name) - f64::from(expected)).abs() < 1e-5 * (1.0 + told(name).abs()), "{name}");
+        }
+        assert_eq!([told("beam"), told("return_number"), told("number_of_returns")], [f64::from(pulse.beam), 1.0, 1.0]);
+        assert!((told("reflectance") / (told("intensity") * told("range").powi(2)) - 1.0).abs() < 1e-5);
+    }
+    assert!([0, 1, 2].iter().all(|class| seen.get(class).is_some_and(|n| *n > 20)), "{seen:?}");
+}
+
+/// Expected of beams with width: the label of the only surface where all rays of a pulse meet one, and else of one of those that they meet; each plant's
+/// echoes lie about it.
+#[test]
+fn an_echo_of_a_wide_beam_has_a_label_within_its_beam() {
+    let (_keep, folder) = scratch();
+    let wide =
+        RAYS.replace("divergence_mrad: 0, exit_mm: 0", "divergence_mrad: 6, exit_mm: 8, returns: All, pulse_ns: 0.1");
+    let field = grown(&page(&folder, "wide.ron", &wide), 2);
+    let (lidar, echoes) = field.scan().unwrap();
+    let (geometry, parts) = (field.geometry().unwrap(), &field.grown().scene.parts);
+    let (mut pure, mut mixed, mut several) = (0, 0, 0);
+    for echo in &echoes {
+        let rays = lidar.rays(&echo.pulse);
+        let hits: Vec<_> = rays.iter().filter_map(|r| geometry.closest(&Ray::new(r.origin, r.direction))).collect();
+        let tags: Vec<Tag> = hits.iter().map(|hit| parts[hit.part as usize].tag).collect();
+        let tag = parts[echo.part as usize].tag;
+        assert!(tags.contains(&tag), "{tag:?} is none of {tags:?}");
+        if tags.iter().all(|other| *other == tags[0]) {
+            pure += 1
+        } else {
+            mixed += 1
+        };
+        several += u32::from(echo.count > 1);
+        let (lo, hi) = hits.iter().fold((f32::INFINITY, 0.0_f32), |(lo, hi), hit| (lo.min(hit.t), hi.max(hit.t)));
+        assert!((lo - 1e-4..=hi + 1e-4).contains(&echo.range));
+        assert!(echo.normal.dot(echo.pulse.direction) < 0.1, "the side that it sees");
+    }
+    assert!(pure > 500 && mixed > 50 && several > 10, "{pure} {mixed} {several}");
+    // More than one echo only of more than one surface, or of one that stands twice in the beam; seldom of the ground alone.
+    let of = |echo: &&Echo| parts[echo.part as usize].tag == Tag::default();
+    let alone = echoes.windows(2).filter(|pair| pair[0].pulse == pair[1].pulse && pair.iter().all(|e| of(&e))).count();
+    assert!(alone * 50 < echoes.len(), "{alone} of {} echoes are of ground behind ground", echoes.len());
+}
+
+/// Expected: the same bytes, noise included.
+#[test]
+fn a_scan_is_the_same_bits_on_one_and_two_threads() {
+    let (_keep, folder) = scratch();
+    let noisy = RAYS.replace("divergence_mrad: 0, exit_mm: 0, range_noise_m: 0", "returns: All, range_noise_m: 0.01");
+    let path = page(&folder, "threads.ron", &noisy);
+    let file = |threads| {
+        let field = grown(&path, threads);
+        let (lidar, echoes) = field.scan().unwrap();
+        output::scan::cloud(field.grown(), lidar, &echoes).file("test")
+    };
+    let one = file(1);
+    assert!(one.len() > 50_000 && one == file(2));
+    let field = grown(&path, 2);
+    let (_, again) = field.scan().unwrap();
+    assert_eq!(again, field.scan().unwrap().1, "and again of the same field");
+}
+
+/// Expected: a drive of 0.5 m/s to the east at 2 Hz moves the LiDAR by 0.25 m a frame; its pulses move with it during a turn. Its plants stay: those
+/// with the same identity are found in both frames, about the same places. Errors of the range are other ones.
+#[test]
+fn frames_of_a_drive_move_the_lidar() {
+    let (_keep, folder) = scratch();
+    let drive = format!("drive: (frames: 2, rate_hz: 2, path: Straight(heading_deg: 90, speed_m_s: 0.5)),\n    {RAYS}");
+    let mut field = grown(&page(&folder, "drive.ron", &drive), 2);
+    let mut frames = Vec::new();
+    for frame in 0..2 {
+        field.take(frame).unwrap();
+        let (lidar, echoes) = field.scan().unwrap();
+        let file = output::scan::cloud(field.grown(), lidar, &echoes).file("test");
+        let (columns, comments) = columns(&file);
+        let [x, y] = [lidar.position.x, lidar.position.y];
+        assert!(comments.iter().any(|line| line.starts_with(&format!("lidar position_m: {x} {y} "))), "{comments:?}");
+        frames.push((lidar.clone(), columns));
+    }
+    let way = frames[1].0.position - frames[0].0.position;
+    assert!((way - vec3(0.25, 0.0, 0.0)).length() < 1e-5, "{way}");
+    for (lidar, _) in &frames {
+        assert!((lidar.axes.y_axis - Vec3::X).length() < 1e-5, "its front looks ahead");
+        let [begin, half] = [0, lidar.columns() / 2].map(|column| lidar.pulse(column, 0));
+        assert!((half.origin - begin.origin - Vec3::X * (0.5 * half.time_s)).length() < 1e-6 && half.time_s > 0.04);
+    }
+    let centres = |k: usize| {
+        let columns: &BTreeMap<String, Vec<f64>> = &frames[k].1;
+        let mut of: BTreeMap<u64, Vec<Vec2>> = BTreeMap::new();
+        for (i, id) in columns["plant_id"].iter().enumerate().filter(|(_, id)| **id > 0.0) {
+            of.entry(*id as u64).or_default().push(Vec2::new(columns["x"][i] as f32, columns["y"][i] as f32));
+        }
+        of
+    };
+    let (first, second) = (centres(0), centres(1));
+    let radius: BTreeMap<u64, (Vec2, f32)> = field
+        .grown()
+        .plants
+        .iter()
+        .map(|plant| (u64::from(plant.id), (plant.position.truncate(), plant.radius)))
+        .collect();
+    let both: Vec<_> = first.keys().filter(|id| second.contains_key(id)).collect();
+    assert!(both.len() > 3, "{}", both.len());
+    for (id, at) in first.iter().chain(&second).flat_map(|(id, all)| all.iter().map(move |at| (id, at))) {
+        let (stem, radius) = radius[id];
+        assert!(at.distance(stem) < radius + 0.02, "{at} is {} m from its plant", at.distance(stem));
+    }
+}
+
+/// Expected: each plant that an image of the field has is a plant of its scan, with the same identity, place, species and age.
+#[test]
+fn plants_have_the_identities_of_an_image() {
+    let (_keep, folder) = scratch();
+    let path = page(&folder, "ids.ron", RAYS);
+    let image = SceneFile::open(&path).unwrap().field(0).unwrap();
+    let scan = grown(&path, 2);
+    let of: BTreeMap<u32, _> = scan.grown().plants.iter().map(|plant| (plant.id, plant)).collect();
+    assert!(image.grown().plants.len() > 3);
+    for plant in &image.grown().plants {
+        let same = of.get(&plant.id).unwrap_or_else(|| panic!("{} is not in the scan", plant.id));
+        assert!((plant.position - same.position).truncate().length() < 1e-5, "{} {}", plant.position, same.position);
+        assert_eq!((&plant.species, plant.age_days, plant.leaves), (&same.species, same.age_days, same.leaves));
+    }
+    // And what a camera's image shows does not depend on the LiDAR.
+    let plain = SceneFile::open(page(&folder, "plain.ron", "")).unwrap().field(0).unwrap();
+    assert_eq!(image.label().unwrap(), plain.label().unwrap());
+}
+
+/// Expected: exit code 2, one error that says what to write, and no file; then a scan that does write.
+#[test]
+fn mistakes_are_told_and_write_nothing() {
+    let (_keep, folder) = scratch();
+    let out = folder.join("out");
+    let written = |k: usize, more: &str| page(&folder, &format!("{k}.ron"), more).to_str().unwrap().to_owned();
+    let scan = |page: &str, more: &[&str]| {
+        let mut command = trace(&["scan", "--scene", page, "--out", out.to_str().unwrap()]);
+        command.args(more);
+        command
+    };
+    for (k, (more, words)) in [
+        ("", "has no LiDAR"),
+        ("lidar: Vlp17(),", "unknown LiDAR `Vlp17`"),
+        ("lidar: (azimuth_deg: (60, -60)),", "from 60 to -60"),
+        ("lidar: (beams: Angles([])),", "of 0 beams"),
+        ("lidar: (beams: Fan(count: 0, from_deg: 0, to_deg: 1)),", "a whole number from 1"),
+        ("lidar: (pulses: PerSecond(1000000000)),", "pulses in a turn are too many"),
+        ("lidar: (range_noise_m: NaN),", "NaN"),
+        ("lidar: (divergence_mrad: 1000),", "too wide"),
+        ("lidar: (position_m: (0, 0, -1)),", "above 0"),
+        ("lidar: (position_m: (1000000000, 0, 1)),", "from the field's origin"),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let error = fail(scan(&written(k, more), &[]), 2);
+        assert!(error.contains(words) && error.matches("error:").count() == 1, "{more}: {error}");
+        assert!(error.contains("help:"), "{more}: {error}");
+        assert!(!out.exists(), "{more}: something was written");
+    }
+    let good = written(20, RAYS);
+    let error = fail(scan(&good, &["--lidar", "Vlp16"]), 2);
+    assert!(error.contains("a LiDAR of its own"), "{error}");
+    let error = fail(scan(&good, &["--lidar", "Vlp17"]), 2);
+    assert!(error.contains("Vlp16"), "{error}");
+    let error = fail(scan(&good, &["--frame", "9"]), 2);
+    assert!(error.contains("no frame 9"), "{error}");
+    assert!(!out.exists());
+    let done = scan(&good, &[]).output().unwrap();
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    assert_eq!(names(&out), ["scan.ply"]);
+    let (found, _) = columns(&std::fs::read(out.join("scan.ply")).unwrap());
+    assert!(found["x"].len() > 1000 && found.len() == 23, "{:?}", found.keys());
+}
