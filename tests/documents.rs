@@ -12,7 +12,7 @@ use furrow::material::LeafDesc;
 use furrow::ron_file::RonFile;
 use furrow::scene::desc::{FieldDesc, ModelDesc};
 use furrow::scene::shipped;
-use furrow::sensor::{CameraDesc, SensorDesc};
+use furrow::sensor::{CameraDesc, LidarDesc, SensorDesc};
 use furrow::soil::SoilDesc;
 
 /// Pages that the program writes from its own types and command line: they may be linked to before they are there.
@@ -209,6 +209,7 @@ fn parsed(note: &str, text: &str) -> Option<furrow::Result<()>> {
     Some(match note {
         "camera" => file.parse::<CameraDesc>().map(drop),
         "sensor" => file.parse::<SensorDesc>().map(drop),
+        "lidar" => file.parse::<LidarDesc>().map(drop),
         "light" => file.parse::<LightDesc>().map(drop),
         "soil" => file.parse::<SoilDesc>().map(drop),
         "model" => file.parse::<ModelDesc>().map(drop),
@@ -236,7 +237,7 @@ fn every_piece_of_ron_is_what_it_says() {
             kinds.insert(block.note);
         }
     }
-    for kind in ["camera", "sensor", "light", "soil", "model", "leaf", "scenes"] {
+    for kind in ["camera", "sensor", "lidar", "light", "soil", "model", "leaf", "scenes"] {
         assert!(kinds.contains(kind), "no page shows a {kind}");
     }
     assert!(
