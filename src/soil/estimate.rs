@@ -69,12 +69,13 @@ pub fn expected(
         "lower their amount or raise min_mm",
     );
     for (i, population) in desc.stones.iter().enumerate() {
-        let cost = stone::cost(population, area, &stone_cover::own(debris, i));
+        let cost = stone::cost(population, area, sizes.told, &stone_cover::own(debris, i));
         add(&[Step::Field("stones"), Step::Item(i)], cost, "lower their cover or raise min_mm and median_mm");
     }
     let of = ["straw_cover", "sticks_per_m2", "bits_per_m2"];
     let advice = ["lower it, or make straws larger", "lower it, or stubs", "lower it"];
-    for ((field, advice), cost) in of.into_iter().zip(advice).zip(litter::costs(&desc.litter, area, leftovers)) {
+    let costs = litter::costs(&desc.litter, area, sizes.told, leftovers);
+    for ((field, advice), cost) in of.into_iter().zip(advice).zip(costs) {
         add(&[Step::Field("litter"), Step::Field(field)], cost, advice);
     }
     (bare, all)

@@ -16,10 +16,18 @@ use std::f32::consts::{PI, TAU};
 const WOOD: Spectrum = Spectrum::new(0.22, 0.16, 0.12, 0.38);
 const ROTTEN: Spectrum = Spectrum::new(0.20, 0.09, 0.05, 0.32);
 
-/// Corners of the sections of straw and bits, of sticks, and of stubs.
-const ARC: usize = 14;
-const ROUND: usize = 8;
-const STUB: usize = 6;
+/// Parts of the wall of straw and bits along its arc, corners of sticks and of stubs.
+const PARTS: u8 = 6;
+const ROUND: u8 = 8;
+const STUB: u8 = 6;
+
+/// Width of what is swept in full, in lengths that are told; narrower ones have fewer points and corners.
+const FINE: f32 = 4.0;
+
+/// Of what is narrower: parts of the wall of straw and bits, corners of sticks and stubs, and points of a path for each that is kept.
+const COARSE_PARTS: u8 = 2;
+const COARSE_ROUND: u8 = 4;
+const KEPT: usize = 3;
 
 /// Points along the path of a stub and of a bit.
 const STUB_POINTS: usize = 4;
@@ -38,6 +46,46 @@ fn stick_points(length: f32) -> usize {
     ((length / 0.005) as usize).clamp(8, 32)
 }
 
+/// How finely pieces are swept.
+#[derive(Clone, Copy)]
+struct Detail {
+    /// Whether as finely as they are made.
+    fine: bool,
+}
+
+impl Detail {
+    /// That of a width, millimetres, where lengths of `told` mm are told.
+    fn of(width_mm: f32, told: f32) -> Self {
+        Self { fine: width_mm >= FINE * told }
+    }
+
+    fn parts(self) -> u8 {
+        if self.fine { PARTS } else { COARSE_PARTS }
+    }
+
+    /// Corners of a section that has `fine` of them.
+    fn corners(self, fine: u8) -> u8 {
+        if self.fine { fine } else { COARSE_ROUND }
+    }
+
+    /// Corners of the wall of a split stalk.
+    fn arc(self) -> usize {
+        2 * (usize::from(self.parts()) + 1)
+    }
+
+    /// Points that are kept of a path of so many.
+    fn points(self, fine: usize) -> usize {
+        if self.fine { fine } else { (fine - 1).div_ceil(KEPT) + 1 }
+    }
+
+    /// The points of a path that are kept: the last one always.
+    fn thinned(self, path: &[Vec3]) -> Vec<Vec3> {
+        let last = path.len() - 1;
+        let kept = |i: &usize| self.fine || *i == last || i.is_multiple_of(KEPT);
+        (0..=last).filter(kept).map(|i| path[i]).collect()
+    }
+}
+
 /// Triangles of what [`sweep`] makes: its wall and its two ends.
 fn swept(points: usize, corners: usize) -> usize {
     2 * (points - 1) * corners + 2 * (corners - 2)
@@ -51,6 +99,7 @@ pub fn litter(desc: &LitterDesc, ground: &Ground, pile: &mut Pile, stream: &Stre
     let mut all = Vec::new();
     let child = |k| own(stream, k);
     let drawn = LitterRecord::draw(desc, stream);
+    let told = ground.sizes.told;
     let straws = straws_per_m2(desc, &drawn, stream);
     for (kind, per_m2, k) in [
         (DebrisKind::Stick, drawn.sticks_per_m2, 4),
@@ -62,9 +111,9 @@ pub fn litter(desc: &LitterDesc, ground: &Ground, pile: &mut Pile, stream: &Stre
                 break;
             }
             let thing = match kind {
-                DebrisKind::Stick => stick(desc, pile, at, &mut s),
-                DebrisKind::Straw => straw(desc, drawn.weathering, pile, at, &mut s),
-                _ => bit(desc, drawn.weathering, pile, at, &mut s),
+                DebrisKind::Stick => stick(desc, told, pile, at, &mut s),
+                DebrisKind::Straw => straw(desc, (drawn.weathering, told), pile, at, &mut s),
+                _ => bit(desc, (drawn.weathering, told), pile, at, &mut s),
             };
             all.push(Debris { dust: desc.dust.draw32(&mut s), ..thing });
         }
@@ -80,17 +129,28 @@ fn straws_per_m2(desc: &LitterDesc, drawn: &LitterRecord, stream: &Stream) -> f3
     -(1.0 - drawn.straw_cover.min(0.95)).ln() / one
 }
 
-/// What straw, sticks and bits on so much ground take, each.
-pub(super) fn costs(desc: &LitterDesc, area: Rect, stream: &Stream) -> [Cost; 3] {
+/// What straw, sticks and bits on so much ground take, each, where lengths of `told` mm are told.
+pub(super) fn costs(desc: &LitterDesc, area: Rect, told: f32, stream: &Stream) -> [Cost; 3] {
     let drawn = LitterRecord::draw(desc, stream);
     let s = own(stream, 8);
     let mean = |of: &dyn Fn(&mut Stream) -> usize| {
         (0..256).map(|k| of(&mut s.child(Purpose::Debris, k))).sum::<usize>() as f64 / 256.0
     };
-    let straw = mean(&|s| swept(straw_points(desc.straw_mm.draw32(s) * 1e-3), ARC));
-    let stick = mean(&|s| swept(stick_points(desc.stick_mm.draw32(s) * 1e-3), ROUND));
-    let stubs = mean(&|s| desc.stubs.draw(s) as usize) * swept(STUB_POINTS, STUB) as f64;
-    let bit = swept(BIT_POINTS, ARC) as f64;
+    let straw = mean(&|s| {
+        let points = straw_points(desc.straw_mm.draw32(s) * 1e-3);
+        let detail = Detail::of(desc.straw_width_mm.draw32(s), told);
+        swept(detail.points(points), detail.arc())
+    });
+    let stick = mean(&|s| {
+        let points = stick_points(desc.stick_mm.draw32(s) * 1e-3);
+        let detail = Detail::of(desc.stick_width_mm.draw32(s), told);
+        swept(detail.points(points), detail.corners(ROUND).into())
+    });
+    let stubs = mean(&|s| desc.stubs.draw(s) as usize) * swept(STUB_POINTS, STUB.into()) as f64;
+    let bit = mean(&|s| {
+        let detail = Detail::of(0.3 * desc.bit_mm.draw32(s), told);
+        swept(detail.points(BIT_POINTS), detail.arc())
+    });
     // Each heaps the pile up around its path.
     let heaps = |width_mm: f64, points: usize, number: f64| {
         let cells = (width_mm * 1e-3 / 1e-3).powi(2).min(f64::from(area.area()) / 1e-6);
@@ -214,9 +274,8 @@ fn round(corners: u8) -> Vec<Vec2> {
     (0..corners).map(|k| Vec2::from_angle(TAU * f32::from(k) / f32::from(corners))).collect()
 }
 
-/// The wall of a split stalk: an arc of `opening` radians in all, half-width 1, its middle up.
-fn arc(opening: f32, wall: f32) -> Vec<Vec2> {
-    let n = 6u8;
+/// The wall of a split stalk: an arc of `opening` radians in all in `n` parts, half-width 1, its middle up.
+fn arc(opening: f32, wall: f32, n: u8) -> Vec<Vec2> {
     let radius = 1.0 / (0.5 * opening).min(0.5 * PI).sin();
     let at = |k: u8, r: f32| {
         let angle = 0.5 * PI + opening * (f32::from(k) / f32::from(n) - 0.5);
@@ -232,18 +291,19 @@ fn debris(kind: DebrisKind, mesh: Mesh, albedo: Spectrum, path: &[Vec3], s: &mut
     Debris { kind, mesh, albedo, tint, dust: 0.0, hue: s.uniform32(), centre, radius }
 }
 
-fn straw(desc: &LitterDesc, weathering: f32, pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
+fn straw(desc: &LitterDesc, (weathering, told): (f32, f32), pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
     let length = desc.straw_mm.draw32(s) * 1e-3;
     let width = desc.straw_width_mm.draw32(s) * 1e-3;
     let n = straw_points(length);
+    let detail = Detail::of(1e3 * width, told);
     let opening = s.range32(0.9, 4.2);
     let points = path(at, length, 0.25, n, s);
     let path = lay(&points, 0.2 * width, 0.85, pile);
     let frayed = s.range32(0.55, 1.0);
     let side = if s.chance(0.35) { -1.0 } else { 1.0 };
-    let section: Vec<Vec2> = arc(opening, 0.22).iter().map(|c| *c * side).collect();
+    let section: Vec<Vec2> = arc(opening, 0.22, detail.parts()).iter().map(|c| *c * side).collect();
     let mesh = sweep(
-        &path,
+        &detail.thinned(&path),
         &section,
         |t| Vec2::splat(0.5 * width * (1.0 - (1.0 - frayed) * t.powi(3))),
         0.5 * s.normal() as f32,
@@ -252,16 +312,17 @@ fn straw(desc: &LitterDesc, weathering: f32, pile: &mut Pile, at: Vec2, s: &mut 
     debris(DebrisKind::Straw, mesh, tone(weathering, s), &path, s)
 }
 
-fn stick(desc: &LitterDesc, pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
+fn stick(desc: &LitterDesc, told: f32, pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
     let length = desc.stick_mm.draw32(s) * 1e-3;
     let half = 0.5e-3 * desc.stick_width_mm.draw32(s);
     let n = stick_points(length);
+    let detail = Detail::of(2e3 * half, told);
     let points = path(at, length, 0.5, n, s);
     let path = lay(&points, half, 0.9, pile);
     let knots = (s.range32(0.0, TAU), s.range32(20.0, 60.0));
     let taper = s.range32(0.35, 0.75);
     let size = |t: f32| Vec2::splat(half * (1.0 - (1.0 - taper) * t) * (1.0 + 0.08 * (knots.0 + knots.1 * t).sin()));
-    let mut mesh = sweep(&path, &round(ROUND as u8), size, 0.0);
+    let mut mesh = sweep(&detail.thinned(&path), &round(detail.corners(ROUND)), size, 0.0);
     for _ in 0..desc.stubs.draw(s) as u32 {
         let i = 1 + s.index(n - 2);
         let along = (path[i + 1] - path[i]).normalize_or(Vec3::X);
@@ -270,15 +331,16 @@ fn stick(desc: &LitterDesc, pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris
         let long = half * s.range32(2.5, 9.0);
         let stub: Vec<Vec3> = (0..STUB_POINTS as u8).map(|k| path[i] + to * (long * f32::from(k) / 3.0)).collect();
         let thick = size(i as f32 / n as f32).x * s.range32(0.35, 0.65);
-        mesh.append(&sweep(&stub, &round(STUB as u8), |t| Vec2::splat(thick * (1.0 - 0.5 * t)), 0.0));
+        mesh.append(&sweep(&stub, &round(detail.corners(STUB)), |t| Vec2::splat(thick * (1.0 - 0.5 * t)), 0.0));
     }
     raise(pile, &path, half);
     debris(DebrisKind::Stick, mesh, WOOD, &path, s)
 }
 
-fn bit(desc: &LitterDesc, weathering: f32, pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
+fn bit(desc: &LitterDesc, (weathering, told): (f32, f32), pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
     let length = desc.bit_mm.draw32(s) * 1e-3;
     let half = 0.5 * length * s.range32(0.12, 0.5);
+    let detail = Detail::of(2e3 * half, told);
     let points = path(at, length, 0.5, BIT_POINTS, s);
     let mut path = lay(&points, 1e-4, 0.6, pile);
     // Dry leaves curl up at their ends.
@@ -289,8 +351,13 @@ fn bit(desc: &LitterDesc, weathering: f32, pile: &mut Pile, at: Vec2, s: &mut St
     let (from, to) = (s.range32(0.1, 0.6), s.range32(0.05, 0.4));
     let wide = |t: f32| ((1.0 - t) * from + t * to) + (1.0 - 0.5 * (from + to)) * (PI * t).sin();
     let thick = (0.06 * half).max(6e-5);
-    let section: Vec<Vec2> = arc(s.range32(0.3, 1.6), 0.12);
-    let mesh = sweep(&path, &section, |t| vec2(half * wide(t), (half * wide(t)).max(thick)), 0.8 * s.normal() as f32);
+    let section: Vec<Vec2> = arc(s.range32(0.3, 1.6), 0.12, detail.parts());
+    let mesh = sweep(
+        &detail.thinned(&path),
+        &section,
+        |t| vec2(half * wide(t), (half * wide(t)).max(thick)),
+        0.8 * s.normal() as f32,
+    );
     let stalk = s.chance(0.3);
     debris(DebrisKind::Bit, mesh, if stalk { tone(weathering, s) } else { ROTTEN }, &path, s)
 }
@@ -313,7 +380,7 @@ mod tests {
     #[test]
     fn swept_bodies_are_closed_and_face_outward() {
         let path: Vec<Vec3> = (0..9u8).map(|i| Vec3::new(f32::from(i) * 0.1, 0.0, 0.02 * f32::from(i))).collect();
-        for section in [round(8), arc(1.2, 0.2), arc(4.0, 0.2)] {
+        for section in [round(8), round(4), arc(1.2, 0.2, 6), arc(4.0, 0.2, 6), arc(1.2, 0.2, 2), arc(4.0, 0.2, 2)] {
             let mesh = sweep(&path, &section, |_| Vec2::splat(0.05), 0.3);
             assert_eq!(mesh.fault(), None);
             let volume: f32 = (0..mesh.triangles.len() as u32)

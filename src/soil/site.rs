@@ -47,6 +47,8 @@ pub(super) struct Sizes {
     pub(super) unseen: [(f32, f32); 2],
     /// Bodies.
     pub(super) clods: (f32, f32),
+    /// What is told from the ground, mm: what lies on it needs no finer shape. 0: as fine as it is made.
+    pub(super) told: f32,
 }
 
 impl Site {
@@ -58,6 +60,12 @@ impl Site {
         let crumbs = (self.smallest_mm.clamp(crumb, clod.max(crumb)), clod);
         let body = (BODIES_FROM * self.smallest_mm).clamp(clod, most);
         let drawn = (self.smallest_mm.clamp(clod, body), body);
-        Sizes { crumbs, drawn, unseen: [(crumb, crumbs.0), (clod, drawn.0)], clods: (body, most) }
+        Sizes {
+            crumbs,
+            drawn,
+            unseen: [(crumb, crumbs.0), (clod, drawn.0)],
+            clods: (body, most),
+            told: self.smallest_mm,
+        }
     }
 }

@@ -65,12 +65,12 @@ fn density(desc: &StonesDesc, stream: &Stream) -> (f32, f32) {
     (-(1.0 - cover.min(0.98)).ln() / (disc * group), group)
 }
 
-/// What a population on so much ground takes.
-pub(super) fn cost(desc: &StonesDesc, area: Rect, stream: &Stream) -> Cost {
+/// What a population on so much ground takes, of which lengths of `told` mm are told.
+pub(super) fn cost(desc: &StonesDesc, area: Rect, told: f32, stream: &Stream) -> Cost {
     let (per_m2, group) = density(desc, stream);
     let number = f64::from(area.area()) * f64::from(per_m2) * f64::from(group);
     let mut s = stream.child(Purpose::Page, 2);
-    let triangles = (0..512).map(|_| body::triangles(level(length(desc, &mut s)))).sum::<usize>() as f64 / 512.0;
+    let triangles = (0..512).map(|_| body::triangles(level(length(desc, &mut s), told))).sum::<usize>() as f64 / 512.0;
     // Each has a shape of its own, which is made whole; what lies in the ground is left out of it.
     Cost::of(0.75 * triangles, 1.0) * number + Cost::work(0.0, SHAPE_SECONDS * triangles * number)
 }
@@ -107,18 +107,26 @@ fn disc_m2(mm: f32) -> f32 {
     std::f32::consts::FRAC_PI_4 * AXES.0 * (mm * 1e-3).powi(2)
 }
 
-/// Detail of a stone of a length.
-fn level(mm: f32) -> usize {
-    match mm {
+/// Detail of a stone of a length where lengths of `told` mm are told: some four triangles for each of them along it.
+fn level(mm: f32, told: f32) -> usize {
+    let own = match mm {
         ..2.5 => 0,
         2.5..6.0 => 1,
         6.0..12.0 => 2,
         _ => 3,
-    }
+    };
+    // Without a shortest length all are told.
+    let seen = match mm / told {
+        ..4.0 => 0,
+        4.0..8.0 => 1,
+        8.0..16.0 => 2,
+        _ => 3,
+    };
+    own.min(seen)
 }
 
 fn stone(desc: &StonesDesc, ground: &Ground, pile: &mut Pile, at: Vec2, mm: f32, s: &mut Stream) -> Debris {
-    let shape = Shape::new(level(mm), CUT, s);
+    let shape = Shape::new(level(mm, ground.sizes.told), CUT, s);
     let mut vary = |mean: f32| (mean * (1.0 + 0.12 * s.normal() as f32)).clamp(0.6 * mean, 1.0);
     let middle = vary(AXES.0);
     let axes = vec3(1.0, middle, middle * vary(AXES.1)) * (0.5e-3 * mm);
