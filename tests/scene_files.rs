@@ -66,7 +66,9 @@ fn every_field_page_builds() {
         let options = Options { width: Some(48), ..Options::default() };
         let field = assemble::field(&path, &options).unwrap_or_else(|e| panic!("{e}"));
         assert!(!field.scene.parts.is_empty() && !field.scene.lights.is_empty(), "{}: nothing to see", path.display());
-        assert!(field.warnings.is_empty(), "{}: {:?}", path.display(), field.warnings);
+        // A horizon has ground beyond all plants, which its scene file tells.
+        let told = |warning: &&String| !warning.starts_with("the camera sees ground to the horizon");
+        assert_eq!(field.warnings.iter().filter(told).collect::<Vec<_>>(), [""; 0], "{}", path.display());
         for part in &field.scene.parts {
             assert_eq!(part.mesh.fault(), None, "{}", path.display());
         }

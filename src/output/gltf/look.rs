@@ -31,10 +31,12 @@ pub(super) struct Looks<'a> {
 struct Sheet<'a> {
     swatch: Swatch<'a>,
     mask: Option<&'a AlphaMask>,
-    /// The largest tints of those that wear it: what the picture is multiplied by so that no factor exceeds one.
-    tint: f32,
-    tint_transmitted: f32,
-    /// The largest transmittance.
+    /// The largest tints of those that wear it in R, G, B: what the picture is multiplied by so that no factor exceeds one.
+    tint: Vec3,
+    tint_transmitted: Vec3,
+    /// The largest reflectance, and the largest transmittance.
+    most: [Vec3; 2],
+    /// The part of light that passes: what both are written beside.
     share: f32,
     /// Whether any of them has a relief.
     raised: bool,
@@ -71,16 +73,28 @@ impl<'a> Looks<'a> {
             let sheet = sheets.entry(key).or_insert_with(|| {
                 order.push(key);
                 let own = scene.materials[*material as usize].swatch();
-                let share = most_transmitted(&own);
-                Sheet { swatch: own, mask: mask.map(|m| &**m), tint: 1.0, tint_transmitted: 1.0, share, raised: false }
+                let (mask, most) = (mask.map(|m| &**m), most(&own));
+                Sheet {
+                    swatch: own,
+                    mask,
+                    tint: Vec3::ONE,
+                    tint_transmitted: Vec3::ONE,
+                    most,
+                    share: 0.0,
+                    raised: false,
+                }
             });
-            sheet.tint = sheet.tint.max(swatch.tint.max_element());
+            sheet.tint = sheet.tint.max(swatch.tint);
             sheet.raised |= swatch.relief > 0.0;
-            sheet.tint_transmitted = sheet.tint_transmitted.max(swatch.tint_transmitted.max_element());
+            sheet.tint_transmitted = sheet.tint_transmitted.max(swatch.tint_transmitted);
         }
         for sheet in sheets.values_mut() {
-            // Specimens that let more light through than their picture need their part of the share.
-            sheet.share = (sheet.share * sheet.tint_transmitted).min(0.9);
+            // Specimens that let more light through than their picture need their part of the share. Where the brightest texels of both leave no
+            // share that holds them, both are cut by the same factor.
+            let [reflected, transmitted] = sheet.most;
+            let reflected = (reflected * sheet.tint).max_element();
+            let transmitted = (transmitted * sheet.tint_transmitted).max_element();
+            sheet.share = (transmitted / (reflected + transmitted).max(1.0)).min(0.9);
         }
         document.samplers = vec![
             // Masks are cut without a filter: as ours are.
@@ -129,12 +143,14 @@ fn key(swatch: &Swatch<'_>, mask: Option<&Arc<AlphaMask>>, number: usize) -> Key
     if swatch.size.is_some() { (swatch.key, address(mask)) } else { ([0, number], address(mask)) }
 }
 
-/// The largest transmittance of a swatch in R, G, B: of its picture's texels, every 4th across and down.
-fn most_transmitted(swatch: &Swatch<'_>) -> f32 {
-    let of = |x, y| swatch.texel(x, y).transmittance.0.truncate().max_element();
+/// The largest reflectance and transmittance of a swatch in R, G, B: of its picture's texels, every 4th across and down.
+fn most(swatch: &Swatch<'_>) -> [Vec3; 2] {
     let (w, h) = swatch.size.unwrap_or((1, 1));
     let some = (0..h).step_by(4).flat_map(|y| (0..w).step_by(4).map(move |x| (x, y)));
-    some.map(|(x, y)| of(x, y)).fold(0.0, f32::max)
+    some.map(|(x, y)| swatch.texel(x, y)).fold([Vec3::ZERO; 2], |most, tone| {
+        let of = [tone.reflectance, tone.transmittance].map(|s| s.0.truncate());
+        [most[0].max(of[0]), most[1].max(of[1])]
+    })
 }
 
 /// Pictures as PNG files.
@@ -146,13 +162,13 @@ struct Drawn {
 
 impl Sheet<'_> {
     /// What reflected colours are multiplied by in the document: tints, and the share that does not pass.
-    fn lift(&self) -> f32 {
+    fn lift(&self) -> Vec3 {
         self.tint / (1.0 - self.share)
     }
 
     /// The same for what passes.
-    fn lift_transmitted(&self) -> f32 {
-        if self.share > 0.0 { self.tint_transmitted / self.share } else { 0.0 }
+    fn lift_transmitted(&self) -> Vec3 {
+        if self.share > 0.0 { self.tint_transmitted / self.share } else { Vec3::ZERO }
     }
 
     fn draw(&self) -> Result<Drawn> {
