@@ -306,11 +306,9 @@ fn an_echo_of_a_wide_beam_has_a_label_within_its_beam() {
         let tags: Vec<Tag> = hits.iter().map(|hit| parts[hit.part as usize].tag).collect();
         let tag = parts[echo.part as usize].tag;
         assert!(tags.contains(&tag), "{tag:?} is none of {tags:?}");
-        if tags.iter().all(|other| *other == tags[0]) {
-            pure += 1
-        } else {
-            mixed += 1
-        };
+        let alike = tags.iter().all(|other| *other == tags[0]);
+        pure += u32::from(alike);
+        mixed += u32::from(!alike);
         several += u32::from(echo.count > 1);
         let (lo, hi) = hits.iter().fold((f32::INFINITY, 0.0_f32), |(lo, hi), hit| (lo.min(hit.t), hi.max(hit.t)));
         assert!((lo - 1e-4..=hi + 1e-4).contains(&echo.range));

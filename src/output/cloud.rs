@@ -166,7 +166,7 @@ impl Cloud {
         let further = self.columns.iter().map(|Column { kind, name }| (*kind, *name));
         let properties = PROPERTIES.into_iter().chain(further).map(|(kind, name)| format!("property {kind} {name}\n"));
         let properties: String = properties.collect();
-        let comments: String = self.comments.iter().map(|line| format!("comment {line}\n")).collect();
+        let comments: String = self.comments.iter().flat_map(|line| ["comment ", line.as_str(), "\n"]).collect();
         let points = self.points;
         let mut file = format!(
             "ply\nformat binary_little_endian 1.0\ncomment furrow {version}; world coordinates, metres, z up\n{comments}element vertex {points}\n{properties}end_header\n"

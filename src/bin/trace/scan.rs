@@ -38,7 +38,7 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     };
     let threads = Threads::all()?;
     let named = args.lidar.as_deref().and_then(LidarDesc::named);
-    let scanner = named.map_or(Scanner::OfScene, Scanner::AtCamera);
+    let scanner = named.map_or(Scanner::OfScene, |lidar| Scanner::AtCamera(Box::new(lidar)));
     let field = args.field.grow_as(&FULL, |scene| scene.threads(&threads).scanned(scanner), tell)?;
     let (lidar, echoes) = field.scan()?;
     if echoes.is_empty() {

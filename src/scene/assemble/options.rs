@@ -41,7 +41,7 @@ pub enum Scanner {
     /// The scene file's.
     OfScene,
     /// This one, where the first camera is; of a scene file that has none.
-    AtCamera(LidarDesc),
+    AtCamera(Box<LidarDesc>),
 }
 
 impl Options {

@@ -10,7 +10,7 @@ use crate::sampling::{Purpose, Stream};
 use crate::scene::desc::Detail;
 use crate::scene::desc::FieldDesc;
 use crate::scene::drive::{Capture, FIRST};
-use crate::sensor::{Camera, LIDARS, Lidar};
+use crate::sensor::{Camera, LIDARS, Lidar, LidarDesc};
 use crate::soil::Rect;
 use crate::{Error, Result};
 use std::borrow::Cow;
@@ -42,7 +42,7 @@ pub(super) fn at_frames(
     let own = match (scan, &desc.lidar) {
         (None, _) => return Ok(Vec::new()),
         (Some(Scanner::OfScene), Some(own)) => own.clone(),
-        (Some(Scanner::AtCamera(of)), None) => of.clone().at(first.pose().position),
+        (Some(Scanner::AtCamera(of)), None) => LidarDesc::clone(of).at(first.pose().position),
         (Some(Scanner::OfScene), None) => {
             let help = format!(
                 "write `lidar: Vlp16(position_m: (0, 0, 1.5))` into it, or scan from its first camera with --lidar {}",
