@@ -72,7 +72,7 @@ fn shoot(edit: &Edit, field: &Field, threads: usize) -> Shot {
 fn shape(field: &Field) -> String {
     let numbers = field.scene.parts.iter().flat_map(|part| {
         let corners = part.mesh.positions.iter().chain(&part.mesh.normals).flat_map(Vec3::to_array).map(f32::to_bits);
-        let tag = [u32::from(part.tag.plant), u32::from(part.tag.leaf), part.tag.class as u32];
+        let tag = [part.tag.plant, u32::from(part.tag.leaf), part.tag.class as u32];
         corners.chain(part.mesh.triangles.iter().flatten().copied()).chain(tag).chain([u32::from(part.mask.is_some())])
     });
     common::program::hash(numbers)

@@ -21,7 +21,7 @@ use std::process::{Command, Stdio};
 
 /// One number a pixel that tells class, plant and leaf.
 fn numbers(map: &LabelMap) -> Vec<u32> {
-    map.tags.iter().map(|t| u32::from(t.plant) << 16 | u32::from(t.leaf) << 2 | t.class as u32).collect()
+    map.tags.iter().map(|t| t.plant << 16 | u32::from(t.leaf) << 2 | t.class as u32).collect()
 }
 
 #[test]

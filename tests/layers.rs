@@ -58,7 +58,7 @@ fn expected(film: &Film, labels: &LabelMap, tags: &[Tag]) -> Value {
         "mattes": mattes,
         "ids": {
             "id.class": ids(&|i| labels.tags[i].class as u32),
-            "id.plant": ids(&|i| labels.tags[i].plant.into()),
+            "id.plant": ids(&|i| labels.tags[i].plant),
             "id.leaf": ids(&|i| labels.tags[i].leaf.into()),
             "id.part": ids(&|i| labels.parts[i].wrapping_add(1)),
         },

@@ -54,7 +54,7 @@ fn bits(mesh: &Mesh) -> Vec<u32> {
 }
 
 fn numbers(map: &LabelMap) -> Vec<u32> {
-    map.tags.iter().map(|t| u32::from(t.plant) << 16 | u32::from(t.leaf) << 2 | t.class as u32).collect()
+    map.tags.iter().map(|t| t.plant << 16 | u32::from(t.leaf) << 2 | t.class as u32).collect()
 }
 
 #[test]

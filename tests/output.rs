@@ -108,7 +108,7 @@ fn the_exr_holds_the_film_and_the_labels() {
     assert!(depth.iter().all(|d| *d > 0.0), "nothing lies behind the camera");
     let ids = |f: fn(&furrow::scene::tag::Tag) -> u32| Samples::Whole(labels.tags.iter().map(f).collect());
     assert_eq!(channels["id.class"], ids(|t| t.class as u32));
-    assert_eq!(channels["id.plant"], ids(|t| u32::from(t.plant)));
+    assert_eq!(channels["id.plant"], ids(|t| t.plant));
     assert_eq!(channels["id.leaf"], ids(|t| u32::from(t.leaf)));
     let parts = labels.parts.iter().map(|p| if *p == NONE { 0 } else { p + 1 }).collect();
     assert_eq!(channels["id.part"], Samples::Whole(parts));

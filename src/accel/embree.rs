@@ -40,6 +40,12 @@ struct Instance {
     slots: Arc<[Slot]>,
 }
 
+/// Neighbours with one placement: the first of them, all of them, and where they stand.
+type Group<'a> = (u32, &'a [Surface<'a>], &'a Placement);
+
+/// Geometries of a scene in the order of their numbers.
+type Geometries = Vec<Arc<rtc::Geometry<Cut>>>;
+
 /// A scene of parts that several plants share, and its slots, whose parts are counted from the first.
 type Shared = (Arc<rtc::Scene<Cut>>, Arc<[Slot]>);
 
@@ -150,7 +156,7 @@ impl EmbreeAccel {
 /// The geometries of parts one after another.
 struct Flat {
     slots: Vec<Slot>,
-    geometries: Vec<Arc<rtc::Geometry<Cut>>>,
+    geometries: Geometries,
     /// See [`EmbreeAccel::firsts`].
     firsts: Vec<usize>,
 }
@@ -173,12 +179,8 @@ impl Flat {
 
 /// The instances among the surfaces, and their geometries: neighbours with one placement are one. What has the same meshes and masks is
 /// built once.
-fn instances(
-    device: &Arc<rtc::Device>,
-    surfaces: &[Surface<'_>],
-    quick: bool,
-) -> Result<(Vec<Instance>, Vec<Arc<rtc::Geometry<Cut>>>)> {
-    let mut groups: Vec<(u32, &[Surface<'_>], &Placement)> = Vec::new();
+fn instances(device: &Arc<rtc::Device>, surfaces: &[Surface<'_>], quick: bool) -> Result<(Vec<Instance>, Geometries)> {
+    let mut groups: Vec<Group<'_>> = Vec::new();
     let mut first = 0;
     for group in surfaces.chunk_by(|a, b| a.instance.map(Arc::as_ptr) == b.instance.map(Arc::as_ptr)) {
         groups.extend(group[0].instance.map(|placement| (first, group, &**placement)));
@@ -199,7 +201,7 @@ fn instances(
         Ok((Arc::new(rtc::Scene::build(device, geometries, quick, None)?), slots.into()))
     };
     let shared: Vec<Shared> = distinct.par_iter().map(share).collect::<Result<_>>()?;
-    let place = |(first, group, at): &(u32, &[Surface<'_>], &Placement)| {
+    let place = |(first, group, at): &Group<'_>| {
         let (scene, slots) = &shared[numbers[&key(group)]];
         let (turned, offset) = (at.rotation, at.offset);
         let geometry = rtc::Geometry::instance(scene, [turned.x_axis, turned.y_axis, turned.z_axis, offset])?;

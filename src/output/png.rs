@@ -65,7 +65,7 @@ pub fn encode(width: u32, height: u32, picture: &Picture<'_>, text: &str) -> Res
             pixels.iter().flat_map(|p| p.to_be_bytes()).collect()
         }
         Picture::Numbers(numbers) => match numbers.iter().copied().max().unwrap_or(0) {
-            most if most <= u32::from(u16::MAX) => {
+            most if u16::try_from(most).is_ok() => {
                 encoder.set_color(ColorType::Grayscale);
                 encoder.set_depth(BitDepth::Sixteen);
                 numbers.iter().flat_map(|n| (*n as u16).to_be_bytes()).collect()

@@ -176,7 +176,7 @@ const CELLS: f32 = 512.0;
 
 /// Ground below organs, m²: cells whose middle lies under one of them.
 fn cover(organs: &[&Organ<'_>]) -> f64 {
-    let corners = || organs.iter().flat_map(|organ| organ.part.positions()).map(|p| p.truncate());
+    let corners = || organs.iter().flat_map(|organ| organ.part.positions()).map(Vec3::truncate);
     let Some(first) = corners().next() else { return 0.0 };
     let (lo, hi) = corners().fold((first, first), |(lo, hi), p| (lo.min(p), hi.max(p)));
     let side = ((hi - lo).max_element() / CELLS).max(1e-5);

@@ -1,12 +1,13 @@
 //! Plants that share their meshes, so that a hectare of them fits into memory.
 //!
 //! Where `detail` is `Instanced`, what stands so far away that a pixel shows more than [`COARSE`] of it is no plant of its own shape: each
-//! population has a bank of [`MEMBERS`] plants, grown as all of its plants are, and each plant stands in the field as an instance of one of them,
+//! population has a bank of plants, grown as all of its plants are, and each plant stands in the field as an instance of one of them,
 //! turned by an angle of its own and leant as its ground. Which one that is, and how it is turned, follows from the plant's own stream
 //! alone, so it does not depend on what else is in view.
 
 use super::builder::Builder;
 use super::grown::Grown;
+use super::member::Member;
 use super::seedling::{Place, Seedling, grow};
 use crate::Result;
 use crate::geometry::Placement;
@@ -17,39 +18,12 @@ use crate::scene::PlantRecord;
 use crate::scene::desc::Detail;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use std::f32::consts::TAU;
 use std::sync::Arc;
 
-/// Plants of a bank.
-const MEMBERS: usize = 64;
 /// Side of the smallest pixel on a plant from which on it may be an instance, metres: blades of a beet are then some forty pixels long.
 const COARSE: f32 = 2.5e-3;
 /// Which of a population's streams its bank is grown from: plants of the field have those of [`Purpose::Plant`].
 const BANK: Purpose = Purpose::Scatter;
-/// Which of a plant's streams says what it is an instance of.
-const CHOICE: u64 = 1 << 22;
-
-/// One plant of a bank, meshed for pixels of one size.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Member {
-    /// Address of the population's streams.
-    population: u64,
-    number: usize,
-    /// Binary logarithm of the shortest cell of its mesh, metres, rounded down.
-    octave: i32,
-}
-
-impl Member {
-    /// That of a plant with this stream.
-    fn of(population: u64, stream: &Stream, cell: f32) -> Self {
-        let number = stream.child(Purpose::Plant, CHOICE).index(MEMBERS);
-        Self { population, number, octave: cell.log2().floor() as i32 }
-    }
-
-    fn cell(self) -> f32 {
-        (self.octave as f32).exp2()
-    }
-}
 
 /// A plant of a bank that has grown, in plant coordinates.
 pub(super) struct Model {
@@ -61,7 +35,7 @@ pub(super) struct Model {
 impl Model {
     /// What is known of the plant of `seedling`, an instance of this one that stands at `foot` on ground with this normal, and how it stands.
     pub(super) fn stand(&self, seedling: &Seedling, foot: Vec3, normal: Vec3) -> (PlantRecord, Placement) {
-        let turn = seedling.stream.child(Purpose::Plant, CHOICE + 1).range32(0.0, TAU);
+        let turn = Member::turn(&seedling.stream);
         let ahead = Vec3::new(turn.sin(), turn.cos(), 0.0);
         let frame = Frame::with_tangent(normal, ahead.cross(normal));
         let at = Placement { rotation: Mat3::from_cols(frame.x, frame.y, frame.z), offset: foot };
@@ -91,35 +65,12 @@ impl Builder<'_> {
         let wanted: Vec<(Member, &Seedling)> = wanted.into_iter().collect();
         let raise = |(member, like): &(Member, &Seedling)| {
             self.options.wanted()?;
-            let stream = self.stream(Purpose::Plant, member.population).child(BANK, member.number as u64);
+            let stream = self.stream(Purpose::Plant, member.population).child(BANK, member.number);
             let own = Seedling { position: Vec2::ZERO, turn: 0.0, member: None, stream, ..(*like).clone() };
             let place = Place { height: 0.0, normal: Vec3::Z, dust, cell: member.cell(), rigged: false };
             let (record, organs) = grow(&own, &place, |_| true);
             Ok((*member, Arc::new(Model { record, organs })))
         };
         wanted.par_iter().map(raise).collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Expected: a population's plants are spread over all of its bank, about evenly; a plant's choice is its own whatever the cell, and the
-    /// cell of a member is at most that of its plant, and more than half of it.
-    #[test]
-    fn plants_choose_from_the_whole_bank() {
-        let mut chosen = [0; MEMBERS];
-        for key in 0..6400 {
-            let stream = Stream::of(5, 0, Purpose::Plant, 1).child(Purpose::Plant, key);
-            let [near, far] = [7.5e-3, 0.02].map(|cell| (Member::of(1, &stream, cell), cell));
-            assert_eq!(near.0.number, far.0.number);
-            for (member, cell) in [near, far] {
-                assert!(member.cell() <= cell && 2.0 * member.cell() > cell, "{member:?} {cell}");
-            }
-            chosen[near.0.number] += 1;
-        }
-        // 100 each on the mean; the bounds are six standard deviations.
-        assert!(chosen.iter().all(|n| (40..160).contains(n)), "{chosen:?}");
     }
 }

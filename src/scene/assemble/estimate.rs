@@ -1,9 +1,9 @@
 //! What a field under way will take: film, ground, what lies on it, plants, models.
 
 use super::PLANT_MARGIN;
-use super::bank::Member;
 use super::builder::Builder;
 use super::census::Population;
+use super::member::Member;
 use super::preview::Counted;
 use super::seedling::{Place, Seedling, grow};
 use super::view::View;

@@ -15,6 +15,7 @@ mod identity;
 mod individual;
 mod known;
 mod lighting;
+mod member;
 mod models;
 mod options;
 mod preview;

@@ -1,9 +1,9 @@
 //! A plant to be grown, and how it grows in its place.
 
-use super::bank::Member;
 use super::condition::{Ailing, Bare};
 use super::grown::Grown;
 use super::individual::Individual;
+use super::member::Member;
 use super::today::{Today, emerging};
 use crate::material::LeafMaterial;
 use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3};

@@ -1,8 +1,8 @@
 //! Plants are grown and stand in the field: each with meshes of its own, or as an instance of a plant of a bank.
 
-use super::bank::Member;
 use super::builder::{Builder, Floor};
 use super::grown::Grown;
+use super::member::Member;
 use super::preview::Standing;
 use super::seedling::{Place, Seedling, grow};
 use crate::geometry::Placement;
@@ -25,7 +25,7 @@ enum Stands {
     /// With meshes of its own.
     Own(Arc<Standing>),
     /// As an instance.
-    Shared(PlantRecord, Member, Placement),
+    Shared(Box<PlantRecord>, Member, Placement),
 }
 
 impl Stands {
@@ -59,7 +59,7 @@ impl Builder<'_> {
             let (height, normal) = floor.map_or((0.0, Vec3::Z), |f| f.stance(x, y));
             if let Some(member) = seedling.member {
                 let (record, at) = bank[&member].stand(seedling, seedling.position.extend(height), normal);
-                return Ok(Stands::Shared(record, member, at));
+                return Ok(Stands::Shared(Box::new(record), member, at));
             }
             let place = Place { height, normal, dust, cell: cell(seedling.position), rigged: options.rigged };
             let known = options.preview.as_ref().and_then(|preview| preview.plant(seedling, &place));
@@ -86,7 +86,7 @@ impl Builder<'_> {
                 }
                 Stands::Shared(record, member, at) => {
                     let (true, Some(organs)) = (reaches(&record), &bank[&member].organs) else { continue };
-                    let record = PlantRecord { number, ..record };
+                    let record = PlantRecord { number, ..*record };
                     if let Entry::Vacant(first) = worn.entry(member) {
                         first.insert(self.dress(&record, organs)?);
                     }
