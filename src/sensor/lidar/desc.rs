@@ -261,7 +261,7 @@ mod tests {
             ("(azimuth_deg: (60, -60))", "from 60 to -60"),
             ("(azimuth_deg: (0, 400))", "from 0 to 400"),
             ("(pulses: StepDeg(0.0001))", "pulses in a turn are too many"),
-            ("(pulses: PerSecond(1000000000))", "1600000000 pulses"),
+            ("(pulses: PerSecond(1000000000))", "100000000 pulses"),
             ("(divergence_mrad: 3000)", "a beam of 3000 mrad"),
             ("(exit_mm: 2000)", "and 2000 mm where it leaves"),
             ("(range_noise_m: NaN)", "NaN"),
