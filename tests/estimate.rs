@@ -9,15 +9,19 @@ mod common;
 use common::program::{scratch, small_text, trace};
 use furrow::render;
 use furrow::scene::assemble::{self, Options, Source};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-/// Estimated triangles over those that grew.
+/// Estimated triangles over those that grew: plants that share meshes have them once.
 fn ratio(path: &Path, options: &Options) -> f64 {
     let pool = render::pool(0).expect("a pool");
     pool.install(|| {
         let expected = Source::open(path).unwrap_or_else(|e| panic!("{e}")).estimate(options).expect("an estimate");
         let field = assemble::field(path, options).unwrap_or_else(|e| panic!("{e}"));
-        expected.total().triangles / field.scene.triangles() as f64
+        let meshes: BTreeMap<_, _> =
+            field.scene.parts.iter().map(|part| (Arc::as_ptr(&part.mesh), part.mesh.triangles.len())).collect();
+        expected.total().triangles / meshes.values().sum::<usize>() as f64
     })
 }
 

@@ -213,7 +213,7 @@ fn every_triangle(scene: &Scene) -> (Vec<u32>, Vec<f32>) {
     let (mut parts, mut distances) = (vec![NONE; rays.len()], vec![f32::INFINITY; rays.len()]);
     let straight = camera.distortion().is_none();
     for (p, part) in scene.parts.iter().enumerate() {
-        let seen: Vec<_> = part.mesh.positions.iter().map(|q| camera.pose().point_to_camera(*q)).collect();
+        let seen: Vec<_> = part.positions().map(|q| camera.pose().point_to_camera(q)).collect();
         let image: Vec<_> = seen.iter().map(|q| camera.project_camera(*q)).collect();
         for (t, corners) in part.mesh.triangles.iter().enumerate() {
             let corners = corners.map(|i| i as usize);

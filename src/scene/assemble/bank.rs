@@ -50,7 +50,7 @@ impl Builder<'_> {
     /// What the plant at a place is an instance of; none of one that has a shape of its own.
     pub(super) fn member(&self, population: u64, stream: &Stream, at: Vec2) -> Option<Member> {
         let whole = self.options.preview.is_some() || self.options.rigged;
-        let shared = self.desc.detail == Detail::Instanced && !whole && self.pixel_at(at) >= COARSE;
+        let shared = self.desc.detail == Detail::Instanced && !whole && self.camera_pixel_at(at) >= COARSE;
         shared.then(|| Member::of(population, stream, self.cell(at)))
     }
 

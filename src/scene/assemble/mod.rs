@@ -267,9 +267,11 @@ impl<'a> Builder<'a> {
 
     /// Side of the smallest pixel on a plant at a place in any image, metres, across the line of sight.
     fn pixel_at(&self, at: Vec2) -> f32 {
-        if let Some(spacing) = self.scanned_at(at) {
-            return spacing;
-        }
+        self.scanned_at(at).unwrap_or_else(|| self.camera_pixel_at(at))
+    }
+
+    /// The same of cameras alone, whoever looks: which plants share meshes follows from it, so that a LiDAR meets the plants that cameras see.
+    fn camera_pixel_at(&self, at: Vec2) -> f32 {
         let side = |camera: &Camera| {
             let distance = camera.pose().position.distance(at.extend(0.0)) - PLANT_MARGIN;
             distance.max(0.0) * camera.pixel_angle()
