@@ -1,5 +1,5 @@
 //! What people choose images and plants by, as tables that databases read: `images.parquet` with a row an image, `plants.parquet` with a row
-//! a plant that an image shows or hides. The format `traits` adds a table of leaves ([`leaves`]). A cell is empty where its value is not known: of models from disk, of imported images.
+//! a plant that an image shows or hides. The format `traits` adds a table of leaves (`leaves.parquet`). A cell is empty where its value is not known: of models from disk, of imported images.
 
 pub(super) mod leaves;
 mod table;
