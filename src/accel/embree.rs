@@ -1,7 +1,8 @@
 //! The accelerator over Embree, version 3 or 4.
 //!
 //! What stands by itself lies flat in one hierarchy: measured on fields like ours, instancing traces 1.4–2.1 times slower. Plants whose
-//! meshes others share are instances of a hierarchy of their own, which costs no memory a plant. Each part becomes up to two geometries: the triangles that are opaque all over, which nobody asks about, and those that the mask cuts, whose hits
+//! meshes others share are instances of a hierarchy of their own, which is built once for all of them. Each part becomes up to two
+//! geometries: the triangles that are opaque all over, which nobody asks about, and those that the mask cuts, whose hits
 //! a filter confirms. ROBUST traversal closes the crack pixels that the fast mode leaks; colour and label share it, since
 //! both must see one geometry. The instruction set is pinned: hits differ in the last bits between instruction sets.
 
