@@ -226,6 +226,38 @@ fn all_that_a_camera_sees_is_planted_or_told() {
     assert!(refused.contains("m away") && refused.contains("lower the camera"), "{refused}");
 }
 
+/// Rationale: a camera within a clod or a ridge takes pictures of nothing, and who took them did not know why. Expected: a warning that says so where the
+/// ground's own triangle at the camera's place is above it, and none where it is not; both happen in sixteen fields.
+#[test]
+fn a_camera_under_the_ground_is_told() {
+    let text = r#"Field(
+        seed: 7,
+        camera: Pinhole(size: (8, 6), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.002)),
+        lights: [Constant(radiance: (1, 1, 1, 1))],
+        soil: (colors: [Loess], relief: (rms_mm: 12), clods: (over_5mm_per_m2: 1, min_mm: 5)),
+    )"#;
+    let mut buried = 0;
+    for index in 0..16 {
+        let field = field(text, &Options { index, ..Options::default() });
+        let soil = &field.scene.parts[field.kinds.iter().position(|kind| *kind == PartKind::Soil).unwrap()];
+        let height = |k: u32| {
+            let [a, b, c] = soil.corners(k);
+            let cross = |p: Vec3, q: Vec3| p.truncate().perp_dot(q.truncate());
+            let [u, v, w] = [cross(b, c), cross(c, a), cross(a, b)];
+            let inside = (u >= 0.0) == (v >= 0.0) && (v >= 0.0) == (w >= 0.0);
+            inside.then(|| (a.z * u + b.z * v + c.z * w) / (u + v + w))
+        };
+        let height = (0..soil.mesh.triangles.len() as u32).find_map(height).unwrap();
+        if (height - 0.002).abs() < 1e-4 {
+            continue;
+        }
+        let told = field.warnings.iter().any(|words| words.contains("under the ground") && words.contains("raise it"));
+        assert_eq!(told, height > 0.002, "{index}: {height} m, {:?}", field.warnings);
+        buried += usize::from(told);
+    }
+    assert!((2..14).contains(&buried), "{buried} of 16");
+}
+
 /// Lengths of blades, base to tip, metres.
 fn lengths(plant: &PlantRecord) -> Vec<f32> {
     plant.leaf_axes.iter().map(|a| a.base.distance(a.tip)).collect()

@@ -24,6 +24,10 @@ use std::ops::Range;
 const BYTES_BESIDE: f64 = 160.0;
 /// Seconds of one core to label a pixel and to write it.
 const SECONDS_PER_PIXEL: f64 = 2e-6;
+/// Bytes of a pulse of a LiDAR: its echoes, in memory and in the file before it is written.
+const BYTES_PER_PULSE: f64 = 400.0;
+/// Seconds of one core to shoot a pulse.
+const SECONDS_PER_PULSE: f64 = 5e-6;
 /// Plants of a population that are grown to know the size of all.
 const LOOKED_AT: usize = 4;
 /// The same where each was placed by hand, and may be of another species.
@@ -56,6 +60,11 @@ impl Builder<'_> {
             shares.push(Share { at: at.to_vec(), cost, advice: format!("{fewer}{advice}") });
         };
         add(&[Step::Field("camera"), Step::Field("size")], film, "make the image smaller, with --width");
+        let pulses = self.scanners.iter().map(|lidar| f64::from(lidar.columns()) * f64::from(lidar.beams())).sum::<f64>();
+        if pulses > 0.0 {
+            let echoes = Cost::work(pulses * BYTES_PER_PULSE, pulses * SECONDS_PER_PULSE);
+            add(&[Step::Field("lidar")], echoes, "take fewer beams, or a larger step in `pulses`");
+        }
         if let Some(soil) = &self.desc.soil {
             let (bare, all) = self.expected_soil(soil, view);
             add(
@@ -88,6 +97,7 @@ impl Builder<'_> {
         }
         Ok(Estimate { shares })
     }
+
     /// The sizes of some plants of a population, which are grown for it. Not grown is what might itself be too large.
     fn count(&self, seedlings: &[Seedling], population: Population, range: Range<usize>) -> Vec<Counted> {
         let number = range.len();

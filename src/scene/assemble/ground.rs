@@ -72,6 +72,7 @@ impl Builder<'_> {
         let ground = earth.ground.clone();
         let floor = Floor { ground: &ground, maps: &soil.maps, flat: desc.flat };
         let record = self.soil_record(desc, &ground);
+        self.warn_of_burial(floor);
         // The bake takes as long as everything else, and neither needs the other.
         let (baked, rest) = rayon::join(
             || match &known {

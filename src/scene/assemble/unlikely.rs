@@ -1,7 +1,8 @@
 //! What a scene file says that is allowed and was probably not meant: the field is built, and its warnings tell.
 
-use super::builder::Builder;
+use super::builder::{Builder, Floor};
 use crate::Result;
+use crate::math::Vec3;
 use crate::ron_file::{Step, place};
 use crate::sampling::Purpose;
 use crate::scatter::Rows;
@@ -77,6 +78,26 @@ impl Builder<'_> {
             }
         }
         Ok(())
+    }
+
+    /// A warning where a camera or the LiDAR lies in ground that is higher than z = 0 at its place; nothing but the inside of it is seen then.
+    pub(super) fn warn_of_burial(&mut self, floor: Floor<'_>) {
+        let depth = |at: Vec3| floor.height(at.x, at.y) - at.z;
+        let cameras = self.captures.iter().map(|capture| capture.camera.pose().position);
+        let (what, places): (_, Vec<Vec3>) = match self.scanners.is_empty() {
+            true => ("camera", cameras.collect()),
+            false => ("LiDAR", self.scanners.iter().map(|lidar| lidar.position).collect()),
+        };
+        let deepest = places.iter().copied().max_by(|a, b| depth(*a).total_cmp(&depth(*b)));
+        if let Some(at) = deepest.filter(|at| depth(*at) > 0.0) {
+            let Vec3 { x, y, z } = at;
+            let words = format!(
+                "the {what} at ({x:.3}, {y:.3}, {z:.3}) lies {:.0} mm under the ground, which is {:.0} mm high there: raise it, or lower the soil's relief",
+                (1e3 * depth(at)).ceil(),
+                1e3 * (depth(at) + z)
+            );
+            self.warnings.push(words);
+        }
     }
 
     /// Warnings about what stands in view.

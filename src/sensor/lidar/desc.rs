@@ -57,7 +57,7 @@ layered! {
         /// Elevations of its beams; default 16 from -15° to 15°.
         #[schemars(extend("x-example" = "Fan(count: 32, from_deg: -30, to_deg: 10)"))]
         pub beams: BeamsDesc = Given<BeamsDesc>,
-        /// Azimuths in which it shoots, from and to, degrees clockwise from its front; default a full turn from 0 to 360.
+        /// Azimuths in which it shoots, from and to, degrees clockwise from its front, from -360 to 360; default a full turn from 0 to 360.
         #[schemars(extend("x-example" = "(-60, 60)"))]
         pub azimuth_deg: (Num<Finite>, Num<Finite>) = Given<(Num<Finite>, Num<Finite>)>,
         /// Turns a second; default 10.
@@ -160,11 +160,10 @@ impl LidarDesc {
         }
         let elevations_deg = self.beams.elevations_deg();
         let (from, to) = (self.azimuth_deg.0.get(), self.azimuth_deg.1.get());
-        if !(to > from && to - from <= 360.0) {
+        if !(to > from && to - from <= 360.0 && from >= -360.0 && to <= 360.0) {
             let words = format!("azimuth_deg goes from {from} to {to}");
-            return Err(
-                Error::input(words).help("write a smaller and a larger angle, at most 360 apart, such as (-60, 60)")
-            );
+            return Err(Error::input(words)
+                .help("write a smaller and a larger angle from -360 to 360, at most 360 apart, such as (-60, 60)"));
         }
         let rotation_hz = self.rotation_hz.get();
         let step_deg = match self.pulses {
@@ -260,6 +259,7 @@ mod tests {
             ("(beams: Fan(count: 5000, from_deg: 0, to_deg: 10))", "of 5000 beams"),
             ("(azimuth_deg: (60, -60))", "from 60 to -60"),
             ("(azimuth_deg: (0, 400))", "from 0 to 400"),
+            ("(azimuth_deg: (3600, 3660))", "from 3600 to 3660"),
             ("(pulses: StepDeg(0.0001))", "pulses in a turn are too many"),
             ("(pulses: PerSecond(1000000000))", "100000000 pulses"),
             ("(divergence_mrad: 3000)", "a beam of 3000 mrad"),
