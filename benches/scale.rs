@@ -1,6 +1,8 @@
-//! How time and memory grow: with pixels, samples, plants, triangles, threads and images.
+//! How time and memory grow: with pixels, samples, plants, triangles, threads, images and area of ground.
 //!
 //!     cargo bench --bench scale            all; `-- pixels plants` for some of the tables
+//!
+//! The table of areas, whose pictures have as many pixels whatever they show, is drawn as a chart too: `FURROW_SCALE_CHART=FILE.svg` says where.
 //!
 //! Each row is a run of this bench of its own, so that its peak memory is its own. Time is that of all cores together, from Linux's clock of
 //! the process (a hundredth of a second), since a busy machine stretches every other; of threads it is the clock on the wall. The exponents are
@@ -13,6 +15,7 @@ use furrow::dataset::meter;
 use furrow::geometry::Window;
 use furrow::integrator::{PathTracer, World};
 use furrow::render::{self, Settings, Watch};
+use furrow::report::chart::{Chart, Curve};
 use furrow::sampling::Points;
 use furrow::scene::assemble;
 use furrow::scene::traits::Traits;
@@ -20,7 +23,7 @@ use std::process::Command;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-/// A row: pixels across (three to two down), samples, crop plants on a square metre, clods over 5 mm on it, threads, images.
+/// A row: pixels across (three to two down), samples, crop plants on a square metre, clods over 5 mm on it, threads, images, height of the camera in metres.
 #[derive(Clone, Copy)]
 struct Row {
     width: u32,
@@ -29,10 +32,16 @@ struct Row {
     clods: u32,
     threads: usize,
     images: u64,
+    height: f64,
 }
 
 /// What the tables vary one value of.
-const BASE: Row = Row { width: 324, spp: 8, density: 60.0, clods: 9000, threads: 1, images: 1 };
+const BASE: Row = Row { width: 324, spp: 8, density: 60.0, clods: 9000, threads: 1, images: 1, height: LOW };
+
+/// Height from which the tables but that of areas look, metres; from higher up detail goes by the pixel, and far plants share meshes.
+const LOW: f64 = 1.0;
+/// The table of areas.
+const AREA: &str = "area";
 
 /// What a row took.
 #[derive(Clone, Copy, Default)]
@@ -61,6 +70,11 @@ fn tables() -> Vec<(&'static str, Vec<(f64, Row)>)> {
         ("triangles", rows(&[1000, 4000, 16000, 64000], |clods| Row { clods, ..BASE })),
         ("threads", rows(&[1, 2], |threads| Row { threads: threads as usize, spp: 32, ..BASE })),
         ("images", rows(&[1, 2, 4, 8], |images| Row { images: u64::from(images), ..BASE })),
+        // From 2 to 20 m, a hundred times the ground.
+        (
+            AREA,
+            [2.0, 4.0, 8.0, 20.0].map(|height| (ground(height), Row { height, width: 648, spp: 16, ..BASE })).to_vec(),
+        ),
     ]
 }
 
@@ -68,13 +82,24 @@ fn height(width: u32) -> u32 {
     width * 2 / 3
 }
 
+/// Ground that an image shows from a height, m².
+fn ground(height: f64) -> f64 {
+    let wide = 2.0 * height * (ANGLE_DEG / 2.0).to_radians().tan();
+    wide * wide / 1.5
+}
+
+/// Horizontal angle of view.
+const ANGLE_DEG: f64 = 50.0;
+
 /// The scene of a row: seedlings in rows so narrow that they stand all over a piece of ground, of the same age whatever their number.
 fn scene(row: &Row) -> String {
     let side = (1.0 / row.density).sqrt();
+    let detail = if row.height > LOW { "detail: Instanced, reach_m: 12," } else { "" };
     format!(
         r#"Field(
             seed: 7,
-            camera: Pinhole(size: ({}, {}), intrinsics: FieldOfView(horizontal_deg: 50), pose: Nadir(height_m: 1)),
+            {detail}
+            camera: Pinhole(size: ({}, {}), intrinsics: FieldOfView(horizontal_deg: {ANGLE_DEG}), pose: Nadir(height_m: {})),
             lights: [Daylight(sun: Angles(elevation_deg: 50, azimuth_deg: 160))],
             soil: (
                 layers: [(albedo: "textures/soil/dirt.png", height: "textures/soil/dirt.height.png", size_m: 0.5, height_mm: (-4, 8))],
@@ -84,6 +109,7 @@ fn scene(row: &Row) -> String {
         )"#,
         row.width,
         height(row.width),
+        row.height,
         row.clods,
     )
 }
@@ -128,9 +154,9 @@ fn run(row: &Row) -> Cost {
 
 /// The same in a process of its own.
 fn measured(row: &Row) -> Cost {
-    let Row { width, spp, density, clods, threads, images } = row;
+    let Row { width, spp, density, clods, threads, images, height } = row;
     let program = std::env::current_exe().expect("this program");
-    let words = format!("{width} {spp} {density} {clods} {threads} {images}");
+    let words = format!("{width} {spp} {density} {clods} {threads} {images} {height}");
     let output = Command::new(program).env(ROW, words).output().expect("a run");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let numbers: Vec<f64> =
@@ -153,10 +179,33 @@ fn exponent(x: &[f64], y: &[f64]) -> f64 {
     above / below
 }
 
+/// Names the variable that says where the chart goes.
+const CHART: &str = "FURROW_SCALE_CHART";
+
+/// What the same number of pixels costs, by the ground that they show.
+fn chart(costs: &[(f64, Cost)]) -> Chart {
+    let curve = |name: &str, value: &dyn Fn(&Cost) -> f64| Curve {
+        name: name.into(),
+        points: costs.iter().map(|(area, cost)| (area.log10(), value(cost))).collect(),
+    };
+    Chart {
+        title: "As many pixels, more ground".into(),
+        across: "log₁₀ of the ground, m²".into(),
+        upwards: "core seconds".into(),
+        curves: vec![
+            curve("all", &|c| c.seconds.iter().sum()),
+            curve("grow", &|c| c.seconds[0]),
+            curve("draw", &|c| c.seconds[2]),
+            curve("labels", &|c| c.seconds[3]),
+        ],
+        logarithmic: false,
+    }
+}
+
 fn main() {
     if let Ok(words) = std::env::var(ROW) {
         let n: Vec<f64> = words.split_whitespace().map(|n| n.parse().expect("a number")).collect();
-        let [width, spp, density, clods, threads, images] = n[..] else { panic!("{words}") };
+        let [width, spp, density, clods, threads, images, height] = n[..] else { panic!("{words}") };
         let row = Row {
             width: width as u32,
             spp: spp as u32,
@@ -164,6 +213,7 @@ fn main() {
             clods: clods as u32,
             threads: threads as usize,
             images: images as u64,
+            height,
         };
         let Cost { plants, triangles, seconds: [a, b, c, d], wall, peak } = run(&row);
         println!("{plants} {triangles} {a} {b} {c} {d} {wall} {peak}");
@@ -208,5 +258,8 @@ fn main() {
             of(&|c| c.wall),
             of(&|c| c.peak),
         );
+        if let Some(file) = std::env::var_os(CHART).filter(|_| name == AREA) {
+            std::fs::write(&file, chart(&costs).svg()).expect("a chart");
+        }
     }
 }

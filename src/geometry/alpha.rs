@@ -146,13 +146,19 @@ impl AlphaMask {
         self.tiles[(y as u32 * self.tiles_x + x as u32) as usize]
     }
 
-    /// Share of a uv triangle that is opaque, 0 to 1: exact where it is all or nothing, else by about two places a texel, 64 at most.
-    pub fn share(&self, uv: [Vec2; 3]) -> f64 {
-        match self.coverage(uv) {
-            Coverage::Opaque => return 1.0,
-            Coverage::Transparent => return 0.0,
-            Coverage::Mixed => {}
-        }
+    /// What the mask says about a uv triangle, as [`AlphaMask::coverage`] does, and the share of it that is opaque, 0 to 1: exact where it is all or
+    /// nothing, else by about two places a texel, 64 at most.
+    pub fn share(&self, uv: [Vec2; 3]) -> (Coverage, f64) {
+        let coverage = self.coverage(uv);
+        let share = match coverage {
+            Coverage::Opaque => 1.0,
+            Coverage::Transparent => 0.0,
+            Coverage::Mixed => self.mixed_share(uv),
+        };
+        (coverage, share)
+    }
+
+    fn mixed_share(&self, uv: [Vec2; 3]) -> f64 {
         let scale = vec2(self.width as f32, self.height as f32);
         let [a, b, c] = uv.map(|p| p * scale);
         let texels = 0.5 * (b - a).perp_dot(c - a).abs();

@@ -10,7 +10,7 @@ mod placement;
 mod ray;
 mod window;
 
-pub use alpha::AlphaMask;
+pub use alpha::{AlphaMask, Coverage};
 pub use cost::Cost;
 pub use interaction::Interaction;
 pub use margin::Margin;
