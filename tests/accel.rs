@@ -8,7 +8,7 @@
 
 mod common;
 
-use common::scenes::{sphere, square};
+use common::scenes::{point, sphere, square, unit};
 use furrow::accel::{Brute, EmbreeAccel, Surface};
 use furrow::geometry::{AlphaMask, Hit, Interaction, Intersect, Mesh, PACKET, Ray};
 use furrow::math::{Mat3, Vec3, vec2, vec3};
@@ -18,14 +18,6 @@ use std::sync::atomic::AtomicBool;
 
 fn stream(index: u64) -> Stream {
     Stream::of(17, 0, Purpose::Test, index)
-}
-
-fn unit(s: &mut Stream) -> Vec3 {
-    vec3(s.normal() as f32, s.normal() as f32, s.normal() as f32).normalize()
-}
-
-fn point(s: &mut Stream, reach: f32) -> Vec3 {
-    vec3(s.range32(-reach, reach), s.range32(-reach, reach), s.range32(-reach, reach))
 }
 
 /// A lobed leaf, 61 × 83 texels.

@@ -230,12 +230,12 @@ fn all_that_a_camera_sees_is_planted_or_told() {
 /// ground's own triangle at the camera's place is above it, and none where it is not; both happen in sixteen fields.
 #[test]
 fn a_camera_under_the_ground_is_told() {
-    let text = r#"Field(
+    let text = r"Field(
         seed: 7,
         camera: Pinhole(size: (8, 6), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.002)),
         lights: [Constant(radiance: (1, 1, 1, 1))],
         soil: (colors: [Loess], relief: (rms_mm: 12), clods: (over_5mm_per_m2: 1, min_mm: 5)),
-    )"#;
+    )";
     let mut buried = 0;
     for index in 0..16 {
         let field = field(text, &Options { index, ..Options::default() });

@@ -8,7 +8,7 @@
 mod common;
 
 use common::program::{field, hash, shoot};
-use common::scenes::square;
+use common::scenes::{point, square, unit};
 use furrow::accel::{Brute, EmbreeAccel, Surface};
 use furrow::geometry::{AlphaMask, Interaction, Intersect, Mesh, PACKET, Placement, Ray};
 use furrow::math::{Mat3, Vec3, vec2, vec3};
@@ -22,14 +22,6 @@ use std::sync::Arc;
 
 fn stream(index: u64) -> Stream {
     Stream::of(23, 0, Purpose::Test, index)
-}
-
-fn unit(s: &mut Stream) -> Vec3 {
-    vec3(s.normal() as f32, s.normal() as f32, s.normal() as f32).normalize()
-}
-
-fn point(s: &mut Stream, reach: f32) -> Vec3 {
-    vec3(s.range32(-reach, reach), s.range32(-reach, reach), s.range32(-reach, reach))
 }
 
 /// One organ: its mesh and mask.

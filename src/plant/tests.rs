@@ -12,6 +12,7 @@ use std::collections::BTreeMap;
 use std::f32::consts::{PI, TAU};
 
 mod build;
+mod sizes;
 
 /// A material, which botany does not read.
 #[derive(Deserialize)]
@@ -55,6 +56,21 @@ fn page(eppo: &str) -> PlantDesc {
 
 fn stream(seed: u64) -> Stream {
     Stream::of(seed, 0, Purpose::Plant, 3)
+}
+
+/// The rows of a table in `tests/ref`: its numbers come with their sources.
+fn table(name: &str) -> Vec<BTreeMap<String, String>> {
+    let path = format!("{}/tests/ref/{name}", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{path}: {e}"));
+    let mut lines = text.lines().filter(|l| !l.starts_with('#')).map(|l| l.split(',').map(str::to_owned));
+    let head: Vec<String> = lines.next().unwrap().collect();
+    lines.map(|row| head.iter().cloned().zip(row).collect()).collect()
+}
+
+/// A number of a row; `None` where the table does not state it.
+fn number(row: &BTreeMap<String, String>, column: &str) -> Option<f32> {
+    let text = &row[column];
+    (!text.is_empty()).then(|| text.parse().unwrap_or_else(|e| panic!("{row:?}: {column}: {e}")))
 }
 
 /// Calls `look` with every species, every stage and twenty seeds; three where a plant flowers, of which there is more.
@@ -188,172 +204,6 @@ fn nothing_floats() {
             assert!(gap < (share * low.distance(high)).max(1.2e-3), "{at}: {gap}");
         }
     });
-}
-
-/// The rows of a table in `tests/ref`: its numbers come with their sources.
-fn table(name: &str) -> Vec<BTreeMap<String, String>> {
-    let path = format!("{}/tests/ref/{name}", env!("CARGO_MANIFEST_DIR"));
-    let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{path}: {e}"));
-    let mut lines = text.lines().filter(|l| !l.starts_with('#')).map(|l| l.split(',').map(str::to_owned));
-    let head: Vec<String> = lines.next().unwrap().collect();
-    lines.map(|row| head.iter().cloned().zip(row).collect()).collect()
-}
-
-/// A number of a row; `None` where the table does not state it.
-fn number(row: &BTreeMap<String, String>, column: &str) -> Option<f32> {
-    let text = &row[column];
-    (!text.is_empty()).then(|| text.parse().unwrap_or_else(|e| panic!("{row:?}: {column}: {e}")))
-}
-
-/// How many true leaves have unfolded at a stage, of all that are there: a leaf has once it is a third as long as the longest, and
-/// so has every older one, withered or not. For whorled plants whorls are counted.
-fn unfolded(plant: &PlantDesc, stage: &StageDesc) -> (usize, usize) {
-    let stream = stream(0);
-    let whorls = plant.form == Form::Whorl;
-    let lengths: Vec<(f64, usize)> = stage
-        .layers
-        .iter()
-        .filter(|l| plant.kinds[&l.kind].organ == OrganKind::Blade)
-        .map(|l| (l.blade_mm.draw(&mut stream.clone()), if whorls { 1 } else { l.leaves.get() as usize }))
-        .collect();
-    let peak = lengths.iter().fold(0.0, |m: f64, l| m.max(l.0));
-    let (mut longest, mut unfolded, mut all) = (0.0_f64, 0, 0);
-    for (length, n) in lengths {
-        if longest < peak || length > 0.35 * peak {
-            unfolded += n;
-        }
-        longest = longest.max(length);
-        all += n;
-    }
-    (unfolded, all)
-}
-
-/// Rationale: a stage is known by the number of its unfolded leaves. Expected: the code's second digit; 9 stands for nine
-/// or more. Source: Meier 2001.
-#[test]
-fn leaves_are_as_many_as_the_stage_says() {
-    everywhere(|page, stage, _| {
-        if stage.bbch > 19 {
-            return;
-        }
-        let stream = stream(0);
-        let grown = growth::growth(&page.plant, Stage::Bbch(stage.bbch), &stream, 1.0).unwrap();
-        let (unfolded, all) = unfolded(&page.plant, stage);
-        let expected = (stage.bbch - 10) as usize;
-        let fits = if expected == 9 { unfolded >= 9 } else { unfolded == expected };
-        assert!(fits, "{} BBCH {}: {unfolded} unfolded of {all}", page.eppo, stage.bbch);
-        assert!(grown.leaves.windows(2).all(|w| w[0].number < w[1].number));
-    });
-}
-
-#[test]
-fn every_species_stands_in_both_tables() {
-    let (sizes, plans) = (table("species_sizes.csv"), table("species_plans.csv"));
-    for page in pages() {
-        for rows in [&sizes, &plans] {
-            assert!(rows.iter().any(|row| row["eppo"] == page.eppo), "{}: {} is in no table", page.name, page.eppo);
-        }
-    }
-}
-
-/// Expected: the largest leaf lies within the table's ranges, give or take three hundredths, whatever the seed; and as many leaves
-/// have unfolded. Source: those of `tests/ref/species_sizes.csv`.
-#[test]
-fn sizes_lie_within_the_tables() {
-    let pages = pages();
-    for row in table("species_sizes.csv") {
-        let plant = &pages.iter().find(|p| p.eppo == row["eppo"]).unwrap().plant;
-        let bbch: u32 = row["bbch"].parse().unwrap();
-        let at = format!("{} {bbch}", row["eppo"]);
-        let stage = plant.stages.iter().find(|s| s.bbch == bbch).unwrap_or_else(|| panic!("{at}: no such stage"));
-        let within = |what: &str, value: f32, slack: f32| {
-            let least = number(&row, &format!("{what}_least")).is_none_or(|l| value >= l * (1.0 - slack));
-            let most = number(&row, &format!("{what}_most")).is_none_or(|m| value <= m * (1.0 + slack));
-            assert!(least && most, "{at}: {what} {value}");
-        };
-        within("leaves", unfolded(plant, stage).0 as f32, 0.0);
-        for seed in 0..20 {
-            let stream = stream(seed);
-            let grown = growth::growth(plant, Stage::Bbch(bbch), &stream, 1.0).unwrap();
-            let leaf = grown
-                .leaves
-                .iter()
-                .filter(|l| bbch == 10 || l.kind.organ == OrganKind::Blade)
-                .max_by(|a, b| a.blade.total_cmp(&b.blade))
-                .unwrap();
-            within("length", leaf.blade * 1e3, 0.03);
-            within("width", leaf.width * 1e3, 0.03);
-        }
-    }
-}
-
-/// Rationale: outlines are told apart by how much of their rectangle they fill. Expected: that of each species' commonest leaf is the
-/// table's within 7 %, and the grown blades have that area, a few hundredths more for the mesh's rim, less for waves. Source:
-/// those of `tests/ref/species_plans.csv`.
-#[test]
-fn blades_fill_as_much_of_their_length_and_width_as_the_table_says() {
-    let rows = table("species_plans.csv");
-    for page in pages() {
-        let row = rows.iter().find(|r| r["eppo"] == page.eppo).unwrap();
-        let Some(area) = number(row, "area") else { continue };
-        let kinds = || page.plant.kinds.iter().filter(|(_, k)| k.organ == OrganKind::Blade);
-        let ratio = |outline: outline::Outline| {
-            (0..2000).map(|i| 2.0 * outline.half_width((i as f32 + 0.5) / 2000.0)).sum::<f32>() / 2000.0
-        };
-        let fits = kinds().any(|(_, k)| match k.shape {
-            Shape::Sheet { outline } | Shape::Leaflets { outline, .. } => (ratio(outline) / area - 1.0).abs() < 0.07,
-            _ => false,
-        });
-        assert!(fits, "{}: no leaf fills {area}", page.eppo);
-        let stream = stream(3);
-        let stage = Stage::Bbch(page.plant.stages.iter().map(|s| s.bbch).filter(|b| *b <= 19).max().unwrap());
-        let plant = grow(&page.plant, stage, &stream);
-        for leaf in growth::growth(&page.plant, stage, &stream, 1.0).unwrap().leaves {
-            let Shape::Sheet { outline: of @ outline::Outline::Power { .. } } = leaf.kind.shape else { continue };
-            let blade = plant.organs.iter().find(|o| o.leaf == leaf.number && o.axis.is_some()).unwrap();
-            let share = blade.mesh.area() / (leaf.blade * leaf.width) / ratio(of);
-            // The mesh has a rim, waves fold it, and no two leaves share an outline.
-            assert!((0.8..1.4).contains(&share), "{} leaf {}: {share}", page.eppo, leaf.number);
-        }
-    }
-}
-
-/// Rationale: three leaflets tell soybean from peanut, which has four. Expected: the blade falls into as many sheets; with a leaflet at the
-/// rachis' tip the midrib reaches to the end of that leaflet, without one it ends with the rachis. Source: the species files.
-#[test]
-fn compound_blades_have_as_many_leaflets_as_their_species() {
-    for (eppo, leaflets, reach) in [("GLXMA", 3, 0.75..1.2), ("ARHHY", 4, 0.3..0.45)] {
-        let page = page(eppo);
-        for seed in 0..10 {
-            let stream = stream(seed);
-            let plant = grow(&page, Stage::Bbch(14), &stream);
-            for leaf in growth::growth(&page, Stage::Bbch(14), &stream, 1.0).unwrap().leaves {
-                if leaf.kind_name != "leaf" {
-                    continue;
-                }
-                let organ = plant.organs.iter().find(|o| o.leaf == leaf.number && o.axis.is_some()).unwrap();
-                // Corners that share a triangle belong to one sheet.
-                let mut sheet: Vec<u32> = (0..organ.mesh.positions.len() as u32).collect();
-                let mut joined = true;
-                while joined {
-                    joined = false;
-                    for triangle in &organ.mesh.triangles {
-                        let least = triangle.iter().map(|i| sheet[*i as usize]).min().unwrap();
-                        for i in triangle {
-                            joined |= sheet[*i as usize] != least;
-                            sheet[*i as usize] = least;
-                        }
-                    }
-                }
-                let held: std::collections::BTreeSet<u32> =
-                    organ.mesh.triangles.iter().map(|t| sheet[t[0] as usize]).collect();
-                assert_eq!(held.len(), leaflets, "{eppo} leaf {}", leaf.number);
-                let axis = organ.axis.as_ref().unwrap();
-                let share = axis.base.distance(axis.tip) / leaf.blade;
-                assert!(reach.contains(&share), "{eppo} leaf {}: {share}", leaf.number);
-            }
-        }
-    }
 }
 
 /// The midrib of the grown mesh is as long as the species file says: relief and joints bend, they do not stretch.
@@ -607,54 +457,6 @@ fn the_keypoints_of_a_leaf_lie_on_its_blade_and_point_outward() {
             }
         }
     });
-}
-
-/// Expected: the mean of ten plants lies within the table's ranges, give or take a tenth. Source: `tests/ref/beet_stages.csv`.
-#[test]
-fn beets_are_as_high_and_wide_as_their_stage() {
-    let beet = page("BEAVX");
-    for row in table("beet_stages.csv") {
-        let bbch: u32 = row["bbch"].parse().unwrap();
-        let stage = beet.stages.iter().find(|s| s.bbch == bbch).unwrap();
-        // By the stage of the file, whatever code of ground cover it bears.
-        let plants: Vec<Plant> = (0..10).map(|seed| grow(&beet, Stage::Age(stage.days.f32()), &stream(seed))).collect();
-        let mean = |pick: fn(&Plant) -> f32| plants.iter().map(pick).sum::<f32>() / plants.len() as f32 * 1e3;
-        let span = |plant: &Plant| {
-            let corners = || plant.organs.iter().filter_map(|o| o.mesh.bounds());
-            let low = corners().fold(Vec3::MAX, |low, b| low.min(b.0));
-            let high = corners().fold(Vec3::MIN, |high, b| high.max(b.1));
-            0.5 * (high.x - low.x + high.y - low.y)
-        };
-        for (what, value) in [("height", mean(|p| p.height)), ("span", mean(span))] {
-            let [least, most] = ["least", "most"].map(|end| number(&row, &format!("{what}_{end}")).unwrap());
-            assert!((0.9 * least..1.1 * most).contains(&value), "BBCH {bbch}: {what} {value:.0} of {least} to {most}");
-        }
-    }
-}
-
-/// Expected: shepherd's purse and cauliflower have the proportions of pictures of them: the first leaves of the one, and all grown leaves of the
-/// other above their winged foot; the rosette of the one lies on the ground. Source: cut-outs, see docs/results.md.
-#[test]
-fn rosettes_have_the_proportions_of_their_pictures() {
-    for seed in 0..10 {
-        let stream = stream(seed);
-        let purse = page("CAPBP");
-        let grown = growth::growth(&purse, Stage::Bbch(16), &stream, 1.0).unwrap();
-        for leaf in grown.leaves.iter().filter(|l| l.kind_name == "leaf_entire") {
-            let ratio = leaf.blade / leaf.width;
-            assert!((1.3..=1.6).contains(&ratio), "leaf {}: {ratio}", leaf.number);
-        }
-        let plant = grow(&purse, Stage::Bbch(19), &stream);
-        assert!(plant.height < 0.5 * plant.radius, "seed {seed}: {} of {}", plant.height, plant.radius);
-        let cauliflower = page("BRSOB");
-        let grown = growth::growth(&cauliflower, Stage::Bbch(16), &stream, 1.0).unwrap();
-        let longest = grown.leaves.iter().map(|l| l.blade).fold(0.0, f32::max);
-        for leaf in grown.leaves.iter().filter(|l| l.kind_name == "leaf" && l.blade > 0.5 * longest) {
-            let ratio = 0.86 * leaf.blade / leaf.width;
-            assert!((1.05..1.45).contains(&ratio), "leaf {}: {ratio}", leaf.number);
-            assert!(leaf.stalk < 0.25 * leaf.blade, "leaf {}", leaf.number);
-        }
-    }
 }
 
 /// Rationale: pansies are known by their stipules. Expected: with them the stalk's organ has more surface, most of it in its lower half; blades

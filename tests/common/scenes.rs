@@ -9,7 +9,7 @@ use furrow::light::Light;
 use furrow::material::Material;
 use furrow::math::{Vec2, Vec3, vec2, vec3};
 use furrow::render::{self, Settings, Watch};
-use furrow::sampling::Points;
+use furrow::sampling::{Points, Stream};
 use furrow::scene::tag::Tag;
 use furrow::scene::{Part, Scene};
 use furrow::sensor::{Camera, Distortion, Pose};
@@ -94,4 +94,14 @@ pub fn with_world<T: Send>(scene: &Scene, threads: usize, f: impl FnOnce(&World<
 /// The pixel's centre.
 pub fn middle(film: &Film) -> Vec2 {
     vec2(film.window.width() as f32 / 2.0, film.window.height() as f32 / 2.0)
+}
+
+/// A direction, evenly over the sphere.
+pub fn unit(s: &mut Stream) -> Vec3 {
+    vec3(s.normal() as f32, s.normal() as f32, s.normal() as f32).normalize()
+}
+
+/// A point of the cube that reaches so far to all sides of the origin.
+pub fn point(s: &mut Stream, reach: f32) -> Vec3 {
+    vec3(s.range32(-reach, reach), s.range32(-reach, reach), s.range32(-reach, reach))
 }

@@ -83,10 +83,10 @@ impl Builder<'_> {
     /// A warning where a camera or the LiDAR lies in ground that is higher than z = 0 at its place; nothing but the inside of it is seen then.
     pub(super) fn warn_of_burial(&mut self, floor: Floor<'_>) {
         let depth = |at: Vec3| floor.height(at.x, at.y) - at.z;
-        let cameras = self.captures.iter().map(|capture| capture.camera.pose().position);
-        let (what, places): (_, Vec<Vec3>) = match self.scanners.is_empty() {
-            true => ("camera", cameras.collect()),
-            false => ("LiDAR", self.scanners.iter().map(|lidar| lidar.position).collect()),
+        let (what, places): (_, Vec<Vec3>) = if self.scanners.is_empty() {
+            ("camera", self.captures.iter().map(|capture| capture.camera.pose().position).collect())
+        } else {
+            ("LiDAR", self.scanners.iter().map(|lidar| lidar.position).collect())
         };
         let deepest = places.iter().copied().max_by(|a, b| depth(*a).total_cmp(&depth(*b)));
         if let Some(at) = deepest.filter(|at| depth(*at) > 0.0) {
