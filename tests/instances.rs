@@ -11,7 +11,7 @@ use common::program::{field, hash, shoot};
 use common::scenes::{point, square, unit};
 use furrow::accel::{Brute, EmbreeAccel, Surface};
 use furrow::geometry::{AlphaMask, Interaction, Intersect, Mesh, PACKET, Placement, Ray};
-use furrow::math::{Mat3, Vec3, vec2, vec3};
+use furrow::math::{Mat3, vec2, vec3};
 use furrow::sampling::{Purpose, Stream};
 use furrow::scene::assemble::Options;
 use furrow::scene::tag::Class;

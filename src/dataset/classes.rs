@@ -101,6 +101,9 @@ impl Classes {
         if named.is_some_and(|place| place + 1 < self.0.len()) {
             return Err(format!("`{IGNORED}` stands behind all other classes"));
         }
+        if let Some(class) = self.0.iter().find(|class| class.name.contains(char::is_control)) {
+            return Err(format!("the name {:?} holds a character that ends lines or is not seen", class.name));
+        }
         let names: BTreeSet<&str> = self.0.iter().map(|c| c.name.trim()).collect();
         let labels: Vec<&String> = self.0.iter().flat_map(|c| &c.labels).collect();
         let distinct: BTreeSet<&String> = labels.iter().copied().collect();
@@ -174,6 +177,15 @@ impl Classes {
         };
         if let Some(label) = self.0.iter().flat_map(|class| &class.labels).find(|label| !known(label)) {
             return Err(unknown(label, records));
+        }
+        for names in &species {
+            let is = |label: &&String| names.iter().any(|name| name.eq_ignore_ascii_case(label));
+            let claims = |class: &&Class| class.labels.iter().any(|label| is(&label));
+            let claiming: Vec<&str> = self.0.iter().filter(claims).map(|class| class.name.as_str()).collect();
+            if let [first, second, ..] = claiming[..] {
+                let words = format!("the species {} ({}) belongs to `{first}` and to `{second}`", names[0], names[1]);
+                return Err(Error::input(words).help("name it in one class alone, by its name or its EPPO code"));
+            }
         }
         let place = |claims: &dyn Fn(&str) -> bool| {
             let place = self.0.iter().position(|class| class.labels.iter().any(|label| claims(label)))?;

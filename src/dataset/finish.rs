@@ -3,10 +3,10 @@
 use super::checksum::Checksum;
 use super::checksum_record::ChecksumRecord;
 use super::labels::LeftOut;
-use super::native::is_native;
+use super::native::{Files, is_native};
 use super::pack::{Id, Packing, store};
 use super::recipe::{FILE, MANIFEST, Recipe};
-use super::set::{Set, Stream, Whole};
+use super::set::{Set, Stream, Whole, in_parallel};
 use super::task::{Task, remaining};
 use super::{format, index, push, report};
 use crate::error::Kind;
@@ -34,7 +34,16 @@ pub fn finish(set: &Set, shards: Option<u64>) -> Result<Vec<PathBuf>> {
         let words: Vec<String> = cut.into_values().chain([lacks.to_string()]).collect();
         return Err(if words.len() == 1 { lacks } else { Error::damaged(words.join("\nerror: ")) });
     }
-    written(set).map_err(|e| with_a_way_out(set, e))
+    check_records(set).and_then(|()| written(set)).map_err(|e| with_a_way_out(set, e))
+}
+
+/// An error where a record is not what its checksum says: tables and lists would repeat what is wrong in it.
+fn check_records(set: &Set) -> Result<()> {
+    let fault = |k| set.checksums(k).and_then(|checksums| set.fault_of_record(&checksums));
+    match in_parallel(0..set.recipe.count, fault).flatten().next() {
+        None => Ok(()),
+        Some((path, fault)) => Err(Error::damaged(format!("its record {fault}")).in_file(set.place(&path))),
+    }
 }
 
 /// An error in a file of an image, with what mends it.

@@ -25,8 +25,9 @@ use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{ErrorKind, Read, Seek};
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -41,6 +42,8 @@ pub struct Push {
     pub free: bool,
     /// How often a unit is tried before the run ends.
     pub tries: u32,
+    /// How long a command may take; as long as it likes unless given.
+    pub timeout: Option<Duration>,
 }
 
 /// What stands for the folder in a command.
@@ -325,13 +328,13 @@ impl Push {
     fn attempt(&self, unit: Unit, folder: &Path, files: &[String], stop: &AtomicBool) -> Result<Option<String>> {
         loop {
             let staged = Staged::of(unit, folder, files)?;
-            let mut failure = run(&self.command, &staged.dir, stop)?;
+            let mut failure = self.run(&self.command, &staged.dir, stop)?;
             // The command has seen all only where nobody has taken any of it away.
             if staged.was_cleared(files) {
                 continue;
             }
             if let (None, Some(check)) = (&failure, &self.check) {
-                failure = run(check, &staged.dir, stop)?;
+                failure = self.run(check, &staged.dir, stop)?;
                 if failure.is_some() && staged.was_cleared(files) {
                     continue;
                 }
@@ -339,6 +342,71 @@ impl Push {
             return Ok(failure);
         }
     }
+
+    /// Runs a command; what is wrong in words where it fails or takes too long. It is ended, with what it has started, where the run is to stop.
+    fn run(&self, command: &str, dir: &Path, stop: &AtomicBool) -> Result<Option<String>> {
+        let place = dir.to_str().ok_or_else(|| {
+            Error::misuse("a folder whose name is not UTF-8 cannot stand in --push")
+                .in_file(dir)
+                .help("name --out otherwise")
+        })?;
+        let filled = filled(command, place);
+        // A file, which unlike a pipe takes any number of words.
+        let mut said = tempfile::tempfile().map_err(Error::io(&std::env::temp_dir()))?;
+        let words = |said: &std::fs::File| said.try_clone().map_err(Error::io(&std::env::temp_dir()));
+        let mut shell = Command::new("sh");
+        shell.arg("-c").arg(&filled).stdin(Stdio::null()).stdout(words(&said)?).stderr(words(&said)?);
+        // A group of its own: what it starts ends with it.
+        let mut child = shell.process_group(0).spawn().map_err(Error::io(Path::new("sh")))?;
+        let begin = Instant::now();
+        let ended = loop {
+            if let Some(ended) = child.try_wait().map_err(Error::io(Path::new("sh")))? {
+                break ended;
+            }
+            if stop.load(Ordering::Relaxed) {
+                end(&mut child);
+                return Err(Error::interrupted());
+            }
+            if let Some(timeout) = self.timeout.filter(|timeout| begin.elapsed() > *timeout) {
+                end(&mut child);
+                return Ok(Some(format!("`{filled}` took longer than {} s", timeout.as_secs())));
+            }
+            std::thread::sleep(EVERY);
+        };
+        if ended.success() {
+            return Ok(None);
+        }
+        let mut text = Vec::new();
+        let length = said.stream_position().unwrap_or(0);
+        let _ = said.seek(std::io::SeekFrom::Start(length.saturating_sub(TOLD)));
+        let _ = said.take(TOLD).read_to_end(&mut text);
+        let text = String::from_utf8_lossy(&text);
+        let last = text.trim().lines().last().unwrap_or("it said nothing");
+        Ok(Some(format!(
+            "`{filled}` ended with {}: {last}",
+            ended.code().map_or("a signal".into(), |code| code.to_string())
+        )))
+    }
+}
+
+/// How long a command that is ended may clear up after itself.
+const GRACE: Duration = Duration::from_secs(2);
+
+/// Ends a command and what it has started: asked first, then killed.
+fn end(child: &mut Child) {
+    let group = child.id();
+    let send = |signal: &str| {
+        let words = format!("kill -s {signal} -- -{group}");
+        let _ = Command::new("sh").arg("-c").arg(words).stderr(Stdio::null()).status();
+    };
+    send("TERM");
+    let until = Instant::now() + GRACE;
+    while Instant::now() < until && matches!(child.try_wait(), Ok(None)) {
+        std::thread::sleep(EVERY);
+    }
+    // The shell may be gone while what it started is not.
+    send("KILL");
+    let _ = child.wait();
 }
 
 /// Removes the files of a unit here; what tells of them stays.
@@ -355,46 +423,6 @@ fn free(set: &Set, files: &[String]) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// Runs a command; what is wrong in words where it fails. It is ended where the run is to stop.
-fn run(command: &str, dir: &Path, stop: &AtomicBool) -> Result<Option<String>> {
-    let place = dir.to_str().ok_or_else(|| {
-        Error::misuse("a folder whose name is not UTF-8 cannot stand in --push")
-            .in_file(dir)
-            .help("name --out otherwise")
-    })?;
-    let filled = filled(command, place);
-    // A file, which unlike a pipe takes any number of words.
-    let mut said = tempfile::tempfile().map_err(Error::io(&std::env::temp_dir()))?;
-    let words = |said: &std::fs::File| said.try_clone().map_err(Error::io(&std::env::temp_dir()));
-    let mut shell = Command::new("sh");
-    shell.arg("-c").arg(&filled).stdin(Stdio::null()).stdout(words(&said)?).stderr(words(&said)?);
-    let mut child = shell.spawn().map_err(Error::io(Path::new("sh")))?;
-    let ended = loop {
-        if let Some(ended) = child.try_wait().map_err(Error::io(Path::new("sh")))? {
-            break ended;
-        }
-        if stop.load(Ordering::Relaxed) {
-            let _ = child.kill();
-            let _ = child.wait();
-            return Err(Error::interrupted());
-        }
-        std::thread::sleep(EVERY);
-    };
-    if ended.success() {
-        return Ok(None);
-    }
-    let mut text = Vec::new();
-    let length = said.stream_position().unwrap_or(0);
-    let _ = said.seek(std::io::SeekFrom::Start(length.saturating_sub(TOLD)));
-    let _ = said.take(TOLD).read_to_end(&mut text);
-    let text = String::from_utf8_lossy(&text);
-    let last = text.trim().lines().last().unwrap_or("it said nothing");
-    Ok(Some(format!(
-        "`{filled}` ended with {}: {last}",
-        ended.code().map_or("a signal".into(), |code| code.to_string())
-    )))
 }
 
 /// A command with the folder in its place, as one word whatever it holds, within and without quotes.

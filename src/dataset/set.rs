@@ -95,6 +95,11 @@ impl Set {
         self.faults_where(image, |path| !native::is_native(path))
     }
 
+    /// The same of its record alone, from which all that belongs to many images is made.
+    pub(super) fn fault_of_record(&self, image: &ChecksumRecord) -> Option<(String, String)> {
+        self.faults_where(image, |path| native::is_native(path) && path.ends_with("/record.json")).pop()
+    }
+
     fn faults_where(&self, image: &ChecksumRecord, which: impl Fn(&str) -> bool) -> Vec<(String, String)> {
         let fault = |(path, sum): (&String, &Checksum)| match below(&self.folder, path) {
             Ok(_) => Some((path.clone(), sum.fault_of(self.length(path), || Ok(Checksum::of(&self.contents(path)?)))?)),

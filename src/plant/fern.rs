@@ -4,10 +4,10 @@
 //! plan with pinnules, and each pinnule is cut into lobes with a pointed tip. The ribbons are those of mayweed.
 
 use super::blade::Rest;
-use super::ribbons::{MOST, Ribbons, drawn};
+use super::ribbons::{MOST, Ribbons, drawn, series};
 use super::skeleton::Skeleton;
 use crate::math::{Vec3, lerp, vec3};
-use crate::sampling::Stream;
+use crate::sampling::{Purpose, Stream};
 
 /// One axis with what it carries on both sides.
 struct Limb {
@@ -16,8 +16,8 @@ struct Limb {
     along: Vec3,
     /// Out of the upper side, unit.
     up: Vec3,
-    /// Pairs on it.
-    pairs: usize,
+    /// Pairs on it that have grown, the last of them in part.
+    pairs: f32,
     /// Length of its longest branch over its own.
     reach: f32,
 }
@@ -33,24 +33,25 @@ pub(super) fn blade(
 ) -> Rest {
     let length = skeleton.length();
     // Small leaves have fewer, not finer, segments.
-    let (pairs, pinnules) = (pairs.min(MOST), pinnules.min(MOST));
-    let pairs = pairs.min((length / (2.4 * segment)) as usize).max(1);
+    let (pairs, pinnules) = (pairs.min(MOST) as f32, pinnules.min(MOST) as f32);
+    let pairs = pairs.min(length / (2.4 * segment)).max(1.0);
     let mut ribbons =
         Ribbons { rest: Rest::default(), skeleton, width: segment, count: 0, drawn: drawn(segment, cell) };
-    ribbons.strip(Vec3::ZERO, vec3(0.0, length, 0.0), Vec3::Z, Vec3::ZERO, segment, 2 * pairs.min(8) as u32);
+    ribbons.strip(Vec3::ZERO, vec3(0.0, length, 0.0), Vec3::Z, Vec3::ZERO, segment, 2 * pairs.min(8.0) as u32);
     let whole =
         Limb { start: Vec3::ZERO, along: vec3(0.0, length, 0.0), up: Vec3::Z, pairs, reach: 0.5 * width / length };
-    for pinna in branches(&whole, stream) {
+    // What is no longer than wide begins to grow.
+    let is_seen = |limb: &Limb| limb.along.length() > segment;
+    for (pinna, mut own) in branches(&whole, stream) {
         let share = pinna.along.length() / (0.5 * width);
-        let pairs = (pinnules as f32 * share).round() as usize;
-        let pinna = Limb { pairs, reach: 0.42, ..pinna };
-        let bow = pinna.up * (pinna.along.length() * stream.range32(-0.12, 0.12));
+        let pinna = Limb { pairs: pinnules * share, reach: 0.42, ..pinna };
+        let bow = pinna.up * (pinna.along.length() * own.range32(-0.12, 0.12));
         ribbons.strip(pinna.start, pinna.along, pinna.up, bow, 0.8 * segment, 2);
-        for pinnule in branches(&pinna, stream) {
+        for (pinnule, own) in branches(&pinna, &own).into_iter().filter(|(pinnule, _)| is_seen(pinnule)) {
             let long = pinnule.along.length();
             ribbons.strip(pinnule.start, pinnule.along, pinnule.up, Vec3::ZERO, segment, 1);
-            let pinnule = Limb { pairs: ((long / (2.6 * segment)) as usize).min(2), reach: 0.5, ..pinnule };
-            for lobe in branches(&pinnule, stream) {
+            let pinnule = Limb { pairs: (long / (2.6 * segment)).min(2.0), reach: 0.5, ..pinnule };
+            for (lobe, _) in branches(&pinnule, &own).into_iter().filter(|(lobe, _)| is_seen(lobe)) {
                 ribbons.strip(lobe.start, lobe.along, lobe.up, Vec3::ZERO, 0.9 * segment, 1);
             }
         }
@@ -58,26 +59,27 @@ pub(super) fn blade(
     ribbons.rest
 }
 
-/// The branches of a limb, pair by pair from its base.
-fn branches(limb: &Limb, stream: &mut Stream) -> Vec<Limb> {
+/// The branches of a limb, pair by pair from its base, each with a stream of its own: those that grow later move no other.
+fn branches(limb: &Limb, stream: &Stream) -> Vec<(Limb, Stream)> {
     let length = limb.along.length();
     let ahead = limb.along / length.max(1e-9);
     let right = ahead.cross(limb.up);
-    let mut all = Vec::with_capacity(2 * limb.pairs);
-    for k in 0..limb.pairs {
-        let t = lerp(0.08, 0.9, ((k as f32 + 0.35) / limb.pairs as f32).powf(0.9));
-        for side in [-1.0_f32, 1.0] {
-            let t = (t + stream.range32(-0.12, 0.12) / (limb.pairs as f32 + 1.0)).clamp(0.03, 0.96);
-            let spread = lerp(1.05, 0.55, t) + stream.range32(-0.1, 0.1);
-            let tilt = stream.range32(-0.12, 0.4);
+    let mut all = Vec::new();
+    for (k, place, grown) in series(limb.pairs) {
+        let t = lerp(0.08, 0.9, (place - 0.15 / limb.pairs.max(1.0)).max(0.0).powf(0.9));
+        for (far, side) in [-1.0_f32, 1.0].into_iter().enumerate() {
+            let mut own = stream.child(Purpose::Leaf, (2 * k + far) as u64);
+            let t = (t + own.range32(-0.12, 0.12) / (limb.pairs + 1.0)).clamp(0.03, 0.96);
+            let spread = lerp(1.05, 0.55, t) + own.range32(-0.1, 0.1);
+            let tilt = own.range32(-0.12, 0.4);
             let out = right * tilt.cos() * side + limb.up * tilt.sin();
             let along = ahead * spread.cos() + out * spread.sin();
             let up = (limb.up * tilt.cos() - right * (side * tilt.sin())).normalize_or(limb.up);
             let up = (up - along * up.dot(along)).normalize_or(limb.up);
-            let reach = limb.reach * length * (1.0 - t).powf(0.75) * stream.range32(0.88, 1.12);
+            let reach = grown * limb.reach * length * (1.0 - t).powf(0.75) * own.range32(0.88, 1.12);
             // The width is that of the projection: a steep branch is as long as one that stands out.
             let along = along * (reach / spread.sin().max(0.5));
-            all.push(Limb { start: limb.start + limb.along * t, along, up, pairs: 0, reach: 0.0 });
+            all.push((Limb { start: limb.start + limb.along * t, along, up, pairs: 0.0, reach: 0.0 }, own));
         }
     }
     all

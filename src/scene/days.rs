@@ -23,7 +23,7 @@ const LATEST: u32 = 1000;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default, rename = "Days")]
 pub struct DaysDesc {
-    /// The first day, counted from the emergence of the field's first crop.
+    /// The first day, counted from the emergence of the field's first crop; none is after day 1000.
     #[schemars(extend("x-example" = "8"))]
     pub from: Num<Count>,
     /// The last day.

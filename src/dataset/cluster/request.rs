@@ -75,9 +75,10 @@ pub struct Job {
 impl Job {
     /// What scripts write behind `render` and `finish`: nothing where nothing is pushed.
     pub(super) fn pushing(&self) -> String {
-        let Some(Push { command, check, free, tries }) = &self.push else { return String::new() };
+        let Some(Push { command, check, free, tries, timeout }) = &self.push else { return String::new() };
         let mut words = format!(" --push {} --push-tries {tries}", quoted(command));
         words.extend(check.iter().map(|check| format!(" --push-check {}", quoted(check))));
+        words.extend(timeout.iter().map(|timeout| format!(" --push-timeout {}", timeout.as_secs())));
         if *free {
             words += " --push-free";
         }

@@ -120,8 +120,12 @@ impl Format for Writer {
         })
     }
 
-    fn warnings(&self, _recipe: &Recipe) -> Vec<String> {
-        vec!["photographs are JPEG, as its scripts expect; the other formats have them without loss".into()]
+    fn warnings(&self, recipe: &Recipe) -> Vec<String> {
+        let mut all = vec!["photographs are JPEG, as its scripts expect; the other formats have them without loss".to_owned()];
+        if recipe.labelling.classes.is_some() {
+            all.push("its labels are CropAndWeed's own, whatever --classes says".into());
+        }
+        all
     }
 }
 

@@ -67,7 +67,7 @@ impl<T: OfFields> Format for T {
     }
 
     fn warnings(&self, recipe: &Recipe) -> Vec<String> {
-        warnings(recipe)
+        warnings(recipe, self.by_day())
     }
 }
 
@@ -118,13 +118,14 @@ pub(super) fn quaternion(axes: &DMat3) -> [f64; 4] {
     DQuat::from_mat3(axes).normalize().to_array()
 }
 
-/// What formats of poses cannot hold of a scene's images.
-pub(super) fn warnings(recipe: &Recipe) -> Vec<String> {
-    let alone = recipe.captures_a_day() == 1;
-    alone
-        .then(|| "each field has one image a day; `drive` in a scene file takes several".to_owned())
-        .into_iter()
-        .collect()
+/// A warning for formats that tell of several images of a field, where there is one: on each day, or on all of them together.
+pub(super) fn warnings(recipe: &Recipe, by_day: bool) -> Vec<String> {
+    let (images, words) = if by_day {
+        (recipe.captures_a_day(), "each field has one image a day; `drive` in a scene file takes several")
+    } else {
+        (recipe.captures(), "each field has one image; `drive` or `days` in a scene file takes several")
+    };
+    if images == 1 { vec![words.to_owned()] } else { Vec::new() }
 }
 
 #[cfg(test)]

@@ -47,7 +47,7 @@ impl Format for Writer {
     }
 
     fn warnings(&self, recipe: &Recipe) -> Vec<String> {
-        super::drives::warnings(recipe)
+        super::drives::warnings(recipe, true)
     }
 }
 

@@ -145,10 +145,27 @@ fn clear(folder: &Path, record: &PackRecord) -> Result<()> {
     for index in record.images.iter().map(|image| image.index) {
         // First what says that it is whole.
         remove(&ChecksumRecord::path(folder, index), |path| std::fs::remove_file(path))?;
-        remove(&folder.join(native::folder(&Set::name(index))), |path| std::fs::remove_dir_all(path))?;
+        remove_folder(&folder.join(native::folder(&Set::name(index))))?;
     }
     Ok(())
 }
+
+/// Removes a folder into which another run may be writing just now: what that one makes is in the pack already.
+fn remove_folder(path: &Path) -> Result<()> {
+    for _ in 0..TRIES {
+        match std::fs::remove_dir_all(path) {
+            Err(e) if e.kind() == ErrorKind::DirectoryNotEmpty => std::thread::sleep(PAUSE),
+            Err(e) if e.kind() != ErrorKind::NotFound => return Err(Error::io(path)(e)),
+            _ => return Ok(()),
+        }
+    }
+    // Whoever writes there clears it away when its own pack is closed.
+    Ok(())
+}
+
+/// How often a folder is removed that fills again, and how long is waited in between.
+const TRIES: u32 = 50;
+const PAUSE: std::time::Duration = std::time::Duration::from_millis(20);
 
 fn remove(path: &Path, by: impl Fn(&Path) -> std::io::Result<()>) -> Result<()> {
     match by(path) {

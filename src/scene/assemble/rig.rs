@@ -76,9 +76,11 @@ pub(super) fn captures(
             let help = "files of flow call other things so; give the camera another name";
             return Err(blame(Error::input(format!("no camera can be called `{}`", mounted.name)).help(help)));
         }
-        if cameras.iter().any(|(name, _)| *name == mounted.name) {
-            let words = format!("two cameras are called `{}`", mounted.name);
-            return Err(blame(Error::input(words).help(format!("the first camera is called `{FIRST}`"))));
+        // Files are named by them, and some file systems do not tell capitals from small letters.
+        if let Some((name, _)) = cameras.iter().find(|(name, _)| name.eq_ignore_ascii_case(&mounted.name)) {
+            let words = format!("two cameras are called `{name}` and `{}`", mounted.name);
+            let help = format!("give this one a name of its own; the first camera is called `{FIRST}`");
+            return Err(blame(Error::input(words).help(help)));
         }
         let camera = mounted.camera.build(&mut stream(Purpose::Page, DRIVE + 1 + k as u64)).map_err(blame)?;
         let shape = |camera: &Camera| f64::from(camera.width()) / f64::from(camera.height());

@@ -9,6 +9,7 @@ use super::ground_view::GroundView;
 use crate::math::{Vec2, Vec3, vec2};
 use crate::ron_file::Step;
 use crate::scene::desc::Detail;
+use crate::scene::drive::{Capture, FIRST};
 use crate::sensor::Camera;
 use crate::soil::Rect;
 use crate::{Error, Result};
@@ -78,11 +79,11 @@ impl Builder<'_> {
         if !self.scanners.is_empty() {
             return self.scanned();
         }
-        let cameras: Vec<Camera> = self.captures.iter().map(|capture| capture.camera).collect();
+        let captures: Vec<Capture> = self.captures.clone();
         let mut whole: Option<View> = None;
         self.seen.clear();
-        for camera in &cameras {
-            let view = self.view_of(camera, whole.is_some_and(|before| before.open))?;
+        for capture in &captures {
+            let view = self.view_of(capture, whole.is_some_and(|before| before.open))?;
             whole = Some(whole.map_or(view, |before| before.join(view)));
         }
         let whole = whole.unwrap_or(View::NONE);
@@ -90,12 +91,29 @@ impl Builder<'_> {
         // That of a camera which sees as far as the reach on all sides.
         let most = 4.0 * self.reach()?.powi(2);
         // A single camera is bounded by its reach, and by what its shutter travels.
-        if cameras.len() > 1 && area > most {
+        if captures.len() > 1 && area > most {
             let words = format!("the drive sees {area:.0} m² of ground, more than the {most} m² of one field");
             let help = "take fewer frames, drive along a row to the north or east, or drive through several fields, or raise reach_m";
             return Err(self.page.blame(&[Step::Field("drive")], Error::input(words).help(help)));
         }
         Ok(whole)
+    }
+
+    /// A capture in the words of an error: its camera, and its frame on a drive.
+    fn which(&self, capture: &Capture) -> String {
+        let Capture { name, frame, .. } = capture;
+        let camera = if name == FIRST { "the camera".into() } else { format!("camera `{name}`") };
+        if self.desc.drive.is_some() { format!("{camera} in frame {frame}") } else { camera }
+    }
+
+    /// An error about a capture, where it stands in the scene file: at the drive once it has moved, else at its camera.
+    fn blame_capture(&self, capture: &Capture, error: Error) -> Error {
+        let place = self.desc.cameras.iter().position(|mounted| mounted.name == capture.name);
+        match place {
+            _ if capture.frame > 0 => self.page.blame(&[Step::Field("drive")], error),
+            Some(k) => self.page.blame(&[Step::Field("cameras"), Step::Item(k)], error),
+            None => self.page.blame(&[Step::Field("camera")], error),
+        }
     }
 
     /// How far from the point below a camera the field is grown, metres.
@@ -109,15 +127,15 @@ impl Builder<'_> {
     }
 
     /// The ground that one camera sees; with a warning where some of it is not planted, unless that was `told`.
-    fn view_of(&mut self, camera: &Camera, told: bool) -> Result<View> {
-        let reach = self.reach()?;
+    fn view_of(&mut self, capture: &Capture, told: bool) -> Result<View> {
+        let (camera, reach) = (&capture.camera, self.reach()?);
         let (w, h) = (camera.width() as f32, camera.height() as f32);
         let below = camera.pose().position.truncate();
         if camera.pose().position.abs().max_element() > FARTHEST {
-            let words = format!("the camera stands more than {FARTHEST} m from the field's origin");
+            let words = format!("{} stands more than {FARTHEST} m from the field's origin", self.which(capture));
             let error = Error::input(words)
                 .help("move it near the origin: a field has no end, and is as good there; heights are in metres");
-            return Err(self.page.blame(&[Step::Field("camera")], error));
+            return Err(self.blame_capture(capture, error));
         }
         let mut seen: Vec<Vec2> = Vec::new();
         let mut level: Vec<Vec2> = Vec::new();
@@ -131,9 +149,9 @@ impl Builder<'_> {
             }
         }
         if seen.is_empty() {
-            let error = Error::input("the camera does not look at the ground")
+            let error = Error::input(format!("{} does not look at the ground", self.which(capture)))
                 .help("turn it down; its height is counted from the ground");
-            return Err(self.page.blame(&[Step::Field("camera")], error));
+            return Err(self.blame_capture(capture, error));
         }
         // Some of the view is of the horizon: the ground is seen as far as it is planted.
         let hull = seen.iter().chain(&level).copied();
@@ -153,13 +171,14 @@ impl Builder<'_> {
         }
         let far = if level.is_empty() { format!("{farthest:.0} m away") } else { "to the horizon".into() };
         let words = format!(
-            "the camera sees ground {far}, and plants are grown up to {reach} m east, north, west and south of the point below it: \
+            "{} sees ground {far}, and plants are grown up to {reach} m east, north, west and south of the point below it: \
              {:.0} % of the ground in the image stays bare and its labels call it soil",
+            self.which(capture),
             (100.0 * bare).ceil()
         );
         let help = "lower the camera, turn it down, narrow its angle of view, or raise reach_m";
         if bare > TOO_BARE {
-            return Err(self.page.blame(&[Step::Field("camera")], Error::input(words).help(help)));
+            return Err(self.blame_capture(capture, Error::input(words).help(help)));
         }
         if !told {
             self.warnings.push(format!("{words}; {help}"));

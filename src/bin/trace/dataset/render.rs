@@ -9,7 +9,7 @@ use furrow::dataset::Set;
 use furrow::dataset::generate::{self, Callbacks, Shard, Work};
 use furrow::dataset::push::Push;
 use std::path::PathBuf;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Which images.
 #[derive(clap::Args)]
@@ -43,13 +43,18 @@ pub(crate) struct PushArgs {
     /// How often a push is tried, with longer and longer pauses, before the run ends.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=10), requires = "push")]
     push_tries: u32,
+    /// End a push that takes longer, with what it has started; it then counts as failed.
+    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..), requires = "push")]
+    push_timeout: Option<u64>,
 }
 
 impl PushArgs {
     /// What they ask for.
     pub(crate) fn push(&self) -> Result<Option<Push>> {
-        let Self { push, push_check: check, push_free: free, push_tries: tries } = self;
-        let push = push.clone().map(|command| Push { command, check: check.clone(), free: *free, tries: *tries });
+        let Self { push, push_check: check, push_free: free, push_tries: tries, push_timeout } = self;
+        let timeout = push_timeout.map(Duration::from_secs);
+        let push =
+            push.clone().map(|command| Push { command, check: check.clone(), free: *free, tries: *tries, timeout });
         push.as_ref().map_or(Ok(()), Push::check)?;
         Ok(push)
     }
