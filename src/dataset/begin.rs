@@ -3,6 +3,7 @@
 use super::File;
 use super::checksum_record::write_files;
 use super::keep::Kept;
+use super::photo::Photo;
 use super::recipe::{FILE, Made, Recipe};
 use super::{format, pack};
 use crate::output::{create_atomically, is_unfinished};
@@ -33,6 +34,9 @@ fn go_on(folder: &Path, mut recipe: Recipe, files: &[File]) -> Result<Recipe> {
         now.parts = then.parts;
         if now.keep == Kept::usual(now.labels_only) {
             now.keep.clone_from(&then.keep);
+        }
+        if now.photo.unwrap_or_default() == Photo::default() {
+            now.photo = then.photo;
         }
     }
     before.check_goes_on(folder, &recipe)?;
