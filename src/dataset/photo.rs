@@ -3,7 +3,6 @@
 //! A photograph that is stored as JPEG is encoded once, and a sample then holds the pixels that its file decodes to: so whatever is made of an
 //! image while it is rendered is what would be made of its files. Colours are not subsampled (4:4:4) at any quality, for leaves are narrow.
 
-use super::sample::Sample;
 use crate::output;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -92,21 +91,24 @@ pub struct Jpegs {
     pub nir: Vec<u8>,
 }
 
-/// Stores the photographs of a sample as a dataset's are: where that is JPEG, the sample holds their bytes, and the pixels that these decode to.
-pub(super) fn store(sample: &mut Sample, photo: Photo) -> Result<()> {
-    let Photo::Jpeg(quality) = photo else { return Ok(()) };
-    let (w, h) = sample.size();
+/// Stores the photographs of an image of this size as a dataset's are: where that is JPEG, they become the pixels that the files decode to.
+pub(super) fn store(
+    (w, h): (u32, u32),
+    rgb: &mut Vec<[u8; 3]>,
+    nir: &mut Vec<u8>,
+    photo: Photo,
+) -> Result<Option<Jpegs>> {
+    let Photo::Jpeg(quality) = photo else { return Ok(None) };
     let mut jpegs = Jpegs::default();
-    if !sample.rgb.is_empty() {
-        jpegs.rgb = output::encode_jpeg(w, h, &sample.rgb, quality)?;
-        sample.rgb = output::decode_jpeg(Path::new("rgb.jpg"), &jpegs.rgb)?.2;
+    if !rgb.is_empty() {
+        jpegs.rgb = output::encode_jpeg(w, h, rgb, quality)?;
+        *rgb = output::decode_jpeg(Path::new("rgb.jpg"), &jpegs.rgb)?.2;
     }
-    if !sample.nir.is_empty() {
-        jpegs.nir = output::encode_gray_jpeg(w, h, &sample.nir, quality)?;
-        sample.nir = output::decode_gray_jpeg(Path::new("nir.jpg"), &jpegs.nir)?.2;
+    if !nir.is_empty() {
+        jpegs.nir = output::encode_gray_jpeg(w, h, nir, quality)?;
+        *nir = output::decode_gray_jpeg(Path::new("nir.jpg"), &jpegs.nir)?.2;
     }
-    sample.jpeg = Some(jpegs);
-    Ok(())
+    Ok(Some(jpegs))
 }
 
 #[cfg(test)]

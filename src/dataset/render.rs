@@ -162,7 +162,7 @@ fn describe(recipe: &Recipe, index: u64, image: Image<'_>) -> Result<Sample> {
     if recipe.keeps(Kept::Nir) {
         sample.nir = photograph.nir;
     }
-    photo::store(&mut sample, recipe.photo())?;
+    sample.jpeg = photo::store(sample.size(), &mut sample.rgb, &mut sample.nir, recipe.photo())?;
     sample.coverage = render::coverage(&film, &field.grown().scene.tags()).into_iter().map(of_255).collect();
     // Classes know what they cover.
     (sample.record.classes, sample.record.ignored) = annotate::classes(&sample);
