@@ -327,7 +327,7 @@ fn a_dataset_of_each_edit_has_the_same_files_and_labels() {
     same(&tree(&alone), &tree(&out.join("low-poly")));
     let said = succeed(verb("verify", &alone, &["--rerender", "1"])).stderr;
     assert!(String::from_utf8_lossy(&said).contains("1 rendered again and the same; 0 faults"));
-    let picture = std::fs::read(alone.join("images/000000/rgb.png")).unwrap();
+    let picture = std::fs::read(alone.join("images/000000/semantics.png")).unwrap();
     assert!(picture.windows(14).any(|bytes| bytes == b"edit: low-poly"));
 }
 

@@ -247,6 +247,10 @@ fn maps_are_kept_as_asked() {
     succeed(make(&usual, "2", &[]));
     assert_eq!(files(&usual), with(&["coverage.png", "geometry.exr", "nir.png"]));
 
+    let (_keep, normals) = scratch();
+    succeed(make(&normals, "2", &["--keep", "nir,coverage,depth,normals"]));
+    assert_eq!(files(&normals), files(&usual));
+
     let (_keep, bare) = scratch();
     succeed(make(&bare, "2", &["--keep", "none"]));
     assert_eq!(files(&bare), with(&[]));
@@ -256,14 +260,20 @@ fn maps_are_kept_as_asked() {
     let (_keep, oldest) = scratch();
     let all = ["--keep", "nir,coverage,depth32,normals16"];
     succeed(make(&oldest, "2", &all));
-    for folder in [&usual, &bare, &depth, &oldest] {
+    for folder in [&usual, &normals, &bare, &depth, &oldest] {
         let said = succeed(verb("verify", folder, &["--rerender", "2"])).stderr;
         assert!(String::from_utf8_lossy(&said).contains("2 rendered again and the same; 0 faults"));
     }
 
     // The same field, to the precision that is promised.
     let read = |folder: &Path| native::read(folder, "000000").unwrap();
-    let (half, single, both) = (read(&usual), read(&depth), read(&oldest));
+    let (half, single, both) = (read(&normals), read(&depth), read(&oldest));
+    assert_eq!(
+        (read(&usual).normals.len(), half.normals.len()),
+        (0, 96 * 72),
+        "normals are kept where they are asked for"
+    );
+    assert_eq!(read(&usual).depth, half.depth);
     assert_eq!((single.depth.len(), single.normals.len()), (96 * 72, 0));
     assert_eq!(single.depth, both.depth);
     for (a, b) in half.depth.iter().zip(&single.depth) {
@@ -276,7 +286,7 @@ fn maps_are_kept_as_asked() {
     assert_eq!((&half.rgb, &half.semantics, &half.record), (&both.rgb, &both.semantics, &both.record));
     assert_eq!(read(&bare).record, both.record, "what is not kept is counted all the same");
     let size = |folder: &Path| fs::metadata(folder.join("images/000000/geometry.exr")).unwrap().len();
-    assert!(size(&usual) < size(&oldest), "{} {}", size(&usual), size(&oldest));
+    assert!(size(&usual) < size(&normals) && size(&normals) < size(&oldest));
 
     // A dataset of before says nothing of maps, and goes on with those that it has.
     let recipe = fs::read_to_string(oldest.join("dataset.json")).unwrap();

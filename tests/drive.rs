@@ -265,6 +265,13 @@ fn what_is_no_drive_is_told() {
         ("rows", "Straight(heading_deg: 30, speed_m_s: 0.2)", "Poses(\"none.tum\")", "none.tum"),
         ("far", "speed_m_s: 0.2", "speed_m_s: 500", "more than the 144 m² of one field"),
         ("many", "frames: 3", "frames: 90000", "are too many for one field"),
+        ("capitals", "\"right\"", "\"Camera\"", "two cameras are called `camera` and `Camera`"),
+        (
+            "sky",
+            "at_m: (0.04, 0))))]",
+            "at_m: (0.04, 0), pitch_deg: 180)))]",
+            "camera `right` in frame 0 does not look at the ground",
+        ),
         ("shape", "Nadir(height_m: 0.45, at_m", "Nadir(height_m: -0.45, at_m", "height_m"),
     ] {
         let said = refused(&format!("{name}.ron"), &|text| {

@@ -223,6 +223,7 @@ fn little_known(numbers: [u32; 2]) -> (tempfile::TempDir, PathBuf, Sample) {
         coverage: Vec::new(),
         depth: Vec::new(),
         normals: Vec::new(),
+        jpeg: None,
         film: None,
     };
     (sample.record.classes, sample.record.ignored) = annotate::classes(&sample);

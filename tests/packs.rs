@@ -242,6 +242,21 @@ fn what_is_finished_is_pushed_once_and_whole() {
     succeed(verb("verify", &there, &["--quiet"]));
 }
 
+/// Rationale: a push that hangs kept a night's work waiting for ever, and what it had started went on after the run's end. Expected: with a bound it counts as
+/// failed, in words, and a program that the command has started in the background ends with it: the file that it would have made never appears.
+#[test]
+fn a_push_that_hangs_is_ended_with_all_it_has_started() {
+    let (_keep, data) = scratch();
+    let (_also, there) = scratch();
+    fs::create_dir_all(&there).expect("a folder");
+    let late = there.join("late");
+    let hangs = format!("(sleep 4; echo {{dir}} > '{}') & sleep 60", path(&late));
+    let said = fail(packed(&data, 2, &["--push", &hangs, "--push-tries", "1", "--push-timeout", "1"]), 1);
+    assert!(said.contains("recipe was not pushed") && said.contains("took longer than 1 s"), "{said}");
+    std::thread::sleep(std::time::Duration::from_secs(5));
+    assert!(!late.exists(), "what the command started went on");
+}
+
 /// The same of images in folders, and of what belongs to all.
 #[test]
 fn folders_are_pushed_too() {

@@ -44,7 +44,7 @@ class Sample(Dict[str, Any]):
     """One image with its labels, by name; a notebook shows its picture.
 
     ========== ======================= ==========================================================
-    image      uint8, (H, W, 3)        the photograph in colour; none of labels alone
+    image      uint8, (H, W, 3)        the photograph in colour, from PNG or JPEG; none of labels alone
     nir        uint8, (H, W)           the one in near infrared, where there is one
     semantics  uint8, (H, W)           0 soil, 1 crop, 2 weed, 255 no label
     plants     int32, (H, W)           number of the plant, 0 for none
@@ -105,12 +105,18 @@ _MAPS = (
     ("leaves", "leaves", np.int32),
 )
 
+# Endings of the names of pictures: photographs may be either.
+_ENDINGS = ("png", "jpg")
+
 
 def _sample(folder: Path, photographs: str = "", labels_only: bool = False) -> Sample:
     """The pictures and labels of an image's folder; `photographs` ends the names of other photographs."""
     sample = Sample()
     for name, file, kind in _MAPS:
-        path = folder / f"{file}{photographs if name in ('image', 'nir') else ''}.png"
+        stem = f"{file}{photographs if name in ('image', 'nir') else ''}"
+        path = folder / f"{stem}.png"
+        if name in ("image", "nir") and not path.is_file() and (folder / f"{stem}.jpg").is_file():
+            path = folder / f"{stem}.jpg"
         optional = name == "nir" or (labels_only and name == "image")
         if not optional or path.is_file():
             sample[name] = _read(path, kind)
@@ -183,7 +189,7 @@ class Dataset:
         files: Dict[str, bytes] = {}
         try:
             with open(archive, "rb") as tar:
-                for name in [f"{file}.png" for _, file, _ in _MAPS] + ["record.json"]:
+                for name in [f"{file}.{ending}" for _, file, _ in _MAPS for ending in _ENDINGS] + ["record.json"]:
                     if place := members.get(f"{index:06d}.{name}"):
                         tar.seek(place[0])
                         files[name] = tar.read(place[1])
@@ -266,8 +272,9 @@ def _from_files(files: Dict[str, bytes], key: str) -> Sample:
     """A sample from the contents of its files, by their names; errors call it `key`."""
     sample = Sample()
     for of, file, kind in _MAPS:
-        if f"{file}.png" in files:
-            sample[of] = _read(io.BytesIO(files[f"{file}.png"]), kind, f"{key}.{file}.png")
+        for name in (f"{file}.{ending}" for ending in _ENDINGS):
+            if name in files:
+                sample[of] = _read(io.BytesIO(files[name]), kind, f"{key}.{name}")
     sample["record"] = _object(files["record.json"], f"{key}.record.json")
     return sample
 
@@ -297,8 +304,9 @@ def stream(
     `(k, n)` gives each its own: reader k of n. Further keywords are the flags of `trace stream` with `_` for `-`: `width=324`, `seed=3`,
     `denoise=True`, `threads=2`. The program runs until the generator is closed or dropped. Raises `Error` with the program's own words.
     """
-    # Only what becomes an array is encoded.
-    chosen: Dict[str, Any] = {"keep": "nir", "spp": spp, "first": first, "count": count, **flags}
+    # Only what becomes an array is encoded; of labels alone there are no samples, and nothing that they tell.
+    drawn = {} if flags.get("labels_only") else {"keep": "nir", "spp": spp}
+    chosen: Dict[str, Any] = {**drawn, "first": first, "count": count, **flags}
     if shard is not None:
         chosen["shard"] = "/".join(map(str, shard))
     command = [program(), "stream", "--quiet", "--scene", os.fspath(scene), *_flags(chosen)]

@@ -1,10 +1,10 @@
 //! Which picture belongs to which, and where labels are.
 //!
-//! A picture is a file, or a folder with `rgb.png`; `nir.png` and `semantics.png` beside it belong to it. Any other folder holds many, below
-//! `images/` where it has that: such of folders with `rgb.png` (datasets, renders), by the folder's name; else every PNG and JPEG, by its own,
+//! A picture is a file, or a folder with `rgb.png` or `rgb.jpg`; `nir.png` or `nir.jpg` and `semantics.png` beside it belong to it. Any other
+//! folder holds many, below `images/` where it has that: such of folders with `rgb` (datasets, renders), by the folder's name; else every PNG and JPEG, by its own,
 //! whose labels lie below `labels/`. Names go without extensions, so that a JPEG may stand against a PNG.
 
-use crate::{Error, Result};
+use crate::{Error, Result, output};
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
@@ -156,8 +156,7 @@ fn source(path: &Path) -> Result<Source> {
     if path.is_file() {
         return Ok(Source::One(path.into()));
     }
-    let rendered = path.join("rgb.png");
-    if rendered.is_file() {
+    if let Some(rendered) = output::photograph_in(path, "rgb") {
         return Ok(Source::One(rendered));
     }
     let images = path.join("images");
@@ -180,8 +179,7 @@ pub(super) fn walk(folder: &Path, prefix: &str, found: &mut BTreeMap<String, Pat
         if name.starts_with('.') {
             continue;
         }
-        let rendered = path.join("rgb.png");
-        let (name, picture) = if rendered.is_file() {
+        let (name, picture) = if let Some(rendered) = output::photograph_in(&path, "rgb") {
             (name, rendered)
         } else if path.is_dir() {
             walk(&path, &format!("{prefix}{name}/"), found)?;
@@ -207,7 +205,7 @@ pub(super) fn stem(path: &Path) -> String {
 /// What else is known of the picture `rgb.png` (or `rgb_denoised.png`): the file beside it whose name begins with something else.
 pub(super) fn beside_rgb(picture: &Path, other: &str) -> Option<PathBuf> {
     let rest = stem(picture).strip_prefix("rgb")?.to_owned();
-    first([picture.with_file_name(format!("{other}{rest}.png"))])
+    output::photograph_in(picture.parent()?, &format!("{other}{rest}"))
 }
 
 fn infrared(a: &Path, b: &Path) -> Option<(PathBuf, PathBuf)> {

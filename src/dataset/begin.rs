@@ -3,6 +3,7 @@
 use super::File;
 use super::checksum_record::write_files;
 use super::keep::Kept;
+use super::photo::Photo;
 use super::recipe::{FILE, Made, Recipe};
 use super::{format, pack};
 use crate::output::{create_atomically, is_unfinished};
@@ -25,14 +26,15 @@ pub(super) fn begin(folder: &Path, recipe: Recipe, files: &[File]) -> Result<Rec
 fn go_on(folder: &Path, mut recipe: Recipe, files: &[File]) -> Result<Recipe> {
     let before = Recipe::read(folder)?;
     // Who asks for nothing in particular leaves labels and maps as they are.
-    if recipe.labelling.is_usual() {
-        recipe.labelling.clone_from(&before.labelling);
-    }
+    recipe.labelling = recipe.labelling.over(&before.labelling);
     recipe.pack = recipe.pack.or(before.pack);
     if let (Made::Rendered(now), Made::Rendered(then)) = (&mut recipe.made, &before.made) {
         now.parts = then.parts;
         if now.keep == Kept::usual(now.labels_only) {
             now.keep.clone_from(&then.keep);
+        }
+        if now.photo.unwrap_or_default() == Photo::default() {
+            now.photo = then.photo;
         }
     }
     before.check_goes_on(folder, &recipe)?;

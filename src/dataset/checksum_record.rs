@@ -83,8 +83,14 @@ pub(super) const BLOCK: usize = 4096;
 /// Writes files, all of them or none. Those of the same bytes, such as the photograph in several formats, are one file with several
 /// names.
 pub(super) fn write_files(folder: &Path, files: &[File]) -> Result<()> {
+    write_files_beside(folder, files, &BTreeMap::new())
+}
+
+/// The same; files of the same bytes as some that lie there, of which these checksums are known, become further names of those.
+pub(super) fn write_files_beside(folder: &Path, files: &[File], there: &BTreeMap<String, Checksum>) -> Result<()> {
+    let known = if there.is_empty() { BTreeMap::new() } else { lying(folder, files, there)? };
     let add_all = |together: &mut Together| {
-        let mut large: BTreeMap<&[u8], PathBuf> = BTreeMap::new();
+        let mut large = known.clone();
         for file in files {
             if file.bytes.is_empty() {
                 return Err(Error::failed(format!("{}: refused to write an empty file", file.path)));
@@ -101,4 +107,24 @@ pub(super) fn write_files(folder: &Path, files: &[File]) -> Result<()> {
         Ok(())
     };
     write_together(folder, add_all).map(drop)
+}
+
+/// Large files whose bytes lie there already, and where: none in archives. A checksum says which to look at, the bytes themselves decide.
+fn lying<'a>(
+    folder: &Path,
+    files: &'a [File],
+    there: &BTreeMap<String, Checksum>,
+) -> Result<BTreeMap<&'a [u8], PathBuf>> {
+    let mut known = BTreeMap::new();
+    for file in files.iter().filter(|file| file.bytes.len() > BLOCK) {
+        let sum = Checksum::of(&file.bytes);
+        for (path, _) in there.iter().filter(|(path, known)| **known == sum && **path != file.path) {
+            let path = below(folder, path)?;
+            let is_file = std::fs::symlink_metadata(&path).is_ok_and(|about| about.is_file());
+            if is_file && crate::input::contents(&path).is_ok_and(|bytes| bytes == file.bytes) {
+                known.insert(file.bytes.as_slice(), path);
+            }
+        }
+    }
+    Ok(known)
 }

@@ -286,6 +286,7 @@ mod tests {
         for bad in ["", "soil", "soil; a=; b", "soil; a=crop; b=crop", "soil; soil=crop", "soil; ignore=weed"] {
             assert!(Classes::parse(bad).is_err(), "{bad}");
         }
+        assert!(Classes::parse("soil; a\nb=crop; weed").unwrap_err().contains("ends lines"));
     }
 
     /// Expected: the most particular label decides; what is ignored has no number and takes none from the others.
@@ -297,6 +298,10 @@ mod tests {
             class: crate::scene::tag::Class::Weed,
         };
         let table = [species("fat hen", "CHEAL"), species("thistle", "CIRAR")];
+        for twice in ["soil; a=CHEAL; b=fat hen; weed", "soil; a=cheal; b=CHEAL; weed"] {
+            let said = Classes::parse(twice).unwrap().of(&table).unwrap_err().to_string();
+            assert!(said.contains("fat hen (CHEAL) belongs to `a` and to `b`"), "{said}");
+        }
         let classes = Classes::parse("soil; ignore=thistle,stick; hen=cheal; weed; stone").unwrap();
         assert_eq!(classes.names(), ["soil", "hen", "weed", "stone"]);
         assert_eq!((classes.of_plants(), classes.needs_parts()), (vec![1, 2], true));

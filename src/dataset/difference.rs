@@ -2,7 +2,7 @@
 //!
 //! Another version of Embree, or of the C library's sines beside it, may move a hit in its last bits. A ray that meets the very edge of a leaf
 //! then goes another way, so a few label pixels and a few paths differ; the images are still of one field. The files' bytes differ in any case,
-//! since pictures name the kernels that made them.
+//! since label maps name the kernels that made them.
 
 use super::sample::Sample;
 use std::fmt;
@@ -99,6 +99,7 @@ mod tests {
             coverage: Vec::new(),
             depth: vec![1.0; n],
             normals: Vec::new(),
+            jpeg: None,
             film: None,
         }
     }

@@ -4,7 +4,7 @@
 //! each with a share of the threads as a pool of its own. (In one pool for all, a thread that waits for a part of its image takes up
 //! a part of another, and may take up all of it.) Memory grows with the images at once, not with the dataset.
 
-use super::checksum_record::{ChecksumRecord, write_files};
+use super::checksum_record::{ChecksumRecord, write_files_beside};
 use super::pack::{Id, Packing, store};
 use super::push::{Push, Unit};
 use super::render::{LastField, Times, render, renderer, scene_file};
@@ -328,11 +328,12 @@ impl Run<'_> {
         if self.callbacks.now.load(Ordering::Relaxed) {
             return Err(Error::interrupted());
         }
-        write_files(folder, &files)?;
+        let before = if task == Task::Formats { ChecksumRecord::read(folder, index) } else { None };
+        let mut own = before.as_ref().map(|before| before.files.clone()).unwrap_or_default();
+        own.retain(|path, _| native::is_native(path));
+        write_files_beside(folder, &files, &own)?;
         let mut checksums = ChecksumRecord::of(index, recipe, &files)?;
-        if task == Task::Formats
-            && let Some(before) = ChecksumRecord::read(folder, index)
-        {
+        if let Some(before) = before {
             // What only the renderer knows was whole, or the image would have been rendered again.
             let films: Vec<&str> =
                 format::all(recipe)?.into_iter().filter(|(_, f)| f.needs_film()).map(|(name, _)| name).collect();

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kept {
-    /// `nir.png`.
+    /// Near infrared.
     Nir,
     /// `coverage.png`.
     Coverage,
@@ -34,7 +34,7 @@ impl Kept {
     ];
 
     /// What a new dataset keeps unless said otherwise.
-    pub const USUAL: [Self; 4] = [Self::Nir, Self::Coverage, Self::Depth, Self::Normals];
+    pub const USUAL: [Self; 3] = [Self::Nir, Self::Coverage, Self::Depth];
 
     /// The same of a dataset whose images may be labels alone.
     pub fn usual(labels_only: bool) -> &'static [Self] {
@@ -107,9 +107,9 @@ mod tests {
             assert!(*exact == kept || (exact / kept - 1.0).abs() <= 1.0 / 2048.0, "{exact} {kept}");
         }
         assert_eq!(depths(&Kept::OLDEST, &depth), depth);
-        assert!(depths(&[Kept::Nir], &depth).is_empty() && normals(&[], [[0.0; 3]].into_iter()).is_empty());
+        assert!(depths(&[Kept::Nir], &depth).is_empty() && normals(&Kept::USUAL, [[0.0; 3]].into_iter()).is_empty());
         let slanted = [[0.6, -0.8, 0.0], [0.0; 3], [0.0, 0.36, 0.933]];
-        for (exact, kept) in slanted.iter().zip(normals(&Kept::USUAL, slanted.into_iter())) {
+        for (exact, kept) in slanted.iter().zip(normals(&[Kept::Normals], slanted.into_iter())) {
             assert!(exact.iter().zip(kept).all(|(a, b)| (a - b).abs() <= 0.5 / STEPS && half(b) == b));
         }
         assert!(of_labels(&Kept::USUAL).unwrap().is_empty() && of_labels(&[Kept::Nir, Kept::Depth]).is_err());

@@ -26,6 +26,16 @@ impl Labelling {
         *self == Self::default()
     }
 
+    /// What is asked for now, and where nothing is, what was asked for before.
+    #[must_use]
+    pub fn over(self, before: &Self) -> Self {
+        Self {
+            classes: self.classes.or_else(|| before.classes.clone()),
+            min_pixels: self.min_pixels.or(before.min_pixels),
+            min_visible: self.min_visible.or(before.min_visible),
+        }
+    }
+
     /// What decides the bytes of formats: SHA-256; `None` of the usual.
     pub fn fingerprint(&self) -> Result<Option<String>> {
         if self.is_usual() {

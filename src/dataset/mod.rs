@@ -20,7 +20,7 @@
 //! | file | idea |
 //! |---|---|
 //! | `recipe`, `split` | what makes a dataset; which image is for what |
-//! | `keep` | which maps images keep |
+//! | `keep`, `photo` | which maps images keep; how photographs are stored |
 //! | `classes`, `labelling`, `labels` | a user's own classes; what else may be asked of labels; how formats name and choose what images show |
 //! | `render` | an image from its field, by [`crate::job`] |
 //! | `sample`, `record`, `annotate`, `rle` | one image and all that is known of it |
@@ -85,6 +85,8 @@ pub mod meter;
 pub mod native;
 #[doc(hidden)]
 pub mod pack;
+#[doc(hidden)]
+pub mod photo;
 #[doc(hidden)]
 pub mod plan;
 #[doc(hidden)]

@@ -2,7 +2,7 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | `rgb.png`, `nir.png` | the photographs, 8 bit; none where images are labels alone |
+//! | `rgb.png`, `nir.png` | the photographs, 8 bit; `rgb.jpg`, `nir.jpg` where the recipe says so; none where images are labels alone |
 //! | `semantics.png` | class, indexed: 0 soil, 1 crop, 2 weed, 255 no label |
 //! | `species.png` | number of the species in `dataset.json`, 8 bit, 0 for none |
 //! | `parts.png` | what is there, indexed: organs and things on the ground, as `parts/names.json` of the format parts; where classes need it |
@@ -14,6 +14,7 @@
 
 use super::File;
 use super::keep::Kept;
+use super::photo::{Jpegs, Photo};
 use super::recipe::{Recipe, compact};
 use super::record::Record;
 use super::sample::{IGNORE, Sample};
@@ -43,7 +44,7 @@ pub fn palette(with_ignore: bool) -> Vec<[u8; 3]> {
     colors
 }
 
-/// The files of a sample; `text` goes into the pictures' comments.
+/// The files of a sample; `text` goes into the comments of label maps, and of photographs where the recipe is one of before.
 pub fn files(recipe: &Recipe, sample: &Sample, text: &str) -> Result<Vec<File>> {
     let (w, h) = sample.size();
     let base = folder(&sample.record.name);
@@ -51,11 +52,20 @@ pub fn files(recipe: &Recipe, sample: &Sample, text: &str) -> Result<Vec<File>> 
     let mut add = |name: &str, bytes: Vec<u8>| files.push(File { path: format!("{base}/{name}"), bytes });
     let png = |picture: &Picture<'_>| output::encode_png(w, h, picture, text);
     let colors = palette(sample.semantics.contains(&IGNORE));
-    if !sample.rgb.is_empty() {
-        add("rgb.png", png(&Picture::Rgb(&sample.rgb))?);
-    }
-    if !sample.nir.is_empty() {
-        add("nir.png", png(&Picture::Gray(&sample.nir))?);
+    let of_photograph = if recipe.has_comments() { text } else { "" };
+    match &sample.jpeg {
+        Some(jpeg) => {
+            let files = [("rgb.jpg", &jpeg.rgb), ("nir.jpg", &jpeg.nir)];
+            files.into_iter().filter(|(_, bytes)| !bytes.is_empty()).for_each(|(name, bytes)| add(name, bytes.clone()));
+        }
+        None => {
+            if !sample.rgb.is_empty() {
+                add("rgb.png", output::encode_png(w, h, &Picture::Rgb(&sample.rgb), of_photograph)?);
+            }
+            if !sample.nir.is_empty() {
+                add("nir.png", output::encode_png(w, h, &Picture::Gray(&sample.nir), of_photograph)?);
+            }
+        }
     }
     add("semantics.png", png(&Picture::Indexed(&sample.semantics, &colors))?);
     if !sample.species.is_empty() {
@@ -148,21 +158,33 @@ impl<'a, F: Files + ?Sized> Image<'a, F> {
         Ok(self.optional(file)?.is_some())
     }
 
-    /// An 8-bit RGB picture: width, height, three numbers a pixel.
-    pub(crate) fn rgb(&self, file: &str) -> Result<(u32, u32, Vec<[u8; 3]>)> {
-        let (place, bytes) = self.needed(file)?;
-        output::decode_rgb(&place, &bytes)
-    }
-
     /// An 8-bit gray picture.
     pub(crate) fn gray(&self, file: &str) -> Result<(u32, u32, Vec<u8>)> {
         let (place, bytes) = self.needed(file)?;
         output::decode_gray(&place, &bytes)
     }
 
-    /// The same, where there is one.
-    pub(crate) fn gray_if_there(&self, file: &str) -> Result<Option<(u32, u32, Vec<u8>)>> {
-        self.optional(file)?.map(|(place, bytes)| output::decode_gray(&place, &bytes)).transpose()
+    /// The photograph in colour, as PNG or as JPEG: width, height, pixels.
+    pub(crate) fn photograph(&self) -> Result<(u32, u32, Vec<[u8; 3]>)> {
+        match self.stored("rgb")? {
+            Some(stored) => stored.rgb(),
+            None => output::decode_rgb(&self.place("rgb.png"), &self.needed("rgb.png")?.1),
+        }
+    }
+
+    /// A band in gray, such as `nir`, as PNG or as JPEG, where there is one: width, height, values, and what errors call the file.
+    pub(crate) fn band(&self, name: &str) -> Result<Option<(PathBuf, (u32, u32, Vec<u8>))>> {
+        self.stored(name)?.map(|stored| Ok((stored.place.clone(), stored.gray()?))).transpose()
+    }
+
+    /// A photograph of this name without its ending, where there is one.
+    fn stored(&self, name: &str) -> Result<Option<Stored>> {
+        for ending in output::ENDINGS {
+            if let Some((place, bytes)) = self.optional(&format!("{name}.{ending}"))? {
+                return Ok(Some(Stored { place, bytes, is_jpeg: ending == Photo::Jpeg(100).ending() }));
+            }
+        }
+        Ok(None)
     }
 
     /// A 16-bit gray picture.
@@ -184,19 +206,71 @@ impl<'a, F: Files + ?Sized> Image<'a, F> {
     }
 }
 
+/// The file of a photograph.
+struct Stored {
+    /// Where it lies, for messages.
+    place: PathBuf,
+    bytes: Vec<u8>,
+    is_jpeg: bool,
+}
+
+impl Stored {
+    fn rgb(&self) -> Result<(u32, u32, Vec<[u8; 3]>)> {
+        if self.is_jpeg {
+            output::decode_jpeg(&self.place, &self.bytes)
+        } else {
+            output::decode_rgb(&self.place, &self.bytes)
+        }
+    }
+
+    fn gray(&self) -> Result<(u32, u32, Vec<u8>)> {
+        if self.is_jpeg {
+            output::decode_gray_jpeg(&self.place, &self.bytes)
+        } else {
+            output::decode_gray(&self.place, &self.bytes)
+        }
+    }
+}
+
+/// Colours, near infrared and the files that they are the pixels of where these are JPEG, of an image of this size.
+type Photographs = (Vec<[u8; 3]>, Vec<u8>, Option<Jpegs>);
+
+/// The photographs of an image.
+fn photographs(image: &Image<'_, impl Files + ?Sized>, record: &Record) -> Result<Photographs> {
+    let size = (record.width, record.height);
+    let (rgb, nir) = (image.stored("rgb")?, image.stored("nir")?);
+    if rgb.is_none() && record.has_photograph() {
+        image.needed("rgb.png")?;
+    }
+    let mut pixels = (Vec::new(), Vec::new());
+    if let Some(stored) = &rgb {
+        let (w, h, values) = stored.rgb()?;
+        check(&stored.place, size, (w, h))?;
+        pixels.0 = values;
+    }
+    if let Some(stored) = &nir {
+        let (w, h, values) = stored.gray()?;
+        check(&stored.place, size, (w, h))?;
+        pixels.1 = values;
+    }
+    let bytes = |stored: Option<Stored>| stored.filter(|stored| stored.is_jpeg).map(|stored| stored.bytes);
+    let jpeg = match (bytes(rgb), bytes(nir)) {
+        (None, None) => None,
+        (rgb, nir) => Some(Jpegs { rgb: rgb.unwrap_or_default(), nir: nir.unwrap_or_default() }),
+    };
+    Ok((pixels.0, pixels.1, jpeg))
+}
+
 /// Reads an image.
 pub(super) fn sample(files: &(impl Files + ?Sized), name: &str) -> Result<Sample> {
     let image = Image::of(files, name);
     let record = record(files, name)?;
     let size = (record.width, record.height);
-    let rgb = if record.has_photograph() || image.has("rgb.png")? {
-        sized(&image, "rgb.png", size, image.rgb("rgb.png")?)?
-    } else {
-        Vec::new()
+    let (rgb, nir, jpeg) = photographs(&image, &record)?;
+    let species = match image.optional("species.png")? {
+        Some((place, bytes)) => sized(&image, "species.png", size, output::decode_gray(&place, &bytes)?)?,
+        None => Vec::new(),
     };
-    let of_size =
-        |file: &str| image.gray_if_there(file)?.map_or(Ok(Vec::new()), |found| sized(&image, file, size, found));
-    let (nir, species) = (of_size("nir.png")?, of_size("species.png")?);
     let coverage = match image.optional("coverage.png")? {
         Some((place, bytes)) => sized(&image, "coverage.png", size, output::decode_rgb(&place, &bytes)?)?,
         None => Vec::new(),
@@ -224,6 +298,7 @@ pub(super) fn sample(files: &(impl Files + ?Sized), name: &str) -> Result<Sample
         coverage,
         depth,
         normals,
+        jpeg,
         film: None,
         record,
     })
@@ -265,9 +340,11 @@ fn check(path: &Path, expected: (u32, u32), found: (u32, u32)) -> Result<()> {
 }
 
 /// Names of an image's files, in the order in which [`files`] makes them and archives hold them: what is known of it comes last.
-const ORDER: [&str; 10] = [
+const ORDER: [&str; 12] = [
     "rgb.png",
+    "rgb.jpg",
     "nir.png",
+    "nir.jpg",
     "semantics.png",
     "species.png",
     "parts.png",
@@ -281,6 +358,11 @@ const ORDER: [&str; 10] = [
 /// Whether a file is an image's own, and of no format.
 pub(super) fn is_native(path: &str) -> bool {
     path.starts_with("images/")
+}
+
+/// Whether a file is an image's own photograph in colour.
+pub(super) fn is_photograph(path: &str) -> bool {
+    is_native(path) && output::ENDINGS.iter().any(|ending| path.ends_with(&format!("/rgb.{ending}")))
 }
 
 /// Paths of an image's own files in the order of archives.

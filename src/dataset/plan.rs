@@ -6,6 +6,7 @@ use super::gather::{Gathered, gather};
 use super::keep::{self, Kept};
 use super::labelling::Labelling;
 use super::labels::Labels;
+use super::photo::Photo;
 use super::recipe::{FILE, Made, Recipe, Rendering};
 use super::set::Set;
 use super::split::Shares;
@@ -39,6 +40,8 @@ pub struct Order {
     pub labelling: Labelling,
     /// Maps that images keep beside photograph, labels and record.
     pub keep: Vec<Kept>,
+    /// How photographs are stored; as PNG, a dataset that is gone on with keeps its way.
+    pub photo: Photo,
     /// Whether images are labels alone: nothing is lit, and there are no photographs.
     pub labels_only: bool,
     /// How the images are split.
@@ -68,6 +71,7 @@ impl Order {
             formats: Vec::new(),
             labelling: Labelling::default(),
             keep: Kept::USUAL.to_vec(),
+            photo: Photo::default(),
             labels_only: false,
             split: Shares::default(),
             pack: None,
@@ -133,6 +137,7 @@ pub(super) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
     let elsewhere = rewritten || source.allows_outside();
     let scene_sha256 = if elsewhere { hash_of_copies(order, &files, &scene, stop)? } else { field.hash.clone() };
     let camera = &field.scene.camera;
+    order.photo.check_size(camera.width(), camera.height())?;
     let recipe = Recipe {
         furrow: env!("CARGO_PKG_VERSION").into(),
         made: Made::Rendered(Rendering {
@@ -152,6 +157,7 @@ pub(super) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
             parts: order.labelling.classes.as_ref().is_some_and(Classes::needs_parts),
             keep,
             labels_only: order.labels_only,
+            photo: Some(order.photo),
             kernels,
             edit: order.edit.label(),
         }),
@@ -180,6 +186,9 @@ fn labels_alone(order: &Order, options: &RenderOptions) -> Result<Vec<Kept>> {
     }
     if order.edit.asks_samples() {
         return refused("this --edit makes labels of samples, and --labels-only takes none");
+    }
+    if order.photo != Photo::default() {
+        return refused("--photo stores photographs, and --labels-only draws none");
     }
     keep::checked(keep::of_labels(&order.keep)?)
 }
@@ -223,7 +232,7 @@ fn warnings(recipe: &Recipe) -> Result<Vec<String>> {
 pub fn add_formats(set: &mut Set, names: &[String], labelling: &Labelling) -> Result<Vec<String>> {
     let mut recipe = set.recipe.clone();
     if !labelling.is_usual() {
-        recipe.labelling = labelling.clone();
+        recipe.labelling = labelling.clone().over(&recipe.labelling);
         Labels::of(&recipe).map_err(|e| e.in_file(&set.folder))?;
     }
     for name in names {

@@ -6,6 +6,7 @@
 use super::classes::Classes;
 use super::keep::Kept;
 use super::labelling::Labelling;
+use super::photo::Photo;
 use super::split::{Shares, Split};
 use crate::ablation::{self, Edit};
 use crate::input::{Scope, below};
@@ -79,7 +80,7 @@ pub struct Rendering {
     pub engine: Engine,
     /// Samples a pixel.
     pub spp: u32,
-    /// Whether `rgb.png` and `nir.png` are without the noise of few samples.
+    /// Whether photographs are without the noise of few samples.
     pub denoise: bool,
     /// Techniques left out.
     pub without: Vec<Technique>,
@@ -96,6 +97,9 @@ pub struct Rendering {
     /// Whether images are labels alone: no photographs and nothing that samples tell, so `spp` says nothing.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub labels_only: bool,
+    /// How photographs are stored. Recipes of before do not say: theirs are PNG files, with the same comment as label maps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub photo: Option<Photo>,
     /// The ray tracing kernels and their instruction set, or the graphics card and its driver.
     pub kernels: String,
     /// What was changed of the field, by its name among [`ablation::EDITS`]. What an edit of the drawing changes stands above as well.
@@ -262,6 +266,19 @@ impl Recipe {
     /// Whether its images are labels alone, without photographs.
     pub fn labels_only(&self) -> bool {
         matches!(&self.made, Made::Rendered(rendering) if rendering.labels_only)
+    }
+
+    /// How its photographs are stored.
+    pub fn photo(&self) -> Photo {
+        match &self.made {
+            Made::Rendered(rendering) => rendering.photo.unwrap_or_default(),
+            Made::Imported { .. } => Photo::Png,
+        }
+    }
+
+    /// Whether its photographs hold a comment, as those of before do; without one, they are the very bytes that formats hold.
+    pub fn has_comments(&self) -> bool {
+        matches!(&self.made, Made::Rendered(Rendering { photo: None, .. }))
     }
 
     /// How it is rendered; an error for images from elsewhere.

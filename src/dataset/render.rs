@@ -6,7 +6,7 @@ use super::recipe::{self, Recipe};
 use super::record::{CaptureRecord, Exposure, Grown, Leaf, Plant, Record, Seen};
 use super::sample::{Rendered, Sample};
 use super::set::Set;
-use super::{damage, flow, format};
+use super::{damage, flow, format, photo};
 use crate::job::{Field, Image, Renderer, Request, SceneFile};
 use crate::math::Vec3;
 use crate::render::{self, LabelMap, Watch};
@@ -162,6 +162,7 @@ fn describe(recipe: &Recipe, index: u64, image: Image<'_>) -> Result<Sample> {
     if recipe.keeps(Kept::Nir) {
         sample.nir = photograph.nir;
     }
+    sample.jpeg = photo::store(sample.size(), &mut sample.rgb, &mut sample.nir, recipe.photo())?;
     sample.coverage = render::coverage(&film, &field.grown().scene.tags()).into_iter().map(of_255).collect();
     // Classes know what they cover.
     (sample.record.classes, sample.record.ignored) = annotate::classes(&sample);
@@ -220,6 +221,7 @@ fn labelled(recipe: &Recipe, index: u64, of: &Field, labels: LabelMap) -> Result
         coverage: Vec::new(),
         depth: keep::depths(&recipe.rendering()?.keep, &labels.depth),
         normals: keep::normals(&recipe.rendering()?.keep, labels.normals.iter().map(Vec3::to_array)),
+        jpeg: None,
         film: None,
     };
     (sample.record.classes, sample.record.ignored) = annotate::classes(&sample);

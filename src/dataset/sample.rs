@@ -1,5 +1,6 @@
 //! One image and everything that is known of it, in memory: what formats are made of.
 
+use super::photo::Jpegs;
 use super::record::Record;
 use crate::film::Film;
 use crate::render::LabelMap;
@@ -31,6 +32,8 @@ pub struct Sample {
     pub depth: Vec<f32>,
     /// Unit normal in the world, facing the camera; zero where nothing is.
     pub normals: Vec<[f32; 3]>,
+    /// The files that `rgb` and `nir` are the pixels of, where photographs are stored as JPEG.
+    pub jpeg: Option<Jpegs>,
     /// What was rendered; only in the process that rendered it.
     pub film: Option<Rendered>,
 }

@@ -169,7 +169,8 @@ fn look(set: &Set, index: u64) -> Result<Looked> {
             Err(e) => faults.push(e.to_string()),
         }
     }
-    let photograph = checksums.files.get(&format!("{}/rgb.png", native::folder(&name))).map(|p| p.sha256.clone());
+    let mut photographs = checksums.files.iter().filter(|(path, _)| native::is_photograph(path));
+    let photograph = photographs.next().map(|(_, sum)| sum.sha256.clone());
     Ok(Looked { missing, faults, photograph })
 }
 

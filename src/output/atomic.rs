@@ -82,18 +82,15 @@ impl Together {
         Ok(())
     }
 
-    /// Adds a file that holds the same bytes as one that was added before: as a second name of it, so that they take space once;
-    /// written anew where the file system has no links.
+    /// Adds a file that holds the same bytes as one that was added before, or that lies there: as a second name of it, so that they take space
+    /// once; written anew where the file system has no links.
     pub fn add_equal(&mut self, to: &Path, path: &Path, bytes: &[u8]) -> Result<()> {
         let folder = parent(path);
         fs::create_dir_all(folder).map_err(Error::io(folder))?;
-        let there = self.waiting.iter().find(|(_, target)| target == to).map(|(there, _)| there);
-        let link = there.map(|there| {
-            tempfile::Builder::new().prefix(UNFINISHED).make_in(folder, |name| fs::hard_link(there, name))
-        });
-        match link {
-            Some(Ok(link)) => self.waiting.push((link.into_temp_path(), path.into())),
-            _ => self.add(path, bytes)?,
+        let there = self.waiting.iter().find(|(_, target)| target == to).map_or(to, |(there, _)| there.as_ref());
+        match tempfile::Builder::new().prefix(UNFINISHED).make_in(folder, |name| fs::hard_link(there, name)) {
+            Ok(link) => self.waiting.push((link.into_temp_path(), path.into())),
+            Err(_) => self.add(path, bytes)?,
         }
         Ok(())
     }

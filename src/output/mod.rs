@@ -31,7 +31,10 @@ pub use self::png::{
     read_gray, read_gray16, read_indexed, read_map, read_numbers, read_rgb,
 };
 pub use denoise::Denoiser;
-pub use photo::{encode_jpeg, photo_size, read_color_photo, read_gray_photo, read_photo, resize_gray, shrink, shrunk};
+pub use photo::{
+    ENDINGS, decode_gray_jpeg, decode_jpeg, encode_gray_jpeg, encode_jpeg, photo_size, photograph_in, read_color_photo,
+    read_gray_photo, read_photo, resize_gray, shrink, shrunk,
+};
 
 /// How many samples the pixels of an image have.
 #[derive(Clone, Copy, Debug, PartialEq)]

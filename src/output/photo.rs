@@ -1,11 +1,21 @@
 //! Photographs that people bring, in whatever form they come; and ours made small, for HTML pages.
 
 use crate::{Error, Result, input};
-use image::codecs::jpeg::JpegEncoder;
-use image::{DynamicImage, ExtendedColorType, GrayImage, ImageError, ImageReader, RgbImage, imageops};
+use image::codecs::jpeg::{JpegDecoder, JpegEncoder};
+use image::{
+    DynamicImage, ExtendedColorType, GrayImage, ImageDecoder, ImageError, ImageReader, ImageResult, RgbImage, imageops,
+};
 use std::fs::File;
-use std::io::{BufReader, ErrorKind};
-use std::path::Path;
+use std::io::{BufReader, Cursor, ErrorKind};
+use std::path::{Path, PathBuf};
+
+/// Endings of the names of photographs that we write.
+pub const ENDINGS: [&str; 2] = ["png", "jpg"];
+
+/// The photograph of this name, such as `rgb` or a band `nir`, in the folder of an image, as PNG or as JPEG; `None` where neither is there.
+pub fn photograph_in(folder: &Path, name: &str) -> Option<PathBuf> {
+    ENDINGS.iter().map(|ending| folder.join(format!("{name}.{ending}"))).find(|path| path.is_file())
+}
 
 /// Reads a PNG or JPEG photograph of any depth as 8-bit sRGB: width, height, pixels.
 pub fn read_photo(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
@@ -19,9 +29,7 @@ pub fn read_photo(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
 pub fn read_color_photo(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
     let bytes = std::fs::read(path).map_err(Error::reading(path))?;
     if is_cut_short(&bytes) {
-        return Err(Error::input("this JPEG is cut short: its end is missing")
-            .help("copy it anew from the camera")
-            .in_file(path));
+        return Err(Error::input(CUT_SHORT).help("copy it anew from the camera").in_file(path));
     }
     let photo = decode(path)?;
     if !photo.color().has_color() {
@@ -37,6 +45,8 @@ pub fn read_color_photo(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
     };
     Ok((w, h, photo.as_raw().as_chunks::<4>().0.iter().map(over_white).collect()))
 }
+
+const CUT_SHORT: &str = "this JPEG is cut short: its end is missing";
 
 /// Whether these are the bytes of a JPEG of which the end is missing: no end marker stands behind the header of its first scan. What is in
 /// segments before, such as a small picture with an end of its own, is passed over. Source: ITU-T T.81, annex B.
@@ -114,12 +124,61 @@ pub fn shrunk(width: u32, height: u32, most: u32) -> (u32, u32) {
 }
 
 /// Encodes an 8-bit sRGB picture as JPEG; `quality` is 1 to 100.
+/// Colours are not subsampled.
 pub fn encode_jpeg(width: u32, height: u32, rgb: &[[u8; 3]], quality: u8) -> Result<Vec<u8>> {
+    jpeg_of(rgb.as_flattened(), (width, height), ExtendedColorType::Rgb8, quality)
+}
+
+/// The same of an 8-bit gray picture.
+pub fn encode_gray_jpeg(width: u32, height: u32, values: &[u8], quality: u8) -> Result<Vec<u8>> {
+    jpeg_of(values, (width, height), ExtendedColorType::L8, quality)
+}
+
+fn jpeg_of(values: &[u8], (w, h): (u32, u32), color: ExtendedColorType, quality: u8) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     JpegEncoder::new_with_quality(&mut bytes, quality)
-        .encode(rgb.as_flattened(), width, height, ExtendedColorType::Rgb8)
+        .encode(values, w, h, color)
         .map_err(|e| Error::failed(format!("cannot encode a JPEG: {e}")))?;
     Ok(bytes)
+}
+
+/// Decodes a JPEG in colour: width, height, pixels. An error where its end is missing.
+pub fn decode_jpeg(path: &Path, bytes: &[u8]) -> Result<(u32, u32, Vec<[u8; 3]>)> {
+    match whole_jpeg(path, bytes)? {
+        DynamicImage::ImageRgb8(photo) => {
+            let (w, h) = photo.dimensions();
+            Ok((w, h, photo.into_raw().as_chunks::<3>().0.to_vec()))
+        }
+        _ => Err(Error::input("it is not a JPEG in colour").in_file(path)),
+    }
+}
+
+/// The same of one in gray.
+pub fn decode_gray_jpeg(path: &Path, bytes: &[u8]) -> Result<(u32, u32, Vec<u8>)> {
+    match whole_jpeg(path, bytes)? {
+        DynamicImage::ImageLuma8(photo) => {
+            let (w, h) = photo.dimensions();
+            Ok((w, h, photo.into_raw()))
+        }
+        _ => Err(Error::input("it is not a JPEG in gray").in_file(path)),
+    }
+}
+
+/// Pixels that a byte of a JPEG may stand for: a block of 64 takes a bit or more in each scan, and two are to spare.
+const PIXELS_A_BYTE: u64 = 1024;
+
+fn whole_jpeg(path: &Path, bytes: &[u8]) -> Result<DynamicImage> {
+    let wrong = |what: String| Error::input(what).in_file(path);
+    if is_cut_short(bytes) {
+        return Err(wrong(CUT_SHORT.into()));
+    }
+    let decoded: ImageResult<_> = JpegDecoder::new(Cursor::new(bytes)).map(|decoder| (decoder.dimensions(), decoder));
+    let ((w, h), decoder) = decoded.map_err(|e| wrong(e.to_string()))?;
+    // Before that much memory is taken.
+    if u64::from(w) * u64::from(h) > PIXELS_A_BYTE.saturating_mul(bytes.len() as u64) {
+        return Err(wrong(format!("it tells of {w} × {h} pixels, more than its {} bytes can hold", bytes.len())));
+    }
+    DynamicImage::from_decoder(decoder).map_err(|e| wrong(e.to_string()))
 }
 
 #[cfg(test)]
@@ -136,6 +195,31 @@ mod tests {
         for length in [whole.len() - 2, whole.len() / 2, 40, 3] {
             assert!(is_cut_short(&whole[..length]), "{length}");
         }
+    }
+
+    /// Expected: pictures come back within what quality 100 rounds, in their shape; a gray one is not taken for one in colour, nor a PNG for either;
+    /// a header that tells of more pixels than the bytes can hold is refused before they are decoded.
+    #[test]
+    fn a_jpeg_comes_back_or_is_refused() {
+        let gray: Vec<u8> = (0..40 * 24).map(|k| (k % 40 * 5) as u8).collect();
+        let rgb: Vec<[u8; 3]> = gray.iter().map(|v| [*v, 200 - v, 90]).collect();
+        let path = Path::new("a.jpg");
+        let (color, plain) = (encode_jpeg(40, 24, &rgb, 100).unwrap(), encode_gray_jpeg(40, 24, &gray, 100).unwrap());
+        let (w, h, back) = decode_jpeg(path, &color).unwrap();
+        assert_eq!((w, h, back.len()), (40, 24, rgb.len()));
+        assert!(back.as_flattened().iter().zip(rgb.as_flattened()).all(|(a, b)| a.abs_diff(*b) <= 3));
+        let (w, h, back) = decode_gray_jpeg(path, &plain).unwrap();
+        assert_eq!((w, h, back.len()), (40, 24, gray.len()));
+        assert!(back.iter().zip(&gray).all(|(a, b)| a.abs_diff(*b) <= 1));
+        let words = |error: Error| error.to_string();
+        assert!(words(decode_jpeg(path, &plain).unwrap_err()).contains("not a JPEG in colour"));
+        assert!(words(decode_gray_jpeg(path, &color).unwrap_err()).contains("not a JPEG in gray"));
+        assert!(words(decode_jpeg(path, &color[..color.len() / 2]).unwrap_err()).contains("cut short"));
+        assert!(decode_jpeg(path, b"\x89PNG\r\n").is_err());
+        let mut vast = color;
+        let frame = vast.windows(2).position(|pair| pair == [0xff, 0xc0]).unwrap();
+        vast[frame + 5..frame + 9].fill(0xff);
+        assert!(words(decode_jpeg(path, &vast).unwrap_err()).contains("65535 × 65535"));
     }
 
     #[test]

@@ -53,6 +53,9 @@ assert started[1].returncode == 0
 bare = next(furrow.stream(scene, keep="none", **SIZE))
 assert "nir" not in bare and "image" in bare, list(bare)
 
+bare = next(furrow.stream(scene, labels_only=True, count=1))
+assert "image" not in bare and bare["semantics"].ndim == 2 and bare["record"]["index"] == 0, list(bare)
+
 # The program's own words.
 for flags, words in [({"count": 0}, "0 is not in"), ({"shard": (3, 2)}, "k/N"), ({"without": ["none-such"]}, "none-such")]:
     try:

@@ -1,11 +1,11 @@
 //! Folders of pictures: what is in them, and what is known of each.
 //!
-//! Pictures are found as `trace compare` finds them: below `images/` where there is such a folder; of datasets and renders each `rgb.png`.
-//! Labels are `labels/NAME.png` or `semantics.png` beside `rgb.png`; near infrared is `nir/NAME.png`, or the file whose name begins with
+//! Pictures are found as `trace compare` finds them: below `images/` where there is such a folder; of datasets and renders each `rgb.png` or `rgb.jpg`.
+//! Labels are `labels/NAME.png` or `semantics.png` beside such a picture; near infrared is `nir/NAME.png`, or the file whose name begins with
 //! `nir` where the picture's begins with `rgb`.
 
 use crate::compare::pairs::{beside, beside_rgb, first, stem, told, walk};
-use crate::{Error, Result};
+use crate::{Error, Result, output};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -30,8 +30,8 @@ pub fn photos(folder: &Path, option: &str) -> Result<Vec<Photo>> {
             .help("give a folder with images/ and, if there are any, labels/ and nir/; or a dataset"));
     }
     let mut found = BTreeMap::new();
-    let (images, rendered) = (folder.join("images"), folder.join("rgb.png"));
-    if rendered.is_file() {
+    let images = folder.join("images");
+    if let Some(rendered) = output::photograph_in(folder, "rgb") {
         found.insert(stem(&rendered), rendered);
     } else if images.is_dir() {
         walk(&images, "", &mut found)?;
@@ -95,6 +95,8 @@ mod tests {
         assert_eq!(found(&["a.jpg", "labels/a.png", "nir/a.png"]), [of("a", true, true)]);
         let dataset = ["images/000001/rgb.png", "images/000001/semantics.png", "images/000001/nir.png"];
         assert_eq!(found(&dataset), [of("000001", true, true)]);
+        let jpeg = dataset.map(|file| file.replace("rgb.png", "rgb.jpg").replace("nir.png", "nir.jpg"));
+        assert_eq!(found(&jpeg.each_ref().map(String::as_str)), [of("000001", true, true)]);
         assert_eq!(found(&["rgb.png", "semantics.png"]), [of("rgb", false, true)]);
     }
 

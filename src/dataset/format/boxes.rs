@@ -44,7 +44,7 @@ pub(super) fn files(folder: &str, sample: &Sample, rows: &[String]) -> Result<Ve
     // Nothing to see is not the same as a file that got lost.
     let text = if rows.is_empty() { "\n".to_owned() } else { rows.iter().flat_map(|row| [row, "\n"]).collect() };
     Ok(vec![
-        picture::photograph(sample, format!("{folder}/images/{split}/{name}.png"))?,
+        picture::photograph(sample, &format!("{folder}/images/{split}/{name}"))?,
         File { path: format!("{folder}/labels/{split}/{name}.txt"), bytes: text.into_bytes() },
     ])
 }

@@ -49,7 +49,7 @@ impl Format for Writer {
         let color = |class: &u8| of_class.get(usize::from(*class)).copied().unwrap_or([128; 3]);
         let colors: Vec<[u8; 3]> = classes.iter().map(color).collect();
         Ok(vec![
-            picture::photograph(sample, at("leftImg8bit", "leftImg8bit"))?,
+            picture::photograph_as_png(sample, at("leftImg8bit", "leftImg8bit"))?,
             labels("gtFine_labelIds")?,
             labels("gtFine_labelTrainIds")?,
             picture::file(sample, at("gtFine", "gtFine_instanceIds"), &Picture::Gray16(&instances))?,

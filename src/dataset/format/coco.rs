@@ -1,5 +1,5 @@
 //! COCO instances and keypoints: `annotations/instances_SPLIT.json` of plants, `annotations/leaves_SPLIT.json` of leaves, and
-//! `images/SPLIT/NAME.png`; `pycocotools.coco.COCO` reads them.
+//! `images/SPLIT/NAME.png` (`.jpg` of a dataset with such photographs); `pycocotools.coco.COCO` reads them.
 //!
 //! Categories are 1 crop and 2 weed, or the classes that the dataset was given, and in the file of leaves the next, leaf. Every plant and every leaf that an image shows is an annotation:
 //! `segmentation` is a compressed run-length mask with `iscrowd` 0, for leaves have holes and parts that polygons cannot hold; `area` is its
@@ -36,7 +36,7 @@ const FOLDER: &str = "coco";
 impl Format for Writer {
     fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
         let Record { name, split, .. } = &sample.record;
-        Ok(vec![picture::photograph(sample, format!("{FOLDER}/images/{}/{name}.png", split.name()))?])
+        Ok(vec![picture::photograph(sample, &format!("{FOLDER}/images/{}/{name}", split.name()))?])
     }
 
     fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
@@ -72,7 +72,7 @@ pub(super) fn head(w: &mut Stream<'_>, set: &Set, split: Split) -> Result<()> {
     w.put(",\n\"licenses\": ")?;
     w.json(&json!([{ "id": 1, "name": recipe.licence, "url": "" }]))?;
     w.put(",\n\"images\": [")?;
-    w.items(set.records(split).map(|record| Ok(image(&record?))))?;
+    w.items(set.records(split).map(|record| Ok(image(set, &record?))))?;
     w.put("],\n")
 }
 
@@ -81,10 +81,10 @@ pub(super) fn image_id(record: &Record) -> u64 {
     record.index + 1
 }
 
-fn image(record: &Record) -> Value {
+fn image(set: &Set, record: &Record) -> Value {
     let mut image = json!({
         "id": image_id(record),
-        "file_name": format!("{}.png", record.name),
+        "file_name": format!("{}.{}", record.name, set.recipe.photo().ending()),
         "width": record.width,
         "height": record.height,
         "license": 1,

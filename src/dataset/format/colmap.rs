@@ -28,10 +28,10 @@ impl OfFields for Writer {
         true
     }
 
-    fn field(&self, _set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
+    fn field(&self, set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
         let folder = format!("{FOLDER}/{name}");
         out.file(&format!("{folder}/cameras.txt"), |w| w.put(cameras(images)))?;
-        out.file(&format!("{folder}/images.txt"), |w| w.put(poses(images)))?;
+        out.file(&format!("{folder}/images.txt"), |w| w.put(poses(set, images)))?;
         out.file(&format!("{folder}/points3D.txt"), |w| w.put("# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]\n"))
     }
 }
@@ -52,7 +52,7 @@ fn cameras(images: &[Taken]) -> String {
 }
 
 /// Two rows an image: its pose, and its points, of which there are none.
-fn poses(images: &[Taken]) -> String {
+fn poses(set: &Set, images: &[Taken]) -> String {
     let numbers: Vec<&str> = drives::by_camera(images).into_keys().collect();
     let mut text = "# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n# POINTS2D[] as (X, Y, POINT3D_ID)\n".to_owned();
     for image in images {
@@ -68,7 +68,7 @@ fn poses(images: &[Taken]) -> String {
             shift.x,
             shift.y,
             shift.z,
-            drives::photograph(image)
+            drives::photograph(set, image)
         );
     }
     text

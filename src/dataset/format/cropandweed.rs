@@ -9,7 +9,7 @@
 //! BBCH 12 to 19 count. Other species get labels from 100 on, 255 is a plant of no species. `labels.json` tells them all. In
 //! `labelIds` a plant's pixels have its label, soil and pixels without a label have 0.
 //!
-//! Images are JPEG, because the original's are and its scripts look for that name; other formats have them without loss.
+//! Images are JPEG, because the original's are and its scripts look for that name; unless the dataset's own are JPEG, other formats have them without loss.
 //!
 //! `params` are what annotators judged by eye; here numbers decide, as `labels.json` tells. `train.txt`, `val.txt` and `test.txt` list the names
 //! of each split, for which the original has no folders.
@@ -20,13 +20,14 @@
 use super::conditions::Brief;
 use super::{Format, Whole, picture};
 use crate::dataset::labels;
+use crate::dataset::photo::Photo;
 use crate::dataset::recipe::Recipe;
 use crate::dataset::record::{Plant, Record};
 use crate::dataset::sample::Sample;
 use crate::dataset::set::Set;
 use crate::dataset::split::Split;
 use crate::dataset::File;
-use crate::output::{self, Picture};
+use crate::output::Picture;
 use crate::{Error, Result};
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
@@ -76,8 +77,6 @@ impl Format for Writer {
         let record = &sample.record;
         let name = name(record.index);
         let labels = Labels::of(recipe)?;
-        let (width, height) = sample.size();
-        let jpeg = output::encode_jpeg(width, height, &sample.rgb, QUALITY)?;
         let mut rows = csv::WriterBuilder::new().has_headers(false).from_writer(Vec::new());
         let mut of_plant = BTreeMap::new();
         let listed: BTreeSet<u32> = labels::Labels::of(recipe)?.plants(record).map(|(plant, _)| plant.number).collect();
@@ -95,7 +94,7 @@ impl Format for Writer {
         }
         let map: Vec<u8> = sample.plants.iter().map(|plant| of_plant.get(plant).copied().unwrap_or(0)).collect();
         Ok(vec![
-            File { path: format!("{FOLDER}/images/{name}.jpg"), bytes: jpeg },
+            picture::photograph_as_jpeg(sample, format!("{FOLDER}/images/{name}.jpg"), QUALITY)?,
             File { path: format!("{FOLDER}/bboxes/CropAndWeed/{name}.csv"), bytes: rows },
             picture::file(sample, format!("{FOLDER}/labelIds/CropAndWeed/{name}.png"), &Picture::Gray(&map))?,
             File { path: format!("{FOLDER}/params/{name}.csv"), bytes: Params::of(record).csv()? },
@@ -121,11 +120,11 @@ impl Format for Writer {
     }
 
     fn warnings(&self, recipe: &Recipe) -> Vec<String> {
-        let mut all = vec!["photographs are JPEG, as its scripts expect; the other formats have them without loss".to_owned()];
-        if recipe.labelling.classes.is_some() {
-            all.push("its labels are CropAndWeed's own, whatever --classes says".into());
-        }
-        all
+        let lossless = recipe.photo() == Photo::Png;
+        let photographs = "photographs are JPEG, as its scripts expect; the other formats have them without loss";
+        let labels = "its labels are CropAndWeed's own, whatever --classes says";
+        let all = [(lossless, photographs), (recipe.labelling.classes.is_some(), labels)];
+        all.into_iter().filter(|(told, _)| *told).map(|(_, words)| words.to_owned()).collect()
     }
 }
 

@@ -103,8 +103,8 @@ pub(super) fn by_camera(images: &[Taken]) -> BTreeMap<&str, Vec<&Taken>> {
 }
 
 /// The photograph of an image, below `images/`.
-pub(super) fn photograph(image: &Taken) -> String {
-    format!("{}/rgb.png", image.record.name)
+pub(super) fn photograph(set: &Set, image: &Taken) -> String {
+    format!("{}/rgb.{}", image.record.name, set.recipe.photo().ending())
 }
 
 /// The camera's axes right, down and forward in the world, as columns; and its place, metres.

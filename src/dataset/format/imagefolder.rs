@@ -30,10 +30,10 @@ const FOLDER: &str = "imagefolder";
 impl Format for Writer {
     fn image(&self, recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
         let Record { name, split, .. } = &sample.record;
-        let at = |kind: &str| format!("{FOLDER}/{}/{kind}/{name}.png", split.name());
-        let file = |kind: &str, picture: &Picture<'_>| picture::file(sample, at(kind), picture);
+        let below = |kind: &str| format!("{FOLDER}/{}/{kind}/{name}", split.name());
+        let file = |kind: &str, picture: &Picture<'_>| picture::file(sample, below(kind) + ".png", picture);
         let mut files = vec![
-            picture::photograph(sample, at("images"))?,
+            picture::photograph(sample, &below("images"))?,
             // Numbers, not palette colours: a reader that turns pictures into RGB would lose them.
             file("masks", &Picture::Gray(&Labels::of(recipe)?.pixels(sample)))?,
             file("plants", &Picture::Numbers(&sample.plants))?,
@@ -43,7 +43,7 @@ impl Format for Writer {
             files.push(file("species", &Picture::Gray(&sample.species))?);
         }
         if !sample.nir.is_empty() {
-            files.push(file("nir", &Picture::Gray(&sample.nir))?);
+            files.push(picture::near_infrared(sample, &below("nir"))?);
         }
         Ok(files)
     }
@@ -82,8 +82,9 @@ fn known(set: &Set, splits: &[Split]) -> Result<BTreeSet<&'static str>> {
 /// One image's columns.
 fn columns(set: &Set, record: &Record) -> Vec<(&'static str, Value)> {
     let Record { name, split, .. } = record;
-    let file = |kind: &str| {
-        let below = format!("{kind}/{name}.png");
+    let photo = set.recipe.photo().ending();
+    let file = |kind: &str, ending: &str| {
+        let below = format!("{kind}/{name}.{ending}");
         set.folder.join(FOLDER).join(split.name()).join(&below).is_file().then_some(below)
     };
     let pixels = |class: Class| record.classes.iter().find(|c| c.class == class).map_or(0, |c| c.pixels);
@@ -93,12 +94,12 @@ fn columns(set: &Set, record: &Record) -> Vec<(&'static str, Value)> {
     // Texts are never null: an empty text has a type.
     let list = |words: Vec<&str>| json!(words.join(", "));
     vec![
-        ("file_name", json!(format!("images/{name}.png"))),
+        ("file_name", json!(format!("images/{name}.{photo}"))),
         ("mask_file_name", json!(format!("masks/{name}.png"))),
         ("plants_file_name", json!(format!("plants/{name}.png"))),
         ("leaves_file_name", json!(format!("leaves/{name}.png"))),
-        ("species_file_name", json!(file("species"))),
-        ("nir_file_name", json!(file("nir"))),
+        ("species_file_name", json!(file("species", "png"))),
+        ("nir_file_name", json!(file("nir", photo))),
         ("index", json!(record.index)),
         ("soil_pixels", json!(pixels(Class::Soil))),
         ("crop_pixels", json!(pixels(Class::Crop))),

@@ -28,9 +28,9 @@ impl OfFields for Writer {
         true
     }
 
-    fn field(&self, _set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
+    fn field(&self, set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
         let mut all = images.first().map(intrinsics).unwrap_or_default();
-        all.insert("frames".into(), images.iter().map(frame).collect());
+        all.insert("frames".into(), images.iter().map(|image| frame(set, image)).collect());
         let text = json(&all)?;
         out.file(&format!("{FOLDER}/{name}/transforms.json"), |w| w.put(text))
     }
@@ -47,12 +47,12 @@ fn intrinsics(image: &Taken) -> Map<String, Value> {
     if let Value::Object(all) = all { all } else { Map::new() }
 }
 
-fn frame(image: &Taken) -> Value {
+fn frame(set: &Set, image: &Taken) -> Value {
     let (axes, place) = drives::camera_to_world(&image.camera);
     // Rows of the matrix; OpenGL's y and z point the other way.
     let row = |i: usize| [axes.x_axis[i], -axes.y_axis[i], -axes.z_axis[i], place[i]];
     let mut all = intrinsics(image);
-    all.insert("file_path".into(), format!("../../images/{}", drives::photograph(image)).into());
+    all.insert("file_path".into(), format!("../../images/{}", drives::photograph(set, image)).into());
     all.insert("transform_matrix".into(), json!([row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]));
     all.insert("time".into(), image.capture.time_s.into());
     all.insert("camera".into(), image.capture.camera.clone().into());

@@ -39,7 +39,7 @@ impl Format for Writer {
         let (ids, segments) = segments(&Labels::of(recipe)?, sample)?;
         let colors: Vec<[u8; 3]> = ids.iter().map(|id| packed(*id)).collect();
         Ok(vec![
-            picture::photograph(sample, format!("{FOLDER}/images/{split}/{name}.png"))?,
+            picture::photograph(sample, &format!("{FOLDER}/images/{split}/{name}"))?,
             picture::file(
                 sample,
                 format!("{FOLDER}/annotations/panoptic_{split}/{name}.png"),

@@ -41,7 +41,7 @@ impl Format for Writer {
     fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
         let record = &sample.record;
         let at = |kind: &str| format!("{FOLDER}/{}/{kind}/{}.png", record.split.name(), record.name);
-        let mut files = vec![picture::photograph(sample, at("images"))?];
+        let mut files = vec![picture::photograph_as_png(sample, at("images"))?];
         if record.split == Split::Test {
             return Ok(files);
         }

@@ -1,21 +1,22 @@
 //! Pascal VOC: `VOCdevkit/VOC2012` with boxes as XML and masks of classes and objects, for torchvision and supervision.
 //!
 //! Boxes count pixels from 1 and hold their last ones. Numbers of `SegmentationClass` are 0 for soil and then the classes, of `SegmentationObject` the
-//! objects of the XML file in its order; 255 is void: no label, or an object behind the 254th. Photographs are JPEG of quality 95,
-//! for readers look for `.jpg`. Lists of names are `train.txt`, `val.txt`, `trainval.txt` and `test.txt`.
+//! objects of the XML file in its order; 255 is void: no label, or an object behind the 254th. Photographs are JPEG,
+//! for readers look for `.jpg`: of quality 95 unless the dataset's are JPEG themselves. Lists of names are `train.txt`, `val.txt`, `trainval.txt` and `test.txt`.
 //!
 //! Source: Everingham and Winn, "The PASCAL Visual Object Classes Challenge 2012 Development Kit", 2012, sections 4 and 5; colours are those of its
 //! `VOClabelcolormap`.
 
 use super::{Format, Whole, picture};
 use crate::dataset::labels::Labels;
+use crate::dataset::photo::Photo;
 use crate::dataset::recipe::Recipe;
 use crate::dataset::rle::Box2;
 use crate::dataset::sample::{IGNORE, Sample};
 use crate::dataset::set::Set;
 use crate::dataset::split::Split;
 use crate::dataset::File;
-use crate::output::{self, Picture};
+use crate::output::Picture;
 use crate::Result;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -71,7 +72,7 @@ impl Format for Writer {
         let colors = colors();
         let path = |folder: &str, ending: &str| format!("{FOLDER}/{folder}/{name}.{ending}");
         Ok(vec![
-            File { path: path("JPEGImages", "jpg"), bytes: output::encode_jpeg(width, height, &sample.rgb, QUALITY)? },
+            picture::photograph_as_jpeg(sample, path("JPEGImages", "jpg"), QUALITY)?,
             File { path: path("Annotations", "xml"), bytes: text.into_bytes() },
             picture::file(sample, path("SegmentationClass", "png"), &Picture::Indexed(&classes, &colors))?,
             picture::file(sample, path("SegmentationObject", "png"), &Picture::Indexed(&objects, &colors))?,
@@ -99,8 +100,10 @@ impl Format for Writer {
         out.file(&format!("{FOLDER}/labels.txt"), |w| w.put(names))
     }
 
-    fn warnings(&self, _recipe: &Recipe) -> Vec<String> {
-        vec!["photographs are JPEG, as its readers expect; those in images/ have lost nothing".into()]
+    fn warnings(&self, recipe: &Recipe) -> Vec<String> {
+        let lossless = recipe.photo() == Photo::Png;
+        let words = || "photographs are JPEG, as its readers expect; those in images/ have lost nothing".to_owned();
+        lossless.then(words).into_iter().collect()
     }
 }
 

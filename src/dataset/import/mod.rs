@@ -197,6 +197,7 @@ fn sample(recipe: &Recipe, listed: &Listed, index: u64, read: Labelled) -> Sampl
         coverage: Vec::new(),
         depth: Vec::new(),
         normals: Vec::new(),
+        jpeg: None,
         film: None,
     };
     (sample.record.classes, sample.record.ignored) = annotate::classes(&sample);

@@ -3,6 +3,7 @@
 use super::statistics::{Species, Statistics};
 use crate::dataset::format;
 use crate::dataset::keep::Kept;
+use crate::dataset::photo::Photo;
 use crate::dataset::recipe::{Made, Recipe, Rendering};
 use crate::dataset::split::Split;
 use crate::report::{count, keyed, legend, list, pairs, percent, whole};
@@ -153,12 +154,13 @@ fn stages(of: &Species) -> String {
 /// The files of an image, and how they are opened.
 pub(super) fn reading(recipe: &Recipe, nir: bool) -> Markup {
     let rendered = matches!(recipe.made, Made::Rendered(_));
+    let jpeg = recipe.photo() != Photo::Png;
     let mut rows = Vec::new();
     if !recipe.labels_only() {
-        rows.push(("rgb.png", html! { "photograph in colour, 8-bit sRGB" }));
+        rows.push((if jpeg { "rgb.jpg" } else { "rgb.png" }, html! { "photograph in colour, 8-bit sRGB" }));
     }
     if nir {
-        rows.push(("nir.png", html! { "photograph in near infrared, 8 bit" }));
+        rows.push((if jpeg { "nir.jpg" } else { "nir.png" }, html! { "photograph in near infrared, 8 bit" }));
     }
     rows.push(("semantics.png", html! { "class, indexed: 0 soil, 1 crop, 2 weed, 255 no label" }));
     if rendered {

@@ -54,7 +54,7 @@ pub(super) fn measure(set: &Set) -> Result<Photographs> {
 
 fn means(set: &Set, name: &str) -> Result<Means> {
     let image = native::Image::of(set, name);
-    let (_, _, rgb) = image.rgb("rgb.png")?;
+    let (_, _, rgb) = image.photograph()?;
     let n = rgb.len().max(1) as f64;
     let mut sums = [0_u64; 3];
     let mut clipped = 0_u64;
@@ -65,6 +65,6 @@ fn means(set: &Set, name: &str) -> Result<Means> {
         clipped += u64::from(pixel.contains(&255));
     }
     let mean = |gray: &[u8]| gray.iter().map(|x| u64::from(*x)).sum::<u64>() as f64 / n;
-    let nir = image.gray_if_there("nir.png")?.map(|(_, _, gray)| mean(&gray));
+    let nir = image.band("nir")?.map(|(_, (_, _, gray))| mean(&gray));
     Ok(Means(sums.map(|s| s as f64 / n), clipped as f64 / n, nir))
 }

@@ -41,9 +41,10 @@
     const link = event.target.closest("a.enlarge");
     if (!link) return;
     event.preventDefault();
-    const folder = link.getAttribute("href").replace(/[^/]*$/, "");
+    const [, folder, photograph] = link.getAttribute("href").match(/^(.*?)([^/]*)$/);
     const name = link.closest(".shot").dataset.name;
-    const pictures = [["rgb.png", "image "], ["semantics.png", "labels of image "]].map(([file, words]) => {
+    const files = [[photograph, "image "], ["semantics.png", "labels of image "]].slice(photograph === "semantics.png" ? 1 : 0);
+    const pictures = files.map(([file, words]) => {
       const picture = new Image();
       picture.alt = words + name;
       picture.onerror = () => { picture.hidden = true; };

@@ -141,7 +141,8 @@ fn card(sample: &Sample, facts: &Facts, unusual: f64, has_files: bool) -> Result
     let Record { name, source, split, width, height, .. } = &sample.record;
     // Labels alone lie on plain earth.
     let earth = if sample.rgb.is_empty() { vec![EARTH; sample.pixels()] } else { Vec::new() };
-    let (shown, full) = if earth.is_empty() { (&sample.rgb, "rgb.png") } else { (&earth, "semantics.png") };
+    let photograph = if sample.jpeg.is_some() { "rgb.jpg" } else { "rgb.png" };
+    let (shown, full) = if earth.is_empty() { (&sample.rgb, photograph) } else { (&earth, "semantics.png") };
     let (w, h, rgb) = output::shrink(*width, *height, shown, SIDE);
     let photograph = data_url("jpeg", &output::encode_jpeg(w, h, &rgb, QUALITY)?);
     let labels = data_url("png", &output::encode_png(w, h, &Picture::Rgba(&overlay(sample, w, h)), "")?);

@@ -9,13 +9,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub enum Band {
-    /// Red of `rgb.png`.
+    /// Red of the photograph.
     Red,
-    /// Green of `rgb.png`.
+    /// Green of the photograph.
     Green,
-    /// Blue of `rgb.png`.
+    /// Blue of the photograph.
     Blue,
-    /// Any other: the 8-bit gray `NAME.png` in the image's folder, `nir.png` among them.
+    /// Any other: the 8-bit gray `NAME.png` or `NAME.jpg` in the image's folder, near infrared among them.
     Gray(String),
 }
 
@@ -83,7 +83,7 @@ impl TryFrom<String> for Band {
 
 /// The planes of the bands, 8 bit, from the pictures of an image: width, height, one plane a band.
 pub(super) fn read(image: &Image<'_, Set>, bands: &[Band]) -> Result<(u32, u32, Vec<Vec<u8>>)> {
-    let rgb = bands.iter().any(Band::is_color).then(|| image.rgb("rgb.png")).transpose()?;
+    let rgb = bands.iter().any(Band::is_color).then(|| image.photograph()).transpose()?;
     let mut size = rgb.as_ref().map(|(w, h, _)| (*w, *h));
     let mut planes = Vec::new();
     for band in bands {
@@ -96,11 +96,9 @@ pub(super) fn read(image: &Image<'_, Set>, bands: &[Band]) -> Result<(u32, u32, 
         planes.push(if let (Some(channel), Some((_, _, pixels))) = (channel, &rgb) {
             pixels.iter().map(|p| p[channel]).collect()
         } else {
-            let file = format!("{}.png", band.name());
-            let place = image.place(&file);
-            let Some((w, h, values)) = image.gray_if_there(&file)? else {
+            let Some((place, (w, h, values))) = image.band(band.name())? else {
                 return Err(Error::input(format!("this image has no band `{}`", band.name()))
-                    .in_file(place)
+                    .in_file(image.place(&format!("{}.png", band.name())))
                     .help("choose bands that all sets have, such as --bands rgb"));
             };
             if *size.get_or_insert((w, h)) != (w, h) {

@@ -96,8 +96,8 @@ pub fn find(inputs: &[PathBuf], shape: &Shape, elsewhere: &[(Band, PathBuf)]) ->
     for input in inputs {
         if let Some(selection) = selection(input)? {
             for (name, folder) in images(&selection)? {
-                let photo = folder.join("rgb.png");
-                let beside = |band: &Band| Some(folder.join(format!("{}.png", band.name()))).filter(|p| p.is_file());
+                let photo = output::photograph_in(&folder, "rgb").unwrap_or_else(|| folder.join("rgb.png"));
+                let beside = |band: &Band| output::photograph_in(&folder, band.name());
                 let planes = planes(&photo, shape, &beside)?;
                 pictures.push(Picture { name, photo, planes });
             }

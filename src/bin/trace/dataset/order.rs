@@ -6,11 +6,12 @@ use furrow::ablation::{Edit, FULL};
 use furrow::dataset::classes::Classes;
 use furrow::dataset::keep::{self, Kept};
 use furrow::dataset::labelling::Labelling;
+use furrow::dataset::photo::Photo;
 use furrow::dataset::plan::{self, Order};
 use furrow::dataset::split::Shares;
 use furrow::dataset::{self, Set, format, pack};
 use furrow::settings::{Quality, RenderOptions};
-use furrow::{Result, cli};
+use furrow::{Error, Result, cli};
 use std::path::{Path, PathBuf};
 
 /// What is made.
@@ -57,8 +58,11 @@ pub(crate) struct ImageArgs {
 #[derive(clap::Args)]
 pub(crate) struct ContentArgs {
     /// Maps to keep beside photograph, labels and record, separated by commas; none for nothing more.
-    #[arg(long, value_delimiter = ',', value_name = "MAP", default_value = "nir,coverage,depth,normals", value_parser = maps())]
+    #[arg(long, value_delimiter = ',', value_name = "MAP", default_value = "nir,coverage,depth", value_parser = maps())]
     keep: Vec<String>,
+    /// How photographs are stored: png, or jpeg with a quality from 50 to 100, such as jpeg95, whose colours are not subsampled.
+    #[arg(long, value_name = "png|jpegQ", default_value_t = Photo::Png, value_parser = Photo::parse)]
+    photo: Photo,
     /// Shares of train, val and test.
     #[arg(long, value_name = "TRAIN,VAL,TEST", default_value = "8,1,1", value_parser = Shares::parse)]
     split: Shares,
@@ -168,9 +172,13 @@ impl LookArgs {
 impl ContentArgs {
     /// Enters what is asked for into an order.
     pub(crate) fn enter(&self, order: &mut Order) -> Result<()> {
+        if self.keep.len() > 1 && self.keep.iter().any(|name| name == "none") {
+            return Err(Error::misuse("--keep none keeps nothing more, and other maps are named beside it")
+                .help("write --keep none, or the maps without it"));
+        }
         let named = |name: &String| Kept::NAMED.iter().find(|(known, ..)| known == name).map(|(_, kept, _)| *kept);
         order.keep = keep::checked(self.keep.iter().filter_map(named).collect())?;
-        order.split = self.split;
+        (order.photo, order.split) = (self.photo, self.split);
         Ok(())
     }
 }

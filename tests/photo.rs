@@ -1,0 +1,299 @@
+//! `trace dataset --photo`: photographs as PNG or JPEG, each byte once.
+//!
+//! Rationale: photographs are most of a dataset's disk, and what is stored with loss must be one thing to all readers: the pixels that the file
+//! decodes to. Expected: samples, formats and networks have those pixels; formats hold the very file, as another name of it; what
+//! makes a dataset one (shards, repairs, packs, checks) holds for JPEG as for PNG; datasets of before keep their bytes. Source: the crate
+//! `image` as another way to the decoder, Pillow, and the PNG dataset of the same scene.
+
+mod common;
+
+use common::dataset::{fail, path, same, succeed, tree, verb};
+use common::program::{SMALL, names, run, scratch, trace};
+use common::python::python;
+use furrow::dataset::{Sample, Set, native};
+use furrow::output;
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+/// A dataset of the small page.
+fn make(folder: &Path, count: u64, more: &[&str]) -> Command {
+    let mut command = trace(&["dataset", "--scene", SMALL, "--quiet", "--width", "96", "--spp", "2"]);
+    command.args(["--split", "1,1,0", "--count", &count.to_string(), "--out", path(folder)]).args(more);
+    command
+}
+
+fn json(file: &Path) -> Value {
+    serde_json::from_slice(&fs::read(file).unwrap()).unwrap()
+}
+
+/// Whether a PNG or JPEG tells of the scene that it shows.
+fn has_comment(file: &Path) -> bool {
+    fs::read(file).unwrap().windows(5).any(|bytes| bytes == b"seed:")
+}
+
+/// Mean difference of two pictures' values.
+fn apart(a: &[u8], b: &[u8]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).map(|(a, b)| f64::from(a.abs_diff(*b))).sum::<f64>() / a.len() as f64
+}
+
+/// Files of formats that are the photograph of image 0, with the folder that they lie in.
+const COPIES: [&str; 6] = [
+    "coco/images/train/000000",
+    "panoptic/images/train/000000",
+    "yolo/images/train/000000",
+    "yolo-detect/images/train/000000",
+    "yolo-pose/images/train/000000",
+    "imagefolder/train/images/000000",
+];
+
+#[test]
+fn all_readers_have_the_pixels_of_the_file() {
+    let (_keep, base) = scratch();
+    let (jpeg, png) = (base.join("jpeg"), base.join("png"));
+    let formats =
+        "cityscapes,coco,colmap,cropandweed,imagefolder,nerf,panoptic,phenobench,voc,yolo,yolo-detect,yolo-pose";
+    succeed(make(&jpeg, 2, &["--photo", "jpeg90", "--format", formats]));
+    succeed(make(&png, 2, &["--format", formats]));
+    let read = |folder: &Path| native::read(folder, "000000").unwrap();
+    let (lossy, exact): (Sample, Sample) = (read(&jpeg), read(&png));
+    let at = |file: &str| jpeg.join(file);
+    let own = at("images/000000/rgb.jpg");
+    assert_eq!(
+        names(&at("images/000000")),
+        [
+            "coverage.png",
+            "geometry.exr",
+            "leaves.png",
+            "nir.jpg",
+            "plants.png",
+            "record.json",
+            "rgb.jpg",
+            "semantics.png",
+            "species.png"
+        ]
+    );
+    assert_eq!(lossy.rgb, output::read_photo(&own).unwrap().2);
+    assert_eq!(lossy.nir, output::read_gray_photo(&at("images/000000/nir.jpg")).unwrap().2);
+    let (color, nir) = (apart(lossy.rgb.as_flattened(), exact.rgb.as_flattened()), apart(&lossy.nir, &exact.nir));
+    assert!((0.1..8.0).contains(&color) && (0.1..8.0).contains(&nir), "{color} {nir}");
+    // Labels do not depend on it.
+    assert_eq!((&lossy.record, &lossy.plants, &lossy.depth), (&exact.record, &exact.plants, &exact.depth));
+
+    // Formats hold the same file, and name it as it is.
+    let bytes = fs::read(&own).unwrap();
+    for copy in COPIES {
+        assert!(
+            fs::read(at(&format!("{copy}.jpg"))).unwrap() == bytes && !at(&format!("{copy}.png")).exists(),
+            "{copy}"
+        );
+        assert!(png.join(format!("{copy}.png")).is_file(), "{copy}");
+    }
+    let nir = "imagefolder/train/nir/000000.jpg";
+    assert!(fs::read(at(nir)).unwrap() == fs::read(at("images/000000/nir.jpg")).unwrap());
+    for file in ["voc/VOCdevkit/VOC2012/JPEGImages/000000.jpg", "cropandweed/images/ave-0000-0000.jpg"] {
+        assert!(fs::read(at(file)).unwrap() == bytes, "{file}: encoded twice");
+    }
+    for format in ["coco/annotations/instances", "coco/annotations/leaves", "panoptic/annotations/panoptic"] {
+        let folder = format.split('/').next().unwrap();
+        let name = json(&at(&format!("{format}_train.json")))["images"][0]["file_name"].as_str().unwrap().to_owned();
+        assert!(name == "000000.jpg" && at(&format!("{folder}/images/train/{name}")).is_file(), "{format}: {name}");
+    }
+    let lines = fs::read_to_string(at("imagefolder/train/metadata.jsonl")).unwrap();
+    let line: Value = serde_json::from_str(lines.lines().next().unwrap()).unwrap();
+    for column in ["file_name", "nir_file_name", "plants_file_name"] {
+        assert!(at("imagefolder/train").join(line[column].as_str().unwrap()).is_file(), "{column}: {line}");
+    }
+    let transforms = json(&at("nerf/000000/transforms.json"));
+    let named = transforms["frames"][0]["file_path"].as_str().unwrap();
+    assert!(at("nerf/000000").join(named).is_file(), "{named}");
+    assert!(fs::read_to_string(at("colmap/000000/images.txt")).unwrap().contains(" 000000/rgb.jpg"));
+    assert!(fs::read_to_string(at("report.html")).unwrap().contains("images/000000/rgb.jpg"));
+    // Where a layout knows PNG alone, it holds what the file decodes to.
+    for file in
+        ["phenobench/train/images/000000.png", "cityscapes/leftImg8bit/train/small/small_000000_000000_leftImg8bit.png"]
+    {
+        assert_eq!(output::read_rgb(&at(file)).unwrap().2, lossy.rgb, "{file}");
+    }
+
+    // Pairs with the other, near infrared and labels among them.
+    let out = base.join("compared");
+    succeed(trace(&["compare", path(&png), path(&jpeg), "--out", path(&out), "--quiet"]));
+    let table = fs::read_to_string(out.join("compare.csv")).unwrap();
+    assert!(table.contains("000001") && table.to_lowercase().contains("nir") && table.contains("crop"), "{table}");
+    learnt_alike(&Set::open(&jpeg).unwrap(), &lossy);
+
+    // A photograph whose end is missing is no grey one.
+    fs::write(&own, &bytes[..bytes.len() / 2]).unwrap();
+    assert!(native::read(&jpeg, "000000").unwrap_err().to_string().contains("cut short"));
+    fs::remove_file(&own).unwrap();
+    assert!(native::read(&jpeg, "000000").is_err());
+}
+
+/// Expected: networks see what the file decodes to, near infrared too.
+#[cfg(feature = "train")]
+fn learnt_alike(set: &Set, sample: &Sample) {
+    use furrow::dataset::classes::Classes;
+    use furrow::train::data::{Band, Example};
+    let map = Classes::default().of(&set.recipe.species).unwrap();
+    let bands = [Band::Blue, Band::Gray("nir".into())];
+    let (_, learnt) = Example::read_whole(set, sample.record.index, &map, 0.0, &bands, false).unwrap();
+    let blue: Vec<u8> = sample.rgb.iter().map(|pixel| pixel[2]).collect();
+    assert_eq!(learnt.planes, [blue, sample.nir.clone()]);
+    let error = Example::read_whole(set, 0, &map, 0.0, &[Band::Gray("red-edge".into())], false).unwrap_err();
+    assert!(error.to_string().contains("no band `red-edge`"), "{error}");
+}
+
+#[cfg(not(feature = "train"))]
+fn learnt_alike(_: &Set, _: &Sample) {}
+
+#[test]
+fn however_it_is_made_it_is_one_dataset() {
+    let (_keep, whole) = scratch();
+    let more = ["--photo", "jpeg95", "--format", "coco"];
+    succeed(make(&whole, 3, &[&more[..], &["--threads", "1"]].concat()));
+    let expected = tree(&whole);
+    let (_keep, shards) = scratch();
+    let plan = ["dataset", "plan", "--scene", SMALL, "--width", "96", "--spp", "2", "--split", "1,1,0", "--count", "3"];
+    succeed(trace(&[&plan[..], &more, &["--out", path(&shards)]].concat()));
+    for shard in ["1/2", "0/2"] {
+        succeed(verb("render", &shards, &["--quiet", "--shard", shard, "--threads", "3"]));
+    }
+    succeed(verb("finish", &shards, &[]));
+    same(&tree(&shards), &expected);
+    // One lost its photograph, one a byte of it, one all; who goes on need not say how photographs are stored.
+    fs::remove_file(whole.join("images/000000/nir.jpg")).unwrap();
+    let damaged = whole.join("images/000001/rgb.jpg");
+    let mut bytes = fs::read(&damaged).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    // A new file: the old one is the format's as well.
+    fs::remove_file(&damaged).unwrap();
+    fs::write(&damaged, bytes).unwrap();
+    fs::remove_dir_all(whole.join("images/000002")).unwrap();
+    let said = fail(verb("verify", &whole, &[]), 1);
+    for fault in
+        ["images/000000/nir.jpg is missing", "images/000001/rgb.jpg was changed", "images/000002/rgb.jpg is missing"]
+    {
+        assert!(said.contains(fault), "{said}");
+    }
+    succeed(make(&whole, 3, &more[2..]));
+    same(&tree(&whole), &expected);
+    let said = succeed(verb("verify", &whole, &["--rerender", "3"])).stderr;
+    assert!(String::from_utf8_lossy(&said).contains("3 rendered again and the same; 0 faults"));
+
+    // In archives the same files, in the order of before.
+    let (_keep, packed) = scratch();
+    succeed(make(&packed, 3, &[&more[..2], &["--pack", "2"]].concat()));
+    let mut archive = tar::Archive::new(fs::File::open(packed.join("packs/train-000000.tar")).unwrap());
+    let members: Vec<String> =
+        archive.entries().unwrap().map(|entry| entry.unwrap().path().unwrap().display().to_string()).collect();
+    assert_eq!(members[..3], ["000000.rgb.jpg", "000000.nir.jpg", "000000.semantics.png"]);
+    let said = succeed(verb("verify", &packed, &["--rerender", "2"])).stderr;
+    assert!(String::from_utf8_lossy(&said).contains("3 of 3 images checked, 2 rendered again and the same; 0 faults"));
+    assert_eq!(Set::open(&packed).unwrap().sample(1).unwrap(), native::read(&whole, "000001").unwrap());
+    if let Some(python) = python("import numpy, PIL") {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let trace = env!("CARGO_BIN_EXE_trace");
+        let mut check = Command::new(&python);
+        check
+            .arg(root.join("tests/photo/check_module.py"))
+            .args([&whole, &packed, &root.join(SMALL), &root.join("python")])
+            .env("FURROW_TRACE", trace)
+            .current_dir(root);
+        succeed(check);
+    }
+}
+
+/// Expected: the photograph and near infrared of a format are the native files under other names, whether they were made at once or later, also
+/// where the format was damaged in between.
+#[cfg(unix)]
+#[test]
+fn each_byte_lies_once() {
+    use std::os::unix::fs::MetadataExt;
+    for (photo, ending) in [("png", "png"), ("jpeg100", "jpg")] {
+        let (_keep, data) = scratch();
+        succeed(make(&data, 1, &["--photo", photo, "--format", "coco"]));
+        let of = |file: &str| {
+            let about = fs::metadata(data.join(file)).unwrap_or_else(|e| panic!("{file}: {e}"));
+            (about.dev(), about.ino())
+        };
+        let own = of(&format!("images/000000/rgb.{ending}"));
+        assert_eq!(of(&format!("coco/images/train/000000.{ending}")), own);
+        succeed(verb("finish", &data, &["--format", "yolo,imagefolder", "--quiet"]));
+        let damaged = data.join(format!("yolo/images/train/000000.{ending}"));
+        fs::remove_file(&damaged).unwrap();
+        fs::write(&damaged, "half").unwrap();
+        succeed(verb("render", &data, &["--quiet"]));
+        for copy in ["coco/images/train/000000", "yolo/images/train/000000", "imagefolder/train/images/000000"] {
+            assert_eq!(of(&format!("{copy}.{ending}")), own, "{copy}");
+        }
+        let nir = format!("images/000000/nir.{ending}");
+        assert_eq!(of(&format!("imagefolder/train/nir/000000.{ending}")), of(&nir));
+        succeed(verb("finish", &data, &["--quiet"]));
+        succeed(verb("verify", &data, &["--rerender", "1"]));
+    }
+}
+
+/// Rationale: datasets of before go on for months. Expected: a recipe that does not tell of photographs makes them as it always did, with the bytes
+/// of the single field, comment and all, also where it is told `--photo png`; new ones have no comment; what another way was
+/// begun with is kept, and another is refused.
+#[test]
+fn datasets_of_before_keep_their_bytes() {
+    let (_keep, old) = scratch();
+    let plan = ["dataset", "plan", "--scene", SMALL, "--width", "96", "--spp", "2", "--split", "1,1,0", "--count", "1"];
+    succeed(trace(&[&plan[..], &["--out", path(&old)]].concat()));
+    let recipe = old.join("dataset.json");
+    let text = fs::read_to_string(&recipe).unwrap();
+    let line = text.lines().find(|line| line.contains("\"photo\": \"png\"")).unwrap_or_else(|| panic!("{text}"));
+    fs::write(&recipe, text.replace(&format!("{line}\n"), "")).unwrap();
+    succeed(make(&old, 1, &[]));
+    succeed(make(&old, 2, &["--photo", "png", "--format", "coco"]));
+    assert!(!fs::read_to_string(&recipe).unwrap().contains("photo\""));
+    let (_keep, one) = scratch();
+    run(&one, &["--index", "1", "--width", "96", "--spp", "2"]);
+    for name in ["rgb.png", "nir.png", "semantics.png"] {
+        let file = old.join("images/000001").join(name);
+        assert!(has_comment(&file) && fs::read(&file).unwrap() == fs::read(one.join(name)).unwrap(), "{name}");
+    }
+    assert!(!has_comment(&old.join("coco/images/val/000001.png")));
+    succeed(verb("verify", &old, &["--rerender", "2"]));
+
+    let (_keep, new) = scratch();
+    let (_keep, jpeg) = scratch();
+    succeed(make(&new, 1, &[]));
+    succeed(make(&jpeg, 1, &["--photo", "jpeg95"]));
+    assert!(!has_comment(&new.join("images/000000/rgb.png")) && !has_comment(&new.join("images/000000/nir.png")));
+    let pixels = |file: &Path| output::read_rgb(file).unwrap();
+    assert_eq!(pixels(&new.join("images/000000/rgb.png")), pixels(&old.join("images/000000/rgb.png")));
+    for (folder, photo, there) in
+        [(&old, "jpeg95", "none"), (&new, "jpeg95", "\"png\""), (&jpeg, "jpeg90", "\"jpeg95\"")]
+    {
+        let before = tree(folder);
+        let count = if folder == &old { 2 } else { 1 };
+        let said = fail(make(folder, count, &["--photo", photo]), 2);
+        let words = format!("another dataset lies in this folder: photo {there} there, \"{photo}\" here");
+        assert!(said.contains(&words), "{said}");
+        same(&tree(folder), &before);
+    }
+    succeed(make(&jpeg, 2, &[]));
+    assert_eq!(json(&jpeg.join("dataset.json"))["made"]["rendered"]["photo"], "jpeg95");
+    assert!(jpeg.join("images/000001/rgb.jpg").is_file());
+}
+
+#[test]
+fn wrong_words_are_told() {
+    let (_keep, data) = scratch();
+    for bad in ["jpeg", "jpeg0", "jpeg49", "jpeg101", "webp"] {
+        let said = fail(make(&data, 1, &["--photo", bad]), 2);
+        assert!(said.contains("such as jpeg95") && said.matches("error: ").count() == 1, "{bad}: {said}");
+    }
+    let mut labels =
+        trace(&["dataset", "--scene", SMALL, "--count", "1", "--labels-only", "--photo", "jpeg95", "--out"]);
+    labels.arg(&data);
+    let said = fail(labels, 2);
+    assert!(said.contains("--labels-only draws none") && said.matches("error: ").count() == 1, "{said}");
+    assert!(names(&data).is_empty(), "nothing was begun");
+}
