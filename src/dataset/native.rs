@@ -53,18 +53,15 @@ pub fn files(recipe: &Recipe, sample: &Sample, text: &str) -> Result<Vec<File>> 
     let png = |picture: &Picture<'_>| output::encode_png(w, h, picture, text);
     let colors = palette(sample.semantics.contains(&IGNORE));
     let of_photograph = if recipe.has_comments() { text } else { "" };
-    match &sample.jpeg {
-        Some(jpeg) => {
-            let files = [("rgb.jpg", &jpeg.rgb), ("nir.jpg", &jpeg.nir)];
-            files.into_iter().filter(|(_, bytes)| !bytes.is_empty()).for_each(|(name, bytes)| add(name, bytes.clone()));
+    if let Some(jpeg) = &sample.jpeg {
+        let files = [("rgb.jpg", &jpeg.rgb), ("nir.jpg", &jpeg.nir)];
+        files.into_iter().filter(|(_, bytes)| !bytes.is_empty()).for_each(|(name, bytes)| add(name, bytes.clone()));
+    } else {
+        if !sample.rgb.is_empty() {
+            add("rgb.png", output::encode_png(w, h, &Picture::Rgb(&sample.rgb), of_photograph)?);
         }
-        None => {
-            if !sample.rgb.is_empty() {
-                add("rgb.png", output::encode_png(w, h, &Picture::Rgb(&sample.rgb), of_photograph)?);
-            }
-            if !sample.nir.is_empty() {
-                add("nir.png", output::encode_png(w, h, &Picture::Gray(&sample.nir), of_photograph)?);
-            }
+        if !sample.nir.is_empty() {
+            add("nir.png", output::encode_png(w, h, &Picture::Gray(&sample.nir), of_photograph)?);
         }
     }
     add("semantics.png", png(&Picture::Indexed(&sample.semantics, &colors))?);
@@ -115,6 +112,15 @@ pub fn read(dataset: &Path, name: &str) -> Result<Sample> {
 /// Reads what is known of an image that lies in a folder of its own, without its maps.
 pub fn read_record(dataset: &Path, name: &str) -> Result<Record> {
     record(dataset, name)
+}
+
+/// A picture in gray that lies in a file.
+pub(crate) struct GrayFile {
+    /// What errors call the file.
+    pub(crate) place: PathBuf,
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+    pub(crate) values: Vec<u8>,
 }
 
 /// The files of one image.
@@ -172,9 +178,13 @@ impl<'a, F: Files + ?Sized> Image<'a, F> {
         }
     }
 
-    /// A band in gray, such as `nir`, as PNG or as JPEG, where there is one: width, height, values, and what errors call the file.
-    pub(crate) fn band(&self, name: &str) -> Result<Option<(PathBuf, (u32, u32, Vec<u8>))>> {
-        self.stored(name)?.map(|stored| Ok((stored.place.clone(), stored.gray()?))).transpose()
+    /// A band in gray, such as `nir`, as PNG or as JPEG, where there is one.
+    pub(crate) fn band(&self, name: &str) -> Result<Option<GrayFile>> {
+        let read = |stored: Stored| {
+            let (width, height, values) = stored.gray()?;
+            Ok(GrayFile { place: stored.place, width, height, values })
+        };
+        self.stored(name)?.map(read).transpose()
     }
 
     /// A photograph of this name without its ending, where there is one.

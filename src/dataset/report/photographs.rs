@@ -65,6 +65,6 @@ fn means(set: &Set, name: &str) -> Result<Means> {
         clipped += u64::from(pixel.contains(&255));
     }
     let mean = |gray: &[u8]| gray.iter().map(|x| u64::from(*x)).sum::<u64>() as f64 / n;
-    let nir = image.band("nir")?.map(|(_, (_, _, gray))| mean(&gray));
+    let nir = image.band("nir")?.map(|file| mean(&file.values));
     Ok(Means(sums.map(|s| s as f64 / n), clipped as f64 / n, nir))
 }

@@ -1,7 +1,7 @@
 //! What a network sees of a pixel.
 
 use crate::dataset::Set;
-use crate::dataset::native::Image;
+use crate::dataset::native::{GrayFile, Image};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -83,7 +83,7 @@ impl TryFrom<String> for Band {
 
 /// The planes of the bands, 8 bit, from the pictures of an image: width, height, one plane a band.
 pub(super) fn read(image: &Image<'_, Set>, bands: &[Band]) -> Result<(u32, u32, Vec<Vec<u8>>)> {
-    let rgb = bands.iter().any(Band::is_color).then(|| image.photograph()).transpose()?;
+    let rgb = bands.iter().any(Band::is_color).then(|| photograph(image)).transpose()?;
     let mut size = rgb.as_ref().map(|(w, h, _)| (*w, *h));
     let mut planes = Vec::new();
     for band in bands {
@@ -96,7 +96,7 @@ pub(super) fn read(image: &Image<'_, Set>, bands: &[Band]) -> Result<(u32, u32, 
         planes.push(if let (Some(channel), Some((_, _, pixels))) = (channel, &rgb) {
             pixels.iter().map(|p| p[channel]).collect()
         } else {
-            let Some((place, (w, h, values))) = image.band(band.name())? else {
+            let Some(GrayFile { place, width: w, height: h, values }) = image.band(band.name())? else {
                 return Err(Error::input(format!("this image has no band `{}`", band.name()))
                     .in_file(image.place(&format!("{}.png", band.name())))
                     .help("choose bands that all sets have, such as --bands rgb"));
@@ -109,6 +109,18 @@ pub(super) fn read(image: &Image<'_, Set>, bands: &[Band]) -> Result<(u32, u32, 
     }
     let (w, h) = size.ok_or_else(|| Error::misuse("no band was named").help("--bands rgb"))?;
     Ok((w, h, planes))
+}
+
+/// The photograph of an image; an error that says so where it is labels alone.
+fn photograph(image: &Image<'_, Set>) -> Result<(u32, u32, Vec<[u8; 3]>)> {
+    image.photograph().map_err(|e| {
+        if !e.is_not_found() {
+            return e;
+        }
+        Error::input("this image has no photograph: its dataset holds labels alone")
+            .in_file(image.place("rgb.png"))
+            .help("train on a dataset that was made without --labels-only")
+    })
 }
 
 #[cfg(test)]
