@@ -1,16 +1,14 @@
 //! `trace sequence`: all images of a drive through one field or several, or of their days, as a dataset.
 
-use crate::dataset::order::{begin, formats};
+use crate::dataset::order::{ContentArgs, LookArgs, begin, formats};
 use crate::dataset::render::{WorkArgs, generate};
 use crate::field::{MemoryArgs, SceneArgs};
-use crate::quality::{TechniqueArgs, samples};
 use furrow::cli::signal::Signals;
 use furrow::dataset::finish;
 use furrow::dataset::generate::Shard;
 use furrow::dataset::plan::Order;
 use furrow::job::SceneFile;
 use furrow::scene::days::DaysDesc;
-use furrow::settings::Quality;
 use furrow::{Error, Result};
 use std::path::PathBuf;
 
@@ -32,14 +30,10 @@ pub(crate) struct Args {
     /// Formats to write beside the native one, separated by commas.
     #[arg(long, value_delimiter = ',', value_name = "FORMAT", default_value = "colmap,flow,mots,nerf,tum", value_parser = formats())]
     format: Vec<String>,
-    /// Samples a pixel.
-    #[arg(long, default_value_t = Quality::SPP, value_parser = samples())]
-    spp: u32,
-    /// Take the noise of few samples out of the photographs; needs Open Image Denoise.
-    #[arg(long)]
-    denoise: bool,
     #[command(flatten)]
-    technique: TechniqueArgs,
+    content: ContentArgs,
+    #[command(flatten)]
+    look: LookArgs,
     #[command(flatten)]
     memory: MemoryArgs,
     #[command(flatten)]
@@ -72,7 +66,9 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     order.formats.clone_from(&args.format);
     order.formats.sort();
     order.formats.dedup();
-    order.options = args.technique.options(Quality { denoise: args.denoise, ..Quality::spp(args.spp) });
+    order.options = args.look.options();
+    order.labels_only = args.look.labels_only;
+    args.content.enter(&mut order)?;
     let set = begin(&args.out, &order)?;
     generate(&set, &args.work, Shard::ALL, args.memory.bytes, signals)?;
     finish::finish(&set, None)
