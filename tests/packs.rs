@@ -156,13 +156,13 @@ fn changed_archives_are_found_and_mended() {
         succeed(packed(&data, 6, &[]));
         same(&tree(&data), &whole);
     }
-    // A record that `finish` cannot read.
+    // A record that is not what its checksum says.
     let mut other = bytes.clone();
     let place = bytes.windows(9).position(|some| some == b"{\"index\":").expect("a record");
     other[place] = b'[';
     fs::write(&archive, other).expect("an archive");
     let said = fail(verb("finish", &data, &["--quiet"]), 1);
-    assert!(said.contains("record.json: this is no record") && said.contains("dataset render"), "{said}");
+    assert!(said.contains("record.json: it was changed") && said.contains("dataset render"), "{said}");
     succeed(packed(&data, 6, &[]));
     same(&tree(&data), &whole);
     // A lost index of an archive that the manifest knows: nothing is drawn anew, formats are written anew.

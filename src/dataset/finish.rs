@@ -42,7 +42,7 @@ fn check_records(set: &Set) -> Result<()> {
     let fault = |k| set.checksums(k).and_then(|checksums| set.fault_of_record(&checksums));
     match in_parallel(0..set.recipe.count, fault).flatten().next() {
         None => Ok(()),
-        Some((path, fault)) => Err(Error::damaged(format!("its record {fault}")).in_file(set.place(&path))),
+        Some((path, fault)) => Err(Error::damaged(format!("it {fault}")).in_file(set.place(&path))),
     }
 }
 
