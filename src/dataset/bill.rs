@@ -239,7 +239,7 @@ impl Images {
         let scene = self.scene.clone().until(stop);
         let mut kept = LastField::default();
         let begin = cpu()?;
-        let (field, _) = kept.at(&self.set, &scene, index)?;
+        let field = kept.at(&self.set, &scene, index)?.field;
         let captures = field.grown().captures.iter().take_while(|capture| capture.frame == 0);
         let cameras = captures.map(|capture| capture.name.clone()).collect();
         let grown = cpu()?;

@@ -85,17 +85,33 @@ fn same(set: &Set, what: &str, there: &str, here: &str) -> Result<()> {
 
 /// The field that was grown last, for the next image of it.
 #[derive(Default)]
-pub struct LastField(Option<Field>);
+pub struct LastField {
+    field: Option<Field>,
+    /// Of its image before.
+    traits: Option<Traits>,
+}
+
+/// A field as an image has it.
+pub(super) struct Last<'a> {
+    pub(super) field: &'a Field,
+    /// What was measured of it for its image before, if it has one.
+    traits: &'a mut Option<Traits>,
+    /// How long it took to grow and build it now.
+    pub(super) grow: Duration,
+}
 
 impl LastField {
-    /// The field that an image of a dataset shows, as that image has it, and how long it took to grow and build it now.
-    pub(super) fn at(&mut self, set: &Set, scene_file: &SceneFile, index: u64) -> Result<(&Field, Duration)> {
+    /// The field that an image of a dataset shows.
+    pub(super) fn at(&mut self, set: &Set, scene_file: &SceneFile, index: u64) -> Result<Last<'_>> {
         let Set { folder, recipe, .. } = set;
         let rendering = recipe.rendering()?;
         let (number, capture) = recipe.field_of(index);
         let (of_day, day) = of_day(recipe, capture);
-        let known = self.0.take().filter(|field| field.grown().index == number && field.grown().day == day);
+        let known = self.field.take().filter(|field| field.grown().index == number && field.grown().day == day);
         let new = known.is_none();
+        if new {
+            self.traits = None;
+        }
         let mut field = known.map_or_else(|| scene_file.clone().day(day).field(number), Ok)?;
         if field.grown().hash != rendering.scene_sha256 {
             let help = format!("restore {}/scene/, or begin another dataset", folder.display());
@@ -105,7 +121,8 @@ impl LastField {
         field.take(of_day)?;
         field.geometry()?;
         let (grow, build) = field.times();
-        Ok((self.0.insert(field), if new { grow + build } else { Duration::ZERO }))
+        let grow = if new { grow + build } else { Duration::ZERO };
+        Ok(Last { field: self.field.insert(field), traits: &mut self.traits, grow })
     }
 }
 
@@ -124,34 +141,34 @@ pub fn render(
     watch: Watch<'_>,
     kept: &mut LastField,
 ) -> Result<RenderedSample> {
-    let (field, grow) = kept.at(set, scene_file, index)?;
+    let Last { field, traits, grow } = kept.at(set, scene_file, index)?;
     if set.recipe.labels_only() {
-        return label(set, field, grow, index, renderer);
+        return label(set, Last { field, traits, grow }, index, renderer);
     }
     let image = renderer.render(field, &Request { watch, ..Request::default() })?;
     image.check_denoised()?;
     let begin = Instant::now();
     let (draw, label) = (image.times.draw, image.times.label);
     let text = image.provenance.photograph_text(image.denoised.is_some());
-    let sample = field.threads().install(|| describe(&set.recipe, index, image))?;
+    let sample = field.threads().install(|| describe(&set.recipe, index, image, traits))?;
     Ok(RenderedSample { sample, text, times: Times { grow, draw, label: label + begin.elapsed() } })
 }
 
 /// Labels an image without drawing it.
-fn label(set: &Set, field: &Field, grow: Duration, index: u64, renderer: &Renderer) -> Result<RenderedSample> {
+fn label(set: &Set, Last { field, traits, grow }: Last<'_>, index: u64, renderer: &Renderer) -> Result<RenderedSample> {
     let begin = Instant::now();
     let labels = field.label()?;
-    let sample = field.threads().install(|| labelled(&set.recipe, index, field, labels))?;
+    let sample = field.threads().install(|| labelled(&set.recipe, index, field, (labels, traits)))?;
     let text = format!("{}\nlabels: without light\nkernels: {}", field.grown().provenance(), renderer.kernels());
     Ok(RenderedSample { sample, text, times: Times { grow, draw: Duration::ZERO, label: begin.elapsed() } })
 }
 
 /// The sample of an image.
-fn describe(recipe: &Recipe, index: u64, image: Image<'_>) -> Result<Sample> {
+fn describe(recipe: &Recipe, index: u64, image: Image<'_>, traits: &mut Option<Traits>) -> Result<Sample> {
     let photograph = image.photograph();
     let field = image.field();
     let Image { film, labels, denoised, .. } = image;
-    let mut sample = labelled(recipe, index, field, labels)?;
+    let mut sample = labelled(recipe, index, field, (labels, traits))?;
     sample.record.exposure = Some(Exposure {
         gain: photograph.gain,
         nir_gain: photograph.nir_gain,
@@ -176,7 +193,12 @@ fn describe(recipe: &Recipe, index: u64, image: Image<'_>) -> Result<Sample> {
 }
 
 /// The sample of an image of which nothing but labels is known.
-fn labelled(recipe: &Recipe, index: u64, of: &Field, labels: LabelMap) -> Result<Sample> {
+fn labelled(
+    recipe: &Recipe,
+    index: u64,
+    of: &Field,
+    (labels, known): (LabelMap, &mut Option<Traits>),
+) -> Result<Sample> {
     let field = of.grown();
     let formats = format::all(recipe)?;
     let flows = if formats.iter().any(|(_, format)| format.needs_flow()) {
@@ -225,9 +247,10 @@ fn labelled(recipe: &Recipe, index: u64, of: &Field, labels: LabelMap) -> Result
         film: None,
     };
     (sample.record.classes, sample.record.ignored) = annotate::classes(&sample);
-    let traits = Traits::of(field);
+    let before = known.take().unwrap_or_default();
+    let traits = known.insert(before.again(field));
     sample.record.canopy = traits.canopy;
-    sample.record.plants = plants(field, &traits, &labels, &sample);
+    sample.record.plants = plants(field, traits, &labels, &sample);
     sample.film = Some(Rendered {
         film: None,
         labels,

@@ -86,6 +86,13 @@ fn sheet(part: &Part) -> Sheet {
 impl Traits {
     /// Measures a field. Call it inside a pool.
     pub fn of(field: &Field) -> Self {
+        Self::default().again(field)
+    }
+
+    /// The same of another image of the field that these are of: its plants and their leaves are measured already, its canopy is not. All is
+    /// measured where nothing was.
+    #[must_use]
+    pub fn again(self, field: &Field) -> Self {
         let parts: Vec<(&Part, OrganKind)> =
             field.scene.parts.iter().zip(&field.kinds).filter_map(|(part, kind)| Some((part, kind.organ()?))).collect();
         // Looked at once, whatever the number of instances: a mask is asked about each triangle that it may cut.
@@ -97,6 +104,9 @@ impl Traits {
         let organs: Vec<Organ<'_>> =
             parts.into_iter().map(|(part, kind)| Organ::new(part, kind, shown[&sheet(part)])).collect();
         let canopy = Canopy::of(field, &organs);
+        if !self.plants.is_empty() {
+            return Self { canopy, ..self };
+        }
         let mut by_plant: BTreeMap<u32, Vec<&Organ<'_>>> = BTreeMap::new();
         for organ in &organs {
             by_plant.entry(organ.part.tag.plant).or_default().push(organ);
