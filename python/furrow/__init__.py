@@ -302,7 +302,7 @@ def stream(
 
     Image k is the one that a dataset of the same scene file, size and samples has, its record included. With several readers, `shard`
     `(k, n)` gives each its own: reader k of n. Further keywords are the flags of `trace stream` with `_` for `-`: `width=324`, `seed=3`,
-    `denoise=True`, `threads=2`. The program runs until the generator is closed or dropped. Raises `Error` with the program's own words.
+    `denoise=True`, `threads=2`; with `labels_only=True` `spp` says nothing. The program runs until the generator is closed or dropped. Raises `Error` with the program's own words.
     """
     # Only what becomes an array is encoded; of labels alone there are no samples, and nothing that they tell.
     drawn = {} if flags.get("labels_only") else {"keep": "nir", "spp": spp}

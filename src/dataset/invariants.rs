@@ -23,9 +23,9 @@ const FEW: f64 = 0.25;
 /// the pixels. Measured over 256 fields of `any-field.ron`: at most 0.05 at 4 and 8 samples, 0.11 at 2, 0.30 at 1; maps that lie one
 /// pixel apart have 0.3 or more at 2 samples and above.
 const THIN_ON_EDGES: f64 = 0.1;
+const FEW_ON_EDGES: f64 = 0.6;
 /// So many pixels may do so in an image of any size: in one of a single pixel a blade may pass beside the centre.
 const ALWAYS_ALLOWED: f64 = 2.0;
-const FEW_ON_EDGES: f64 = 0.6;
 
 /// Checks a sample; the error names the image and everything that does not hold.
 pub fn check(recipe: &Recipe, sample: &Sample) -> Result<()> {

@@ -191,7 +191,7 @@ impl<'a, F: Files + ?Sized> Image<'a, F> {
     fn stored(&self, name: &str) -> Result<Option<Stored>> {
         for ending in output::ENDINGS {
             if let Some((place, bytes)) = self.optional(&format!("{name}.{ending}"))? {
-                return Ok(Some(Stored { place, bytes, is_jpeg: ending == Photo::Jpeg(100).ending() }));
+                return Ok(Some(Stored { place, bytes, is_jpeg: ending != Photo::Png.ending() }));
             }
         }
         Ok(None)

@@ -395,16 +395,17 @@ const GRACE: Duration = Duration::from_secs(2);
 /// Ends a command and what it has started: asked first, then killed.
 fn end(child: &mut Child) {
     let group = child.id();
+    // Whether anybody of the group was there to get it.
     let send = |signal: &str| {
         let words = format!("kill -s {signal} -- -{group}");
-        let _ = Command::new("sh").arg("-c").arg(words).stderr(Stdio::null()).status();
+        Command::new("sh").arg("-c").arg(words).stderr(Stdio::null()).status().is_ok_and(|ended| ended.success())
     };
     send("TERM");
     let until = Instant::now() + GRACE;
-    while Instant::now() < until && matches!(child.try_wait(), Ok(None)) {
+    // The shell may be gone while what it started is not; signal 0 asks and does nothing.
+    while Instant::now() < until && { matches!(child.try_wait(), Ok(None)) || send("0") } {
         std::thread::sleep(EVERY);
     }
-    // The shell may be gone while what it started is not.
     send("KILL");
     let _ = child.wait();
 }

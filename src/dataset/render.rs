@@ -248,7 +248,7 @@ fn labelled(
     };
     (sample.record.classes, sample.record.ignored) = annotate::classes(&sample);
     let before = known.take().unwrap_or_default();
-    let traits = known.insert(before.again(field));
+    let traits = known.insert(before.of_next_image(field));
     sample.record.canopy = traits.canopy;
     sample.record.plants = plants(field, traits, &labels, &sample);
     sample.film = Some(Rendered {

@@ -86,13 +86,13 @@ fn sheet(part: &Part) -> Sheet {
 impl Traits {
     /// Measures a field. Call it inside a pool.
     pub fn of(field: &Field) -> Self {
-        Self::default().again(field)
+        Self::default().of_next_image(field)
     }
 
     /// The same of another image of the field that these are of: its plants and their leaves are measured already, its canopy is not. All is
     /// measured where nothing was.
     #[must_use]
-    pub fn again(self, field: &Field) -> Self {
+    pub fn of_next_image(self, field: &Field) -> Self {
         let parts: Vec<(&Part, OrganKind)> =
             field.scene.parts.iter().zip(&field.kinds).filter_map(|(part, kind)| Some((part, kind.organ()?))).collect();
         // Looked at once, whatever the number of instances: a mask is asked about each triangle that it may cut.

@@ -60,9 +60,9 @@ impl Builder<'_> {
             shares.push(Share { at: at.to_vec(), cost, advice: format!("{fewer}{advice}") });
         };
         add(&[Step::Field("camera"), Step::Field("size")], film, "make the image smaller, with --width");
-        let pulses =
-            self.scanners.iter().map(|lidar| f64::from(lidar.columns()) * f64::from(lidar.beams())).sum::<f64>();
-        if pulses > 0.0 {
+        // One frame is scanned, and all have as many pulses.
+        if let Some(lidar) = self.scanners.first() {
+            let pulses = f64::from(lidar.columns()) * f64::from(lidar.beams());
             let echoes = Cost::work(pulses * BYTES_PER_PULSE, pulses * SECONDS_PER_PULSE);
             add(&[Step::Field("lidar")], echoes, "take fewer beams, or a larger step in `pulses`");
         }
