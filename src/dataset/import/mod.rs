@@ -105,13 +105,15 @@ pub fn import(
     stop: &AtomicBool,
 ) -> Result<Set> {
     let there = AtomicUsize::new(0);
+    // Of several faults the first image's is told, whatever the number of threads.
     let each = |what: &(dyn Fn(u64) -> Result<()> + Sync)| {
-        (0..source.images().len() as u64).into_par_iter().try_for_each(|index| {
+        let fault = (0..source.images().len() as u64).into_par_iter().find_map_first(|index| {
             if stop.load(Ordering::Relaxed) {
-                return Err(generate::interrupted(folder, there.load(Ordering::Relaxed), source.images().len()));
+                return Some(generate::interrupted(folder, there.load(Ordering::Relaxed), source.images().len()));
             }
-            what(index)
-        })
+            what(index).err()
+        });
+        fault.map_or(Ok(()), Err)
     };
     if !folder.join(FILE).exists() {
         refuse_full(folder)?;
