@@ -43,7 +43,8 @@ fn main() -> furrow::Result<()> {
 
     let trained = TrainedModel::open(Path::new(&run))?;
     let stop = AtomicBool::new(false);
-    let report = train::evaluate(&trained, &images("test")?, "f32", plan.threads, &machine, &stop, &mut |_| Ok(()))?;
+    let report =
+        train::evaluate(&trained.into(), &images("test")?, "f32", plan.threads, &machine, &stop, &mut |_| Ok(()))?;
     eprintln!("{}", report.summary().markdown());
     for name in ["weights.safetensors", "model.json", "result.json"] {
         println!("{run}/{name}");

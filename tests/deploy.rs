@@ -315,6 +315,50 @@ fn photographs_of_any_size_get_masks_of_their_size() {
     assert!(before == read());
 }
 
+/// Expected: a folder of two runs answers with the class of the highest mean of their probabilities; a run that is not done and one that sees
+/// other bands are told by their folders. Source: softmax and mean, computed here from the logits of each.
+#[test]
+fn runs_of_one_folder_answer_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let (runs, photos, out) = (folder.path().join("runs"), folder.path().join("photos"), folder.path().join("answers"));
+    let first = TrainedModel::open(&RGB).unwrap();
+    let both = [first.clone(), stirred(&first, 5)];
+    for (k, trained) in both.iter().enumerate() {
+        trained.write(&runs.join(format!("seed-{}", k + 1))).unwrap();
+    }
+    let size = training::SIZE;
+    let bytes = pictures(1, size, 3, 4);
+    std::fs::create_dir_all(&photos).unwrap();
+    let rgb: Vec<[u8; 3]> = bytes.as_chunks().0.to_vec();
+    output::write_png(&photos.join("a.png"), size.0, size.1, &Picture::Rgb(&rgb), "").unwrap();
+    let arguments = ["predict", path(&runs), path(&photos), "--out", path(&out)];
+    succeed(train(&arguments));
+
+    let n = bytes.len() / 3;
+    let mut mean = vec![0.0_f32; 3 * n];
+    for trained in &both {
+        let logits = model(trained).scores(&normalised(trained, &bytes, size), size).unwrap();
+        for at in 0..n {
+            let sum: f32 = (0..3).map(|c| logits[c * n + at].exp()).sum();
+            (0..3).for_each(|c| mean[c * n + at] += logits[c * n + at].exp() / sum / 2.0);
+        }
+    }
+    let highest = |at: usize| (0..3).max_by(|a, b| mean[a * n + at].total_cmp(&mean[b * n + at])).unwrap() as u8;
+    let (_, _, mask) = output::read_indexed(&out.join("a.png")).unwrap();
+    let differ = (0..n).filter(|at| mask[*at] != highest(*at)).count();
+    assert!(differ * 1000 <= n, "{differ} of {n} pixels differ");
+    let alone: Vec<u8> = model(&first).predict(&normalised(&first, &bytes, size), size).unwrap();
+    assert!(mask != alone, "the second run has no say");
+
+    TrainedModel::open(&RGBN).unwrap().write(&runs.join("seed-3")).unwrap();
+    let words = fail(train(&arguments), 2);
+    assert!(words.contains("seed-3") && words.contains("answers otherwise"), "{words}");
+    std::fs::remove_file(runs.join("seed-3").join(run::MODEL)).unwrap();
+    std::fs::copy(RGB.join(run::PLAN), runs.join("seed-3").join(run::PLAN)).unwrap();
+    let words = fail(train(&arguments), 2);
+    assert!(words.contains("seed-3") && words.contains("not done"), "{words}");
+}
+
 #[test]
 fn images_of_a_set_are_asked_about_by_name_and_bands_are_found() {
     let folder = tempfile::tempdir().unwrap();

@@ -25,6 +25,7 @@
 //! | `adapt` | a trained network goes on learning from photographs without labels |
 //! | `calibrated`, `evaluate` | class-bias calibration; ground truth and prediction to scores |
 //! | [`TrainedModel`], [`Results`], [`Report`] | weights and model card; loss curve and validation passes; scores |
+//! | [`Ensemble`] | runs with several seeds that answer together |
 //! | [`table`] | experiments: networks × training sets × seeds, evaluated on test sets |
 //!
 //! | module | idea |
@@ -45,10 +46,11 @@ pub mod adapt;
 #[doc(hidden)]
 pub mod baseline;
 #[doc(hidden)]
-#[doc(hidden)]
 pub mod data;
 #[doc(hidden)]
 pub mod deploy;
+#[doc(hidden)]
+pub mod ensemble;
 #[doc(hidden)]
 pub mod figure;
 #[doc(hidden)]
@@ -76,6 +78,7 @@ pub mod zoo;
 
 pub use crate::dataset::classes::Classes;
 pub use data::{Band, Pick, Selection, Shape};
+pub use ensemble::Ensemble;
 pub use fit::{Hyperparameters, Plan, Settings};
 pub use measure::{Report, Scores};
 pub use net::Network;

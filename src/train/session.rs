@@ -2,6 +2,7 @@
 
 use super::data::{Photos, Pick, Resize, Selection, Store, resize};
 use super::deploy::enlarge::classes_at;
+use super::ensemble::Ensemble;
 use super::fit::calibrate::calibrate;
 use super::fit::checkpoint::Checkpoint;
 use super::fit::logits;
@@ -183,9 +184,9 @@ pub struct Predicted<'a> {
     pub predicted: &'a [u8],
 }
 
-/// Evaluates a trained model on images of a dataset, one after the other; each is passed to `seen`.
+/// Evaluates a trained model, or several together, on images of a dataset, one after the other; each is passed to `seen`.
 pub fn evaluate(
-    trained: &TrainedModel,
+    trained: &Ensemble,
     on: &Selection,
     precision: &str,
     threads: usize,
@@ -196,7 +197,7 @@ pub fn evaluate(
     let card = &trained.card;
     let place = machine.place(precision)?;
     device::set_threads(threads);
-    let model = Model::with(card.network, card.input.bands.len(), card.classes.len(), &trained.values, place)?;
+    let models = trained.models(place)?;
     let store = Store::open(std::slice::from_ref(on), Pick::All, 0, &card.classes, &card.input, true, 0)?;
     let trained_at = (card.input.width, card.input.height);
     let mut evaluation = Evaluation::new(card.classes.names());
@@ -211,7 +212,7 @@ pub fn evaluate(
         let sizes = card.resize.sizes(trained_at, size)?;
         let inputs = resize::inputs(&example.planes, size, &sizes, &card.normalization);
         let begun = Instant::now();
-        let mut scores = multiscale::scores(&model, &inputs)?;
+        let mut scores = multiscale::scores(&models, &inputs)?;
         scores.refine(card.refine, &inputs, &card.input.bands);
         let seconds = Some(begun.elapsed().as_secs_f64());
         let predicted = classes_at(&scores.values, scores.size, size);

@@ -5,7 +5,7 @@ use crate::machine::MachineArgs;
 use crate::report;
 use furrow::cli::signal::Signals;
 use furrow::train::data::{Pick, Resize, Selection};
-use furrow::train::run::TrainedModel;
+use furrow::train::ensemble::Ensemble;
 use furrow::train::{session, zoo};
 use furrow::{Result, cli};
 use std::path::PathBuf;
@@ -13,7 +13,8 @@ use std::path::PathBuf;
 /// Which network, on which images.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folder of the run, or the name of a network that ships (`train zoo`).
+    /// Folder of the run, or the name of a network that ships (`train zoo`), or a folder of runs with several seeds, whose probabilities are
+    /// averaged.
     run: PathBuf,
     /// Test set: images with labels; all of the dataset unless it says DIR@PICK.
     #[arg(long = "set", value_name = "DIR[@PICK]", value_parser = Selection::parse)]
@@ -29,7 +30,7 @@ pub(crate) struct Args {
 
 /// Evaluates, and writes the report.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
-    let mut trained = TrainedModel::open(&args.run)?;
+    let mut trained = Ensemble::open(&args.run)?;
     args.inference.apply(&mut trained.card)?;
     let set = args.set.folder.file_name().unwrap_or_default();
     if args.out.is_none() {

@@ -6,7 +6,7 @@ use furrow::cli::signal::Signals;
 use furrow::train::data::Band;
 use furrow::train::deploy::pictures;
 use furrow::train::deploy::predict::{self, Options, Predictions};
-use furrow::train::run::TrainedModel;
+use furrow::train::ensemble::Ensemble;
 use furrow::{Error, Result, cli};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
@@ -14,7 +14,8 @@ use std::path::PathBuf;
 /// Which network, on which images.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folder of the run, or the name of a network that ships (`train zoo`).
+    /// Folder of the run, or the name of a network that ships (`train zoo`), or a folder of runs with several seeds, whose probabilities are
+    /// averaged.
     run: PathBuf,
     /// PNG or JPEG files of any size, folders of them, or images of a set: DIR, DIR@PICK.
     #[arg(required = true, value_name = "IMAGES")]
@@ -48,7 +49,7 @@ fn band(text: &str) -> Result<(Band, PathBuf), String> {
 
 /// Predicts.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
-    let mut trained = TrainedModel::open(&args.run)?;
+    let mut trained = Ensemble::open(&args.run)?;
     args.inference.apply(&mut trained.card)?;
     cli::check_folder(&args.out)?;
     let pictures = pictures::find(&args.images, &trained.card.input, &args.bands)?;

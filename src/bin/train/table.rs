@@ -161,7 +161,8 @@ fn evaluate(
                 shots.see(seen.example, seen.size, seen.predicted);
                 Ok(())
             };
-            let report = session::evaluate(trained, on, precision, *threads, machine, stop, &mut see)?;
+            let report =
+                session::evaluate(&(*trained).clone().into(), on, precision, *threads, machine, stop, &mut see)?;
             (report, shots, trained.card.classes.colors())
         }
         Predictor::Baseline(baseline, shape) => {

@@ -7,7 +7,8 @@ use super::pictures::{PREDICTION, Picture, Prediction, files};
 use super::{enlarge, overlay};
 use crate::output::{self, Picture as Png};
 use crate::train::data::resize::{self, Input};
-use crate::train::run::{ModelCard, TrainedModel};
+use crate::train::ensemble::Ensemble;
+use crate::train::run::ModelCard;
 use crate::train::session::Machine;
 use crate::train::torch::multiscale::{self, Scores};
 use crate::train::torch::{Model, device};
@@ -61,7 +62,7 @@ const AHEAD: usize = 2;
 /// Predicts the classes of pictures: for each, an indexed PNG of its classes and one of them over it, both at its own size.
 /// An error where files would be written over that are not predictions of the same pictures.
 pub fn predict(
-    trained: &TrainedModel,
+    trained: &Ensemble,
     pictures: &[Picture],
     out: &Path,
     machine: &Machine,
@@ -70,8 +71,7 @@ pub fn predict(
     let card = &trained.card;
     let place = machine.place(options.precision)?;
     device::set_threads(options.threads);
-    let (bands, classes) = (card.input.bands.len(), card.classes.len());
-    let model = Model::with(card.network, bands, classes, &trained.values, place)?;
+    let models = trained.models(place)?;
     let prediction = Prediction::claim(out, card, pictures)?;
     let workers = machine.loaders.max(1);
     let failed = AtomicBool::new(false);
@@ -95,7 +95,7 @@ pub fn predict(
                 Err(_) => break,
             }
             if batch.len() == options.batch || number + 1 == pictures.len() {
-                made.seconds += infer(&model, std::mem::take(&mut batch), &writers)?;
+                made.seconds += infer(&models, std::mem::take(&mut batch), &writers)?;
                 (options.done)(number + 1);
             }
         }
@@ -173,24 +173,24 @@ fn write<'s, 'a: 's>(
     (sender, handle)
 }
 
-/// Runs the network on a batch and hands the scores on; seconds of the network.
-fn infer<'a>(model: &Model, batch: Vec<(usize, Ready<'a>)>, writers: &[SyncSender<Scored<'a>>]) -> Result<f64> {
+/// Runs the networks on a batch and hands the scores on; seconds of the network.
+fn infer<'a>(models: &[Model], batch: Vec<(usize, Ready<'a>)>, writers: &[SyncSender<Scored<'a>>]) -> Result<f64> {
     let begun = Instant::now();
-    // Pictures that the network takes at one size, and at the same, go through it together.
+    // Pictures that one network takes at one size, and at the same, go through it together.
     let alike = |a: &(usize, Ready<'_>), b: &(usize, Ready<'_>)| match (a.1.inputs.as_slice(), b.1.inputs.as_slice()) {
-        ([a], [b]) => a.size == b.size,
+        ([a], [b]) => models.len() == 1 && a.size == b.size,
         _ => false,
     };
     let mut all = Vec::new();
     for group in batch.chunk_by(alike) {
         match group {
-            [(_, ready)] => all.push(multiscale::scores(model, &ready.inputs)?),
+            [(_, ready)] => all.push(multiscale::scores(models, &ready.inputs)?),
             several => {
                 let size = several[0].1.inputs[0].size;
                 let pixels: Vec<f32> = several.iter().flat_map(|(_, ready)| &ready.inputs[0].pixels).copied().collect();
-                let values = model.scores(&pixels, size)?;
+                let values = models[0].scores(&pixels, size)?;
                 let each = values.chunks_exact(values.len() / several.len());
-                all.extend(each.map(|values| Scores { values: values.to_vec(), size, finest: None }));
+                all.extend(each.map(|values| Scores { values: values.to_vec(), size, finest: None, are_logits: true }));
             }
         }
     }

@@ -1,0 +1,100 @@
+//! A deep ensemble: runs of one training with several seeds, which answer together by the mean of their probabilities.
+//!
+//! What networks are unsure of depends on their seed; what they agree on does not. Source: Lakshminarayanan, Pritzel & Blundell 2017, "Simple
+//! and scalable predictive uncertainty estimation using deep ensembles".
+
+use super::run::{self, MODEL, ModelCard, PLAN, TrainedModel};
+#[cfg(feature = "train")]
+use super::torch::{Model, Where};
+use super::weights::Array;
+use crate::{Error, Result};
+use sha2::{Digest, Sha256};
+use std::path::{Path, PathBuf};
+
+/// One trained model, or several that differ in their weights alone.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ensemble {
+    /// The model card of all; `weights_sha256` is that of one model, or over those of several.
+    pub card: ModelCard,
+    members: Vec<Vec<Array>>,
+}
+
+impl From<TrainedModel> for Ensemble {
+    fn from(trained: TrainedModel) -> Self {
+        Self { card: trained.card, members: vec![trained.values] }
+    }
+}
+
+impl Ensemble {
+    /// Opens a run's folder, a network that ships by its name, or a folder of runs, such as `train table` makes for several seeds.
+    pub fn open(path: &Path) -> Result<Self> {
+        let runs = runs(path)?;
+        let Some((first, others)) = runs.split_first() else {
+            return TrainedModel::open(path).map(Self::from);
+        };
+        let TrainedModel { card, values } = TrainedModel::open(first)?;
+        let mut together = Sha256::new_with_prefix(&card.weights_sha256);
+        let mut members = vec![values];
+        for run in others {
+            let other = TrainedModel::open(run)?;
+            if !alike(&card, &other.card) {
+                let what = format!("it answers otherwise than {} beside it", first.display());
+                return Err(Error::input(what)
+                    .help("runs of one folder answer together where classes, bands and sizes are the same: name one of them")
+                    .in_file(run));
+            }
+            together.update(&other.card.weights_sha256);
+            members.push(other.values);
+        }
+        let weights_sha256 = match members.len() {
+            1 => card.weights_sha256.clone(),
+            _ => hex::encode(together.finalize()),
+        };
+        Ok(Self { card: ModelCard { weights_sha256, ..card }, members })
+    }
+
+    /// How many models answer.
+    pub fn size(&self) -> usize {
+        self.members.len()
+    }
+
+    /// The models, on a device.
+    #[cfg(feature = "train")]
+    pub fn models(&self, place: Where) -> Result<Vec<Model>> {
+        let ModelCard { network, input, classes, .. } = &self.card;
+        self.members
+            .iter()
+            .map(|values| Model::with(*network, input.bands.len(), classes.len(), values, place))
+            .collect()
+    }
+}
+
+/// The runs that lie in a folder, in order of their names; none where it is a run itself, or none of its folders is.
+fn runs(path: &Path) -> Result<Vec<PathBuf>> {
+    if run::folder(path) != path || [MODEL, PLAN].iter().any(|file| path.join(file).exists()) || !path.is_dir() {
+        return Ok(Vec::new());
+    }
+    let mut runs = Vec::new();
+    for entry in std::fs::read_dir(path).map_err(Error::reading(path))? {
+        let folder = entry.map_err(Error::reading(path))?.path();
+        // A training that is not done is told when it is opened.
+        if [MODEL, PLAN].iter().any(|file| folder.join(file).is_file()) {
+            runs.push(folder);
+        }
+    }
+    runs.sort();
+    Ok(runs)
+}
+
+/// Whether two models see the same pictures and name the same classes.
+fn alike(a: &ModelCard, b: &ModelCard) -> bool {
+    let same = ModelCard {
+        furrow: a.furrow.clone(),
+        weights: a.weights.clone(),
+        weights_sha256: a.weights_sha256.clone(),
+        plan_sha256: a.plan_sha256.clone(),
+        pixel_mm: a.pixel_mm,
+        ..b.clone()
+    };
+    *a == same
+}
