@@ -57,6 +57,14 @@ pub struct WheelRecord {
     pub depth_mm: f32,
     /// From lug to lug; 0 for a smooth tyre.
     pub lugs_mm: f32,
+    /// From one track to the next; 0 for one alone.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub every_m: f32,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
+fn is_zero(metres: &f32) -> bool {
+    *metres == 0.0
 }
 
 /// The shape of one ground.

@@ -19,6 +19,9 @@ pub struct WheelDesc {
     pub depth_mm: Vary<NonNegative>,
     /// From lug to lug; 0 for a smooth tyre.
     pub lugs_mm: Vary<NonNegative>,
+    /// From one such track to the next, where a machine comes back again and again: its working width, such as 5.4 for a drill of twelve rows 0.45 m
+    /// apart, or 24 for a sprayer in its tramlines. 0: one track alone.
+    pub every_m: Vary<NonNegative>,
 }
 
 impl Default for WheelDesc {
@@ -28,6 +31,7 @@ impl Default for WheelDesc {
             width_mm: Vary::uniform(300.0, 500.0),
             depth_mm: Vary::uniform(10.0, 40.0),
             lugs_mm: Vary::uniform(90.0, 180.0),
+            every_m: Vary::fixed(0.0),
         }
     }
 }
@@ -41,7 +45,7 @@ const LUG: (f32, f32) = (0.5, 0.35);
 /// Slant of the lugs: how far ahead they reach at the side, of the half-width.
 const SLANT: f32 = 0.8;
 
-/// One track.
+/// One track, or one of each pass of a machine.
 #[derive(Clone, Debug)]
 pub(super) struct Wheel {
     across: Vec2,
@@ -49,6 +53,7 @@ pub(super) struct Wheel {
     half_width: f32,
     depth: f32,
     lugs: f32,
+    every: f32,
 }
 
 impl Wheel {
@@ -60,13 +65,20 @@ impl Wheel {
             half_width: 0.5e-3 * desc.width_mm.draw32(stream),
             depth: 1e-3 * desc.depth_mm.draw32(stream),
             lugs: 1e-3 * desc.lugs_mm.draw32(stream),
+            every: desc.every_m.draw32(stream),
         }
+    }
+
+    /// How far a place lies from the middle of the nearest track, in half-widths; negative on its left.
+    fn aside(&self, p: Vec2) -> f32 {
+        let x = p.dot(self.across) - self.middle;
+        let x = if self.every > 0.0 { x - self.every * (x / self.every).round() } else { x };
+        x / self.half_width
     }
 
     /// How much of a place the wheel pressed: 1 on its floor, 0 beside it.
     pub(super) fn pressed(&self, p: Vec2) -> f32 {
-        let d = (p.dot(self.across) - self.middle).abs() / self.half_width;
-        1.0 - smoothstep(1.0 - SIDE, 1.0 + SIDE, d)
+        1.0 - smoothstep(1.0 - SIDE, 1.0 + SIDE, self.aside(p).abs())
     }
 
     /// Share of roughness and of clods that is left at a place.
@@ -76,7 +88,7 @@ impl Wheel {
 
     /// Height beside that of the ground, metres: the floor, the lugs' prints in it, and what was pushed up at the sides.
     pub(super) fn height(&self, p: Vec2) -> f32 {
-        let x = (p.dot(self.across) - self.middle) / self.half_width;
+        let x = self.aside(p);
         let rim = (-((x.abs() - 1.0 - 1.5 * SIDE) / SIDE).powi(2)).exp();
         let lug = if self.lugs > 0.0 {
             // Bars slant forward from the middle and alternate from side to side.
@@ -98,6 +110,7 @@ impl Wheel {
             width_mm: 2e3 * self.half_width,
             depth_mm: 1e3 * self.depth,
             lugs_mm: 1e3 * self.lugs,
+            every_m: self.every,
         }
     }
 }
@@ -118,6 +131,19 @@ mod tests {
             assert!(wheel.height(vec2(0.8, y)).abs() < 1e-5 && wheel.left(vec2(0.8, y)) == 1.0);
             assert!(wheel.height(vec2(0.636, y)) > 0.002);
             assert!((wheel.left(vec2(0.4, y)) - LEFT).abs() < 1e-6);
+        }
+    }
+
+    /// Expected: where tracks come back every 2.4 m, each is as deep as the first, on both sides of it, and the ground between them is untouched.
+    #[test]
+    fn tracks_come_back_with_each_pass() {
+        let desc = "(offset_m: 0.3, width_mm: 400, depth_mm: 30, lugs_mm: 0, every_m: 2.4)";
+        let desc: WheelDesc = ron::from_str(desc).unwrap();
+        let wheel = Wheel::draw(&desc, Vec2::X, 0.1, &mut Stream::of(1, 0, Purpose::Test, 0));
+        for pass in -40..40 {
+            let middle = 0.4 + 2.4 * pass as f32;
+            assert!((wheel.height(vec2(middle, 0.2)) + 0.030).abs() < 1e-6, "{pass}");
+            assert!(wheel.height(vec2(middle + 1.2, 0.2)).abs() < 1e-6 && wheel.left(vec2(middle + 1.1, 0.0)) == 1.0);
         }
     }
 
