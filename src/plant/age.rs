@@ -2,6 +2,7 @@
 
 use super::growth::Growth;
 use super::stage::BUD;
+use super::stems;
 use std::collections::BTreeMap;
 
 /// How old one leaf is.
@@ -14,7 +15,7 @@ pub struct LeafAge {
     pub days: f32,
 }
 
-/// The ages of all leaves of the main shoot, by their numbers.
+/// The ages of all leaves of the main shoot, by their numbers; where several stems rise from one place, those of all.
 pub(super) fn ages(growth: &Growth<'_>) -> BTreeMap<u16, LeafAge> {
     let longest = growth.leaves.iter().map(|l| l.blade).fold(BUD, f32::max);
     let mut younger = 0.0_f32;
@@ -23,6 +24,11 @@ pub(super) fn ages(growth: &Growth<'_>) -> BTreeMap<u16, LeafAge> {
         younger = younger.max(leaf.blade);
         let days = (growth.age_days - born(growth, leaf.layer)).max(0.0);
         ages.insert(leaf.number, LeafAge { unfolded: younger / longest, days });
+    }
+    for stem in stems::others(growth) {
+        let leaves = growth.leaves.iter().filter_map(|leaf| stem.leaf(leaf, growth));
+        let own: Vec<_> = leaves.map(|leaf| (leaf.number, ages[&(leaf.number - stem.above)])).collect();
+        ages.extend(own);
     }
     ages
 }

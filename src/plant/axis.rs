@@ -5,7 +5,7 @@ use super::leaf::Seat;
 use super::organ::{Organ, OrganKind};
 use super::tube::{self, Profile, Ring};
 use crate::math::{Frame, Vec3, direction, lerp, smoothstep, vec3};
-use crate::sampling::Purpose;
+use crate::sampling::{Purpose, Stream};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 /// How far everything that stands in the soil continues below it, metres.
@@ -55,22 +55,55 @@ impl Axis {
     }
 }
 
-/// Grows hypocotyl and stem.
+/// Where a stem leaves the soil, and how large it is.
+#[derive(Clone, Debug)]
+pub(super) struct Foot {
+    /// Metres.
+    pub(super) point: Vec3,
+    /// Its direction there, unit.
+    pub(super) along: Vec3,
+    /// Its sizes over those of the first stem.
+    pub(super) size: f32,
+    /// How far it continues below the soil, metres.
+    pub(super) root: f32,
+    /// The numbers of its hypocotyl.
+    pub(super) stream: Stream,
+}
+
+impl Foot {
+    /// That of a plant's first stem.
+    pub(super) fn first(growth: &Growth<'_>, along: Vec3) -> Self {
+        Self { point: Vec3::ZERO, along, size: 1.0, root: ROOT, stream: growth.stream.child(Purpose::Plant, 2) }
+    }
+}
+
+/// Grows hypocotyl and first stem.
 pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Section) -> Axis {
     let mut stream = growth.stream.child(Purpose::Plant, 1);
     let lean = growth.desc.lean_deg.draw32(&mut stream).to_radians();
-    let towards = stream.range32(0.0, std::f32::consts::TAU);
-    let mut direction_now = direction(lean, towards);
-    let radius = (0.5 * growth.stem).max(2e-4);
-    let base = direction_now * growth.hypocotyl;
-    let top_rise = growth.rise.last().copied().unwrap_or(0.0);
+    let towards = stream.range32(0.0, TAU);
+    stem(organs, growth, section, Foot::first(growth, direction(lean, towards)), &mut stream)
+}
+
+/// Grows hypocotyl and stem from a foot; what its internodes draw comes from `stream`.
+pub(super) fn stem(
+    organs: &mut Vec<Organ>,
+    growth: &Growth<'_>,
+    section: Section,
+    foot: Foot,
+    stream: &mut Stream,
+) -> Axis {
+    let mut direction_now = foot.along;
+    let radius = (0.5 * growth.stem * foot.size).max(2e-4);
+    let base = foot.point + direction_now * (growth.hypocotyl * foot.size);
+    let top_rise = growth.rise.last().copied().unwrap_or(0.0) * foot.size;
     let (mut nodes, mut radii) = (Vec::new(), Vec::new());
     let (mut point, mut below) = (base, 0.0);
     // A crown's short internodes make its dome higher; its leaves are seated on the dome.
     let stemless = top_rise < radius;
     let crown = if stemless { CROWN + top_rise / radius } else { 0.0 };
     for rise in &growth.rise {
-        let rise = &if stemless { 0.0 } else { *rise };
+        let rise = &if stemless { 0.0 } else { *rise * foot.size };
         point += direction_now * (rise - below);
         let share = if top_rise > 0.0 { rise / top_rise } else { 0.0 };
         nodes.push((point, direction_now));
@@ -85,7 +118,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
         nodes.push((base, direction_now));
         radii.push(radius);
     }
-    hypocotyl(organs, growth, nodes[0].1, radius);
+    hypocotyl(organs, growth, foot, radius);
     let mut rings: Vec<Ring> = Vec::with_capacity(2 * nodes.len() + 4);
     if stemless {
         // Leaf bases close round a crown: it is green like them, however red the hypocotyl below.
@@ -123,19 +156,20 @@ pub(super) fn material(own: &str) -> String {
     if own.is_empty() { "stalk".to_owned() } else { own.to_owned() }
 }
 
-/// Adds the stem below the seed leaves, from the soil along a direction: round, of this radius at both ends. Where it is slender it is a
-/// little bowed and thinner in its middle, as one that has pushed itself out of the soil is.
-pub(super) fn hypocotyl(organs: &mut Vec<Organ>, growth: &Growth<'_>, along: Vec3, radius: f32) {
-    let mut stream = growth.stream.child(Purpose::Plant, 2);
+/// Adds the stem below the seed leaves, from its foot on: round, of this radius at both ends. Where it is slender it is a little bowed and
+/// thinner in its middle, as one that has pushed itself out of the soil is.
+pub(super) fn hypocotyl(organs: &mut Vec<Organ>, growth: &Growth<'_>, foot: Foot, radius: f32) {
+    let Foot { point, along, size, root, mut stream } = foot;
+    let length = growth.hypocotyl * size;
     let side = along.cross(direction(FRAC_PI_2, stream.range32(0.0, TAU))).normalize_or(Vec3::X);
-    let bow = 0.05 * stream.normal().clamp(-2.0, 2.0) as f32 * growth.hypocotyl;
-    let slender = smoothstep(2.0, 6.0, growth.hypocotyl / (2.0 * radius));
-    let below = -ROOT / along.z.max(0.3);
-    let mut rings = vec![ring(along * below, along, radius, Profile::Channelled(1.0))];
+    let bow = 0.05 * stream.normal().clamp(-2.0, 2.0) as f32 * length;
+    let slender = smoothstep(2.0, 6.0, length / (2.0 * radius));
+    let below = -root / along.z.max(0.3);
+    let mut rings = vec![ring(point + along * below, along, radius, Profile::Channelled(1.0))];
     for i in 0..=HYPOCOTYL {
         let s = i as f32 / HYPOCOTYL as f32;
-        let centre = along * (growth.hypocotyl * s) + side * (slender * bow * (PI * s).sin());
-        let direction = (along + side * (slender * PI * bow / growth.hypocotyl.max(1e-4) * (PI * s).cos())).normalize();
+        let centre = point + (along * (length * s) + side * (slender * bow * (PI * s).sin()));
+        let direction = (along + side * (slender * PI * bow / length.max(1e-4) * (PI * s).cos())).normalize();
         let thick = 1.0 - 0.18 * slender * (PI * s).sin().max(0.0).powf(0.7);
         rings.push(ring(centre, direction, thick * radius, Profile::Channelled(1.0)));
     }

@@ -17,7 +17,7 @@ macro_rules! forms {
             Rosette => rosette,
             /// Whorls of leaves without stalks on a square stem.
             Whorl => whorl,
-            /// Stalked leaves on an upright stem.
+            /// Stalked leaves on an upright stem, or on several from one place (`tillers`).
             Erect => erect,
             /// A rosette of finely divided leaves.
             Dissected => dissected,

@@ -6,6 +6,7 @@
 use super::desc::{PlantDesc, Stage};
 use super::kind::LeafKind;
 use super::stage::{BUD, StageDesc};
+use super::stems;
 use crate::math::lerp;
 use crate::ron_file::{Bound, Vary};
 use crate::sampling::{Purpose, Stream};
@@ -67,7 +68,7 @@ pub(super) struct Growth<'a> {
     /// Width of the stem at the soil, metres.
     pub(super) stem: f32,
     pub(super) tillers: usize,
-    /// How far the side shoots of a grass have caught up with the main one, 0–1.
+    /// How far the side shoots of a grass, or the other stems of an upright plant, have caught up with the main one, 0–1.
     pub(super) tillers_grown: f32,
     /// Side shoots of each side shoot.
     pub(super) branches: usize,
@@ -164,13 +165,17 @@ pub(super) fn age(desc: &PlantDesc, stage: Stage) -> f32 {
     covering(desc, code).map_or_else(between, |(_, days)| days)
 }
 
-/// When the leaves of the plant of `stream` come out, and how large they become, all sizes times `vigour`.
+/// When the leaves of the plant of `stream` come out, and how large they become, all sizes times `vigour`: those of its main shoot, and of
+/// all stems where several rise from one place.
 pub(super) fn leaf_lives(desc: &PlantDesc, stream: &Stream, vigour: f32) -> BTreeMap<u16, LeafLife> {
     let mut lives: BTreeMap<u16, LeafLife> = BTreeMap::new();
     let mut before = 0.0;
     for stage in &desc.stages {
         let days = stage.days.f32();
-        for leaf in growth(desc, Stage::Age(days), stream, vigour).map_or(Vec::new(), |growth| growth.leaves) {
+        let Some(now) = growth(desc, Stage::Age(days), stream, vigour) else { continue };
+        let others = stems::others(&now);
+        let leaves = others.iter().flat_map(|stem| now.leaves.iter().filter_map(|leaf| stem.leaf(leaf, &now)));
+        for leaf in leaves.chain(now.leaves.iter().cloned()) {
             let appears_days = lerp(before, days, BUD / leaf.blade);
             let life = lives.entry(leaf.number).or_insert(LeafLife { appears_days, blade: 0.0, width: 0.0 });
             life.blade = life.blade.max(leaf.blade);

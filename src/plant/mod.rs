@@ -21,6 +21,7 @@
 //! | `stipules` | what stands at the foot of a stalk |
 //! | `spines` | spines on a blade's margin |
 //! | `twine` | shoots that wind |
+//! | `stems` | several main stems from one place |
 //! | `condition` | age, health and damage of a plant and its leaves |
 //! | `rosette`, `whorl`, `erect`, `dissected`, `tuft`, `cane`, `runner` | growth forms |
 //!
@@ -52,6 +53,7 @@ pub mod skeleton;
 pub mod skin;
 mod spines;
 mod stage;
+mod stems;
 mod stipules;
 pub mod table;
 mod tube;
@@ -86,7 +88,7 @@ pub struct Plant {
     pub bbch: u32,
     /// Days after emergence.
     pub age_days: f32,
-    /// How old the leaves of its main shoot are, by number.
+    /// How old the leaves of its main shoot are, by number; where several stems rise from one place, those of all.
     pub ages: BTreeMap<u16, LeafAge>,
     /// Its highest point, metres.
     pub height: f32,

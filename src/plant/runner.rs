@@ -69,7 +69,7 @@ pub(super) fn shoots(growth: &Growth<'_>, habit: Habit) -> Vec<Organ> {
     let radius = (0.5 * growth.stem).max(2e-4);
     let foot = Foot { point: upright * growth.hypocotyl, along: upright, radius, length: growth.hypocotyl };
     plant.line = foot.point.truncate();
-    axis::hypocotyl(&mut plant.organs, growth, upright, radius);
+    axis::hypocotyl(&mut plant.organs, growth, axis::Foot::first(growth, upright), radius);
     let nodes = plant.stem(&foot, &growth.rise, &mut stream);
     for leaf in &growth.leaves {
         plant.seat(leaf, &nodes, leaf.layer);

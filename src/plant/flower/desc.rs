@@ -1,5 +1,6 @@
 //! Flowers and fruits as they are written, and how many triangles they have at most.
 
+use super::pen::LOBE_SIDES;
 use crate::geometry::outline::Outline;
 use crate::math::{Frame, Vec3};
 use crate::ron_file::{Count, Finite, Fraction, NonNegative, Num, Positive, PositiveCount, Vary};
@@ -9,6 +10,8 @@ use serde::{Deserialize, Serialize};
 const SHEET: f64 = 2.0 * 10.0 * 8.0;
 /// The most triangles of a solid.
 const SOLID: f64 = 2.0 * 10.0 * 12.0;
+/// The most triangles of a lobe of a solid.
+const LOBE: f64 = 2.0 * 10.0 * LOBE_SIDES as f64;
 /// The most triangles of a strand.
 const STRAND: f64 = 2.0 * 12.0 * 10.0;
 /// The most triangles of a dome or bowl under florets.
@@ -17,7 +20,7 @@ const DOME: f64 = SOLID;
 const MOST_RINGS: f64 = 8.0;
 
 /// What a flower, an inflorescence that looks like one, or a fruit is made like. Its size stands where it grows, in the stage: the
-/// diameter of a flower, head or berry, the length of an ear, tassel or pod.
+/// diameter of a flower, head or berry, the length of an ear, tassel, pod or capsule.
 ///
 /// ```
 /// let daisy: furrow::plant::FlowerDesc = ron::from_str(
@@ -159,6 +162,27 @@ pub enum FlowerDesc {
         #[serde(default = "pod")]
         material: String,
     },
+    /// A poppy's capsule: round, narrower at its foot, closed by a flat disc that bears the rays of the stigma.
+    Capsule {
+        /// Its outline without the disc.
+        #[serde(default = "obovoid")]
+        outline: Outline,
+        /// Width over length.
+        #[serde(default = "num::<Positive, 75>")]
+        aspect: Num<Positive>,
+        /// Diameter of the disc, of the capsule's width.
+        #[serde(default = "num::<Positive, 80>")]
+        disc: Num<Positive>,
+        /// Rays of the stigma, each ending in a lobe of the disc's margin.
+        #[serde(default = "rays")]
+        rays: Vary<PositiveCount>,
+        /// Its material.
+        #[serde(default = "pod")]
+        material: String,
+        /// Material of the rays.
+        #[serde(default = "stigma")]
+        stigma_material: String,
+    },
     /// A berry with its calyx.
     Berry {
         /// Length over diameter.
@@ -198,10 +222,18 @@ fn vary_share<B: crate::ron_file::Bound, const N: i32>() -> Vary<B> {
     Vary::fixed(f64::from(N) / 100.0)
 }
 
+fn obovoid() -> Outline {
+    Outline::Power { a: 0.62, b: 0.4 }
+}
+
+fn rays() -> Vary<PositiveCount> {
+    Vary::uniform(8.0, 14.0)
+}
+
 macro_rules! names {
     ($($name:ident),*) => { $(fn $name() -> String { stringify!($name).into() })* };
 }
-names!(sepal, anther, disc, husk, silk, pod, berry);
+names!(sepal, anther, disc, husk, silk, pod, stigma, berry);
 
 /// Where a flower stands, how large it is, and how far it has opened.
 #[derive(Clone, Copy, Debug)]
@@ -290,6 +322,7 @@ impl FlowerDesc {
             Self::Spike { material, awn_material, .. } => vec![material, awn_material],
             Self::Cob { material, silk_material, .. } => vec![material, silk_material],
             Self::Panicle { material, .. } | Self::Pod { material, .. } => vec![material],
+            Self::Capsule { material, stigma_material, .. } => vec![material, stigma_material],
             Self::Berry { material, sepal_material, .. } => vec![material, sepal_material],
         }
     }
@@ -309,6 +342,7 @@ impl FlowerDesc {
                 along * (spikelets.get() + 1.0) * SOLID + (1.0 + branches.largest()) * STRAND
             }
             Self::Pod { .. } => SOLID + STRAND,
+            Self::Capsule { rays, .. } => SOLID + rays.largest().round() * (LOBE + STRAND),
             Self::Berry { sepals, .. } => SOLID + sepals.get() * SHEET,
         }
     }

@@ -1,4 +1,5 @@
-//! Fruits: pods, silicles and capsules are solids within an outline; berries are round, with a calyx.
+//! Fruits: pods, silicles and capsules are solids within an outline, those of poppies with the stigma's disc on top; berries are round, with
+//! a calyx.
 
 use super::desc::{Bloom, FlowerDesc};
 use super::pen::{Pen, ROUND, Sheet, Solid};
@@ -19,6 +20,34 @@ pub(super) fn pod(flower: &FlowerDesc, bloom: &Bloom, pen: &mut Pen) {
         let thick = (0.05 * width).max(0.012 * size);
         let tip = from + frame.z * (style.f32() * size);
         pen.strand(OrganKind::Pod, material, &[from, tip], (thick, thick));
+    }
+}
+
+/// Thickness of a stigma's disc over its diameter.
+const DISC: f32 = 0.14;
+
+/// Draws a poppy's capsule, with its disc as long as the bloom's size.
+pub(super) fn capsule(flower: &FlowerDesc, bloom: &Bloom, pen: &mut Pen, stream: &mut Stream) {
+    let FlowerDesc::Capsule { outline, aspect, disc, rays, material, stigma_material } = flower else { return };
+    let Bloom { base, frame, size, .. } = *bloom;
+    let width = aspect.f32() * size;
+    let across = disc.f32() * width;
+    let thick = DISC * across;
+    let body = Solid { base, frame, length: size - 0.5 * thick, width, flat: 1.0, outline: *outline, notch: 0.0 };
+    pen.solid(OrganKind::Pod, material, &body);
+    let seat = base + frame.z * (size - thick);
+    let count = rays.draw(stream).round().max(1.0) as u32;
+    let spin = stream.range32(0.0, TAU);
+    let lid = Solid { base: seat, length: thick, width: across, outline: Outline::Power { a: 0.12, b: 0.3 }, ..body };
+    pen.lobed(OrganKind::Pod, material, &lid, count, (0.14, spin));
+    let wide = 0.16 * TAU * across / count.max(8) as f32;
+    for i in 0..count {
+        let (sin, cos) = (spin + TAU * i as f32 / count as f32).sin_cos();
+        let out = frame.x * cos + frame.y * sin;
+        // Half sunk into the disc, which is highest in its middle, where the rays meet.
+        let ray = [(0.03, 0.96), (0.3, 0.9), (0.46, 0.68)]
+            .map(|(r, high)| seat + out * (r * across) + frame.z * (high * thick));
+        pen.strand(OrganKind::Pod, stigma_material, &ray, (0.22 * wide, 0.5 * wide));
     }
 }
 

@@ -36,6 +36,7 @@ pub(super) fn grow(flower: &FlowerDesc, bloom: &Bloom, pen: &mut Pen, stream: &m
         FlowerDesc::Cob { .. } => cob::grow(flower, bloom, pen, stream),
         FlowerDesc::Panicle { .. } => panicle::grow(flower, bloom, pen, stream),
         FlowerDesc::Pod { .. } => fruit::pod(flower, bloom, pen),
+        FlowerDesc::Capsule { .. } => fruit::capsule(flower, bloom, pen, stream),
         FlowerDesc::Berry { .. } => fruit::berry(flower, bloom, pen, stream),
     }
 }

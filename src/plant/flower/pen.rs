@@ -77,6 +77,9 @@ pub(super) struct Solid {
     pub(super) notch: f32,
 }
 
+/// Corners round a lobe of a solid.
+pub(super) const LOBE_SIDES: u32 = 4;
+
 /// The outline of an ellipsoid.
 pub(super) const ROUND: Outline = Outline::Power { a: 0.5, b: 0.5 };
 
@@ -138,8 +141,27 @@ impl Pen {
 
     /// Draws a solid.
     pub(super) fn solid(&mut self, kind: OrganKind, material: &str, solid: &Solid) {
-        let rows = self.cells(solid.length, 3.0, 10.0);
         let sides = self.cells(3.0 * solid.width, 5.0, 12.0);
+        self.turned(kind, material, solid, sides, |_| 1.0);
+    }
+
+    /// Draws a solid with so many round lobes, which reach a share of its half-width inwards; the first stands at this angle from its x axis,
+    /// radians.
+    pub(super) fn lobed(
+        &mut self,
+        kind: OrganKind,
+        material: &str,
+        solid: &Solid,
+        lobes: u32,
+        (deep, first): (f32, f32),
+    ) {
+        let lobe = |turn: f32| 1.0 - deep * (1.0 - (0.5 * lobes as f32 * (turn - first)).cos().abs());
+        self.turned(kind, material, solid, LOBE_SIDES * lobes, lobe);
+    }
+
+    /// Draws a solid with so many corners round it, its half-width times a factor by the angle from its x axis.
+    fn turned(&mut self, kind: OrganKind, material: &str, solid: &Solid, sides: u32, factor: impl Fn(f32) -> f32) {
+        let rows = self.cells(solid.length, 3.0, 10.0);
         let mut rest = Rest::default();
         let mut near = None;
         for i in 0..=rows {
@@ -147,7 +169,9 @@ impl Pen {
             let half = (solid.outline.half_width(t) * solid.width).max(0.01 * solid.width);
             let first = rest.positions.len() as u32;
             for k in 0..=sides {
-                let (sin, cos) = (TAU * k as f32 / sides as f32).sin_cos();
+                let turn = TAU * k as f32 / sides as f32;
+                let (sin, cos) = turn.sin_cos();
+                let half = half * factor(turn);
                 let across = cos * 2.0 * solid.outline.half_width(t);
                 let along = solid.length * t * (1.0 - solid.notch * notch(across) * t);
                 let f = &solid.frame;

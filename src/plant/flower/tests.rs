@@ -120,6 +120,27 @@ fn fruits_have_their_measures() {
     assert_eq!(of(&organs, "sepal").pieces().len(), 5);
 }
 
+/// Expected: a poppy's capsule is as long as its size with the disc and as wide as written, widest above its middle; 8 to 14 rays lie on the
+/// disc, which they nearly reach across. All of it is a pod.
+#[test]
+fn a_capsule_bears_its_stigma() {
+    for seed in 0..20 {
+        let (_, organs) = draw("Capsule(aspect: 0.8, disc: 0.75)", 1.0, seed);
+        assert!(organs.iter().all(|o| o.kind == OrganKind::Pod));
+        let body = of(&organs, "pod");
+        let (lo, hi) = body.bounds().unwrap();
+        assert!((hi.z / SIZE - 1.0).abs() < 1e-3 && ((hi - lo).x / SIZE - 0.8).abs() < 0.03, "{lo} {hi}");
+        let far = |p: &Vec3| p.truncate().length();
+        let widest = body.positions.iter().max_by(|a, b| far(a).total_cmp(&far(b))).unwrap();
+        assert!((0.5..0.8).contains(&(widest.z / SIZE)), "{widest}");
+        let stigma = of(&organs, "stigma");
+        assert!((8..=14).contains(&stigma.pieces().len()), "{}", stigma.pieces().len());
+        let reach = stigma.positions.iter().map(far).fold(0.0, f32::max) / (0.5 * 0.75 * 0.8 * SIZE);
+        assert!((0.95..1.2).contains(&reach), "{reach}");
+        assert!(stigma.positions.iter().all(|p| p.z > 0.85 * SIZE));
+    }
+}
+
 /// Expected: silks and husks as many as written; a tassel has its rachis and branches, and all is set with spikelets.
 #[test]
 fn maize_has_its_silks_and_its_tassel() {
