@@ -1,8 +1,11 @@
-//! How old each leaf of a plant is: what its colour follows from.
+//! How old each leaf of a plant is, what its colour follows from; and when each comes out.
 
-use super::growth::Growth;
+use super::desc::{PlantDesc, Stage};
+use super::growth::{Growth, growth};
 use super::stage::BUD;
 use super::stems;
+use crate::math::lerp;
+use crate::sampling::Stream;
 use std::collections::BTreeMap;
 
 /// How old one leaf is.
@@ -13,6 +16,17 @@ pub struct LeafAge {
     pub unfolded: f32,
     /// Days since it could first be seen.
     pub days: f32,
+}
+
+/// A leaf over time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LeafLife {
+    /// Age of the plant when it comes out of the bud, days.
+    pub appears_days: f32,
+    /// Length of its blade when it is largest, metres.
+    pub blade: f32,
+    /// The blade's width then, metres.
+    pub width: f32,
 }
 
 /// The ages of all leaves of the main shoot, by their numbers; where several stems rise from one place, those of all.
@@ -41,4 +55,25 @@ fn born(growth: &Growth<'_>, layer: usize) -> f32 {
         Some(before) => 0.5 * (stages[before].days.f32() + stages[first].days.f32()),
         None => 0.0,
     }
+}
+
+/// When the leaves of the plant of `stream` come out, and how large they become, all sizes times `vigour`: those of its main shoot, and of
+/// all stems where several rise from one place.
+pub(super) fn leaf_lives(desc: &PlantDesc, stream: &Stream, vigour: f32) -> BTreeMap<u16, LeafLife> {
+    let mut lives: BTreeMap<u16, LeafLife> = BTreeMap::new();
+    let mut before = 0.0;
+    for stage in &desc.stages {
+        let days = stage.days.f32();
+        let Some(now) = growth(desc, Stage::Age(days), stream, vigour) else { continue };
+        let others = stems::others(&now);
+        let leaves = others.iter().flat_map(|stem| now.leaves.iter().filter_map(|leaf| stem.leaf(leaf, &now)));
+        for leaf in leaves.chain(now.leaves.iter().cloned()) {
+            let appears_days = lerp(before, days, BUD / leaf.blade);
+            let life = lives.entry(leaf.number).or_insert(LeafLife { appears_days, blade: 0.0, width: 0.0 });
+            life.blade = life.blade.max(leaf.blade);
+            life.width = life.width.max(leaf.width);
+        }
+        before = days;
+    }
+    lives
 }

@@ -6,11 +6,9 @@
 use super::desc::{PlantDesc, Stage};
 use super::kind::LeafKind;
 use super::stage::{BUD, StageDesc};
-use super::stems;
 use crate::math::lerp;
 use crate::ron_file::{Bound, Vary};
 use crate::sampling::{Purpose, Stream};
-use std::collections::BTreeMap;
 use std::f32::consts::PI;
 
 /// Shortest cell of a blade's mesh unless coarser ones are asked for, metres: about what four pixels of a field camera see.
@@ -44,17 +42,6 @@ pub(super) struct LeafNow<'a> {
     pub(super) rigged: bool,
     /// This leaf's own numbers.
     pub(super) stream: Stream,
-}
-
-/// A leaf over time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LeafLife {
-    /// Age of the plant when it comes out of the bud, days.
-    pub appears_days: f32,
-    /// Length of its blade when it is largest, metres.
-    pub blade: f32,
-    /// The blade's width then, metres.
-    pub width: f32,
 }
 
 /// The plant as it is today, before anything has a shape.
@@ -163,27 +150,6 @@ pub(super) fn age(desc: &PlantDesc, stage: Stage) -> f32 {
         between.map_or(0.0, |Between { from, to, u }| lerp(from.days.f32(), to.days.f32(), u))
     };
     covering(desc, code).map_or_else(between, |(_, days)| days)
-}
-
-/// When the leaves of the plant of `stream` come out, and how large they become, all sizes times `vigour`: those of its main shoot, and of
-/// all stems where several rise from one place.
-pub(super) fn leaf_lives(desc: &PlantDesc, stream: &Stream, vigour: f32) -> BTreeMap<u16, LeafLife> {
-    let mut lives: BTreeMap<u16, LeafLife> = BTreeMap::new();
-    let mut before = 0.0;
-    for stage in &desc.stages {
-        let days = stage.days.f32();
-        let Some(now) = growth(desc, Stage::Age(days), stream, vigour) else { continue };
-        let others = stems::others(&now);
-        let leaves = others.iter().flat_map(|stem| now.leaves.iter().filter_map(|leaf| stem.leaf(leaf, &now)));
-        for leaf in leaves.chain(now.leaves.iter().cloned()) {
-            let appears_days = lerp(before, days, BUD / leaf.blade);
-            let life = lives.entry(leaf.number).or_insert(LeafLife { appears_days, blade: 0.0, width: 0.0 });
-            life.blade = life.blade.max(leaf.blade);
-            life.width = life.width.max(leaf.width);
-        }
-        before = days;
-    }
-    lives
 }
 
 /// Azimuth from which the leaves of the plant of `stream` count, radians clockwise from north.

@@ -61,7 +61,7 @@ mod tuft;
 mod twine;
 mod whorl;
 
-pub use age::LeafAge;
+pub use age::{LeafAge, LeafLife};
 pub use bound::most_triangles;
 pub use condition::{Condition, ConditionDesc};
 pub use desc::{Form, PlantDesc, Stage};
@@ -76,7 +76,6 @@ pub use twine::TwineDesc;
 
 use crate::sampling::Stream;
 use growth::Growth;
-pub use growth::LeafLife;
 use std::collections::BTreeMap;
 
 /// One plant: its organs in plant coordinates (metres, growth axis +z, origin where the stem meets the soil).
@@ -115,7 +114,7 @@ pub fn age_days(desc: &PlantDesc, stage: Stage) -> f32 {
 
 /// When the leaves of the plant of `stream` come out, and how large they become, by their numbers; `vigour` is a factor on its sizes.
 pub fn leaf_lives(desc: &PlantDesc, stream: &Stream, vigour: f32) -> BTreeMap<u16, LeafLife> {
-    growth::leaf_lives(desc, stream, vigour)
+    age::leaf_lives(desc, stream, vigour)
 }
 
 /// What a plant is grown with beyond its species, stage and stream.

@@ -11,7 +11,7 @@
 
 use super::axis::Foot;
 use super::desc::Form;
-use super::growth::{Growth, LeafNow};
+use super::growth::{self, Growth, LeafNow};
 use super::stage::BUD;
 use crate::math::{direction, lerp};
 use crate::sampling::{Purpose, Stream};
@@ -71,7 +71,7 @@ pub(super) fn others(growth: &Growth<'_>) -> Vec<OtherStem> {
     let count = growth.tillers.min(MOST).min((MOST_LEAVES / each).saturating_sub(1));
     let stem = |k: usize| {
         let mut stream = growth.stream.child(Purpose::Plant, 100 + k as u64);
-        let towards = super::turn(growth.stream) + GOLDEN * k as f32 + stream.range32(-0.4, 0.4);
+        let towards = growth::turn(growth.stream) + GOLDEN * k as f32 + stream.range32(-0.4, 0.4);
         let out = direction(FRAC_PI_2, towards);
         let foot = Foot {
             point: out * stream.range32(APART.0, APART.1),

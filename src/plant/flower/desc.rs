@@ -1,6 +1,5 @@
 //! Flowers and fruits as they are written, and how many triangles they have at most.
 
-use super::pen::LOBE_SIDES;
 use crate::geometry::outline::Outline;
 use crate::math::{Frame, Vec3};
 use crate::ron_file::{Count, Finite, Fraction, NonNegative, Num, Positive, PositiveCount, Vary};
@@ -10,6 +9,8 @@ use serde::{Deserialize, Serialize};
 const SHEET: f64 = 2.0 * 10.0 * 8.0;
 /// The most triangles of a solid.
 const SOLID: f64 = 2.0 * 10.0 * 12.0;
+/// Corners round a lobe of a solid.
+pub(super) const LOBE_SIDES: u32 = 4;
 /// The most triangles of a lobe of a solid.
 const LOBE: f64 = 2.0 * 10.0 * LOBE_SIDES as f64;
 /// The most triangles of a strand.

@@ -2,6 +2,7 @@
 //!
 //! One flower has many small parts, so a plant's parts of one kind and material are one mesh: one organ, one label.
 
+use super::desc::LOBE_SIDES;
 use crate::geometry::Mesh;
 use crate::geometry::outline::{self, Outline};
 use crate::math::{Frame, Vec3, vec2};
@@ -76,9 +77,6 @@ pub(super) struct Solid {
     /// Depth of the notch at its tip, of its length.
     pub(super) notch: f32,
 }
-
-/// Corners round a lobe of a solid.
-pub(super) const LOBE_SIDES: u32 = 4;
 
 /// The outline of an ellipsoid.
 pub(super) const ROUND: Outline = Outline::Power { a: 0.5, b: 0.5 };
