@@ -6,9 +6,8 @@
 use super::run::{self, MODEL, ModelCard, PLAN, TrainedModel};
 #[cfg(feature = "train")]
 use super::torch::{Model, Where};
-use super::weights::Array;
+use super::weights::{self, Array};
 use crate::{Error, Result};
-use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
 /// One trained model, or several that differ in their weights alone.
@@ -33,7 +32,7 @@ impl Ensemble {
             return TrainedModel::open(path).map(Self::from);
         };
         let TrainedModel { card, values } = TrainedModel::open(first)?;
-        let mut together = Sha256::new_with_prefix(&card.weights_sha256);
+        let mut hashes = vec![card.weights_sha256.clone()];
         let mut members = vec![values];
         for run in others {
             let other = TrainedModel::open(run)?;
@@ -43,14 +42,10 @@ impl Ensemble {
                     .help("runs of one folder answer together where classes, bands and sizes are the same: name one of them")
                     .in_file(run));
             }
-            together.update(&other.card.weights_sha256);
+            hashes.push(other.card.weights_sha256);
             members.push(other.values);
         }
-        let weights_sha256 = match members.len() {
-            1 => card.weights_sha256.clone(),
-            _ => hex::encode(together.finalize()),
-        };
-        Ok(Self { card: ModelCard { weights_sha256, ..card }, members })
+        Ok(Self { card: ModelCard { weights_sha256: weights::hash_together(&hashes), ..card }, members })
     }
 
     /// How many models answer.

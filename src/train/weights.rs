@@ -138,6 +138,14 @@ pub fn hash(arrays: &[Array]) -> String {
     hex::encode(sha.finalize())
 }
 
+/// Over the weights of several networks by their hashes, in their order; of one, its own.
+pub fn hash_together(hashes: &[String]) -> String {
+    match hashes {
+        [one] => one.clone(),
+        all => hex::encode(Sha256::digest(all.concat())),
+    }
+}
+
 /// Over the arrays and the text beside them.
 fn checksum(arrays: &[Array], text: &str) -> String {
     hex::encode(Sha256::new().chain_update(hash(arrays)).chain_update(text).finalize())

@@ -50,7 +50,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         session::evaluate(&trained, &args.set, &args.machine.precision, threads, &machine, signals.heed(), &mut see)?;
     let title = format!("{} on {}", args.run.display(), args.set.folder.display());
     let lead = format!(
-        "{}, {} parameters, {}{}.",
+        "{}, {} parameters, {}{}{}.",
         card.network.about().trim_end_matches('.'),
         card.parameters,
         match card.resize {
@@ -58,7 +58,8 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
             Resize::LongSides(_) => format!("at long sides of {} pixels", card.resize.name()),
             Resize::Scale(_) => format!("at the images' size {}", card.resize.name()),
         },
-        if card.refine.is_none() { ", not refined".into() } else { format!(", refined by {}", card.refine.name()) }
+        if card.refine.is_none() { ", not refined".into() } else { format!(", refined by {}", card.refine.name()) },
+        if trained.size() > 1 { format!("; the mean of {} runs", trained.size()) } else { String::new() }
     );
     let paths = report::write(&out, &title, &lead, &report, &shots.kept, &card.classes.colors())?;
     furrow::tell!("{}", report.summary().markdown().trim_end());
