@@ -58,7 +58,9 @@ pub fn scores(models: &[Model], inputs: &[Input]) -> Result<Scores> {
         for model in models {
             add(&mut mean, model.probabilities(&input.pixels, input.size, size)?);
         }
-        mean.iter_mut().for_each(|sum| *sum /= models.len() as f32);
+        for sum in &mut mean {
+            *sum /= models.len() as f32;
+        }
         if input.size == size && inputs.len() > 1 {
             finest = Some(mean.clone());
         }
