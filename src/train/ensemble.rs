@@ -3,7 +3,7 @@
 //! What networks are unsure of depends on their seed; what they agree on does not. Source: Lakshminarayanan, Pritzel & Blundell 2017, "Simple
 //! and scalable predictive uncertainty estimation using deep ensembles".
 
-use super::run::{self, MODEL, ModelCard, PLAN, TrainedModel};
+use super::run::{self, ModelCard, TrainedModel};
 #[cfg(feature = "train")]
 use super::torch::{Model, Where};
 use super::weights::{self, Array};
@@ -66,14 +66,14 @@ impl Ensemble {
 
 /// The runs that lie in a folder, in order of their names; none where it is a run itself, or none of its folders is.
 fn runs(path: &Path) -> Result<Vec<PathBuf>> {
-    if run::folder(path) != path || [MODEL, PLAN].iter().any(|file| path.join(file).exists()) || !path.is_dir() {
+    if run::folder(path) != path || run::is_run(path) || !path.is_dir() {
         return Ok(Vec::new());
     }
     let mut runs = Vec::new();
     for entry in std::fs::read_dir(path).map_err(Error::reading(path))? {
         let folder = entry.map_err(Error::reading(path))?.path();
         // A training that is not done is told when it is opened.
-        if [MODEL, PLAN].iter().any(|file| folder.join(file).is_file()) {
+        if run::is_run(&folder) {
             runs.push(folder);
         }
     }

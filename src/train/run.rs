@@ -185,18 +185,22 @@ pub struct Results {
     pub images_per_second: f64,
 }
 
+/// Whether a training, begun or done, lies in this folder.
+pub fn is_run(folder: &Path) -> bool {
+    [MODEL, PLAN].iter().any(|file| folder.join(file).exists())
+}
+
 /// The folder of a run that a user means: the folder itself where a run of that name lies; else that of a network that ships, where it
 /// is a bare name such as `any-field`; else what was written.
 pub fn folder(written: &Path) -> PathBuf {
-    let is_run = [MODEL, PLAN].iter().any(|file| written.join(file).exists());
-    let bare = written.to_str().is_some_and(shipped::is_bare) && !is_run;
+    let bare = written.to_str().is_some_and(shipped::is_bare) && !is_run(written);
     let named = bare.then(|| shipped::networks().ok()).flatten().map(|networks| networks.join(written));
     named.filter(|folder| folder.join(MODEL).is_file()).unwrap_or_else(|| written.to_owned())
 }
 
 /// An error where a run, begun or done, lies in a folder that another model is to be written to.
 pub fn check_untaken(folder: &Path) -> Result<()> {
-    if [MODEL, PLAN].iter().any(|file| folder.join(file).exists()) {
+    if is_run(folder) {
         return Err(Error::misuse("there is a trained model in this folder already")
             .in_file(folder)
             .help("give another --out"));
