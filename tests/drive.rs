@@ -44,6 +44,30 @@ fn labels(field: &Field) -> render::LabelMap {
     field.threads().install(|| render::label(geometry, &scene.parts, &scene.camera, window))
 }
 
+/// Rationale: a reader of poses takes all rows of an image to be seen from one place. Expected: planning says so where a phone's rolling shutter drives,
+/// and not of a global shutter.
+#[test]
+fn one_pose_for_the_rows_of_a_rolling_shutter_is_told() {
+    let (_keep, folder) = scratch();
+    std::fs::create_dir_all(&folder).unwrap();
+    std::fs::write(folder.join("plane.obj"), "v -2 -2 0\nv 2 -2 0\nv 2 2 0\nv -2 2 0\nf 1 2 3 4\n").unwrap();
+    for (camera, rolls) in [("Phone(height_m: 0.5)", true), ("JaiAd130(height_m: 0.5)", false)] {
+        let text = format!(
+            "Field(camera: {camera}, lights: [Overcast()], drive: (frames: 2, rate_hz: 10, path: Straight(heading_deg: 0, speed_m_s: 0.5)), \
+             models: [(file: \"plane.obj\", class: Soil, up: Z)])"
+        );
+        let (scene, out) = (folder.join("phone.ron"), folder.join(camera.split('(').next().unwrap()));
+        std::fs::write(&scene, text).unwrap();
+        let mut command =
+            trace(&["dataset", "plan", "--scene", path(&scene), "--out", path(&out), "--width", "48", "--count", "2"]);
+        let ended = command.args(["--format", "colmap,mots,nerf,tum"]).output().unwrap();
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert!(ended.status.success(), "{said}");
+        let words = "colmap, nerf, tum cannot tell a rolling shutter: poses are those of the middle row";
+        assert_eq!(said.contains(words), rolls, "{said}");
+    }
+}
+
 /// Expected: over the plane z = 0 seen from height h, a camera that moves by b to its right sees points f · b / h pixels further left.
 #[test]
 fn flow_over_a_plane_is_that_of_the_pinhole() {

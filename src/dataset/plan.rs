@@ -13,6 +13,7 @@ use super::split::Shares;
 use super::{File, checksum_record, format, pack};
 use crate::ablation::{Edit, FULL};
 use crate::job::{Renderer, SceneFile};
+use crate::sensor::Camera;
 use crate::settings::{Engine, RenderOptions};
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -174,6 +175,7 @@ pub(super) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
     pack::check(&recipe)?;
     let mut told = field.warnings.clone();
     told.extend(warnings(&recipe)?);
+    told.extend(rolling(&recipe, camera)?);
     let scene_sha256 = field.hash.clone();
     Ok(Draft { recipe, files, warnings: told, scene: source, scene_sha256 })
 }
@@ -216,6 +218,14 @@ fn hash_of_copies(order: &Order, files: &[File], scene: &str, stop: &Arc<AtomicB
         .in_file(&order.scene)
         .help("name it relative to the file that needs it")),
     }
+}
+
+/// What formats with one pose for all rows lose of a camera that rolls.
+fn rolling(recipe: &Recipe, camera: &Camera) -> Result<Option<String>> {
+    let formats = format::all(recipe)?.into_iter().filter(|(_, format)| camera.rolls() && format.has_one_pose());
+    let names: Vec<String> = formats.map(|(name, _)| name.to_string()).collect();
+    let words = "cannot tell a rolling shutter: poses are those of the middle row";
+    Ok((!names.is_empty()).then(|| format!("{} {words}", names.join(", "))))
 }
 
 /// What the formats of a recipe cannot hold or do otherwise.

@@ -35,8 +35,15 @@ pub(super) fn blade(
     // Small leaves have fewer, not finer, segments.
     let (pairs, pinnules) = (pairs.min(MOST) as f32, pinnules.min(MOST) as f32);
     let pairs = pairs.min(length / (2.4 * segment)).max(1.0);
-    let mut ribbons =
-        Ribbons { rest: Rest::default(), skeleton, width: segment, count: 0, drawn: drawn(segment, cell) };
+    let half_width = |t: f32| half_width(t) * width;
+    let mut ribbons = Ribbons {
+        rest: Rest::default(),
+        skeleton,
+        half_width: Some(&half_width),
+        width: segment,
+        count: 0,
+        drawn: drawn(segment, cell),
+    };
     ribbons.strip(Vec3::ZERO, vec3(0.0, length, 0.0), Vec3::Z, Vec3::ZERO, segment, 2 * pairs.min(8.0) as u32);
     let whole =
         Limb { start: Vec3::ZERO, along: vec3(0.0, length, 0.0), up: Vec3::Z, pairs, reach: 0.5 * width / length };
@@ -59,6 +66,16 @@ pub(super) fn blade(
     ribbons.rest
 }
 
+/// How far branches at a share of their limb reach, of the longest.
+fn taper(t: f32) -> f32 {
+    (1.0 - t).max(0.0).powf(0.75)
+}
+
+/// Half of the width over the width, at a share of the length, of what holds the pinnae.
+pub(super) fn half_width(t: f32) -> f32 {
+    0.5 * taper(t)
+}
+
 /// The branches of a limb, pair by pair from its base, each with a stream of its own: those that grow later move no other.
 fn branches(limb: &Limb, stream: &Stream) -> Vec<(Limb, Stream)> {
     let length = limb.along.length();
@@ -76,7 +93,7 @@ fn branches(limb: &Limb, stream: &Stream) -> Vec<(Limb, Stream)> {
             let along = ahead * spread.cos() + out * spread.sin();
             let up = (limb.up * tilt.cos() - right * (side * tilt.sin())).normalize_or(limb.up);
             let up = (up - along * up.dot(along)).normalize_or(limb.up);
-            let reach = grown * limb.reach * length * (1.0 - t).powf(0.75) * own.range32(0.88, 1.12);
+            let reach = grown * limb.reach * length * taper(t) * own.range32(0.88, 1.12);
             // The width is that of the projection: a steep branch is as long as one that stands out.
             let along = along * (reach / spread.sin().max(0.5));
             all.push((Limb { start: limb.start + limb.along * t, along, up, pairs: 0.0, reach: 0.0 }, own));

@@ -1,6 +1,7 @@
 //! Kinds of leaves: what all leaves of a kind share in the species file, whatever their size.
 
 use super::organ::OrganKind;
+use super::{fern, ribbons};
 use crate::geometry::outline::Outline;
 use crate::ron_file::{Count, Finite, Fraction, NonNegative, Num, Positive, PositiveCount, Vary};
 use serde::{Deserialize, Serialize};
@@ -224,11 +225,21 @@ impl LeafKind {
         }
     }
 
-    /// Angle between midrib and the skeleton's branches, radians, and the half-width at each vein joint, metres, of a sheet of this width;
-    /// `None` for a blade that only bends along.
-    pub(super) fn branches(&self, outline: Outline, width: f32, veins: &[f32]) -> Option<(f32, Vec<f32>)> {
+    /// Half of the width over the width at a share of the length: of a sheet or leaflet its outline's, of a divided blade that of what holds
+    /// its pinnae.
+    pub(super) fn half_width(&self, t: f32) -> f32 {
+        match &self.shape {
+            Shape::Sheet { outline } | Shape::Leaflets { outline, .. } => outline.half_width(t),
+            Shape::Pinnate { bare, .. } => ribbons::half_width(bare.f32(), t),
+            Shape::Fern { .. } => fern::half_width(t),
+        }
+    }
+
+    /// Angle between midrib and the skeleton's branches, radians, and the half-width at each vein joint, metres, of a blade or leaflet of this
+    /// width; `None` for one that only bends along.
+    pub(super) fn branches(&self, width: f32, veins: &[f32]) -> Option<(f32, Vec<f32>)> {
         let angle = self.branch_angle_deg.unwrap_or(self.vein_angle_deg).f32().to_radians();
-        let halves = veins.iter().map(|t| (outline.half_width(*t) * width).max(1e-5));
+        let halves = veins.iter().map(|t| (self.half_width(*t) * width).max(1e-5));
         (0.1..1.5).contains(&angle).then(|| (angle, halves.collect()))
     }
 

@@ -151,14 +151,13 @@ fn cells(leaf: &LeafNow<'_>) -> (usize, usize) {
 fn measures(leaf: &LeafNow<'_>) -> Measures {
     let count = leaf.kind.joints.get() as usize;
     let (veins, secondaries) = match &leaf.kind.shape {
-        Shape::Sheet { outline } => {
-            let veins = leaf.kind.joints_along(count);
-            let branches = leaf.kind.branches(*outline, leaf.width, &veins);
-            (veins, branches)
-        }
         // Their joints are the leaflets'.
         Shape::Leaflets { .. } => ((1..=count).map(|k| k as f32 / (count as f32 + 1.0)).collect(), None),
-        _ => (leaf.kind.joints_along(count), None),
+        _ => {
+            let veins = leaf.kind.joints_along(count);
+            let branches = leaf.kind.branches(leaf.width, &veins);
+            (veins, branches)
+        }
     };
     Measures {
         stalk: leaf.stalk,

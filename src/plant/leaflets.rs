@@ -59,7 +59,7 @@ pub(super) fn blade(
             stalk: 0.0,
             stalk_joints: 1,
             length: along,
-            secondaries: leaf.kind.branches(*outline, width, &veins),
+            secondaries: leaf.kind.branches(width, &veins),
             veins: veins.clone(),
         });
         let chain = skeleton.along().len();

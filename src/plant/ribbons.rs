@@ -7,7 +7,7 @@
 
 use super::blade::Rest;
 use super::growth::CELL;
-use super::skeleton::Skeleton;
+use super::skeleton::{Skeleton, Weights};
 use crate::math::{Vec3, lerp, smoothstep, vec2, vec3};
 use crate::sampling::{Purpose, Stream};
 use std::f32::consts::PI;
@@ -28,6 +28,8 @@ pub(super) struct Ribbons<'a> {
     pub(super) rest: Rest,
     /// The joints that carry it.
     pub(super) skeleton: &'a Skeleton,
+    /// Half of the blade's width at a share of its length, metres; none of what the chain alone carries.
+    pub(super) half_width: Option<&'a dyn Fn(f32) -> f32>,
     /// Width of a segment, metres.
     pub(super) width: f32,
     /// How many ribbons there are.
@@ -76,7 +78,7 @@ impl Ribbons<'_> {
             let s = i as f32 / pieces as f32;
             let centre = start + along * s + bow * (s * s);
             let half = 0.5 * wider * width(s);
-            let tie = self.skeleton.weights_on_chain(centre.y);
+            let tie = self.tie(centre);
             let first = self.rest.positions.len() as u32;
             for (k, side) in [-1.0_f32, 0.0, 1.0].into_iter().enumerate() {
                 let keel = if side == 0.0 { -0.55 * half } else { 0.0 };
@@ -88,6 +90,13 @@ impl Ribbons<'_> {
             }
             previous = Some(first);
         }
+    }
+
+    /// Which joints carry a point: those of the chain at the rachis, further out those of the branches beside it.
+    fn tie(&self, p: Vec3) -> Weights {
+        let Some(half_width) = self.half_width else { return self.skeleton.weights_on_chain(p.y) };
+        let across = p.x.abs() / half_width(p.y / self.skeleton.length()).max(1e-5);
+        self.skeleton.weights(p.x, p.y, across)
     }
 
     /// A pinna with its pairs of lobes, the last of them being its own tip. Each lobe has a stream of its own: those that grow later move no other.
@@ -159,6 +168,24 @@ pub(super) struct Division {
     pub(super) cell: f32,
 }
 
+/// Where on the rachis the foremost pinnae stand, of its length.
+const LAST: f32 = 0.96;
+
+/// Where the first of them stand on a rachis that is bare so far.
+fn first(bare: f32) -> f32 {
+    lerp(0.08, 1.0, bare)
+}
+
+/// How far the pinnae at a share of the way from the first to the last reach, of the longest.
+fn arch(u: f32) -> f32 {
+    (PI * u.powf(0.8)).sin().max(0.05).powf(0.7)
+}
+
+/// Half of the width over the width, at a share of the length, of what holds the pinnae.
+pub(super) fn half_width(bare: f32, t: f32) -> f32 {
+    0.5 * arch(((t - first(bare)) / (LAST - first(bare))).clamp(0.0, 1.0))
+}
+
 /// Share of the pinnae that a leaf with a long bare rachis lacks.
 const LACKING: f32 = 0.5;
 
@@ -169,8 +196,15 @@ pub(super) fn blade(division: Division, width: f32, skeleton: &Skeleton, stream:
     // Small leaves have fewer, not finer, segments.
     let pairs = (pairs.min(MOST) as f32).min(length * (1.0 - bare) / (1.6 * segment)).max(1.0);
     let lobes = (lobes.min(MOST) as f32).min(0.5 * width / (3.0 * segment));
-    let mut ribbons =
-        Ribbons { rest: Rest::default(), skeleton, width: segment, count: 0, drawn: drawn(segment, cell) };
+    let half_width = |t: f32| half_width(bare, t) * width;
+    let mut ribbons = Ribbons {
+        rest: Rest::default(),
+        skeleton,
+        half_width: Some(&half_width),
+        width: segment,
+        count: 0,
+        drawn: drawn(segment, cell),
+    };
     let rachis = (Vec3::ZERO, vec3(0.0, length, 0.0), Vec3::Z, Vec3::ZERO);
     ribbons.band(rachis, (2 * pairs.min(12.0) as u32).max(8), |s| {
         // A thread that widens where the pinnae stand; with few of them the tip is a little blade itself.
@@ -183,9 +217,8 @@ pub(super) fn blade(division: Division, width: f32, skeleton: &Skeleton, stream:
             let mut own = stream.child(Purpose::Leaf, (2 * k + far) as u64);
             let stray = own.range32(-0.3, 0.3) / (pairs + 1.0);
             let u = (place + stray).clamp(0.03, 0.97);
-            let t = lerp(lerp(0.08, 1.0, bare), 0.96, u);
-            let arch = (PI * u.powf(0.8)).sin().max(0.05).powf(0.7);
-            let reach = grown * 0.5 * width * arch * own.range32(0.8, 1.15);
+            let t = lerp(first(bare), LAST, u);
+            let reach = grown * 0.5 * width * arch(u) * own.range32(0.8, 1.15);
             let spread = lerp(lerp(1.1, 0.75, bare), 0.5, u) + own.range32(-0.14, 0.14);
             let tilt = own.range32(-0.35, 0.85) * (1.0 - 0.6 * bare);
             let lacking = own.chance(f64::from(LACKING * bare));

@@ -17,7 +17,8 @@ const SPREAD: f32 = 0.55;
 pub(super) fn pair(plan: &Stipules, leaf: &LeafNow<'_>, skeleton: &Skeleton) -> Rest {
     let mut stream = leaf.stream.child(Purpose::Leaf, 103);
     let long = plan.length.f32() * leaf.blade;
-    let mut ribbons = Ribbons { rest: Rest::default(), skeleton, width: 0.2 * long, count: 0, drawn: 1.0 };
+    let rest = Rest::default();
+    let mut ribbons = Ribbons { rest, skeleton, half_width: None, width: 0.2 * long, count: 0, drawn: 1.0 };
     let lobes = plan.lobes.get().min(12.0) as usize;
     for side in [-1.0_f32, 1.0] {
         let heading = |angle: f32, rise: f32| vec3(side * angle.sin(), angle.cos(), rise).normalize_or(Vec3::Y);

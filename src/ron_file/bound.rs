@@ -61,6 +61,8 @@ bounds! {
     NonNegative { const MIN: f64 = 0.0; const WORDS: &'static str = "0 or above"; }
     /// Between 0 and 1.
     Fraction { const MIN: f64 = 0.0; const MAX: f64 = 1.0; const WORDS: &'static str = "between 0 and 1"; }
+    /// A factor on what is usual.
+    Factor { const MIN: f64 = 0.0; const MAX: f64 = 10.0; const ABOVE_MIN: bool = true; const WORDS: &'static str = "above 0, at most 10"; }
     /// A whole number, 0 or above.
     Count { const MIN: f64 = 0.0; const MAX: f64 = 1e6; const WHOLE: bool = true; const WORDS: &'static str = "a whole number from 0 to 1000000"; }
     /// A whole number, 1 or above.

@@ -3,9 +3,10 @@
 //! Days count from the emergence of the field's first crop. A scene file without days describes its field on one day; the same field on
 //! another is younger or older by the days between.
 
-use crate::ron_file::{Count, Num, Positive, Vary};
+use crate::ron_file::{Count, Factor, Num, Positive, Vary};
 use crate::{Error, Result};
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// Latest day.
 const LATEST: u32 = 1000;
@@ -19,6 +20,7 @@ const LATEST: u32 = 1000;
 /// let some: DaysDesc = ron::from_str("(on: [8, 9, 30], pace: Normal(mean: 1, sd: 0.1))").unwrap();
 /// assert_eq!(some.list().unwrap(), [8, 9, 30]);
 /// assert!(ron::from_str::<DaysDesc>("(from: 40, to: 8)").unwrap().list().is_err());
+/// assert!(ron::from_str::<DaysDesc>("(on: [])").is_err() && ron::from_str::<DaysDesc>("(pace: 11)").is_err());
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default, rename = "Days")]
@@ -33,11 +35,11 @@ pub struct DaysDesc {
     #[schemars(extend("x-example" = "4"))]
     pub every: Num<Count>,
     /// The days one by one, in place of `from`, `to` and `every`.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty", deserialize_with = "some_days")]
     #[schemars(extend("x-example" = "[8, 9, 30]"))]
     pub on: Vec<Num<Count>>,
     /// How many days' growth a plant makes in a day, drawn for each plant: some are ahead of others, and more so from day to day.
-    pub pace: Vary<Positive>,
+    pub pace: Vary<Factor>,
     /// Days in which rain makes 63 % of the crusts: of the soil's layers with `clods` below 0.5. It begins ten days before emergence, with
     /// sowing.
     pub crust_days: Num<Positive>,
@@ -88,6 +90,16 @@ impl DaysDesc {
     pub(super) fn crust(&self, day: u32) -> f32 {
         const SOWN_BEFORE: f32 = 10.0;
         -(-(day as f32 + SOWN_BEFORE) / self.crust_days.f32()).exp_m1()
+    }
+}
+
+/// A list that somebody wrote names a day at least.
+fn some_days<'de, D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Vec<Num<Count>>, D::Error> {
+    let days = Vec::<Num<Count>>::deserialize(deserializer)?;
+    if days.is_empty() {
+        Err(D::Error::custom("`on` names no day: write one at least, or leave it out"))
+    } else {
+        Ok(days)
     }
 }
 

@@ -31,6 +31,11 @@ pub(super) trait OfFields: Sync {
     fn names_photographs(&self) -> bool {
         false
     }
+
+    /// As [`Format::has_one_pose`].
+    fn has_one_pose(&self) -> bool {
+        false
+    }
 }
 
 impl<T: OfFields> Format for T {
@@ -48,6 +53,10 @@ impl<T: OfFields> Format for T {
 
     fn names_photographs(&self) -> bool {
         OfFields::names_photographs(self)
+    }
+
+    fn has_one_pose(&self) -> bool {
+        OfFields::has_one_pose(self)
     }
 
     fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {

@@ -51,6 +51,11 @@ pub trait Format: Sync {
         false
     }
 
+    /// Whether it tells one pose for all rows of an image, and cannot tell a rolling shutter.
+    fn has_one_pose(&self) -> bool {
+        false
+    }
+
     /// Whether it holds [`Rendered::flows`](crate::dataset::sample::Rendered::flows), which are worked out for it alone.
     fn needs_flow(&self) -> bool {
         false

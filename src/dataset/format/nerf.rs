@@ -20,6 +20,10 @@ pub(super) struct Writer;
 const FOLDER: &str = "nerf";
 
 impl OfFields for Writer {
+    fn has_one_pose(&self) -> bool {
+        true
+    }
+
     fn by_day(&self) -> bool {
         true
     }

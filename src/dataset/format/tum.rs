@@ -16,6 +16,10 @@ pub(super) struct Writer;
 const FOLDER: &str = "tum";
 
 impl OfFields for Writer {
+    fn has_one_pose(&self) -> bool {
+        true
+    }
+
     fn field(&self, _set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
         for (camera, of) in drives::by_camera(images) {
             let mut text = "# time_s x_m y_m z_m qx qy qz qw\n".to_owned();

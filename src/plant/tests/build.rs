@@ -89,6 +89,49 @@ fn joints_stand_where_the_species_file_says() {
     }
 }
 
+/// Rationale: a real leaf of carrot or mayweed twists pinna by pinna, and a blade that bends along its rachis alone is a plane. Expected: it has
+/// branches at its vein joints; where these rise by 30° at the midrib, the outer half of a blade rises by sin 30° of its distance along the branch,
+/// what lies on the rachis by nothing. Source: Di Cicco et al. 2017, §III-A, for the branches; a rotation about a hinge at the midrib.
+#[test]
+fn divided_blades_bend_branch_by_branch() {
+    for (eppo, shape) in [
+        ("DAUCA", "Fern(pairs: 6, pinnules: 4, segment_mm: 1)"),
+        ("MATIN", "Pinnate(pairs: 10, lobes: 3, segment_mm: 0.7, bare: 0.14)"),
+    ] {
+        assert!(
+            grow(&page(eppo), Stage::Bbch(16), &stream(1))
+                .leaf_axes()
+                .any(|axis| axis.joints.iter().any(|joint| joint.name.to_string() == "STR2")),
+            "{eppo} has no branches"
+        );
+        let grown = |bend: &str| {
+            let text = format!(
+                r#"(form: Dissected, kinds: {{"leaf": (shape: {shape}, wobble_deg: 0, roll_deg: 0, branch_bend_deg: ({bend}, 0))}}, lean_deg: 0, stages: [
+                (bbch: 12, days: 3, hypocotyl_mm: 80, stem_mm: 1, layers: [(kind: "leaf", blade_mm: 50, width_mm: 24, angle_deg: 90)])])"#
+            );
+            let desc: PlantDesc = crate::ron_file::RonFile::of(&text).parse().unwrap();
+            let plant = grow(&desc, Stage::Bbch(12), &stream(4));
+            let blade = plant.organs.into_iter().find(|o| o.kind == OrganKind::Blade).unwrap();
+            (blade.mesh.positions, blade.axis.unwrap())
+        };
+        let ((flat, axis), (bent, _)) = (grown("0"), grown("30"));
+        let along = (axis.tip - axis.base).normalize();
+        let across = |p: Vec3| (p - axis.base - along * (p - axis.base).dot(along)).truncate().length();
+        let widest = flat.iter().map(|p| across(*p)).fold(0.0_f32, f32::max);
+        let rise = |least: f32, most: f32| {
+            let of = flat.iter().zip(&bent).filter(|(p, _)| (least..most).contains(&(across(**p) / widest)));
+            let all: Vec<f32> = of.map(|(p, q)| (q.z - p.z) / across(*p).max(1e-5)).collect();
+            all.iter().sum::<f32>() / all.len() as f32
+        };
+        assert!(
+            flat.iter().zip(&bent).filter(|(p, _)| across(**p) < 1e-5).all(|(p, q)| p.distance(*q) < 1e-5),
+            "{eppo}"
+        );
+        let outer = rise(0.5, 1.1) * 55f32.to_radians().sin();
+        assert!((outer - 0.5).abs() < 0.1, "{eppo}: {outer}");
+    }
+}
+
 /// Rationale: a thistle pricks. Expected: spines as long as the species file says, some above the blade and some below, on the leaves that
 /// ask for them and on no other. Source: 1.5-3 mm, SLU Ogräsrådgivaren.
 #[test]

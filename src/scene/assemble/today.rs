@@ -5,7 +5,7 @@
 
 use super::season::growths;
 use crate::plant::{self, Stage};
-use crate::ron_file::{Positive, RonFile, Step, Vary};
+use crate::ron_file::{Factor, RonFile, Step, Vary};
 use crate::sampling::{Purpose, Stream};
 use crate::scene::desc::{FieldDesc, Growth};
 use crate::scene::library::Library;
@@ -29,7 +29,7 @@ pub(super) struct Today {
     /// The day that the scene file describes.
     written: f32,
     /// How many days' growth a plant makes in one.
-    pace: Vary<Positive>,
+    pace: Vary<Factor>,
 }
 
 impl Today {

@@ -159,6 +159,12 @@ impl LidarDesc {
             return Err(Error::input(words).help(format!("give `beams` 1 to {MOST_BEAMS}")));
         }
         let elevations_deg = self.beams.elevations_deg();
+        let mut sorted = elevations_deg.clone();
+        sorted.sort_by(f64::total_cmp);
+        if let Some(pair) = sorted.windows(2).find(|pair| pair[0] >= pair[1]) {
+            return Err(Error::input(format!("two of its beams go to {} degrees", pair[0]))
+                .help("`Angles` names each elevation once; the first and the last of a `Fan` differ"));
+        }
         let (from, to) = (self.azimuth_deg.0.get(), self.azimuth_deg.1.get());
         if !(to > from && to - from <= 360.0 && from >= -360.0 && to <= 360.0) {
             let words = format!("azimuth_deg goes from {from} to {to}");
@@ -256,6 +262,8 @@ mod tests {
     fn what_could_not_shoot_is_refused() {
         for (text, words) in [
             ("(beams: Angles([]))", "of 0 beams"),
+            ("(beams: Angles([-5, 3, -5]))", "two of its beams go to -5"),
+            ("(beams: Fan(count: 3, from_deg: 4, to_deg: 4))", "two of its beams go to 4"),
             ("(beams: Fan(count: 5000, from_deg: 0, to_deg: 10))", "of 5000 beams"),
             ("(azimuth_deg: (60, -60))", "from 60 to -60"),
             ("(azimuth_deg: (0, 400))", "from 0 to 400"),
