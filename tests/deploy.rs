@@ -8,7 +8,7 @@
 mod common;
 
 use common::dataset::{fail, path, succeed};
-use common::program::names;
+use common::program::{SMALL, names, trace};
 use common::python::{ask, python, torch};
 use common::training::{self, learn, normalised, pictures, stirred};
 use furrow::output::{self, Picture};
@@ -357,6 +357,38 @@ fn runs_of_one_folder_answer_together() {
     std::fs::copy(RGB.join(run::PLAN), runs.join("seed-3").join(run::PLAN)).unwrap();
     let words = fail(train(&arguments), 2);
     assert!(words.contains("seed-3") && words.contains("not done"), "{words}");
+}
+
+/// Rationale: who stores a dataset in packs would unpack all of it to predict some of its images. Expected: the same masks, overlays and picture names of
+/// a dataset in packs and in folders, near infrared among the bands; an image that is in no pack yet is told.
+#[test]
+fn images_in_packs_are_predicted_as_those_in_folders_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let answers = ["folders", "packs"].map(|kind| {
+        let (set, out) = (folder.path().join(kind), folder.path().join(format!("{kind}-answers")));
+        let mut make = trace(&["dataset", "--scene", SMALL, "--width", "48", "--spp", "1", "--count", "5"]);
+        make.args(["--split", "3,1,1", "--quiet", "--out"]).arg(&set);
+        if kind == "packs" {
+            make.args(["--pack", "2"]);
+        }
+        succeed(make);
+        assert_eq!(set.join("images/000001").is_dir(), kind == "folders");
+        succeed(train(&["predict", path(&RGBN), &format!("{}@1..4", path(&set)), "--out", path(&out)]));
+        names(&out)
+            .into_iter()
+            .filter(|name| name != "prediction.json")
+            .map(|name| (name.clone(), std::fs::read(out.join(name)).unwrap()))
+            .collect::<Vec<_>>()
+    });
+    assert_eq!(answers[0].len(), 6);
+    assert!(answers[0] == answers[1], "other predictions of packs");
+    let packs = folder.path().join("packs");
+    for pack in ["packs", "seals"] {
+        std::fs::remove_dir_all(packs.join(pack)).unwrap();
+    }
+    let out = folder.path().join("none");
+    let words = fail(train(&["predict", path(&RGBN), path(&packs), "--out", path(&out)]), 2);
+    assert!(words.contains("not there yet"), "{words}");
 }
 
 #[test]

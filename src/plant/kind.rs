@@ -1,7 +1,6 @@
 //! Kinds of leaves: what all leaves of a kind share in the species file, whatever their size.
 
 use super::organ::OrganKind;
-use super::{fern, ribbons};
 use crate::geometry::outline::Outline;
 use crate::ron_file::{Count, Finite, Fraction, NonNegative, Num, Positive, PositiveCount, Vary};
 use serde::{Deserialize, Serialize};
@@ -225,21 +224,11 @@ impl LeafKind {
         }
     }
 
-    /// Half of the width over the width at a share of the length: of a sheet or leaflet its outline's, of a divided blade that of what holds
-    /// its pinnae.
-    pub(super) fn half_width(&self, t: f32) -> f32 {
-        match &self.shape {
-            Shape::Sheet { outline } | Shape::Leaflets { outline, .. } => outline.half_width(t),
-            Shape::Pinnate { bare, .. } => ribbons::half_width(bare.f32(), t),
-            Shape::Fern { .. } => fern::half_width(t),
-        }
-    }
-
-    /// Angle between midrib and the skeleton's branches, radians, and the half-width at each vein joint, metres, of a blade or leaflet of this
-    /// width; `None` for one that only bends along.
-    pub(super) fn branches(&self, width: f32, veins: &[f32]) -> Option<(f32, Vec<f32>)> {
+    /// Angle between midrib and the skeleton's branches, radians, and the half-width at each vein joint, metres, of a blade or leaflet whose
+    /// half-width at a share of its length is this; `None` for one that only bends along.
+    pub(super) fn branches(&self, half_width: impl Fn(f32) -> f32, veins: &[f32]) -> Option<(f32, Vec<f32>)> {
         let angle = self.branch_angle_deg.unwrap_or(self.vein_angle_deg).f32().to_radians();
-        let halves = veins.iter().map(|t| (self.half_width(*t) * width).max(1e-5));
+        let halves = veins.iter().map(|t| half_width(*t).max(1e-5));
         (0.1..1.5).contains(&angle).then(|| (angle, halves.collect()))
     }
 

@@ -24,6 +24,8 @@ const SIDES: u32 = 9;
 const FEWEST: (f64, f64) = (8.0, 4.0);
 /// The same where cells are coarser than usual: a leaf of a few pixels.
 const FEWEST_COARSE: (f64, f64) = (4.0, 2.0);
+/// Pinnae stand on the rest of a rachis.
+const MOST_BARE: f32 = 0.9;
 /// A midrib never comes nearer to the soil than this, metres, plus [`LYING_WIDTH`] of the blade's width for its hanging
 /// sides: a leaf that would, lies on the soil's crumbs. Near the crown the bound falls to half the crown's height.
 const LYING: f32 = 0.004;
@@ -80,7 +82,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
         Shape::Pinnate { pairs, lobes, segment_mm, bare } => {
             let (pairs, lobes) = (pairs.draw(&mut stream) as usize, lobes.draw(&mut stream) as usize);
             let segment = segment_mm.draw32(&mut stream) * 1e-3;
-            let division = Division { pairs, lobes, bare: bare.f32().min(0.9), segment, cell: leaf.cell };
+            let division = Division { pairs, lobes, bare: bare.f32().min(MOST_BARE), segment, cell: leaf.cell };
             pressed(leaf, ribbons::blade(division, leaf.width, &skeleton, &mut stream))
         }
         Shape::Fern { pairs, pinnules, segment_mm } => {
@@ -150,14 +152,18 @@ fn cells(leaf: &LeafNow<'_>) -> (usize, usize) {
 
 fn measures(leaf: &LeafNow<'_>) -> Measures {
     let count = leaf.kind.joints.get() as usize;
-    let (veins, secondaries) = match &leaf.kind.shape {
+    let half_width = |t: f32| match &leaf.kind.shape {
+        Shape::Sheet { outline } | Shape::Leaflets { outline, .. } => outline.half_width(t) * leaf.width,
+        Shape::Pinnate { bare, .. } => ribbons::half_width(bare.f32().min(MOST_BARE), t) * leaf.width,
+        Shape::Fern { .. } => fern::half_width(t) * leaf.width,
+    };
+    let (veins, secondaries) = if let Shape::Leaflets { .. } = leaf.kind.shape {
         // Their joints are the leaflets'.
-        Shape::Leaflets { .. } => ((1..=count).map(|k| k as f32 / (count as f32 + 1.0)).collect(), None),
-        _ => {
-            let veins = leaf.kind.joints_along(count);
-            let branches = leaf.kind.branches(leaf.width, &veins);
-            (veins, branches)
-        }
+        ((1..=count).map(|k| k as f32 / (count as f32 + 1.0)).collect(), None)
+    } else {
+        let veins = leaf.kind.joints_along(count);
+        let branches = leaf.kind.branches(half_width, &veins);
+        (veins, branches)
     };
     Measures {
         stalk: leaf.stalk,

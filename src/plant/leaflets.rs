@@ -59,7 +59,7 @@ pub(super) fn blade(
             stalk: 0.0,
             stalk_joints: 1,
             length: along,
-            secondaries: leaf.kind.branches(width, &veins),
+            secondaries: leaf.kind.branches(|t| outline.half_width(t) * width, &veins),
             veins: veins.clone(),
         });
         let chain = skeleton.along().len();

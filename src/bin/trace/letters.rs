@@ -55,3 +55,28 @@ pub(crate) fn glyph(letter: char) -> [u8; HEIGHT] {
         _ => [0; HEIGHT],
     }
 }
+
+/// Writes words into a picture of this width, from its top left corner on; a dot is so many pixels wide and high. What would lie outside is left out.
+pub(crate) fn draw(
+    pixels: &mut [[u8; 3]],
+    width: usize,
+    words: &str,
+    (x, y): (usize, usize),
+    dot: usize,
+    ink: [u8; 3],
+) {
+    for (i, letter) in words.chars().enumerate() {
+        for (row, bits) in glyph(letter).into_iter().enumerate() {
+            for across in (0..WIDTH).filter(|across| bits >> (WIDTH - 1 - across) & 1 == 1) {
+                let left = x + (i * PITCH + across) * dot;
+                for down in (0..dot).map(|down| y + row * dot + down) {
+                    if left + dot <= width
+                        && let Some(line) = pixels.get_mut(down * width + left..down * width + left + dot)
+                    {
+                        line.fill(ink);
+                    }
+                }
+            }
+        }
+    }
+}

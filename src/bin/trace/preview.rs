@@ -156,28 +156,13 @@ fn compose(shots: &[Shot], columns: usize) -> Result<Sheet> {
     let mut sheet = Sheet { width, pixels: vec![PAPER; width * height] };
     for (i, shot) in shots.iter().enumerate() {
         let (x, y) = (GAP + i % columns * (wide + GAP), GAP + i / columns * (LINE + tall + GAP));
-        write(&mut sheet, &shot.words, (x, y));
+        letters::draw(&mut sheet.pixels, width, &shot.words, (x, y), DOT, INK);
         for (row, pixels) in shot.pixels.chunks_exact(shot.width).enumerate() {
             let start = (y + LINE + row) * width + x;
             sheet.pixels[start..start + shot.width].copy_from_slice(pixels);
         }
     }
     Ok(sheet)
-}
-
-/// Writes words.
-fn write(sheet: &mut Sheet, words: &str, (x, y): (usize, usize)) {
-    for (i, letter) in words.chars().enumerate() {
-        for (row, bits) in letters::glyph(letter).into_iter().enumerate() {
-            for dot in (0..letters::WIDTH).filter(|dot| bits >> (letters::WIDTH - 1 - dot) & 1 == 1) {
-                let left = x + (i * letters::PITCH + dot) * DOT;
-                for down in 0..DOT {
-                    let start = (y + row * DOT + down) * sheet.width + left;
-                    sheet.pixels[start..start + DOT].fill(INK);
-                }
-            }
-        }
-    }
 }
 
 #[cfg(test)]

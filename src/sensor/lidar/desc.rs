@@ -161,8 +161,8 @@ impl LidarDesc {
         let elevations_deg = self.beams.elevations_deg();
         let mut sorted = elevations_deg.clone();
         sorted.sort_by(f64::total_cmp);
-        if let Some(pair) = sorted.windows(2).find(|pair| pair[0] >= pair[1]) {
-            return Err(Error::input(format!("two of its beams go to {} degrees", pair[0]))
+        if let Some([twice, ..]) = sorted.windows(2).find(|pair| matches!(pair, [lower, upper] if lower >= upper)) {
+            return Err(Error::input(format!("two of its beams go to {twice} degrees"))
                 .help("`Angles` names each elevation once; the first and the last of a `Fan` differ"));
         }
         let (from, to) = (self.azimuth_deg.0.get(), self.azimuth_deg.1.get());

@@ -82,7 +82,7 @@ impl TryFrom<String> for Band {
 }
 
 /// The planes of the bands, 8 bit, from the pictures of an image: width, height, one plane a band.
-pub(super) fn read(image: &Image<'_, Set>, bands: &[Band]) -> Result<(u32, u32, Vec<Vec<u8>>)> {
+pub(crate) fn read(image: &Image<'_, Set>, bands: &[Band]) -> Result<(u32, u32, Vec<Vec<u8>>)> {
     let rgb = bands.iter().any(Band::is_color).then(|| photograph(image)).transpose()?;
     let mut size = rgb.as_ref().map(|(w, h, _)| (*w, *h));
     let mut planes = Vec::new();

@@ -4,11 +4,14 @@
 //! blue are the photograph's. Another band, such as nir, is a gray picture of the same size: of `a.jpg`, the file `a.nir.png` beside
 //! it; of a photograph with `rgb` in its name, the file with `nir` instead; or the file of the photograph's name, `a.png`, in a
 //! folder that is named for the band. Files that are another's band are no pictures of their own.
+//!
+//! Images of a set in packs are read out of their archives.
 
+use crate::dataset::native::Image;
 use crate::dataset::pack::refuse_archives;
 use crate::dataset::{Set, native};
 use crate::output;
-use crate::train::data::{Band, Pick, Resize, Selection, Shape};
+use crate::train::data::{Band, Pick, Resize, Selection, Shape, bands};
 use crate::train::refine::Refine;
 use crate::train::run::{self, ModelCard};
 use crate::{Error, Result};
@@ -16,19 +19,29 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What pictures' names end with.
 const ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];
+/// The photograph of a set's image, unless it is stored as JPEG.
+const PHOTO: &str = "rgb.png";
 
 /// A picture without labels.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct Picture {
     /// What its prediction is called.
     pub name: String,
-    /// The photograph.
+    /// The photograph; of an image in a pack, where it would lie as a file.
     pub photo: PathBuf,
-    /// Where each band of the network lies.
-    planes: Vec<Plane>,
+    source: Source,
+}
+
+#[derive(Clone, Debug)]
+enum Source {
+    /// Files: where each band of the network lies.
+    Files(Vec<Plane>),
+    /// An image of this set, in a pack, and the bands of the network.
+    Packed(Arc<Set>, Vec<Band>),
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -57,7 +70,20 @@ pub struct Pixels {
 impl Picture {
     /// Reads it. An error where it is no picture, is gray to a network that sees colours, or where bands differ in size.
     pub fn read(&self) -> Result<Pixels> {
-        let colored = self.planes.iter().any(|p| matches!(p, Plane::Channel(_)));
+        let planes = match &self.source {
+            Source::Files(planes) => planes,
+            Source::Packed(set, of) => {
+                let image = Image::of(set.as_ref(), &self.name);
+                let (width, height, planes) = bands::read(&image, of)?;
+                let (w, h, rgb) = image.photograph()?;
+                if (w, h) != (width, height) {
+                    let what = format!("it is {width} × {height} pixels, the photograph {w} × {h}");
+                    return Err(Error::input(what).in_file(self.photo.clone()));
+                }
+                return Ok(Pixels { width, height, rgb, planes });
+            }
+        };
+        let colored = planes.iter().any(|p| matches!(p, Plane::Channel(_)));
         let read = if colored { output::read_color_photo } else { output::read_photo };
         let (width, height, rgb) = read(&self.photo)?;
         let plane = |plane: &Plane| {
@@ -76,8 +102,20 @@ impl Picture {
             }
             Ok(values)
         };
-        let planes = self.planes.iter().map(plane).collect::<Result<_>>()?;
+        let planes = planes.iter().map(plane).collect::<Result<_>>()?;
         Ok(Pixels { width, height, rgb, planes })
+    }
+
+    /// What tells it from all others, whatever its path is written like.
+    fn identity(&self) -> Result<String> {
+        let place = match &self.source {
+            Source::Files(_) => std::fs::canonicalize(&self.photo).map_err(Error::reading(&self.photo))?,
+            Source::Packed(set, _) => {
+                let folder = std::fs::canonicalize(&set.folder).map_err(Error::reading(&set.folder))?;
+                folder.join(native::folder(&self.name)).join(PHOTO)
+            }
+        };
+        Ok(place.to_string_lossy().into_owned())
     }
 }
 
@@ -95,12 +133,7 @@ pub fn find(inputs: &[PathBuf], shape: &Shape, elsewhere: &[(Band, PathBuf)]) ->
     let mut pictures: Vec<Picture> = Vec::new();
     for input in inputs {
         if let Some(selection) = selection(input)? {
-            for (name, folder) in images(&selection)? {
-                let photo = output::photograph_in(&folder, "rgb").unwrap_or_else(|| folder.join("rgb.png"));
-                let beside = |band: &Band| output::photograph_in(&folder, band.name());
-                let planes = planes(&photo, shape, &beside)?;
-                pictures.push(Picture { name, photo, planes });
-            }
+            pictures.extend(images(&selection, shape)?);
             continue;
         }
         for photo in photos(input, shape)? {
@@ -110,7 +143,7 @@ pub fn find(inputs: &[PathBuf], shape: &Shape, elsewhere: &[(Band, PathBuf)]) ->
                 None => companion(&photo, band.name()),
             };
             let planes = planes(&photo, shape, &beside)?;
-            pictures.push(Picture { name: stem(&photo), photo, planes });
+            pictures.push(Picture { name: stem(&photo), photo, source: Source::Files(planes) });
         }
     }
     let pictures = first_of_each(pictures, |picture| picture.photo.clone());
@@ -135,15 +168,22 @@ fn selection(input: &Path) -> Result<Option<Selection>> {
     }
 }
 
-/// Names and folders of a set's images.
-fn images(selection: &Selection) -> Result<Vec<(String, PathBuf)>> {
+/// A set's images, in folders or in packs.
+fn images(selection: &Selection, shape: &Shape) -> Result<Vec<Picture>> {
     let (set, numbers) = selection.open(Pick::All, 0)?;
-    refuse_archives(&set.folder)?;
+    let set = Arc::new(set);
     let image = |number: u64| {
         let name = Set::name(number);
         let folder = set.folder.join(native::folder(&name));
         if folder.is_dir() {
-            return Ok((name, folder));
+            let photo = output::photograph_in(&folder, "rgb").unwrap_or_else(|| folder.join(PHOTO));
+            let beside = |band: &Band| output::photograph_in(&folder, band.name());
+            let source = Source::Files(planes(&photo, shape, &beside)?);
+            return Ok(Picture { name, photo, source });
+        }
+        if set.recipe.pack.is_some() && Image::of(set.as_ref(), &name).has("record.json")? {
+            let source = Source::Packed(Arc::clone(&set), shape.bands.clone());
+            return Ok(Picture { photo: folder.join(PHOTO), name, source });
         }
         Err(Error::input("this image is not there yet").in_file(folder).help("the command that began the set makes it"))
     };
@@ -297,8 +337,7 @@ impl Prediction {
         }
         let mut all = there.map(|t| t.pictures).unwrap_or_default();
         for picture in pictures {
-            let photo = std::fs::canonicalize(&picture.photo).map_err(Error::reading(&picture.photo))?;
-            let photo = photo.to_string_lossy().into_owned();
+            let photo = picture.identity()?;
             match all.get(&picture.name) {
                 Some(other) if *other == photo => {}
                 Some(other) => {

@@ -1,8 +1,8 @@
 //! `trace catalogue`: every species at every stage, from above and from the side, with a scale, to be looked at plant by plant.
 //!
 //! A species is one sheet, one column a stage: above, the camera looks straight down; below, from some 30° above the ground. It is
-//! the same plant in all of them. A sheet holds the pictures alone, and says in its comment what it was made of; asked again, one that
-//! would come out the same is kept. Words and scales stand on the page. With a folder of photographs they stand beside the stages, and the
+//! the same plant in all of them. A sheet holds the pictures with the stages' names and bars to scale, and says in its comment what it was made of; asked
+//! again, one that would come out the same is kept. With a folder of photographs they stand beside the stages, and the
 //! outlines of cut-outs and of rendered plants are measured alike.
 
 mod beside;
@@ -25,7 +25,7 @@ use furrow::scene::{Field, PlantRecord, assemble};
 use furrow::{Error, Result};
 use outline::{Measures, Silhouette};
 use page::{Entry, Look, Stage};
-use sheet::{Sheet, Shot, View};
+use sheet::{Bar, Column, Layout, Sheet, Shot, View};
 use std::path::{Path, PathBuf};
 
 /// Angle of view: narrow, so that near and far leaves have nearly one scale.
@@ -141,16 +141,19 @@ impl Args {
         }
         let path = self.out.join(page.file_stem().unwrap_or_default()).with_extension("png");
         let (spp, size) = (self.spp, self.size);
+        let layout = Layout { rows: View::KINDS, size: size as usize };
         let from: Vec<&str> = stages.iter().map(|(_, of)| of.as_str()).collect();
-        let from = format!("{}\nspp: {spp}\nsize: {size}\nwords: none", from.join("\n"));
+        let from = format!("{}\nspp: {spp}\nsize: {size}\nwords: stages and bars", from.join("\n"));
         let kept = std::fs::read(&path).is_ok_and(|old| contains(&old, from.as_bytes()));
         if !kept {
             let mut columns = Vec::new();
             for (plant, _) in &stages {
-                let shots = View::both(plant).map(|view| self.shoot(page, plant.bbch, &view, signals));
-                columns.push(shots.into_iter().collect::<Result<Vec<Shot>>>()?);
+                let shots = View::both(plant)
+                    .map(|view| Ok((self.shoot(page, plant.bbch, &view, signals)?, view.bar(size as usize))));
+                let shots = shots.into_iter().collect::<Result<Vec<(Shot, Bar)>>>()?;
+                columns.push(Column { words: format!("BBCH {}", plant.bbch), shots });
             }
-            let sheet = sheet::compose(&columns, size as usize);
+            let sheet = layout.compose(&columns);
             let (width, height) = (sheet.width as u32, sheet.height as u32);
             output::write_png(&path, width, height, &Picture::Rgb(&sheet.pixels), &from)?;
         }
@@ -173,7 +176,7 @@ impl Args {
         let stages = stages.into_iter().enumerate().map(|(i, (plant, _))| {
             let views = View::both(&plant);
             let look = |(k, view): (usize, &View)| {
-                let shot = sheet::part(&sheet, (i, k), views.len(), size as usize);
+                let shot = layout.part(&sheet, (i, k));
                 Ok(Look { jpeg: output::encode_jpeg(size, size, &shot, 88)?, width_mm: view.width_mm() })
             };
             let looks = views.iter().enumerate().map(look).collect::<Result<Vec<Look>>>()?;
@@ -252,8 +255,17 @@ fn reach(plant: &PlantRecord) -> f32 {
 }
 
 impl View {
+    /// Pictures of a stage.
+    const KINDS: usize = 2;
+
+    /// A bar of a round length to the scale of a picture so many pixels wide.
+    fn bar(&self, size: usize) -> Bar {
+        let mm = page::round_length(page::LONGEST * self.width_mm());
+        Bar { pixels: (size as f32 * mm / self.width_mm()).round() as usize, words: format!("{mm} mm") }
+    }
+
     /// From above, and from the side.
-    fn both(plant: &PlantRecord) -> [Self; 2] {
+    fn both(plant: &PlantRecord) -> [Self; Self::KINDS] {
         [Self::above(plant), Self::aside(plant)]
     }
 

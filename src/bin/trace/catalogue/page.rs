@@ -10,7 +10,7 @@ use maud::{Markup, html};
 /// Style rules beyond those of every page.
 const STYLE: &str = include_str!("page.css");
 /// The longest a scale may be, of its picture's width.
-const LONGEST: f32 = 0.38;
+pub(super) const LONGEST: f32 = 0.38;
 /// Side of a picture in the units of what is drawn over it.
 const SIDE: f32 = 200.0;
 
@@ -116,7 +116,7 @@ fn outlines(entry: &Entry) -> Option<Table> {
 }
 
 /// The longest of 1, 2, 5, 10, 20, … that is not above `most`.
-fn round_length(most: f32) -> f32 {
+pub(super) fn round_length(most: f32) -> f32 {
     let ten = 10.0_f32.powf(most.log10().floor());
     [5.0, 2.0, 1.0].into_iter().map(|k| k * ten).find(|length| *length <= most).unwrap_or(ten)
 }
