@@ -16,7 +16,7 @@ use furrow::train::deploy::pictures::Prediction;
 use furrow::train::deploy::{onnx, torchscript};
 use furrow::train::fit::hyper::NormalizationMode;
 use furrow::train::net::Network;
-use furrow::train::refine::Refine;
+use furrow::train::refine::{Refine, Seen};
 use furrow::train::run::{self, TrainedModel};
 use furrow::train::torch::{Model, Precision, Where, device};
 use furrow::train::weights::{self, Array};
@@ -419,7 +419,8 @@ fn images_of_a_set_are_asked_about_by_name_and_bands_are_found() {
     let network = model(&learnt);
     let pixels = normalised(&learnt, &four, (w, h));
     let mut probabilities = network.probabilities(&pixels, (w, h), (w, h)).unwrap();
-    Refine::parse("colour,plants").unwrap().apply(&pixels, (w, h), &learnt.card.input.bands, &mut probabilities, None);
+    let seen = Seen { pixels: &pixels, size: (w, h), bands: &learnt.card.input.bands, finest: None, features: None };
+    Refine::parse("colour,plants").unwrap().apply(&seen, &mut probabilities, None);
     let n = (w * h) as usize;
     let class = |at: usize| {
         (1..3).fold(0, |best, c| if probabilities[c * n + at] > probabilities[best * n + at] { c } else { best })
@@ -541,4 +542,38 @@ fn what_cannot_be_answered_is_refused_and_nothing_is_written_over() {
     std::fs::copy(RGBN.join("weights.safetensors"), broken.join("weights.safetensors")).unwrap();
     refuse(&broken, &[&photos], &[], &["these are not the weights that model.json beside them is about"]);
     assert_eq!(names(&broken), ["model.json", "weights.safetensors"]);
+}
+
+/// Rationale: what is learnt from photographs must depend on which they are, not on how they go through the network. Expected: with appearance,
+/// the same masks in batches of one and of three; of one photograph, from which nothing is learnt, those of rows alone; without rows it is
+/// refused.
+#[test]
+fn appearance_is_learnt_from_all_pictures_and_from_one_alone_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows = "colour,plants,rows";
+    let looks = "colour,plants,rows,appearance";
+    let masks = |name: &str, images: &str, refine: &str, batch: &str| -> Vec<Vec<u8>> {
+        let out = folder.path().join(name);
+        let set = format!("{}@{images}", path(&SET));
+        succeed(train(&["predict", path(&RGB), &set, "--out", path(&out), "--refine", refine, "--batch", batch]));
+        let of = |name: &&String| !name.contains("overlay") && !name.contains("prediction");
+        names(&out).iter().filter(of).map(|name| output::read_indexed(&out.join(name)).unwrap().2).collect()
+    };
+    let (one_by_one, together) = (masks("a", "0..3", looks, "1"), masks("b", "0..3", looks, "3"));
+    assert!(one_by_one.len() == 3 && one_by_one == together);
+    assert!(one_by_one.iter().any(|mask| mask.iter().any(|class| *class > 0)), "the network finds no plants at all");
+    assert_eq!(masks("c", "1..2", looks, "1"), masks("d", "1..2", rows, "1"));
+    let out = folder.path().join("e");
+    let words =
+        fail(train(&["predict", path(&RGB), path(&SET), "--out", path(&out), "--refine", "plants,appearance"]), 2);
+    assert!(words.contains("appearance is learnt from what rows say"), "{words}");
+
+    // Every network tells of its encoder, whatever the size: evaluation learns from the same features.
+    for network in Network::ALL {
+        let run = folder.path().join(network.name());
+        learn(*network, "rgb", NormalizationMode::Image, &SET, &run);
+        let report = run.join("report");
+        succeed(train(&["eval", path(&run), "--set", path(&SET), "--refine", looks, "--out", path(&report)]));
+        assert!(report.join("report.json").is_file());
+    }
 }

@@ -201,19 +201,25 @@ pub fn evaluate(
     let store = Store::open(std::slice::from_ref(on), Pick::All, 0, &card.classes, &card.input, true, 0)?;
     let trained_at = (card.input.width, card.input.height);
     let mut evaluation = Evaluation::new(card.classes.names());
-    for place in 0..store.len() {
-        if stop.load(Ordering::Relaxed) {
-            return Err(Error::interrupted());
-        }
+    let heed = || if stop.load(Ordering::Relaxed) { Err(Error::interrupted()) } else { Ok(()) };
+    let open = |place| -> Result<_> {
+        heed()?;
         let (size, example) = match card.resize {
             Resize::Stretch => (trained_at, store.get(place)?),
             _ => store.whole(place).map(|(size, example)| (size, Cow::Owned(example)))?,
         };
         let sizes = card.resize.sizes(trained_at, size)?;
         let inputs = resize::inputs(&example.planes, size, &sizes, &card.normalization);
+        Ok((size, example, inputs))
+    };
+    let (refine, bands) = (card.refine, &card.input.bands);
+    let pictures = multiscale::learnt_from(refine, store.len()).into_iter();
+    let appearance = multiscale::learn(&models, refine, bands, pictures.map(|place| Ok(open(place)?.2)))?;
+    for place in 0..store.len() {
+        let (size, example, inputs) = open(place)?;
         let begun = Instant::now();
-        let mut scores = multiscale::scores(&models, &inputs)?;
-        scores.refine(card.refine, &inputs, &card.input.bands);
+        let mut scores = multiscale::scores(&models, refine, &inputs)?;
+        scores.refine(refine, &inputs, bands, appearance.as_ref());
         let seconds = Some(begun.elapsed().as_secs_f64());
         let predicted = classes_at(&scores.values, scores.size, size);
         let (width, height) = size;

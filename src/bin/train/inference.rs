@@ -17,7 +17,8 @@ pub(crate) struct InferenceArgs {
     pixel_mm: Option<f64>,
     /// Refinement: colour (pixels of equal colour in a picture are rather of equal kind, plant or soil), plants (plant pixels that hang
     /// together are of one class), rows (crop rows and sizes of plants, too, say which are crop and which weed; only beside
-    /// plants), with commas between, or none. As the training said unless given.
+    /// plants), appearance (and so do their looks, learnt from what rows say in all pictures that are given, which should be of one field;
+    /// only beside rows), with commas between, or none. As the training said unless given.
     #[arg(long, value_name = "NAMES", value_parser = Refine::parse)]
     refine: Option<Refine>,
 }

@@ -53,7 +53,8 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     args.inference.apply(&mut trained.card)?;
     cli::check_folder(&args.out)?;
     let pictures = pictures::find(&args.images, &trained.card.input, &args.bands)?;
-    let bar = if args.quiet { ProgressBar::hidden() } else { ProgressBar::new(pictures.len() as u64) };
+    let passes = predict::passes(&trained.card, pictures.len());
+    let bar = if args.quiet { ProgressBar::hidden() } else { ProgressBar::new(passes as u64) };
     let style = ProgressStyle::with_template("{bar:30} {pos} of {len} pictures, {eta} left");
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
     let how = Options {

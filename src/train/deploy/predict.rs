@@ -8,6 +8,7 @@ use super::{enlarge, overlay};
 use crate::output::{self, Picture as Png};
 use crate::train::data::resize::{self, Input};
 use crate::train::ensemble::Ensemble;
+use crate::train::refine::{Appearance, Refine};
 use crate::train::run::ModelCard;
 use crate::train::session::Machine;
 use crate::train::torch::multiscale::{self, Scores};
@@ -27,7 +28,7 @@ pub struct Options<'a> {
     pub threads: usize,
     /// Batch size; ≥ 1.
     pub batch: usize,
-    /// Called with the number of pictures that are done with.
+    /// Called with the number of pictures that are done with, of as many as [`passes`] tells.
     pub done: &'a (dyn Fn(usize) + Sync),
     /// Raised by whoever wants it to stop.
     pub stop: &'a AtomicBool,
@@ -56,6 +57,11 @@ struct Ready<'a> {
     inputs: Vec<Input>,
 }
 
+/// How many pictures go through the network: those that the appearance of their field is learnt from go twice.
+pub fn passes(card: &ModelCard, pictures: usize) -> usize {
+    pictures + multiscale::learnt_from(card.refine, pictures).len()
+}
+
 /// Pictures that each thread may be ahead, or behind.
 const AHEAD: usize = 2;
 
@@ -77,10 +83,12 @@ pub fn predict(
     let failed = AtomicBool::new(false);
     let mut made = Predictions::default();
     let mut unread = Vec::new();
+    let (appearance, learnt) = learn(&models, card, pictures, options)?;
     std::thread::scope(|scope| -> Result<()> {
         let readers: Vec<_> =
             (0..workers).map(|w| read(scope, card, pictures.iter().skip(w).step_by(workers))).collect();
-        let (writers, handles): (Vec<_>, Vec<_>) = (0..workers).map(|_| write(scope, card, out, &failed)).unzip();
+        let (writers, handles): (Vec<_>, Vec<_>) =
+            (0..workers).map(|_| write(scope, card, out, appearance.as_ref(), &failed)).unzip();
         let mut batch = Vec::new();
         for number in 0..pictures.len() {
             if options.stop.load(Ordering::Relaxed) || failed.load(Ordering::Relaxed) {
@@ -95,8 +103,8 @@ pub fn predict(
                 Err(_) => break,
             }
             if batch.len() == options.batch || number + 1 == pictures.len() {
-                made.seconds += infer(&models, std::mem::take(&mut batch), &writers)?;
-                (options.done)(number + 1);
+                made.seconds += infer(&models, card.refine, std::mem::take(&mut batch), &writers)?;
+                (options.done)(learnt + number + 1);
             }
         }
         drop((readers, writers));
@@ -120,6 +128,38 @@ pub fn predict(
     Ok(made)
 }
 
+impl<'a> Ready<'a> {
+    fn read(picture: &'a Picture, card: &ModelCard) -> Result<Self> {
+        let found = picture.read()?;
+        let (size, trained) = ((found.width, found.height), (card.input.width, card.input.height));
+        let sizes = card.resize.sizes(trained, size).map_err(|e| e.in_file(picture.photo.clone()))?;
+        let inputs = resize::inputs(&found.planes, size, &sizes, &card.normalization);
+        Ok(Self { picture, width: found.width, height: found.height, rgb: found.rgb, inputs })
+    }
+}
+
+/// What crop and weeds look like in these pictures, where that is asked for, and how many it was learnt from. Pictures that cannot be read are
+/// left out here and told when they are predicted.
+fn learn(
+    models: &[Model],
+    card: &ModelCard,
+    pictures: &[Picture],
+    options: &Options<'_>,
+) -> Result<(Option<Appearance>, usize)> {
+    let picked = multiscale::learnt_from(card.refine, pictures.len());
+    let read = |(k, place): (usize, &usize)| {
+        (options.done)(k);
+        let stopped = options.stop.load(Ordering::Relaxed);
+        let words = || format!("stopped: 0 of {} pictures are predicted", pictures.len());
+        if stopped {
+            return Some(Err(Error::stopped(words()).help("the same command ends with all of them")));
+        }
+        Ready::read(&pictures[*place], card).ok().map(|ready| Ok(ready.inputs))
+    };
+    let found = multiscale::learn(models, card.refine, &card.input.bands, picked.iter().enumerate().filter_map(read))?;
+    Ok((found, picked.len()))
+}
+
 /// Begins to read pictures.
 fn read<'s, 'a: 's>(
     scope: &'s Scope<'s, '_>,
@@ -129,12 +169,7 @@ fn read<'s, 'a: 's>(
     let (sender, receiver) = sync_channel(AHEAD);
     scope.spawn(move || {
         for picture in pictures {
-            let ready = picture.read().and_then(|found| {
-                let (size, trained) = ((found.width, found.height), (card.input.width, card.input.height));
-                let sizes = card.resize.sizes(trained, size).map_err(|e| e.in_file(picture.photo.clone()))?;
-                let inputs = resize::inputs(&found.planes, size, &sizes, &card.normalization);
-                Ok(Ready { picture, width: found.width, height: found.height, rgb: found.rgb, inputs })
-            });
+            let ready = Ready::read(picture, card);
             // Nobody listens any more: it was stopped.
             if sender.send(ready).is_err() {
                 return;
@@ -154,13 +189,14 @@ fn write<'s, 'a: 's>(
     scope: &'s Scope<'s, '_>,
     card: &'a ModelCard,
     out: &'a Path,
+    appearance: Option<&'s Appearance>,
     failed: &'s AtomicBool,
 ) -> (SyncSender<Scored<'a>>, ScopedJoinHandle<'s, Written>) {
     let (sender, receiver) = sync_channel::<Scored<'a>>(AHEAD);
     let handle = scope.spawn(move || {
         let mut written = Vec::new();
         for (number, ready, mut scores) in receiver {
-            match draw(card, out, &ready, &mut scores) {
+            match draw(card, out, &ready, &mut scores, appearance) {
                 Ok(paths) => written.push((number, paths)),
                 Err(e) => {
                     failed.store(true, Ordering::Relaxed);
@@ -174,23 +210,35 @@ fn write<'s, 'a: 's>(
 }
 
 /// Runs the networks on a batch and hands the scores on; seconds of the network.
-fn infer<'a>(models: &[Model], batch: Vec<(usize, Ready<'a>)>, writers: &[SyncSender<Scored<'a>>]) -> Result<f64> {
+fn infer<'a>(
+    models: &[Model],
+    refine: Refine,
+    batch: Vec<(usize, Ready<'a>)>,
+    writers: &[SyncSender<Scored<'a>>],
+) -> Result<f64> {
     let begun = Instant::now();
     // Pictures that one network takes at one size, and at the same, go through it together.
     let alike = |a: &(usize, Ready<'_>), b: &(usize, Ready<'_>)| match (a.1.inputs.as_slice(), b.1.inputs.as_slice()) {
-        ([a], [b]) => models.len() == 1 && a.size == b.size,
+        ([a], [b]) => models.len() == 1 && a.size == b.size && !refine.appearance,
         _ => false,
     };
     let mut all = Vec::new();
     for group in batch.chunk_by(alike) {
         match group {
-            [(_, ready)] => all.push(multiscale::scores(models, &ready.inputs)?),
+            [(_, ready)] => all.push(multiscale::scores(models, refine, &ready.inputs)?),
             several => {
                 let size = several[0].1.inputs[0].size;
                 let pixels: Vec<f32> = several.iter().flat_map(|(_, ready)| &ready.inputs[0].pixels).copied().collect();
                 let values = models[0].scores(&pixels, size)?;
                 let each = values.chunks_exact(values.len() / several.len());
-                all.extend(each.map(|values| Scores { values: values.to_vec(), size, finest: None, are_logits: true }));
+                let whole = |values: &[f32]| Scores {
+                    values: values.to_vec(),
+                    size,
+                    finest: None,
+                    features: None,
+                    are_logits: true,
+                };
+                all.extend(each.map(whole));
             }
         }
     }
@@ -203,9 +251,15 @@ fn infer<'a>(models: &[Model], batch: Vec<(usize, Ready<'a>)>, writers: &[SyncSe
 }
 
 /// Writes the prediction of one picture.
-fn draw(card: &ModelCard, out: &Path, ready: &Ready<'_>, scores: &mut Scores) -> Result<[PathBuf; 2]> {
+fn draw(
+    card: &ModelCard,
+    out: &Path,
+    ready: &Ready<'_>,
+    scores: &mut Scores,
+    appearance: Option<&Appearance>,
+) -> Result<[PathBuf; 2]> {
     let (width, height) = (ready.width, ready.height);
-    scores.refine(card.refine, &ready.inputs, &card.input.bands);
+    scores.refine(card.refine, &ready.inputs, &card.input.bands, appearance);
     let colors = card.classes.colors();
     let classes = enlarge::classes_at(&scores.values, scores.size, (width, height));
     let over = overlay::draw(&ready.rgb, &classes, width, &colors);

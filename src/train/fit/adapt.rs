@@ -15,7 +15,7 @@ use crate::Result;
 use crate::dataset::sample::IGNORE;
 use crate::sampling::{Purpose, Stream};
 use crate::train::data::{Batch, Views, paste};
-use crate::train::refine::Refine;
+use crate::train::refine::Seen;
 use crate::train::torch::Model;
 use std::collections::BTreeMap;
 
@@ -38,10 +38,10 @@ pub(super) fn batch(
     Ok((photos, share))
 }
 
-/// The class of each pixel and its probability, refined as the network's predictions will be, but for rows: a crop of a photograph holds few
-/// of them.
+/// The class of each pixel and its probability, refined as the network's predictions will be, but for rows and what they teach: a crop of a
+/// photograph holds few of them.
 fn answers(teacher: &Model, pixels: &[f32], plan: &Plan) -> Result<(Vec<u8>, Vec<f32>)> {
-    let refine = Refine { rows: false, ..plan.hyper.refine };
+    let refine = plan.hyper.refine.of_crops();
     let (size, bands) = (plan.crop_size(), &plan.shape.bands);
     if refine.is_none() {
         return teacher.predict_with_probability(pixels, size);
@@ -51,7 +51,7 @@ fn answers(teacher: &Model, pixels: &[f32], plan: &Plan) -> Result<(Vec<u8>, Vec
     let images = pixels.chunks_exact(area * bands.len()).zip(probabilities.chunks_exact_mut(area * teacher.classes));
     let (mut labels, mut sure) = (Vec::new(), Vec::new());
     for (pixels, probabilities) in images {
-        refine.apply(pixels, size, bands, probabilities, None);
+        refine.apply(&Seen { pixels, size, bands, finest: None, features: None }, probabilities, None);
         for at in 0..area {
             let each = probabilities.iter().skip(at).step_by(area).enumerate();
             let (class, p) =

@@ -144,10 +144,11 @@ pub struct Settings {
     pub resize: Option<String>,
     /// Refinement of predictions once the network is trained: colour (pixels of equal colour in a picture are rather of equal kind, plant
     /// or soil), plants (plant pixels that hang together are of one class), rows (crop rows and sizes of plants, too, say which
-    /// are crop and which weed; only beside plants), with commas between, or none. The first class must be soil.
+    /// are crop and which weed; only beside plants), appearance (and so do their looks, learnt from what rows say in all pictures of a
+    /// field; only beside rows), with commas between, or none. The first class must be soil.
     #[arg(long, value_name = "NAMES", default_value = default_of("refine"))]
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("x-example" = "\"colour,plants,rows\""))]
+    #[schemars(extend("x-example" = "\"colour,plants,rows,appearance\""))]
     pub refine: Option<String>,
     /// Data augmentation: all, none, or some of flip, rotate, scale, crop, colour, blur, noise with commas between, and erase (random
     /// erasing: patches of one colour labelled as soil), which is not part of all.

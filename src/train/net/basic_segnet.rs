@@ -16,10 +16,12 @@ pub(super) fn walk<O: Operations>(o: &mut O, x: &O::Value, bands: usize, classes
     stack.push(places);
     for level in 1..DEPTH {
         x = unit(o, &x, &format!("enc{level}_0"), conv(CHANNELS), true);
+        o.features(&x, level);
         let (smaller, places) = o.pool(&x);
         stack.push(places);
         x = smaller;
     }
+    o.features(&x, DEPTH);
     for level in 0..DEPTH {
         if let Some(places) = stack.pop() {
             x = o.unpool(&x, places);

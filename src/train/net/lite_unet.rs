@@ -35,6 +35,7 @@ pub(super) fn walk<O: Operations>(o: &mut O, x: &O::Value, bands: usize, classes
             let next = block(o, &now, &format!("enc{stage}_{k}"), channels, (kernel, stride, expansion, outputs));
             let before = std::mem::replace(&mut now, next);
             if stride == 2 {
+                o.features(&before, skips.len() + 1);
                 skips.push((before, channels));
             }
             channels = outputs;

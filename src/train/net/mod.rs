@@ -115,6 +115,8 @@ pub trait Operations {
     fn pool3(&mut self, x: &Self::Value) -> Self::Value;
     /// To the height and width of `like`, by the nearest pixel.
     fn enlarge(&mut self, x: &Self::Value, like: &Self::Value) -> Self::Value;
+    /// Told of the last value of the encoder that is halved so many times: its features at that size.
+    fn features(&mut self, _x: &Self::Value, _halvings: usize) {}
 }
 
 /// One line a network: its variant, its file, its name on command lines, what it is.

@@ -32,6 +32,7 @@ pub(super) fn walk<O: Operations>(o: &mut O, x: &O::Value, bands: usize, classes
             let inputs = if *inputs == 0 { bands } else { *inputs };
             now = Some(unit(o, now.as_ref().unwrap_or(x), &format!("enc{level}_{i}"), conv(inputs, *outputs), true));
         }
+        o.features(now.as_ref().unwrap_or(x), level);
         let (smaller, places) = o.pool(now.as_ref().unwrap_or(x));
         stack.push(places);
         now = Some(smaller);

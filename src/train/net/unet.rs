@@ -21,6 +21,7 @@ pub(super) fn walk<O: Operations>(o: &mut O, x: &O::Value, bands: usize, classes
         let first = block(o, &deepest, &format!("enc{stage}_0"), channels, outputs, stride);
         let second = block(o, &first, &format!("enc{stage}_1"), outputs, outputs, 1);
         if stage > 0 {
+            o.features(&deepest, stage + 1);
             skips.push((std::mem::replace(&mut deepest, second), channels));
         } else {
             deepest = second;

@@ -8,9 +8,11 @@
 //! | `colour` | pixels of equal colour are rather of equal kind, plant or soil |
 //! | `plants` | plant pixels that hang together are of one class |
 //! | `rows` | crop rows and sizes of plants, too, say which are crop and which weed |
+//! | `appearance` | plants of one field that look alike are rather of one class |
 //!
 //! The rules' constants were chosen on the even images of five sets of photographs; `docs/results.md` reports the odd ones.
 
+mod appearance;
 mod colour;
 mod plants;
 mod rows;
@@ -18,6 +20,8 @@ mod rows;
 use super::data::Band;
 use crate::dataset::classes::Classes;
 use serde::{Deserialize, Serialize};
+
+pub use appearance::{Appearance, Features, Plants};
 
 /// Which steps are done, in the order of the table above.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -29,12 +33,35 @@ pub struct Refine {
     pub plants: bool,
     /// Whether rows and sizes decide with the network which of them are crop and which are weed.
     pub rows: bool,
+    /// Whether what plants look like decides, too: learnt from all pictures of a field by what rows and sizes say of their plants.
+    pub appearance: bool,
+}
+
+/// A picture as a network saw it.
+pub struct Seen<'a> {
+    /// Its bands side by side.
+    pub pixels: &'a [f32],
+    /// Width and height, pixels.
+    pub size: (u32, u32),
+    /// Which bands.
+    pub bands: &'a [Band],
+    /// Where it was seen at several sizes, the probabilities at the largest of them, which decide of which class a plant is.
+    pub finest: Option<&'a [f32]>,
+    /// What the encoder makes of it, where appearance is asked for.
+    pub features: Option<&'a Features>,
+}
+
+impl Seen<'_> {
+    fn side(&self) -> (usize, usize) {
+        (self.size.0 as usize, self.size.1 as usize)
+    }
 }
 
 impl Refine {
-    /// Reads `none`, or some of `colour`, `plants` and `rows` with commas between; `rows` beside `plants` alone.
+    /// Reads `none`, or some of `colour`, `plants`, `rows` and `appearance` with commas between; `rows` beside `plants` alone, `appearance`
+    /// beside `rows` alone.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let help = "write none, or some of colour, plants and rows with commas between";
+        let help = "write none, or some of colour, plants, rows and appearance with commas between";
         if text.trim() == "none" {
             return Ok(Self::default());
         }
@@ -44,6 +71,7 @@ impl Refine {
                 "colour" => &mut refine.colour,
                 "plants" => &mut refine.plants,
                 "rows" => &mut refine.rows,
+                "appearance" => &mut refine.appearance,
                 _ => return Err(format!("there is no refinement `{name}`: {help}")),
             };
             if std::mem::replace(step, true) {
@@ -53,12 +81,16 @@ impl Refine {
         if refine.rows && !refine.plants {
             return Err("rows decide of which class a plant is: write plants,rows".into());
         }
+        if refine.appearance && !refine.rows {
+            return Err("appearance is learnt from what rows say: write plants,rows,appearance".into());
+        }
         Ok(refine)
     }
 
     /// As it is written.
     pub fn name(self) -> String {
-        let names = [(self.colour, "colour"), (self.plants, "plants"), (self.rows, "rows")];
+        let names =
+            [(self.colour, "colour"), (self.plants, "plants"), (self.rows, "rows"), (self.appearance, "appearance")];
         let names: Vec<&str> = names.iter().filter(|(done, _)| *done).map(|(_, name)| *name).collect();
         if names.is_empty() { "none".into() } else { names.join(",") }
     }
@@ -83,21 +115,43 @@ impl Refine {
         Ok(())
     }
 
-    /// Refines the probabilities of a picture, classes × height × width, whose `pixels` hold these bands side by side. Where it was seen at
-    /// several sizes, `finest` are the probabilities at the largest of them, which decide of which class a plant is.
-    pub fn apply(
-        self,
-        pixels: &[f32],
-        (width, height): (u32, u32),
-        bands: &[Band],
-        probabilities: &mut [f32],
-        finest: Option<&[f32]>,
-    ) {
-        if let (true, Some(rgb)) = (self.colour, colour_bands(bands)) {
-            colour::refine(pixels, bands.len(), rgb, probabilities);
+    /// The same without what is learnt from other pictures or seen in whole ones only: for crops of pictures.
+    pub fn of_crops(self) -> Self {
+        Self { rows: false, appearance: false, ..self }
+    }
+
+    /// Refines the probabilities of a picture, classes × height × width. `appearance` is what [`Appearance::learn`] made of the plants of its
+    /// field; without it, that step is left out.
+    pub fn apply(self, seen: &Seen<'_>, probabilities: &mut [f32], appearance: Option<&Appearance>) {
+        self.recolour(seen, probabilities);
+        if !self.plants {
+            return;
         }
-        if self.plants {
-            plants::refine((width as usize, height as usize), probabilities, finest, self.rows);
+        let found = plants::Found::of(seen.side(), probabilities, seen.finest);
+        if !self.rows {
+            let classes = found.voted();
+            return found.write(probabilities, |_, region| classes[region]);
+        }
+        let odds = found.arranged();
+        let Some((appearance, features)) = appearance.filter(|_| self.appearance).zip(seen.features) else {
+            return found.write(probabilities, |_, region| plants::crop_or_weed(odds[region]));
+        };
+        let looks = appearance.log_odds(&found.regions, seen.side(), features);
+        found.write(probabilities, |at, region| plants::crop_or_weed(odds[region] + looks[at]));
+    }
+
+    /// The plants of a picture, to learn the appearance of its field from; the probabilities become those after `colour`. None where
+    /// appearance is not asked for.
+    pub fn plants(self, seen: &Seen<'_>, probabilities: &mut [f32]) -> Option<Plants> {
+        let features = seen.features.filter(|_| self.appearance)?;
+        self.recolour(seen, probabilities);
+        let found = plants::Found::of(seen.side(), probabilities, seen.finest);
+        Some(Plants::of(&found.regions, seen.side(), &found.arranged(), features))
+    }
+
+    fn recolour(self, seen: &Seen<'_>, probabilities: &mut [f32]) {
+        if let (true, Some(rgb)) = (self.colour, colour_bands(seen.bands)) {
+            colour::refine(seen.pixels, seen.bands.len(), rgb, probabilities);
         }
     }
 }
@@ -128,13 +182,22 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read_again_and_other_words_are_not() {
-        for text in ["none", "colour", "plants", "colour,plants", "plants,rows", "colour,plants,rows"] {
+        for text in [
+            "none",
+            "colour",
+            "plants",
+            "colour,plants",
+            "plants,rows",
+            "colour,plants,rows",
+            "colour,plants,rows,appearance",
+        ] {
             assert_eq!(Refine::parse(text).unwrap().name(), text);
         }
         assert_eq!(Refine::parse("rows, plants, colour").unwrap().name(), "colour,plants,rows");
         for bad in [
             "rows",
             "colour,rows",
+            "colour,plants,appearance",
             "",
             "color",
             "colour;plants",
@@ -149,7 +212,7 @@ mod tests {
 
     #[test]
     fn it_is_refused_without_soil_or_colours() {
-        let both = Refine { colour: true, plants: true, rows: false };
+        let both = Refine::parse("colour,plants").unwrap();
         let (soil, gray) = (Classes::default(), [Band::Red, Band::Gray("nir".into())]);
         assert!(both.check(&soil, &Band::RGB).is_ok());
         assert!(both.check(&soil, &gray).is_err());

@@ -5,7 +5,7 @@
 //! in closed canopies a weed between crops is outvoted.
 //!
 //! Where rows are asked for, a region is crop or weed by the sum of three log odds: the network's, the logarithm of the region's area by that
-//! of the largest one, and how near it is to a row, as far as there are rows at all.
+//! of the largest one, and how near it is to a row, as far as there are rows at all. What plants look like is added by [`super::appearance`].
 
 use super::rows::Rows;
 use crate::train::measure::components::Components;
@@ -21,51 +21,84 @@ const CHANCE: f64 = 1.0;
 /// Probability that is added to both classes' means over a region: what is sure stays finite.
 const SURE: f64 = 0.02;
 
-/// Gives each plant pixel the class of its region: that class has the highest of the plants' probabilities then, the others 0, so that no
-/// other class lies between a plant and soil when the map is enlarged. `probabilities` have one plane a class, soil first, and so has
-/// `finest`, which decides where it is given. With `rows`, classes are soil, crop and weed, and rows and sizes decide with the network.
-pub(super) fn refine((width, height): (usize, usize), probabilities: &mut [f32], finest: Option<&[f32]>, rows: bool) {
-    let n = width * height;
-    let classes = probabilities.len() / n.max(1);
-    let best = |at: usize, probabilities: &[f32]| {
-        // The first of equal ones, as a network's classes are read.
-        (1..classes).fold(0, |best, c| if probabilities[c * n + at] > probabilities[best * n + at] { c } else { best })
-    };
-    let regions = Components::of(width, height, |at| (best(at, probabilities) > 0).then_some(()));
-    let mut sums = vec![0.0f64; regions.areas.len() * classes];
-    for (at, region) in regions.labels.iter().enumerate().filter(|(_, region)| **region > 0) {
-        for class in 1..classes {
-            let p = finest.unwrap_or(probabilities)[class * n + at];
-            sums[(*region as usize - 1) * classes + class] += f64::from(p);
+/// The plants of a picture: regions of neighbouring plant pixels, and what the network says of each.
+pub(super) struct Found {
+    pub regions: Components,
+    size: (usize, usize),
+    classes: usize,
+    /// Of each region the sum of each class's probabilities.
+    sums: Vec<f64>,
+}
+
+impl Found {
+    /// Those of a picture whose `probabilities` have one plane a class, soil first; so has `finest`, which decides where it is given.
+    pub(super) fn of(size: (usize, usize), probabilities: &[f32], finest: Option<&[f32]>) -> Self {
+        let n = size.0 * size.1;
+        let classes = probabilities.len() / n.max(1);
+        let regions = Components::of(size.0, size.1, |at| (best(at, n, probabilities) > 0).then_some(()));
+        let mut sums = vec![0.0f64; regions.areas.len() * classes];
+        for (at, region) in regions.labels.iter().enumerate().filter(|(_, region)| **region > 0) {
+            for class in 1..classes {
+                let p = finest.unwrap_or(probabilities)[class * n + at];
+                sums[(*region as usize - 1) * classes + class] += f64::from(p);
+            }
         }
+        Self { regions, size, classes, sums }
     }
-    let winner = |sums: &[f64]| (1..classes).fold(1, |best, c| if sums[c] > sums[best] { c } else { best });
-    let winners: Vec<usize> = if rows {
-        arranged(&regions, (width, height), &sums)
-    } else {
-        sums.chunks_exact(classes.max(1)).map(winner).collect()
-    };
-    for (at, region) in regions.labels.iter().enumerate().filter(|(_, region)| **region > 0) {
-        let (own, won) = (best(at, probabilities), winners[*region as usize - 1]);
-        let highest = probabilities[own * n + at];
-        (1..classes).for_each(|class| probabilities[class * n + at] = if class == won { highest } else { 0.0 });
+
+    /// Of each region the class with the largest sum of probabilities.
+    pub(super) fn voted(&self) -> Vec<usize> {
+        let winner = |sums: &[f64]| (1..self.classes).fold(1, |best, c| if sums[c] > sums[best] { c } else { best });
+        self.sums.chunks_exact(self.classes.max(1)).map(winner).collect()
+    }
+
+    /// Of each region the log odds of crop over weed by the network, rows and sizes. Classes are soil, crop and weed.
+    pub(super) fn arranged(&self) -> Vec<f64> {
+        let (regions, size) = (&self.regions, self.size);
+        let rows = Rows::of(regions, size).filter(|rows| rows.surplus >= CHANCE).map(|rows| {
+            let likely = 1.0 / (1.0 + (LIKELY - rows.surplus).exp());
+            (likely, rows.distances(regions, size))
+        });
+        let largest = f64::from(regions.areas.iter().copied().max().unwrap_or(1));
+        let odds = |(region, sums): (usize, &[f64])| {
+            let area = f64::from(regions.areas[region]);
+            let network = ((sums[1] + SURE * area) / (sums[2] + SURE * area)).ln();
+            let place = rows.as_ref().map_or(0.0, |(likely, distances)| PLACE * likely * (NEAR - distances[region]));
+            network + (area / largest).ln() + place
+        };
+        self.sums.chunks_exact(3).enumerate().map(odds).collect()
+    }
+
+    /// Gives each plant pixel the class that `won` says of it and its region, from 0: that class has the highest of the plants' probabilities
+    /// then, the others 0, so that no other class lies between a plant and soil when the map is enlarged.
+    pub(super) fn write(&self, probabilities: &mut [f32], won: impl Fn(usize, usize) -> usize) {
+        let n = self.size.0 * self.size.1;
+        for (at, region) in self.regions.labels.iter().enumerate().filter(|(_, region)| **region > 0) {
+            let (own, won) = (best(at, n, probabilities), won(at, *region as usize - 1));
+            let highest = probabilities[own * n + at];
+            (1..self.classes)
+                .for_each(|class| probabilities[class * n + at] = if class == won { highest } else { 0.0 });
+        }
     }
 }
 
-/// The class of each region by rows and sizes: 1 for crop, 2 for weed. `sums` are those of the probabilities of soil, crop and weed.
-fn arranged(regions: &Components, size: (usize, usize), sums: &[f64]) -> Vec<usize> {
-    let rows = Rows::of(regions, size).filter(|rows| rows.surplus >= CHANCE).map(|rows| {
-        let likely = 1.0 / (1.0 + (LIKELY - rows.surplus).exp());
-        (likely, rows.distances(regions, size))
-    });
-    let largest = f64::from(regions.areas.iter().copied().max().unwrap_or(1));
-    let class = |(region, sums): (usize, &[f64])| {
-        let area = f64::from(regions.areas[region]);
-        let network = ((sums[1] + SURE * area) / (sums[2] + SURE * area)).ln();
-        let place = rows.as_ref().map_or(0.0, |(likely, distances)| PLACE * likely * (NEAR - distances[region]));
-        if network + (area / largest).ln() + place >= 0.0 { 1 } else { 2 }
-    };
-    sums.chunks_exact(3).enumerate().map(class).collect()
+/// The class of a pixel: the first of equal ones, as a network's classes are read.
+fn best(at: usize, n: usize, probabilities: &[f32]) -> usize {
+    (1..probabilities.len() / n)
+        .fold(0, |best, c| if probabilities[c * n + at] > probabilities[best * n + at] { c } else { best })
+}
+
+/// The class of log odds of crop over weed.
+pub(super) fn crop_or_weed(odds: f64) -> usize {
+    if odds >= 0.0 { 1 } else { 2 }
+}
+
+/// Gives each plant pixel the class of its region, by votes or, with `rows`, by rows and sizes, too.
+#[cfg(test)]
+fn refine(size: (usize, usize), probabilities: &mut [f32], finest: Option<&[f32]>, rows: bool) {
+    let found = Found::of(size, probabilities, finest);
+    let classes = if rows { found.arranged().into_iter().map(crop_or_weed).collect() } else { found.voted() };
+    found.write(probabilities, |_, region| classes[region]);
 }
 
 #[cfg(test)]

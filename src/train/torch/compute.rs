@@ -24,6 +24,8 @@ pub(super) struct Compute<'a> {
     pub(super) tensors: &'a BTreeMap<String, Tensor>,
     pub(super) precision: Precision,
     pub(super) pass: Pass,
+    /// The encoder's features by how often they are halved, where these are asked for.
+    pub(super) features: Option<BTreeMap<usize, Tensor>>,
 }
 
 impl Compute<'_> {
@@ -94,6 +96,12 @@ impl Operations for Compute<'_> {
 
     fn enlarge(&mut self, x: &Tensor, like: &Tensor) -> Tensor {
         x.upsample_nearest2d(size(like), None, None)
+    }
+
+    fn features(&mut self, x: &Tensor, halvings: usize) {
+        if let Some(features) = &mut self.features {
+            features.insert(halvings, x.shallow_clone());
+        }
     }
 }
 

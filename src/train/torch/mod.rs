@@ -7,11 +7,15 @@ pub mod device;
 pub mod multiscale;
 
 use super::net::{Network, Parameter, fitting, parameters};
+use super::refine::Features;
 use super::weights::Array;
 use crate::{Error, Result};
 use compute::Compute;
 use std::collections::BTreeMap;
 use tch::{Device, Kind, Tensor};
+
+/// Halvings of an image that the finer features have: cells of 8 pixels.
+const FINE: usize = 3;
 
 pub use compute::Pass;
 pub use device::{Precision, Where};
@@ -86,7 +90,7 @@ impl Model {
 
     /// The same in the precision of the last convolution.
     pub(super) fn walk(&self, x: &Tensor, pass: Pass) -> Tensor {
-        let mut compute = Compute { tensors: &self.tensors, precision: self.place.precision, pass };
+        let mut compute = Compute { tensors: &self.tensors, precision: self.place.precision, pass, features: None };
         self.network.walk(&mut compute, x, self.bands, self.classes)
     }
 
@@ -110,6 +114,23 @@ impl Model {
             }
             found.upsample_bilinear2d([i64::from(to.1), i64::from(to.0)], false, None, None)
         }))
+    }
+
+    /// The values of the classes of one image, and what the encoder makes of it: its features of 8 and of 16 pixels, in cells of 8.
+    pub(super) fn scores_and_features(&self, pixels: &[f32], size: (u32, u32)) -> Result<(Tensor, Features)> {
+        let features = Some(BTreeMap::new());
+        let mut compute =
+            Compute { tensors: &self.tensors, precision: self.place.precision, pass: Pass::Inference, features };
+        let x = self.images(pixels, size);
+        let scores = tch::no_grad(|| self.network.walk(&mut compute, &x, self.bands, self.classes));
+        let features = compute.features.unwrap_or_default();
+        let (Some(fine), Some(coarse)) = (features.get(&FINE), features.get(&(FINE + 1))) else {
+            return Err(Error::failed(format!("{} tells of no features of its encoder", self.network.name())));
+        };
+        let (height, width) = (fine.size()[2], fine.size()[3]);
+        let all = tch::no_grad(|| Tensor::cat(&[fine, &coarse.upsample_nearest2d([height, width], None, None)], 1));
+        let planes = values(&all)?.chunks_exact((width * height) as usize).map(<[f32]>::to_vec).collect();
+        Ok((scores.to_kind(Kind::Float), Features { size: (width as usize, height as usize), planes }))
     }
 
     /// The class of each pixel as in [`Self::predict`], and its probability.

@@ -1,10 +1,14 @@
 //! Multi-scale inference: one picture at several sizes, and the mean of what one network or several say.
 
-use super::Model;
+use super::{Model, values};
 use crate::train::data::Band;
 use crate::train::data::resize::Input;
-use crate::train::refine::Refine;
+use crate::train::refine::{Appearance, Features, Plants, Refine, Seen};
 use crate::{Error, Result};
+use tch::Kind;
+
+/// Pictures that the appearance of a field is learnt from at most.
+const LEARNT: usize = 64;
 
 /// What networks make of one picture.
 pub struct Scores {
@@ -14,6 +18,8 @@ pub struct Scores {
     pub size: (u32, u32),
     /// Of several inputs, the probabilities of the largest alone.
     pub finest: Option<Vec<f32>>,
+    /// What the encoder of the first network makes of the largest input, where it is asked for.
+    pub features: Option<Features>,
     /// Whether the values are logits, of one network and one input; sums of probabilities otherwise.
     pub are_logits: bool,
 }
@@ -35,28 +41,81 @@ impl Scores {
     }
 
     /// Refines them by what the picture says as a whole, where that is asked for: probabilities then.
-    pub fn refine(&mut self, refine: Refine, inputs: &[Input], bands: &[Band]) {
-        let seen = inputs.iter().find(|input| input.size == self.size);
-        if let (false, Some(seen)) = (refine.is_none(), seen) {
+    pub fn refine(&mut self, refine: Refine, inputs: &[Input], bands: &[Band], appearance: Option<&Appearance>) {
+        if let (false, Some(input)) = (refine.is_none(), inputs.iter().find(|input| input.size == self.size)) {
             self.normalize();
-            refine.apply(&seen.pixels, self.size, bands, &mut self.values, self.finest.as_deref());
+            let Self { values, size, finest, features, .. } = self;
+            let seen = seen(input, *size, bands, finest.as_deref(), features.as_ref());
+            refine.apply(&seen, values, appearance);
         }
+    }
+
+    /// The plants of the picture, to learn the appearance of its field from.
+    fn plants(mut self, refine: Refine, inputs: &[Input], bands: &[Band]) -> Option<Plants> {
+        let input = inputs.iter().find(|input| input.size == self.size)?;
+        self.normalize();
+        let Self { values, size, finest, features, .. } = &mut self;
+        refine.plants(&seen(input, *size, bands, finest.as_deref(), features.as_ref()), values)
     }
 }
 
+fn seen<'a>(
+    input: &'a Input,
+    size: (u32, u32),
+    bands: &'a [Band],
+    finest: Option<&'a [f32]>,
+    features: Option<&'a Features>,
+) -> Seen<'a> {
+    Seen { pixels: &input.pixels, size, bands, finest, features }
+}
+
+/// The places of the pictures that the appearance of a field is learnt from, evenly picked among so many; none unless it is asked for.
+pub fn learnt_from(refine: Refine, pictures: usize) -> Vec<usize> {
+    let used = if refine.appearance { pictures.min(LEARNT) } else { 0 };
+    (0..used).map(|k| k * pictures / used).collect()
+}
+
+/// What crop and weeds look like on the field that these pictures show; none where they say too little.
+pub fn learn(
+    models: &[Model],
+    refine: Refine,
+    bands: &[Band],
+    pictures: impl Iterator<Item = Result<Vec<Input>>>,
+) -> Result<Option<Appearance>> {
+    let mut plants = Vec::new();
+    for inputs in pictures {
+        let inputs = inputs?;
+        plants.extend(scores(models, refine, &inputs)?.plants(refine, &inputs, bands));
+    }
+    Ok(Appearance::learn(&plants))
+}
+
 /// The logits of one model on one input; of several models or inputs, sums of their probabilities at the largest size.
-pub fn scores(models: &[Model], inputs: &[Input]) -> Result<Scores> {
+pub fn scores(models: &[Model], refine: Refine, inputs: &[Input]) -> Result<Scores> {
     let largest = inputs.iter().map(|input| input.size).max_by_key(|(w, h)| u64::from(*w) * u64::from(*h));
     let size = largest.ok_or_else(|| Error::failed("a picture without an input"))?;
     if let ([model], [input]) = (models, inputs) {
-        return Ok(Scores { values: model.scores(&input.pixels, size)?, size, finest: None, are_logits: true });
+        let (values, features) = if refine.appearance {
+            let (scores, features) = model.scores_and_features(&input.pixels, size)?;
+            (values(&scores)?, Some(features))
+        } else {
+            (model.scores(&input.pixels, size)?, None)
+        };
+        return Ok(Scores { values, size, finest: None, features, are_logits: true });
     }
-    let mut values: Vec<f32> = Vec::new();
-    let mut finest = None;
+    let mut sums: Vec<f32> = Vec::new();
+    let (mut finest, mut features) = (None, None);
     for input in inputs {
         let mut mean: Vec<f32> = Vec::new();
         for model in models {
-            add(&mut mean, model.probabilities(&input.pixels, input.size, size)?);
+            let found = if refine.appearance && input.size == size && features.is_none() {
+                let (scores, found) = model.scores_and_features(&input.pixels, size)?;
+                features = Some(found);
+                values(&scores.softmax(1, Kind::Float))?
+            } else {
+                model.probabilities(&input.pixels, input.size, size)?
+            };
+            add(&mut mean, found);
         }
         for sum in &mut mean {
             *sum /= models.len() as f32;
@@ -64,9 +123,9 @@ pub fn scores(models: &[Model], inputs: &[Input]) -> Result<Scores> {
         if input.size == size && inputs.len() > 1 {
             finest = Some(mean.clone());
         }
-        add(&mut values, mean);
+        add(&mut sums, mean);
     }
-    Ok(Scores { values, size, finest, are_logits: false })
+    Ok(Scores { values: sums, size, finest, features, are_logits: false })
 }
 
 /// Adds values to sums, which begin empty.

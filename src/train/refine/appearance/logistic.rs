@@ -1,0 +1,251 @@
+//! Logistic regression on a few principal components.
+//!
+//! Labels are probabilities, since nobody is sure of them. Of many features, which are hundreds, only the directions in which they vary the
+//! most are used, so that a classifier cannot learn each mistake of its labels by heart.
+
+use crate::sampling::rng::mix;
+
+/// Principal components that are used.
+pub(super) const COMPONENTS: usize = 8;
+/// Rounds of subspace iteration.
+const ROUNDS: usize = 30;
+/// Newton steps.
+const STEPS: usize = 25;
+/// A step that moves no coefficient by more than this is the last.
+const CLOSE: f64 = 1e-9;
+/// Standard deviations below this share of the mean are none: such a feature is left out.
+const FLAT: f64 = 1e-6;
+
+/// An affine function of the features: log odds.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Classifier {
+    /// A factor for each feature.
+    pub weights: Vec<f64>,
+    /// What is added.
+    pub bias: f64,
+}
+
+/// What is learnt from: rows of features one after the other, and of each row the probability that it is of the first kind and how much it
+/// counts.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Rows {
+    pub features: Vec<f32>,
+    pub labels: Vec<f64>,
+    pub weights: Vec<f64>,
+}
+
+impl Rows {
+    /// The log odds of rows by their features. None where there are too few rows to tell anything.
+    ///
+    /// Minimizes Σ u_i (−p_i ln q_i − (1 − p_i) ln(1 − q_i)) + ½ |β|², the weights u scaled so that their sum is the number of rows, over β and
+    /// a bias that is not penalized; q_i is the logistic function of the bias and β · y_i, and y_i are the row's principal components, each
+    /// scaled to a variance of 1. Source: Hastie, Tibshirani & Friedman 2009, sections 3.5.1 and 4.4.1.
+    pub(super) fn classifier(&self) -> Option<Classifier> {
+        let (n, total) = (self.labels.len(), self.weights.iter().sum::<f64>());
+        if n <= COMPONENTS || total <= 0.0 {
+            return None;
+        }
+        let channels = self.features.len() / n;
+        let scales = self.scales(channels, total);
+        let standard: Vec<f32> = self.features.iter().enumerate().map(|(i, f)| scales[i % channels].of(*f)).collect();
+        let axes = self.axes(&standard, channels, total);
+        let rows: Vec<f64> = standard
+            .chunks_exact(channels)
+            .flat_map(|row| axes.iter().map(|axis| row.iter().zip(axis).map(|(f, a)| f64::from(*f) * a).sum()))
+            .collect();
+        let beta = self.newton(&rows, axes.len(), n as f64 / total)?;
+        let weight =
+            |c: usize| axes.iter().zip(&beta[1..]).map(|(axis, b)| axis[c] * b).sum::<f64>() * scales[c].factor;
+        let weights: Vec<f64> = (0..channels).map(weight).collect();
+        let bias = beta[0] - weights.iter().zip(&scales).map(|(w, s)| w * s.mean).sum::<f64>();
+        Some(Classifier { weights, bias })
+    }
+
+    fn scales(&self, channels: usize, total: f64) -> Vec<Scale> {
+        let mut sums = vec![(0.0, 0.0); channels];
+        for (row, u) in self.features.chunks_exact(channels).zip(&self.weights) {
+            for (sum, f) in sums.iter_mut().zip(row) {
+                let f = f64::from(*f);
+                *sum = (sum.0 + u * f, sum.1 + u * f * f);
+            }
+        }
+        let scale = |(sum, squares): (f64, f64)| {
+            let mean = sum / total;
+            let sd = (squares / total - mean * mean).max(0.0).sqrt();
+            Scale { mean, factor: if sd > FLAT * mean.abs().max(FLAT) { 1.0 / sd } else { 0.0 } }
+        };
+        sums.into_iter().map(scale).collect()
+    }
+
+    /// The directions of the largest variance, scaled so that the rows' variance along each is 1, by subspace iteration (Golub & Van Loan
+    /// 2013, section 8.2.4). Fewer where rows vary along fewer.
+    fn axes(&self, standard: &[f32], channels: usize, total: f64) -> Vec<Vec<f64>> {
+        let random = |i: usize| (mix(i as u64) >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
+        let mut axes: Vec<Vec<f64>> =
+            (0..COMPONENTS.min(channels)).map(|k| (0..channels).map(|c| random(k * channels + c)).collect()).collect();
+        let mut variances = Vec::new();
+        for _ in 0..ROUNDS {
+            let mut next = vec![vec![0.0; channels]; axes.len()];
+            for (row, u) in standard.chunks_exact(channels).zip(&self.weights) {
+                for (axis, next) in axes.iter().zip(&mut next) {
+                    let along: f64 = row.iter().zip(axis).map(|(f, a)| f64::from(*f) * a).sum();
+                    next.iter_mut().zip(row).for_each(|(sum, f)| *sum += u / total * along * f64::from(*f));
+                }
+            }
+            (axes, variances) = orthonormal(next);
+        }
+        let scaled = |(axis, variance): (Vec<f64>, &f64)| axis.into_iter().map(|a| a / variance.sqrt()).collect();
+        axes.into_iter().zip(&variances).map(scaled).collect()
+    }
+
+    /// Bias and coefficients, by Newton's method.
+    fn newton(&self, rows: &[f64], k: usize, scale: f64) -> Option<Vec<f64>> {
+        let mut beta = vec![0.0; k + 1];
+        for _ in 0..STEPS {
+            let mut gradient: Vec<f64> = std::iter::once(0.0).chain(beta[1..].iter().copied()).collect();
+            let mut hessian = vec![vec![0.0; k + 1]; k + 1];
+            (1..=k).for_each(|i| hessian[i][i] = 1.0);
+            for (at, (p, u)) in self.labels.iter().zip(&self.weights).enumerate() {
+                let x = |i: usize| if i == 0 { 1.0 } else { rows[at * k + i - 1] };
+                let q = 1.0 / (1.0 + (-(0..=k).map(|i| beta[i] * x(i)).sum::<f64>()).exp());
+                let (first, second) = (scale * u * (q - p), scale * u * (q * (1.0 - q)).max(1e-12));
+                for i in 0..=k {
+                    gradient[i] += first * x(i);
+                    (0..=i).for_each(|j| hessian[i][j] += second * x(i) * x(j));
+                }
+            }
+            let step = solve(hessian, gradient)?;
+            beta.iter_mut().zip(&step).for_each(|(b, s)| *b -= s);
+            if step.iter().all(|s| s.abs() < CLOSE) {
+                break;
+            }
+        }
+        beta.iter().all(|b| b.is_finite()).then_some(beta)
+    }
+}
+
+/// How a feature is brought to mean 0 and variance 1.
+struct Scale {
+    mean: f64,
+    factor: f64,
+}
+
+impl Scale {
+    fn of(&self, feature: f32) -> f32 {
+        ((f64::from(feature) - self.mean) * self.factor) as f32
+    }
+}
+
+/// Vectors made orthonormal one after the other (modified Gram-Schmidt), and how long what is left of each was; without what depends on those
+/// before it.
+fn orthonormal(vectors: Vec<Vec<f64>>) -> (Vec<Vec<f64>>, Vec<f64>) {
+    let (mut done, mut lengths): (Vec<Vec<f64>>, Vec<f64>) = (Vec::new(), Vec::new());
+    for mut vector in vectors {
+        let before = length(&vector);
+        for other in &done {
+            let along: f64 = vector.iter().zip(other).map(|(a, b)| a * b).sum();
+            vector.iter_mut().zip(other).for_each(|(a, b)| *a -= along * b);
+        }
+        let left = length(&vector);
+        if left > 1e-9 * before.max(1e-9) {
+            vector.iter_mut().for_each(|a| *a /= left);
+            done.push(vector);
+            lengths.push(left);
+        }
+    }
+    (done, lengths)
+}
+
+fn length(vector: &[f64]) -> f64 {
+    vector.iter().map(|a| a * a).sum::<f64>().sqrt()
+}
+
+/// Solves a symmetric positive definite system, of which the lower half is given, by Cholesky's method.
+fn solve(mut a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Option<Vec<f64>> {
+    let n = b.len();
+    for i in 0..n {
+        for j in 0..=i {
+            let rest = a[i][j] - (0..j).map(|k| a[i][k] * a[j][k]).sum::<f64>();
+            a[i][j] = if i == j { Some(rest).filter(|r| *r > 0.0)?.sqrt() } else { rest / a[j][j] };
+        }
+    }
+    for i in 0..n {
+        b[i] = (b[i] - (0..i).map(|k| a[i][k] * b[k]).sum::<f64>()) / a[i][i];
+    }
+    for i in (0..n).rev() {
+        b[i] = (b[i] - (i + 1..n).map(|k| a[k][i] * b[k]).sum::<f64>()) / a[i][i];
+    }
+    Some(b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::{Purpose, Stream};
+
+    /// Rows whose two kinds lie apart along the first of `channels` features, whose variance is the largest, with noise of its own in the
+    /// others; a share of the labels is wrong.
+    fn rows(count: usize, channels: usize, wrong: f64) -> (Rows, Vec<bool>) {
+        let mut s = Stream::of(3, 0, Purpose::Test, 0);
+        let (mut rows, mut kinds) = (Rows::default(), Vec::new());
+        for _ in 0..count {
+            let first = s.range(0.0, 1.0) < 0.5;
+            let side = if first { 2.0 } else { -2.0 };
+            // Half of the features tell the kind, the others are noise; one is constant.
+            rows.features.extend((0..channels).map(|c| {
+                let noise = s.range(-1.0, 1.0);
+                if c == 1 {
+                    7.0
+                } else if c % 2 == 0 {
+                    (side + noise) as f32
+                } else {
+                    noise as f32
+                }
+            }));
+            rows.labels.push(if first == (s.range(0.0, 1.0) >= wrong) { 0.9 } else { 0.1 });
+            rows.weights.push(s.range(0.5, 2.0));
+            kinds.push(first);
+        }
+        (rows, kinds)
+    }
+
+    /// Expected: of 400 rows a quarter of whose labels are wrong all but a few are told apart, since the features that agree are the largest
+    /// component and the coefficients of the others are small; a constant feature has no weight. Source: the rule.
+    #[test]
+    fn kinds_are_told_apart_in_spite_of_wrong_labels() {
+        let (rows, kinds) = rows(400, 12, 0.25);
+        let found = rows.classifier().unwrap();
+        let odds =
+            |row: &[f32]| row.iter().zip(&found.weights).map(|(f, w)| f64::from(*f) * w).sum::<f64>() + found.bias;
+        let right =
+            rows.features.chunks_exact(12).zip(&kinds).filter(|(row, first)| (odds(row) > 0.0) == **first).count();
+        assert!(right >= 390 && found.weights[1] == 0.0, "{right}");
+        assert_eq!(rows.classifier(), Some(found), "the same again");
+    }
+
+    /// Expected: where features say nothing the log odds are those of the labels' weighted mean; rows that are too few, or that weigh nothing,
+    /// say nothing. Source: the minimum of the loss.
+    #[test]
+    fn without_features_the_mean_of_the_labels_remains() {
+        let flat = Rows {
+            features: vec![1.0; 40],
+            labels: [[0.9; 15], [0.1; 15], [0.5; 15]].concat()[..20].to_vec(),
+            weights: vec![2.0; 20],
+        };
+        let found = flat.classifier().unwrap();
+        let mean = (15.0 * 0.9 + 5.0 * 0.1) / 20.0;
+        assert!((found.bias - f64::ln(mean / (1.0 - mean))).abs() < 1e-6 && found.weights == [0.0, 0.0], "{found:?}");
+        let few = Rows { features: vec![1.0; 8], labels: vec![0.5; 8], weights: vec![1.0; 8] };
+        assert!(few.classifier().is_none());
+        assert!(Rows { weights: vec![0.0; 20], ..flat }.classifier().is_none());
+        assert!(Rows::default().classifier().is_none());
+    }
+
+    /// Expected: 2 x + y = 4 and x + 3 y = 7 at (1, 2); a matrix that is not positive definite has no solution. Source: arithmetic.
+    #[test]
+    fn symmetric_systems_are_solved() {
+        let solved = solve(vec![vec![2.0, 0.0], vec![1.0, 3.0]], vec![4.0, 7.0]).unwrap();
+        assert!((solved[0] - 1.0).abs() < 1e-12 && (solved[1] - 2.0).abs() < 1e-12, "{solved:?}");
+        assert!(solve(vec![vec![1.0, 0.0], vec![2.0, 1.0]], vec![1.0, 1.0]).is_none());
+    }
+}

@@ -1,0 +1,211 @@
+//! Plants of one field that look alike are rather of one class.
+//!
+//! A network that never saw a crop cannot know what it looks like. Where rows, sizes and the network tell which plants of a field are rather
+//! crop, these teach a classifier what crop and weeds look like *there*, and it says of each plant what its looks say: a plant off the row that
+//! looks like those in it is crop. Photographs without labels, no step of the network's training.
+//!
+//! What a plant looks like is what the network's encoder makes of it: values of its levels of 8 and of 16 pixels.
+//!
+//! Source: self-training on the arrangement of plants, Lottes & Stachniss 2017, "Semi-supervised online visual crop and weed classification in
+//! precision farming exploiting plant arrangement"; features and constants are our choice.
+
+mod logistic;
+
+use crate::train::measure::components::Components;
+use logistic::{Classifier, Rows};
+use std::collections::BTreeMap;
+
+/// Weight of a plant's looks beside the sum of the other log odds.
+const WEIGHT: f64 = 8.0;
+/// Share of a place within a plant; the rest is that of the plant as a whole.
+const PLACE: f64 = 0.5;
+/// Standard deviation that looks are blurred by within plants, longer sides of the picture.
+const BLUR: f64 = 1.0 / 60.0;
+/// Log odds of the labels that are learnt from are not beyond this.
+const SURE: f64 = 8.0;
+/// Pictures that are learnt from, at least: what one picture's rows say wrongly its plants repeat.
+const LEAST: usize = 2;
+
+/// What a network's encoder makes of a picture: a vector for each square cell.
+#[derive(Clone, Debug, Default)]
+pub struct Features {
+    /// Cells across and down.
+    pub size: (usize, usize),
+    /// One plane of cells a feature.
+    pub planes: Vec<Vec<f32>>,
+}
+
+impl Features {
+    /// The cell of a pixel of a picture of this size.
+    fn cell(&self, at: usize, (width, height): (usize, usize)) -> usize {
+        let (x, y) = (at % width * self.size.0 / width, at / width * self.size.1 / height);
+        y * self.size.0 + x
+    }
+
+    /// How many pixels of which region, from 0, lie in which cell.
+    fn shared(&self, regions: &Components, size: (usize, usize)) -> BTreeMap<(usize, usize), f32> {
+        let mut shared = BTreeMap::new();
+        for (at, region) in regions.labels.iter().enumerate().filter(|(_, region)| **region > 0) {
+            *shared.entry((*region as usize - 1, self.cell(at, size))).or_insert(0.0) += 1.0;
+        }
+        shared
+    }
+}
+
+/// The plants of a picture, as they are learnt from.
+#[derive(Clone, Debug, Default)]
+pub struct Plants(Rows);
+
+impl Plants {
+    /// Those of a picture's regions, with the log odds of crop over weed that the network, sizes and rows give each.
+    pub(super) fn of(regions: &Components, size: (usize, usize), evidence: &[f64], features: &Features) -> Self {
+        let channels = features.planes.len();
+        let mut means = vec![0.0f32; regions.areas.len() * channels];
+        for ((region, cell), pixels) in features.shared(regions, size) {
+            let share = pixels / regions.areas[region] as f32;
+            let means = &mut means[region * channels..(region + 1) * channels];
+            means.iter_mut().zip(&features.planes).for_each(|(mean, plane)| *mean += share * plane[cell]);
+        }
+        let label = |evidence: &f64| 1.0 / (1.0 + (-evidence.clamp(-SURE, SURE)).exp());
+        Self(Rows {
+            features: means,
+            labels: evidence.iter().map(label).collect(),
+            weights: regions.areas.iter().map(|area| f64::from(*area).sqrt()).collect(),
+        })
+    }
+}
+
+/// What crop and weeds of a field look like.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Appearance(Classifier);
+
+impl Appearance {
+    /// Learns it from the plants of pictures; none where these are too few.
+    pub fn learn(pictures: &[Plants]) -> Option<Self> {
+        let pictures: Vec<&Rows> = pictures.iter().map(|plants| &plants.0).filter(|p| !p.labels.is_empty()).collect();
+        if pictures.len() < LEAST {
+            return None;
+        }
+        let mut all = Rows::default();
+        for picture in pictures {
+            all.features.extend(&picture.features);
+            all.labels.extend(&picture.labels);
+            all.weights.extend(&picture.weights);
+        }
+        all.classifier().map(Self)
+    }
+
+    /// What is added to the log odds of crop over weed at each plant pixel of a picture; 0 elsewhere.
+    pub(super) fn log_odds(&self, regions: &Components, size: (usize, usize), features: &Features) -> Vec<f64> {
+        let cells = self.cells(features);
+        let mut counts = vec![0.0; cells.len()];
+        let mut sums = vec![0.0; regions.areas.len()];
+        for ((region, cell), pixels) in features.shared(regions, size) {
+            counts[cell] += f64::from(pixels);
+            sums[region] += f64::from(pixels) * cells[cell];
+        }
+        let near = blurred(&cells, &counts, features.size);
+        let value = |(at, region): (usize, &u32)| {
+            let Some(region) = (*region as usize).checked_sub(1) else { return 0.0 };
+            let whole = sums[region] / f64::from(regions.areas[region]);
+            WEIGHT * ((1.0 - PLACE) * whole + PLACE * near[features.cell(at, size)])
+        };
+        regions.labels.iter().enumerate().map(value).collect()
+    }
+
+    /// The log odds of each cell.
+    fn cells(&self, features: &Features) -> Vec<f64> {
+        let mut cells = vec![self.0.bias; features.size.0 * features.size.1];
+        for (plane, weight) in features.planes.iter().zip(&self.0.weights) {
+            cells.iter_mut().zip(plane).for_each(|(cell, value)| *cell += weight * f64::from(*value));
+        }
+        cells
+    }
+}
+
+/// Values blurred by a normal curve, each cell counting by its number of plant pixels; as they are where no plant is near.
+fn blurred(values: &[f64], counts: &[f64], (width, height): (usize, usize)) -> Vec<f64> {
+    let sd = BLUR * width.max(height) as f64;
+    let reach = (3.0 * sd).ceil() as isize;
+    let kernel: Vec<f64> = (-reach..=reach).map(|k| (-0.5 * (k as f64 / sd.max(1e-9)).powi(2)).exp()).collect();
+    let along = |grid: &[f64], stride: usize, cells: usize| -> Vec<f64> {
+        let value = |at: usize| {
+            let place = (at / stride % cells) as isize;
+            let near = (-reach..=reach).zip(&kernel).filter(|(k, _)| (0..cells as isize).contains(&(place + k)));
+            near.map(|(k, weight)| weight * grid[at.wrapping_add_signed(k * stride as isize)]).sum()
+        };
+        (0..grid.len()).map(value).collect()
+    };
+    let both = |grid: Vec<f64>| along(&along(&grid, 1, width), width, height);
+    let (sums, all) = (both(values.iter().zip(counts).map(|(v, n)| v * n).collect()), both(counts.to_vec()));
+    let value = |((sum, all), value): ((&f64, &f64), &f64)| if *all > 0.0 { sum / all } else { *value };
+    sums.iter().zip(&all).zip(values).map(value).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A picture of 80 × 80 pixels in cells of 8: plants of 6 × 6 pixels, each within the cell at its place, with what a classifier that looks
+    /// at features alone sees of them, and log odds by rows.
+    fn picture(plants: &[(usize, usize, f32, f64)]) -> (Components, Features, Vec<f64>) {
+        let inside = |at: usize| {
+            let (x, y) = (at % 80, at / 80);
+            let plant = plants.iter().position(|(cx, cy, ..)| x / 8 == *cx && y / 8 == *cy)?;
+            ((1..7).contains(&(x % 8)) && (1..7).contains(&(y % 8))).then_some(plant)
+        };
+        let regions = Components::of(80, 80, inside);
+        let cell =
+            |c: usize| plants.iter().find(|(x, y, ..)| (*x, *y) == (c % 10, c / 10)).map_or(0.0, |plant| plant.2);
+        let plane: Vec<f32> = (0..100).map(cell).collect();
+        let other = (0..100).map(|c| (c % 7) as f32).collect();
+        let mut order: Vec<_> = plants.to_vec();
+        order.sort_by_key(|(x, y, ..)| (*y, *x));
+        (regions, Features { size: (10, 10), planes: vec![plane, other] }, order.iter().map(|plant| plant.3).collect())
+    }
+
+    /// Expected: where plants in rows look one way and plants off them another, one off the row that looks like those in it is crop, one in the
+    /// row that looks like the others is weed; soil has no odds. Source: the rule.
+    #[test]
+    fn plants_that_look_alike_are_of_one_class() {
+        let crops = [(2, 0), (2, 2), (2, 4), (2, 6), (7, 1), (7, 3), (7, 5), (7, 7)].map(|(x, y)| (x, y, 1.0, 3.0));
+        let weeds = [(0, 1), (4, 3), (5, 5), (4, 7), (0, 9), (9, 0)].map(|(x, y)| (x, y, -1.0, -3.0));
+        let odd = [(2, 8, -1.0, 3.0), (9, 9, 1.0, -3.0)];
+        let plants = [crops.as_slice(), &weeds, &odd].concat();
+        let (regions, features, evidence) = picture(&plants);
+        assert_eq!(regions.areas, [36; 16]);
+        let learnt = || Plants::of(&regions, (80, 80), &evidence, &features);
+        let appearance = Appearance::learn(&[learnt(), learnt(), Plants::default()]).unwrap();
+        let odds = appearance.log_odds(&regions, (80, 80), &features);
+        for (x, y, looks, rows) in plants {
+            let at = (y * 8 + 4) * 80 + x * 8 + 4;
+            assert_eq!(odds[at] + rows > 0.0, looks > 0.0, "({x}, {y}): {}", odds[at]);
+        }
+        assert!(regions.labels.iter().zip(&odds).all(|(region, odds)| (*region == 0) == (*odds == 0.0)));
+    }
+
+    /// Expected: one picture alone teaches nothing, nor do pictures without plants. Source: the rule.
+    #[test]
+    fn one_picture_says_too_little() {
+        let plants: Vec<_> = (0..10).map(|k| (k, k, if k % 2 == 0 { 1.0 } else { -1.0 }, 1.0)).collect();
+        let (regions, features, evidence) = picture(&plants);
+        let learnt = || Plants::of(&regions, (80, 80), &evidence, &features);
+        assert!(Appearance::learn(&[learnt()]).is_none());
+        assert!(Appearance::learn(&[learnt(), Plants::default()]).is_none());
+        assert!(Appearance::learn(&[]).is_none());
+        assert!(Appearance::learn(&[learnt(), learnt()]).is_some());
+    }
+
+    /// Expected: an even field stays even, up to its edges and whatever cells hold plants; a value beside plants becomes their mean. Source:
+    /// the rule.
+    #[test]
+    fn blurring_keeps_what_is_even() {
+        let counts: Vec<f64> = (0..600).map(|c| f64::from(u8::from(c % 3 == 0))).collect();
+        let even = blurred(&[0.25; 600], &counts, (30, 20));
+        assert!(even.iter().all(|v| (v - 0.25).abs() < 1e-12), "{even:?}");
+        assert_eq!(blurred(&[1.0, 2.0], &[0.0, 0.0], (2, 1)), [1.0, 2.0]);
+        let halves: Vec<f64> = (0..600).map(|c| if c % 30 < 15 { 1.0 } else { -1.0 }).collect();
+        let soft = blurred(&halves, &[1.0; 600], (30, 20));
+        assert!(soft[0] > 0.999 && soft[29] < -0.999 && soft[14].abs() < 0.9 && (soft[14] + soft[15]).abs() < 1e-9);
+    }
+}
