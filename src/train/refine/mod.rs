@@ -26,6 +26,7 @@ pub use appearance::{Appearance, Features, Plants};
 /// Which steps are done, in the order of the table above.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
+#[expect(clippy::struct_excessive_bools, reason = "each is a step of its own, none a state")]
 pub struct Refine {
     /// Whether pixels of equal colour become rather of equal kind.
     pub colour: bool,
@@ -116,6 +117,7 @@ impl Refine {
     }
 
     /// The same without what is learnt from other pictures or seen in whole ones only: for crops of pictures.
+    #[must_use]
     pub fn of_crops(self) -> Self {
         Self { rows: false, appearance: false, ..self }
     }

@@ -148,8 +148,7 @@ fn orthonormal(vectors: Vec<Vec<f64>>) -> (Vec<Vec<f64>>, Vec<f64>) {
         }
         let left = length(&vector);
         if left > 1e-9 * before.max(1e-9) {
-            vector.iter_mut().for_each(|a| *a /= left);
-            done.push(vector);
+            done.push(vector.into_iter().map(|a| a / left).collect());
             lengths.push(left);
         }
     }
