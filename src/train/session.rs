@@ -201,9 +201,10 @@ pub fn evaluate(
     let store = Store::open(std::slice::from_ref(on), Pick::All, 0, &card.classes, &card.input, true, 0)?;
     let trained_at = (card.input.width, card.input.height);
     let mut evaluation = Evaluation::new(card.classes.names());
-    let heed = || if stop.load(Ordering::Relaxed) { Err(Error::interrupted()) } else { Ok(()) };
     let open = |place| -> Result<_> {
-        heed()?;
+        if stop.load(Ordering::Relaxed) {
+            return Err(Error::interrupted());
+        }
         let (size, example) = match card.resize {
             Resize::Stretch => (trained_at, store.get(place)?),
             _ => store.whole(place).map(|(size, example)| (size, Cow::Owned(example)))?,

@@ -147,16 +147,14 @@ fn learn(
     options: &Options<'_>,
 ) -> Result<(Option<Appearance>, usize)> {
     let picked = multiscale::learnt_from(card.refine, pictures.len());
+    // Stopped, it ends early, and whoever called tells of it.
+    let going = |_: &(usize, &usize)| !options.stop.load(Ordering::Relaxed);
     let read = |(k, place): (usize, &usize)| {
         (options.done)(k);
-        let stopped = options.stop.load(Ordering::Relaxed);
-        let words = || format!("stopped: 0 of {} pictures are predicted", pictures.len());
-        if stopped {
-            return Some(Err(Error::stopped(words()).help("the same command ends with all of them")));
-        }
         Ready::read(&pictures[*place], card).ok().map(|ready| Ok(ready.inputs))
     };
-    let found = multiscale::learn(models, card.refine, &card.input.bands, picked.iter().enumerate().filter_map(read))?;
+    let inputs = picked.iter().enumerate().take_while(going).filter_map(read);
+    let found = multiscale::learn(models, card.refine, &card.input.bands, inputs)?;
     Ok((found, picked.len()))
 }
 

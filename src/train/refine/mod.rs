@@ -10,7 +10,8 @@
 //! | `rows` | crop rows and sizes of plants, too, say which are crop and which weed |
 //! | `appearance` | plants of one field that look alike are rather of one class |
 //!
-//! The rules' constants were chosen on the even images of five sets of photographs; `docs/results.md` reports the odd ones.
+//! The rules' constants were chosen on the even images of five sets of photographs; `docs/results.md` reports the odd ones, and for which of
+//! them these had been seen before.
 
 mod appearance;
 mod colour;
@@ -21,7 +22,7 @@ use super::data::Band;
 use crate::dataset::classes::Classes;
 use serde::{Deserialize, Serialize};
 
-pub use appearance::{Appearance, Features, Plants};
+pub use appearance::{Appearance, Examples, Features};
 
 /// Which steps are done, in the order of the table above.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -53,7 +54,7 @@ pub struct Seen<'a> {
 }
 
 impl Seen<'_> {
-    fn side(&self) -> (usize, usize) {
+    fn extent(&self) -> (usize, usize) {
         (self.size.0 as usize, self.size.1 as usize)
     }
 }
@@ -129,7 +130,7 @@ impl Refine {
         if !self.plants {
             return;
         }
-        let found = plants::Found::of(seen.side(), probabilities, seen.finest);
+        let found = plants::Found::of(seen.extent(), probabilities, seen.finest);
         if !self.rows {
             let classes = found.voted();
             return found.write(probabilities, |_, region| classes[region]);
@@ -138,17 +139,17 @@ impl Refine {
         let Some((appearance, features)) = appearance.filter(|_| self.appearance).zip(seen.features) else {
             return found.write(probabilities, |_, region| plants::crop_or_weed(odds[region]));
         };
-        let looks = appearance.log_odds(&found.regions, seen.side(), features);
+        let looks = appearance.log_odds(&found.regions, seen.extent(), features);
         found.write(probabilities, |at, region| plants::crop_or_weed(odds[region] + looks[at]));
     }
 
-    /// The plants of a picture, to learn the appearance of its field from; the probabilities become those after `colour`. None where
+    /// The plants of a picture as examples to learn the appearance of its field from; the probabilities become those after `colour`. None where
     /// appearance is not asked for.
-    pub fn plants(self, seen: &Seen<'_>, probabilities: &mut [f32]) -> Option<Plants> {
+    pub fn examples(self, seen: &Seen<'_>, probabilities: &mut [f32]) -> Option<Examples> {
         let features = seen.features.filter(|_| self.appearance)?;
         self.recolour(seen, probabilities);
-        let found = plants::Found::of(seen.side(), probabilities, seen.finest);
-        Some(Plants::of(&found.regions, seen.side(), &found.arranged(), features))
+        let found = plants::Found::of(seen.extent(), probabilities, seen.finest);
+        Some(Examples::of(&found.regions, seen.extent(), &found.arranged(), features))
     }
 
     fn recolour(self, seen: &Seen<'_>, probabilities: &mut [f32]) {

@@ -93,18 +93,16 @@ pub(super) fn crop_or_weed(odds: f64) -> usize {
     if odds >= 0.0 { 1 } else { 2 }
 }
 
-/// Gives each plant pixel the class of its region, by votes or, with `rows`, by rows and sizes, too.
-#[cfg(test)]
-fn refine(size: (usize, usize), probabilities: &mut [f32], finest: Option<&[f32]>, rows: bool) {
-    let found = Found::of(size, probabilities, finest);
-    let classes = if rows { found.arranged().into_iter().map(crop_or_weed).collect() } else { found.voted() };
-    found.write(probabilities, |_, region| classes[region]);
-}
-
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::sampling::{Purpose, Stream};
+    use crate::train::refine::{Refine, Seen};
+
+    /// Refines probabilities by `plants` or, with `rows`, by `plants,rows`.
+    fn refine(size: (u32, u32), probabilities: &mut [f32], finest: Option<&[f32]>, rows: bool) {
+        let seen = Seen { pixels: &[], size, bands: &[], finest, features: None };
+        Refine { plants: true, rows, ..Refine::default() }.apply(&seen, probabilities, None);
+    }
 
     /// Expected: of a plant said to be crop, weed, crop all is crop, by its sums; one apart from it stays weed; soil stays soil. Source: the rule.
     #[test]

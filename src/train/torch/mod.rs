@@ -14,11 +14,11 @@ use compute::Compute;
 use std::collections::BTreeMap;
 use tch::{Device, Kind, Tensor};
 
-/// Halvings of an image that the finer features have: cells of 8 pixels.
-const FINE: usize = 3;
-
 pub use compute::Pass;
 pub use device::{Precision, Where};
+
+/// Halvings of an image that the finer features have: cells of 8 pixels.
+const FINE: usize = 3;
 
 /// A network with its parameters, on a device.
 pub struct Model {
@@ -188,4 +188,25 @@ pub(super) fn laid(shape: &[usize], values: &[f32], device: Device) -> Tensor {
 /// The same values, channels beside each other in memory; tch has no name for this.
 fn channels_last(x: &Tensor) -> Tensor {
     x.permute([0, 2, 3, 1]).contiguous().permute([0, 3, 1, 2])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Expected: of every network features of 8 and of 16 pixels in cells of 8, as many as its encoder has there, and the scores that it has
+    /// without them. Source: the networks' tables of channels.
+    #[test]
+    fn every_network_tells_of_its_encoder() {
+        let place = Where { device: Device::Cpu, precision: Precision::Single };
+        let (size, channels) = ((96u32, 64u32), [64 + 64, 512 + 512, 40 + 112, 128 + 256]);
+        let pixels: Vec<f32> = (0..96 * 64 * 3).map(|i| (i % 17) as f32 / 17.0).collect();
+        for (network, channels) in Network::ALL.iter().zip(channels) {
+            let model = Model::new(*network, 3, 3, 1, place);
+            let (scores, features) = model.scores_and_features(&pixels, size).unwrap();
+            assert_eq!((features.size, features.planes.len()), ((12, 8), channels), "{}", network.name());
+            assert!(features.planes.iter().all(|plane| plane.len() == 96));
+            assert_eq!(values(&scores).unwrap(), model.scores(&pixels, size).unwrap(), "{}", network.name());
+        }
+    }
 }

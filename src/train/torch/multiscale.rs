@@ -3,7 +3,7 @@
 use super::{Model, values};
 use crate::train::data::Band;
 use crate::train::data::resize::Input;
-use crate::train::refine::{Appearance, Features, Plants, Refine, Seen};
+use crate::train::refine::{Appearance, Examples, Features, Refine, Seen};
 use crate::{Error, Result};
 use tch::Kind;
 
@@ -44,29 +44,24 @@ impl Scores {
     pub fn refine(&mut self, refine: Refine, inputs: &[Input], bands: &[Band], appearance: Option<&Appearance>) {
         if let (false, Some(input)) = (refine.is_none(), inputs.iter().find(|input| input.size == self.size)) {
             self.normalize();
-            let Self { values, size, finest, features, .. } = self;
-            let seen = seen(input, *size, bands, finest.as_deref(), features.as_ref());
-            refine.apply(&seen, values, appearance);
+            let (seen, probabilities) = self.seen(input, bands);
+            refine.apply(&seen, probabilities, appearance);
         }
     }
 
-    /// The plants of the picture, to learn the appearance of its field from.
-    fn plants(mut self, refine: Refine, inputs: &[Input], bands: &[Band]) -> Option<Plants> {
+    /// The plants of the picture as examples to learn the appearance of its field from.
+    fn examples(mut self, refine: Refine, inputs: &[Input], bands: &[Band]) -> Option<Examples> {
         let input = inputs.iter().find(|input| input.size == self.size)?;
         self.normalize();
-        let Self { values, size, finest, features, .. } = &mut self;
-        refine.plants(&seen(input, *size, bands, finest.as_deref(), features.as_ref()), values)
+        let (seen, probabilities) = self.seen(input, bands);
+        refine.examples(&seen, probabilities)
     }
-}
 
-fn seen<'a>(
-    input: &'a Input,
-    size: (u32, u32),
-    bands: &'a [Band],
-    finest: Option<&'a [f32]>,
-    features: Option<&'a Features>,
-) -> Seen<'a> {
-    Seen { pixels: &input.pixels, size, bands, finest, features }
+    /// The picture at the largest size, and the values.
+    fn seen<'a>(&'a mut self, input: &'a Input, bands: &'a [Band]) -> (Seen<'a>, &'a mut [f32]) {
+        let (finest, features) = (self.finest.as_deref(), self.features.as_ref());
+        (Seen { pixels: &input.pixels, size: self.size, bands, finest, features }, &mut self.values)
+    }
 }
 
 /// The places of the pictures that the appearance of a field is learnt from, evenly picked among so many; none unless it is asked for.
@@ -82,12 +77,12 @@ pub fn learn(
     bands: &[Band],
     pictures: impl Iterator<Item = Result<Vec<Input>>>,
 ) -> Result<Option<Appearance>> {
-    let mut plants = Vec::new();
+    let mut examples = Vec::new();
     for inputs in pictures {
         let inputs = inputs?;
-        plants.extend(scores(models, refine, &inputs)?.plants(refine, &inputs, bands));
+        examples.extend(scores(models, refine, &inputs)?.examples(refine, &inputs, bands));
     }
-    Ok(Appearance::learn(&plants))
+    Ok(Appearance::learn(&examples))
 }
 
 /// The logits of one model on one input; of several models or inputs, sums of their probabilities at the largest size.

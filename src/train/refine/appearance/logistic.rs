@@ -25,20 +25,22 @@ pub(super) struct Classifier {
     pub bias: f64,
 }
 
-/// What is learnt from: rows of features one after the other, and of each row the probability that it is of the first kind and how much it
-/// counts.
+/// Training examples.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Rows {
-    pub features: Vec<f32>,
-    pub labels: Vec<f64>,
-    pub weights: Vec<f64>,
+pub struct Examples {
+    /// Features, one example after the other.
+    pub(super) features: Vec<f32>,
+    /// Of each example the probability that it is of the first kind.
+    pub(super) labels: Vec<f64>,
+    /// Of each how much it counts.
+    pub(super) weights: Vec<f64>,
 }
 
-impl Rows {
-    /// The log odds of rows by their features. None where there are too few rows to tell anything.
+impl Examples {
+    /// The log odds of examples by their features. None where there are too few to tell anything.
     ///
-    /// Minimizes Σ u_i (−p_i ln q_i − (1 − p_i) ln(1 − q_i)) + ½ |β|², the weights u scaled so that their sum is the number of rows, over β and
-    /// a bias that is not penalized; q_i is the logistic function of the bias and β · y_i, and y_i are the row's principal components, each
+    /// Minimizes Σ u_i (−p_i ln q_i − (1 − p_i) ln(1 − q_i)) + ½ |β|², the weights u scaled so that their sum is the number of examples, over β and
+    /// a bias that is not penalized; q_i is the logistic function of the bias and β · y_i, and y_i are the example's principal components, each
     /// scaled to a variance of 1. Source: Hastie, Tibshirani & Friedman 2009, sections 3.5.1 and 4.4.1.
     pub(super) fn classifier(&self) -> Option<Classifier> {
         let (n, total) = (self.labels.len(), self.weights.iter().sum::<f64>());
@@ -77,8 +79,8 @@ impl Rows {
         sums.into_iter().map(scale).collect()
     }
 
-    /// The directions of the largest variance, scaled so that the rows' variance along each is 1, by subspace iteration (Golub & Van Loan
-    /// 2013, section 8.2.4). Fewer where rows vary along fewer.
+    /// The directions of the largest variance, scaled so that the examples' variance along each is 1, by subspace iteration (Golub & Van Loan
+    /// 2013, section 8.2.4). Fewer where they vary along fewer.
     fn axes(&self, standard: &[f32], channels: usize, total: f64) -> Vec<Vec<f64>> {
         let random = |i: usize| (mix(i as u64) >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
         let mut axes: Vec<Vec<f64>> =
@@ -182,11 +184,11 @@ mod tests {
     use super::*;
     use crate::sampling::{Purpose, Stream};
 
-    /// Rows whose two kinds lie apart along the first of `channels` features, whose variance is the largest, with noise of its own in the
+    /// Examples whose two kinds lie apart along the first of `channels` features, whose variance is the largest, with noise of its own in the
     /// others; a share of the labels is wrong.
-    fn rows(count: usize, channels: usize, wrong: f64) -> (Rows, Vec<bool>) {
+    fn examples(count: usize, channels: usize, wrong: f64) -> (Examples, Vec<bool>) {
         let mut s = Stream::of(3, 0, Purpose::Test, 0);
-        let (mut rows, mut kinds) = (Rows::default(), Vec::new());
+        let (mut rows, mut kinds) = (Examples::default(), Vec::new());
         for _ in 0..count {
             let first = s.range(0.0, 1.0) < 0.5;
             let side = if first { 2.0 } else { -2.0 };
@@ -208,11 +210,11 @@ mod tests {
         (rows, kinds)
     }
 
-    /// Expected: of 400 rows a quarter of whose labels are wrong all but a few are told apart, since the features that agree are the largest
+    /// Expected: of 400 examples a quarter of whose labels are wrong all but a few are told apart, since the features that agree are the largest
     /// component and the coefficients of the others are small; a constant feature has no weight. Source: the rule.
     #[test]
     fn kinds_are_told_apart_in_spite_of_wrong_labels() {
-        let (rows, kinds) = rows(400, 12, 0.25);
+        let (rows, kinds) = examples(400, 12, 0.25);
         let found = rows.classifier().unwrap();
         let odds =
             |row: &[f32]| row.iter().zip(&found.weights).map(|(f, w)| f64::from(*f) * w).sum::<f64>() + found.bias;
@@ -222,11 +224,11 @@ mod tests {
         assert_eq!(rows.classifier(), Some(found), "the same again");
     }
 
-    /// Expected: where features say nothing the log odds are those of the labels' weighted mean; rows that are too few, or that weigh nothing,
+    /// Expected: where features say nothing the log odds are those of the labels' weighted mean; examples that are too few, or that weigh nothing,
     /// say nothing. Source: the minimum of the loss.
     #[test]
     fn without_features_the_mean_of_the_labels_remains() {
-        let flat = Rows {
+        let flat = Examples {
             features: vec![1.0; 40],
             labels: [[0.9; 15], [0.1; 15], [0.5; 15]].concat()[..20].to_vec(),
             weights: vec![2.0; 20],
@@ -234,10 +236,10 @@ mod tests {
         let found = flat.classifier().unwrap();
         let mean = (15.0 * 0.9 + 5.0 * 0.1) / 20.0;
         assert!((found.bias - f64::ln(mean / (1.0 - mean))).abs() < 1e-6 && found.weights == [0.0, 0.0], "{found:?}");
-        let few = Rows { features: vec![1.0; 8], labels: vec![0.5; 8], weights: vec![1.0; 8] };
+        let few = Examples { features: vec![1.0; 8], labels: vec![0.5; 8], weights: vec![1.0; 8] };
         assert!(few.classifier().is_none());
-        assert!(Rows { weights: vec![0.0; 20], ..flat }.classifier().is_none());
-        assert!(Rows::default().classifier().is_none());
+        assert!(Examples { weights: vec![0.0; 20], ..flat }.classifier().is_none());
+        assert!(Examples::default().classifier().is_none());
     }
 
     /// Expected: 2 x + y = 4 and x + 3 y = 7 at (1, 2); a matrix that is not positive definite has no solution. Source: arithmetic.

@@ -12,8 +12,10 @@
 mod logistic;
 
 use crate::train::measure::components::Components;
-use logistic::{Classifier, Rows};
+use logistic::Classifier;
 use std::collections::BTreeMap;
+
+pub use logistic::Examples;
 
 /// Weight of a plant's looks beside the sum of the other log odds.
 const WEIGHT: f64 = 8.0;
@@ -23,6 +25,8 @@ const PLACE: f64 = 0.5;
 const BLUR: f64 = 1.0 / 60.0;
 /// Log odds of the labels that are learnt from are not beyond this.
 const SURE: f64 = 8.0;
+/// Regions of a picture that are learnt from at most, the largest: noise would fill the memory.
+const MOST: usize = 2000;
 /// Pictures that are learnt from, at least: what one picture's rows say wrongly its plants repeat.
 const LEAST: usize = 2;
 
@@ -52,26 +56,28 @@ impl Features {
     }
 }
 
-/// The plants of a picture, as they are learnt from.
-#[derive(Clone, Debug, Default)]
-pub struct Plants(Rows);
-
-impl Plants {
-    /// Those of a picture's regions, with the log odds of crop over weed that the network, sizes and rows give each.
-    pub(super) fn of(regions: &Components, size: (usize, usize), evidence: &[f64], features: &Features) -> Self {
+impl Examples {
+    /// The largest regions of a picture, with the log odds of crop over weed that the network, sizes and rows give each.
+    pub(super) fn of(regions: &Components, size: (usize, usize), odds: &[f64], features: &Features) -> Self {
+        let mut largest: Vec<usize> = (0..regions.areas.len()).collect();
+        largest.sort_by_key(|region| std::cmp::Reverse(regions.areas[*region]));
+        largest.truncate(MOST);
+        let mut places = vec![None; regions.areas.len()];
+        largest.iter().enumerate().for_each(|(place, region)| places[*region] = Some(place));
         let channels = features.planes.len();
-        let mut means = vec![0.0f32; regions.areas.len() * channels];
+        let mut means = vec![0.0f32; largest.len() * channels];
         for ((region, cell), pixels) in features.shared(regions, size) {
+            let Some(place) = places[region] else { continue };
             let share = pixels / regions.areas[region] as f32;
-            let means = &mut means[region * channels..(region + 1) * channels];
+            let means = &mut means[place * channels..(place + 1) * channels];
             means.iter_mut().zip(&features.planes).for_each(|(mean, plane)| *mean += share * plane[cell]);
         }
-        let label = |evidence: &f64| 1.0 / (1.0 + (-evidence.clamp(-SURE, SURE)).exp());
-        Self(Rows {
+        let label = |region: &usize| 1.0 / (1.0 + (-odds[*region].clamp(-SURE, SURE)).exp());
+        Self {
             features: means,
-            labels: evidence.iter().map(label).collect(),
-            weights: regions.areas.iter().map(|area| f64::from(*area).sqrt()).collect(),
-        })
+            labels: largest.iter().map(label).collect(),
+            weights: largest.iter().map(|region| f64::from(regions.areas[*region]).sqrt()).collect(),
+        }
     }
 }
 
@@ -81,12 +87,12 @@ pub struct Appearance(Classifier);
 
 impl Appearance {
     /// Learns it from the plants of pictures; none where these are too few.
-    pub fn learn(pictures: &[Plants]) -> Option<Self> {
-        let pictures: Vec<&Rows> = pictures.iter().map(|plants| &plants.0).filter(|p| !p.labels.is_empty()).collect();
+    pub fn learn(pictures: &[Examples]) -> Option<Self> {
+        let pictures: Vec<&Examples> = pictures.iter().filter(|picture| !picture.labels.is_empty()).collect();
         if pictures.len() < LEAST {
             return None;
         }
-        let mut all = Rows::default();
+        let mut all = Examples::default();
         for picture in pictures {
             all.features.extend(&picture.features);
             all.labels.extend(&picture.labels);
@@ -174,8 +180,8 @@ mod tests {
         let plants = [crops.as_slice(), &weeds, &odd].concat();
         let (regions, features, evidence) = picture(&plants);
         assert_eq!(regions.areas, [36; 16]);
-        let learnt = || Plants::of(&regions, (80, 80), &evidence, &features);
-        let appearance = Appearance::learn(&[learnt(), learnt(), Plants::default()]).unwrap();
+        let learnt = || Examples::of(&regions, (80, 80), &evidence, &features);
+        let appearance = Appearance::learn(&[learnt(), learnt(), Examples::default()]).unwrap();
         let odds = appearance.log_odds(&regions, (80, 80), &features);
         for (x, y, looks, rows) in plants {
             let at = (y * 8 + 4) * 80 + x * 8 + 4;
@@ -189,9 +195,9 @@ mod tests {
     fn one_picture_says_too_little() {
         let plants: Vec<_> = (0..10).map(|k| (k, k, if k % 2 == 0 { 1.0 } else { -1.0 }, 1.0)).collect();
         let (regions, features, evidence) = picture(&plants);
-        let learnt = || Plants::of(&regions, (80, 80), &evidence, &features);
+        let learnt = || Examples::of(&regions, (80, 80), &evidence, &features);
         assert!(Appearance::learn(&[learnt()]).is_none());
-        assert!(Appearance::learn(&[learnt(), Plants::default()]).is_none());
+        assert!(Appearance::learn(&[learnt(), Examples::default()]).is_none());
         assert!(Appearance::learn(&[]).is_none());
         assert!(Appearance::learn(&[learnt(), learnt()]).is_some());
     }
@@ -207,5 +213,19 @@ mod tests {
         let halves: Vec<f64> = (0..600).map(|c| if c % 30 < 15 { 1.0 } else { -1.0 }).collect();
         let soft = blurred(&halves, &[1.0; 600], (30, 20));
         assert!(soft[0] > 0.999 && soft[29] < -0.999 && soft[14].abs() < 0.9 && (soft[14] + soft[15]).abs() < 1e-9);
+    }
+
+    /// Expected: of 2500 specks and one plant that is found last, the plant is the first example and the specks fill the rest. Source: the rule.
+    #[test]
+    fn the_largest_regions_are_learnt_from() {
+        let plant = |at: usize| at / 202 > 100 && at % 202 < 10;
+        let speck = |at: usize| [at / 202, at % 202].iter().all(|place| *place < 100 && place & 1 == 0);
+        let regions = Components::of(202, 110, |at| (plant(at) || speck(at)).then_some(()));
+        assert_eq!(regions.areas.len(), 2501);
+        let odds: Vec<f64> = (0..2501).map(|k| if k == 2500 { 4.0 } else { -4.0 }).collect();
+        let found = Examples::of(&regions, (202, 110), &odds, &Features { size: (1, 1), planes: vec![vec![2.5]] });
+        assert_eq!((found.labels.len(), found.weights[0], found.weights[1]), (MOST, 90f64.sqrt(), 1.0));
+        assert!(found.labels[0] > 0.9 && found.labels[1..].iter().all(|p| *p < 0.1));
+        assert!(found.features.iter().all(|f| (f - 2.5).abs() < 1e-5));
     }
 }
