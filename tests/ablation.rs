@@ -4,10 +4,8 @@
 //! camera, sensor and drawing one group differs, the one that the edit names; labels stay where it says so; datasets with edits
 //! are as resumable as those without. Source: none needed, equality is exact.
 
-mod common;
-
-use common::dataset::{fail, made, path, same, succeed, tree, verb};
-use common::program::{SMALL, bits, scratch, trace};
+use crate::common::dataset::{fail, made, path, same, succeed, tree, verb};
+use crate::common::program::{SMALL, bits, scratch, trace};
 use furrow::ablation::{Change, EDITS, Edit, FULL};
 use furrow::accel::EmbreeAccel;
 use furrow::dataset::{Set, native};
@@ -75,7 +73,7 @@ fn shape(field: &Field) -> String {
         let tag = [part.tag.plant, u32::from(part.tag.leaf), part.tag.class as u32];
         corners.chain(part.mesh.triangles.iter().flatten().copied()).chain(tag).chain([u32::from(part.mask.is_some())])
     });
-    common::program::hash(numbers)
+    crate::common::program::hash(numbers)
 }
 
 /// How some places of every part scatter.

@@ -6,9 +6,7 @@
 //! lost; the mask is asked; nothing depends on the number of threads.
 //! Source: `accel::brute`, Möller & Trumbore 1997 in double precision; the watertightness tests of pbrt.
 
-mod common;
-
-use common::scenes::{point, sphere, square, unit};
+use crate::common::scenes::{point, sphere, square, unit};
 use furrow::accel::{Brute, EmbreeAccel, Surface};
 use furrow::geometry::{AlphaMask, Hit, Interaction, Intersect, Mesh, PACKET, Ray};
 use furrow::math::{Mat3, Vec3, vec2, vec3};

@@ -4,10 +4,8 @@
 //! file together exceed once in 10⁴ draws, and its error is small enough to mean something (below 2 %).
 //! Source: radiometry, each formula stands at its scene.
 
-mod common;
-
-use common::scenes::{camera, scene, shoot, sphere, square};
-use common::stats::{p_value, sidak};
+use crate::common::scenes::{camera, scene, shoot, sphere, square};
+use crate::common::stats::{p_value, sidak};
 use furrow::bsdf::{Bsdf, Leaf, OrenNayar};
 use furrow::film::Film;
 use furrow::integrator::{PathTracer, Technique};

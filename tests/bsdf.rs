@@ -6,9 +6,7 @@
 //! may be walked either way; a leaf returns the R and T it was given.
 //! Source: the χ² and energy tests of pbrt, Mitsuba and nori; Helmholtz reciprocity; quadrature of Fresnel's equations.
 
-mod common;
-
-use common::chi2::check_sphere;
+use crate::common::chi2::check_sphere;
 use furrow::bsdf::{Bsdf, Leaf, OrenNayar, Scatter, Side, SurfaceLayer, Wet, fresnel};
 use furrow::math::{Spectrum, Vec3, direction, vec3};
 use furrow::sampling::{Purpose, Sampler, Stream};

@@ -4,9 +4,7 @@
 //! on the ground becomes a ramp of speed × exposure × pixels a metre; with a rolling shutter it leans by speed × readout × pixels a metre
 //! over the image's height, in light and labels alike; any number of threads gives the same bits. Source: geometry.
 
-mod common;
-
-use common::scenes::{camera, scene, shoot, square, with_world};
+use crate::common::scenes::{camera, scene, shoot, square, with_world};
 use furrow::accel::EmbreeAccel;
 use furrow::bsdf::{Bsdf, OrenNayar};
 use furrow::film::Film;

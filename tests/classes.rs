@@ -4,10 +4,8 @@
 //! there already. Expected: equality pixel by pixel with the native maps put together here in another way, list by list with the records,
 //! and byte by byte between datasets that got their classes early and late. Source: the native files; EPPO codes from the species files.
 
-mod common;
-
-use common::dataset::{fail, path, same, succeed, tree, verb};
-use common::program::{SMALL, scratch, trace};
+use crate::common::dataset::{fail, path, same, succeed, tree, verb};
+use crate::common::program::{SMALL, scratch, trace};
 use furrow::dataset::record::{Plant, Record};
 use furrow::dataset::sample::IGNORE;
 use furrow::dataset::{Sample, Set, native};
@@ -236,7 +234,7 @@ fn what_a_set_does_not_have_is_refused_with_nothing_changed() {
 
 #[test]
 fn maps_are_kept_as_asked() {
-    let files = |folder: &Path| common::program::names(&folder.join("images/000000"));
+    let files = |folder: &Path| crate::common::program::names(&folder.join("images/000000"));
     let labels = ["leaves.png", "plants.png", "record.json", "rgb.png", "semantics.png", "species.png"];
     let with = |more: &[&str]| {
         let mut all: Vec<String> = labels.iter().chain(more).map(ToString::to_string).collect();
@@ -292,7 +290,7 @@ fn maps_are_kept_as_asked() {
     let recipe = fs::read_to_string(oldest.join("dataset.json")).unwrap();
     assert!(!recipe.contains("keep"), "{recipe}");
     succeed(make(&oldest, "3", &[]));
-    assert_eq!(common::program::names(&oldest.join("images/000002")), files(&oldest));
+    assert_eq!(crate::common::program::names(&oldest.join("images/000002")), files(&oldest));
     assert!(!fs::read_to_string(oldest.join("dataset.json")).unwrap().contains("keep"));
     let words = fail(make(&oldest, "3", &["--keep", "depth"]), 2);
     assert!(words.contains("another dataset lies in this folder: keep "), "{words}");

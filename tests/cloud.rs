@@ -3,9 +3,7 @@
 //! Rationale: who measures a plant by its points must find the area that it has. Expected: as many points as area times density, on the mean of
 //! every part and every triangle; none where a mask is open; every point on its part, with its label. Bounds are 5 standard errors.
 
-mod common;
-
-use common::program::{SMALL, field, scratch, small_text, trace};
+use crate::common::program::{SMALL, field, scratch, small_text, trace};
 use furrow::geometry::Mesh;
 use furrow::math::{Vec3, vec3};
 use furrow::output::cloud::{self, Cloud};

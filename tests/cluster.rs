@@ -3,13 +3,10 @@
 //! Rationale: what a scheduler does to jobs (cuts, stops, starts twice) is not what its manual makes one think. Expected: however a
 //! dataset was cut up, stopped and gone on with, its bytes are those of one run on one machine; the exit code tells a scheduler what
 //! to do. Source: none needed, equality is exact; the Kubernetes schema is that of PyPI's kubernetes-validate.
-#![cfg(unix)]
 
-mod common;
-
-use common::dataset::{fail, made, path, same, succeed, tree, verb};
-use common::program::{SMALL, scratch, trace};
-use common::python::python;
+use crate::common::dataset::{fail, made, path, same, succeed, tree, verb};
+use crate::common::program::{SMALL, scratch, trace};
+use crate::common::python::python;
 use std::collections::BTreeMap;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};

@@ -4,10 +4,8 @@
 //! independent values; the same numbers in every file; one clear error and nothing written where pictures cannot be compared.
 //! Source: Sharma et al. 2005 for CIEDE2000; scikit-image and FLIP's own Python package for the rest (`tests/compare/reference.py`).
 
-mod common;
-
-use common::browser::{browser, probe};
-use common::program::{names, trace};
+use crate::common::browser::{browser, probe};
+use crate::common::program::{names, trace};
 use furrow::compare::{
     Band, FILES, Figures, Options, PIXELS_PER_DEGREE, Pairs, Picture, Region, ciede2000, folders, maps, pair,
 };

@@ -5,9 +5,7 @@
 //! of eaten leaves; a condition of zeros gives the same bits as none; a condition given to one plant leaves the others alone.
 //! Source: none, these are identities.
 
-mod common;
-
-use common::program::{bits, field, shoot};
+use crate::common::program::{bits, field, shoot};
 use furrow::accel::{Brute, EmbreeAccel};
 use furrow::dataset::damage::damage;
 use furrow::geometry::{Hit, Interaction, Intersect, Mesh, Ray, Window};

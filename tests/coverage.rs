@@ -6,10 +6,8 @@
 //! shares sum to one; parts of one class count together. Any way of rendering counts the same samples.
 //! Source: area of a clipped polygon (Sutherland & Hodgman 1974); variance of a share, p (1 − p) / n.
 
-mod common;
-
-use common::program;
-use common::scenes::{camera, scene, shoot, square, with_world};
+use crate::common::program;
+use crate::common::scenes::{camera, scene, shoot, square, with_world};
 use furrow::bsdf::Bsdf;
 use furrow::film::Film;
 use furrow::geometry::Window;

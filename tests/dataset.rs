@@ -4,10 +4,8 @@
 //! byte for byte, with the single field and between shards, threads and repairs; every damage found, every broken rule told;
 //! bad input refused with nothing changed. Source: none needed, equality is exact.
 
-mod common;
-
-use common::dataset::{fail, made, make, path, same, succeed, tree, verb};
-use common::program::{SMALL, run, scratch, trace};
+use crate::common::dataset::{fail, made, make, path, same, succeed, tree, verb};
+use crate::common::program::{SMALL, run, scratch, trace};
 use furrow::dataset::checksum::Checksum;
 use furrow::dataset::checksum_record::ChecksumRecord;
 use furrow::dataset::record::PointState;
@@ -38,7 +36,7 @@ fn shards_threads_and_order_make_the_same_bytes() {
     let (_keep, parts) = scratch();
     succeed(make(&whole, 5, &["--threads", "1", "--at-once", "1"]));
     let page = ["--scene", SMALL, "--out", path(&parts), "--count", "5"];
-    succeed(trace(&[&["dataset", "plan"], &page[..], &common::dataset::SIZE].concat()));
+    succeed(trace(&[&["dataset", "plan"], &page[..], &crate::common::dataset::SIZE].concat()));
     for shard in ["2/3", "0/3", "1/3"] {
         succeed(verb("render", &parts, &["--shard", shard, "--threads", "3", "--at-once", "2"]));
     }
@@ -55,7 +53,7 @@ fn a_longer_dataset_with_more_formats_begins_with_the_shorter_one() {
     let (_keep, fresh) = scratch();
     let bare = |count: &str| {
         let mut command = trace(&["dataset", "--scene", SMALL, "--quiet", "--out", path(&grown), "--count", count]);
-        command.args(&common::dataset::SIZE[..4]);
+        command.args(&crate::common::dataset::SIZE[..4]);
         command
     };
     succeed(bare("2"));
@@ -66,7 +64,7 @@ fn a_longer_dataset_with_more_formats_begins_with_the_shorter_one() {
     same(&tree(&grown), &tree(&fresh));
     // A format that was planned and not yet made is missing, not forgotten; and the order of asking makes no other dataset.
     let page = ["dataset", "plan", "--scene", SMALL, "--count", "4", "--out", path(&grown)];
-    succeed(trace(&[&page[..], &common::dataset::SIZE[..4], &["--format", "coco"]].concat()));
+    succeed(trace(&[&page[..], &crate::common::dataset::SIZE[..4], &["--format", "coco"]].concat()));
     let said = fail(verb("finish", &grown, &[]), 1);
     assert!(said.contains("4 of 4 images are missing: 0-3"), "{said}");
     succeed(verb("render", &grown, &["--quiet"]));
@@ -580,7 +578,7 @@ fn a_cause_that_lasts_ends_a_dataset_and_keeps_what_is_made() {
     let (_keep, whole) = scratch();
     succeed(make(&whole, 5, &[]));
     let plan = ["dataset", "plan", "--scene", SMALL, "--count", "5", "--out", path(&data)];
-    succeed(trace(&[&plan[..], &common::dataset::SIZE].concat()));
+    succeed(trace(&[&plan[..], &crate::common::dataset::SIZE].concat()));
     let blocked = data.join("images/000002");
     fs::create_dir_all(data.join("images")).unwrap();
     fs::write(&blocked, "").unwrap();

@@ -4,10 +4,8 @@
 //! ends with the bytes of an uninterrupted run and no file beside them; a full disk is one clear error and no half file; TERM and USR1 are
 //! exit code 75. Source: none needed, equality is exact.
 
-mod common;
-
-use common::dataset::{made, make, path, same, succeed, tree};
-use common::program::{SMALL, scratch, trace};
+use crate::common::dataset::{made, make, path, same, succeed, tree};
+use crate::common::program::{SMALL, scratch, trace};
 use std::io::Read;
 use std::path::Path;
 use std::process::{Command, Stdio};

@@ -3,15 +3,13 @@
 //! Rationale: a denoiser that is not there, fails or mixes up bands must not cost the picture. Expected: one clear error before
 //! anything is rendered where it is missing; the noisy files in any case; each band back where it came from. A stand-in that
 //! copies its input plays the denoiser, so this runs anywhere.
-//! With Open Image Denoise itself: `cargo test --release --test denoise -- --ignored --nocapture`.
+//! With Open Image Denoise itself: `cargo test --release --test all denoise:: -- --ignored --nocapture`.
 
 #![allow(clippy::print_stdout, reason = "the long test tells what it measured")]
 
-mod common;
-
-use common::layers::read_layers;
-use common::program::{FILES, SMALL, names, scratch, trace};
-use common::scenes::with_world;
+use crate::common::layers::read_layers;
+use crate::common::program::{FILES, SMALL, names, scratch, trace};
+use crate::common::scenes::with_world;
 use furrow::film::Film;
 use furrow::geometry::Window;
 use furrow::integrator::PathTracer;

@@ -5,12 +5,10 @@
 //! sizes, whatever is taken out of the pictures; masks are what the network says; what cannot be done is refused with words and code
 //! 2, and leaves nothing. Source: `tests/train/check_onnx.py`, the programs named in `tests/requirements.txt`.
 
-mod common;
-
-use common::dataset::{fail, path, succeed};
-use common::program::{SMALL, names, trace};
-use common::python::{ask, python, torch};
-use common::training::{self, learn, normalised, pictures, stirred};
+use crate::common::dataset::{fail, path, succeed};
+use crate::common::program::{SMALL, names, trace};
+use crate::common::python::{ask, python, torch};
+use crate::common::training::{self, learn, normalised, pictures, stirred};
 use furrow::output::{self, Picture};
 use furrow::train::deploy::pictures::Prediction;
 use furrow::train::deploy::{onnx, torchscript};

@@ -6,12 +6,10 @@
 //! Source: none needed, equality is exact.
 //!
 //! `tests/ref/labels.sha256` holds the hash of the small page's label map. Where plants, soil, scattering or labels change on
-//! purpose, look at `target/test-failures/golden-labels/`, then renew it: `FURROW_BLESS=1 cargo test --test determinism`.
+//! purpose, look at `target/test-failures/golden-labels/`, then renew it: `FURROW_BLESS=1 cargo test --test all determinism::`.
 
-mod common;
-
-use common::pictures;
-use common::program::{self, FILES, SMALL, bits, field, hash, names, run, scratch, shoot, small_text, trace};
+use crate::common::pictures;
+use crate::common::program::{self, FILES, SMALL, bits, field, hash, names, run, scratch, shoot, small_text, trace};
 use furrow::output::{read_gray16, read_indexed};
 use furrow::render::{self, LabelMap};
 use furrow::scene::assemble::Options;
@@ -130,7 +128,7 @@ fn the_small_pages_label_map_is_the_one_on_record() {
         let seen = pictures::keep("golden-labels", labels.window.width(), &now, &now);
         panic!(
             "the label map of {SMALL} has changed; if it should have, look at it in {seen} and renew its hash with \
-             FURROW_BLESS=1 cargo test --test determinism"
+             FURROW_BLESS=1 cargo test --test all determinism::"
         );
     }
 }

@@ -3,10 +3,8 @@
 //! Rationale: a README is the first program that a newcomer runs, and a page that names a flag or a test that is gone misleads. Expected:
 //! nothing in them is stale. Source: the pages; the rules stand in CONTRIBUTING.md. `tests/guide.rs` runs the guide.
 
-mod common;
-
-use common::book::{self, anchors, blocks, commands, links, pages, program, prose, quoted, read, root, shell};
-use common::program::SMALL;
+use crate::common::book::{self, anchors, blocks, commands, links, pages, program, prose, quoted, read, root, shell};
+use crate::common::program::SMALL;
 use furrow::light::LightDesc;
 use furrow::material::LeafDesc;
 use furrow::ron_file::RonFile;

@@ -4,11 +4,9 @@
 //! over a plane in closed form; the same plant and leaf where flow leads; images that do not depend on which others were made before. Source:
 //! the pinhole camera's geometry; equality is exact otherwise. COLMAP's own reader and OpenCV's stereo matcher are asked as well.
 
-mod common;
-
-use common::dataset::{fail, path, same, succeed, tree, verb};
-use common::program::{scratch, small_text, trace};
-use common::python::python;
+use crate::common::dataset::{fail, path, same, succeed, tree, verb};
+use crate::common::program::{scratch, small_text, trace};
+use crate::common::python::python;
 use furrow::dataset::flow::flows;
 use furrow::dataset::{Record, Set, native};
 use furrow::geometry::Window;

@@ -4,11 +4,9 @@
 //! worse than it says. Expected: passes make the bits of one go; the error that is told covers the error that is there;
 //! what was used to decide is not in the picture. Source: none needed for bits; a long render and closed forms for errors.
 
-mod common;
-
-use common::layers::read_layers;
-use common::program::{FILES, bits, field, names, run, scratch, small_text, trace};
-use common::scenes::with_world;
+use crate::common::layers::read_layers;
+use crate::common::program::{FILES, bits, field, names, run, scratch, small_text, trace};
+use crate::common::scenes::with_world;
 use furrow::film::Film;
 use furrow::geometry::{PACKET, Window};
 use furrow::integrator::{Integrator, PathTracer, Sample, Sighting, World};

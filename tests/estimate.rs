@@ -4,9 +4,7 @@
 //! estimate that says so must not refuse what is ordinary. Expected: for each shipped scene file, and for dense ones, the estimate is at
 //! least half of the triangles that grow and at most three times as many: plants beside the view are grown, and dropped. Source: the fields.
 
-mod common;
-
-use common::program::{scratch, small_text, trace};
+use crate::common::program::{scratch, small_text, trace};
 use furrow::render;
 use furrow::scene::assemble::{self, Options, Source};
 use std::collections::BTreeMap;

@@ -1,11 +1,9 @@
 //! The programs in `examples/` run, and the library's image is the program's, byte for byte.
 //!
 //! Rationale: an example is the first thing that a user of the library copies. Expected: each runs at a small size and leaves
-//! what it promises. Cargo builds them with the tests; with `--test examples` alone, `cargo build --examples` must have run.
+//! what it promises. Cargo builds them with the tests; with `--test all` alone, `cargo build --examples` must have run.
 
-mod common;
-
-use common::program::{SMALL, names, scratch, trace};
+use crate::common::program::{SMALL, names, scratch, trace};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -5,9 +5,7 @@
 //! before anything is written; whatever the order and the interruptions, the files are the same; numbers of tables are means of the
 //! runs' numbers. Source: Di Cicco et al. 2017 for what the tables hold; equality is exact.
 
-mod common;
-
-use common::dataset::{make, same, succeed, tree};
+use crate::common::dataset::{make, same, succeed, tree};
 use furrow::dataset::classes::Classes;
 use furrow::dataset::generate::Shard;
 use furrow::error::Kind;
@@ -33,7 +31,7 @@ use tempfile::TempDir;
 fn frames() -> &'static Path {
     static FRAMES: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
     let made = FRAMES.get_or_init(|| {
-        let (keep, folder) = common::program::scratch();
+        let (keep, folder) = crate::common::program::scratch();
         succeed(make(&folder, 8, &[]));
         (keep, folder)
     });
@@ -189,7 +187,7 @@ impl Players {
 
 /// Runs the page to its end in a folder that goes away with what is returned.
 fn whole(text: &str) -> (TempDir, PathBuf) {
-    let (keep, out) = common::program::scratch();
+    let (keep, out) = crate::common::program::scratch();
     Players::default().run(text, &out, Shard::ALL, None).unwrap();
     (keep, out)
 }
@@ -238,7 +236,7 @@ fn tables_hold_means_of_the_seeds_and_how_far_they_stray() {
 #[test]
 fn interrupted_before_every_step_it_ends_with_the_same_files() {
     let (_keep, expected) = whole(PAGE);
-    let (_keep, out) = common::program::scratch();
+    let (_keep, out) = crate::common::program::scratch();
     let players = Players::default();
     let mut sittings = 0;
     loop {
@@ -260,7 +258,7 @@ fn interrupted_before_every_step_it_ends_with_the_same_files() {
 #[test]
 fn shards_of_rows_make_the_whole_in_any_order() {
     let (_keep, expected) = whole(PAGE);
-    let (_keep, out) = common::program::scratch();
+    let (_keep, out) = crate::common::program::scratch();
     let players = Players::default();
     let mut all = Vec::new();
     for number in [2, 0, 1] {
@@ -299,7 +297,7 @@ fn what_is_there_is_not_made_again_and_a_page_may_get_longer() {
 
 #[test]
 fn a_page_whose_trainings_have_changed_is_refused_before_any_work() {
-    let (_keep, out) = common::program::scratch();
+    let (_keep, out) = crate::common::program::scratch();
     let players = Players::default();
     players.run(PAGE, &out, Shard { number: 7, of: 10 }, None).unwrap();
     players.took();
@@ -374,7 +372,7 @@ fn a_damaged_training_is_an_error_that_says_what_to_do() {
 #[test]
 fn nothing_is_evaluated_on_what_it_was_trained_on() {
     for (from, to) in [("4..6", "1..6"), ("4..6", "2..6"), ("4..6", "all"), ("4..6", "3..4"), ("0..2", "random:8")] {
-        let (_keep, out) = common::program::scratch();
+        let (_keep, out) = crate::common::program::scratch();
         let error = Players::default().run(&PAGE.replace(from, to), &out, Shard::ALL, None).unwrap_err();
         assert!(error.to_string().contains("in the training or validation set"), "{from} → {to}: {error}");
         assert_eq!(error.exit_code(), 2);
@@ -581,10 +579,11 @@ fn our_pages_are_understood_at_both_scales() {
 fn variants() -> &'static Path {
     static VARIANTS: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
     let made = VARIANTS.get_or_init(|| {
-        let (keep, folder) = common::program::scratch();
-        let page = ["ablate", "--scene", common::program::SMALL, "--only", "no-sky", "--count", "6", "--width", "48"];
-        let more = ["--spp", "1", "--split", "4,0,2", "--quiet", "--out", common::dataset::path(&folder)];
-        succeed(common::program::trace(&[&page[..], &more].concat()));
+        let (keep, folder) = crate::common::program::scratch();
+        let page =
+            ["ablate", "--scene", crate::common::program::SMALL, "--only", "no-sky", "--count", "6", "--width", "48"];
+        let more = ["--spp", "1", "--split", "4,0,2", "--quiet", "--out", crate::common::dataset::path(&folder)];
+        succeed(crate::common::program::trace(&[&page[..], &more].concat()));
         (keep, folder)
     });
     &made.1
@@ -617,7 +616,7 @@ fn what_ablate_writes_is_an_experiment_on_its_datasets() {
 
 #[test]
 fn changes_are_told_seed_by_seed_with_their_spread() {
-    let (_keep, out) = common::program::scratch();
+    let (_keep, out) = crate::common::program::scratch();
     let page = written();
     let page = RonFile { path: page.path.clone(), text: page.text.replace("\"real\"", "\"frames\"") };
     Players::default().run_page(&page, &out, Shard::ALL, None).unwrap();

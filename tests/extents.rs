@@ -7,10 +7,8 @@
 //! visible ≤ unoccluded ≤ whole, always. The same numbers at any number of threads.
 //! Source: geometry.
 
-mod common;
-
-use common::program::{field, small_text};
-use common::scenes::{camera, square};
+use crate::common::program::{field, small_text};
+use crate::common::scenes::{camera, square};
 use furrow::accel::{EmbreeAccel, Surface};
 use furrow::film::Filter;
 use furrow::geometry::{Intersect, Mesh, Ray, Window};

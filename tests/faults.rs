@@ -3,13 +3,10 @@
 //! Rationale: a full disk, a lost network share and a dying drive show themselves at any write, flush or rename. Expected: wherever it is,
 //! exit code 1 and one error with a help, no file that is half under its final name, no file of the program's beside them, and the same
 //! command ends with the bytes of an undisturbed run. Source: none needed, equality is exact.
-#![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
-mod common;
-
-use common::dataset::{path, same, succeed, tree};
-use common::faults::{self, Ended, moments};
-use common::program::{FILES, SMALL, names, scratch, trace};
+use crate::common::dataset::{path, same, succeed, tree};
+use crate::common::faults::{self, Ended, moments};
+use crate::common::program::{FILES, SMALL, names, scratch, trace};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;

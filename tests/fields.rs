@@ -3,9 +3,7 @@
 //! Rationale: people learn from what is written beside the images, so it must be what was drawn, in the units it names.
 //! Expected: a season is shared by all plants of a field; records agree with the scene that was built from the same numbers.
 
-mod common;
-
-use common::program::{SMALL, field, shoot, small_text};
+use crate::common::program::{SMALL, field, shoot, small_text};
 use furrow::job::{Field as Shown, SceneFile};
 use furrow::light::LightRecord;
 use furrow::math::{Spectrum, Vec3, vec3};

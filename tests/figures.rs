@@ -4,11 +4,9 @@
 //! XML, end at the axis' ends and lose no peak; a page whose numbers are those of the report, that opens without a network in windows wide
 //! and narrow. Source: the values worked out here; Python's XML parser; headless Chromium (Debian's `chromium`).
 
-mod common;
-
-use common::browser::{browser, probe};
-use common::program::scratch;
-use common::python::python;
+use crate::common::browser::{browser, probe};
+use crate::common::program::scratch;
+use crate::common::python::python;
 use furrow::report::chart::{Chart, Curve};
 use furrow::train::figure::{Page, Shot, sheet, spread};
 use furrow::train::measure::{Evaluation, Prediction, Report};

@@ -4,9 +4,7 @@
 //! taken for its own, would falsify every table made of it. Expected: equal bytes of `weights.safetensors` stopped or not, killed or not,
 //! with any number of loading threads; one clear error, exit code 2, for what cannot be gone on with. Source: what `train fit --help` says.
 
-mod common;
-
-use common::python::{ask, python};
+use crate::common::python::{ask, python};
 use furrow::dataset::classes::Classes;
 use furrow::output::{Picture, write_png};
 use furrow::ron_file::RonFile;
@@ -176,11 +174,11 @@ fn a_training_whose_disk_fails_ends_with_the_same_bytes() {
     let more = format!("--network unet --steps 4 --validate-every 2 --val {}@0..1", set.display());
     let begin = |out: &Path| fit(&set, out, &more);
     let whole = folder.join("whole");
-    let undisturbed = common::faults::run(begin(&whole), &whole, 0, false);
+    let undisturbed = crate::common::faults::run(begin(&whole), &whole, 0, false);
     assert!(undisturbed.output.status.success(), "{}", undisturbed.said());
-    for at in common::faults::moments(undisturbed.changes, 9) {
+    for at in crate::common::faults::moments(undisturbed.changes, 9) {
         let out = folder.join(format!("at-{at}"));
-        let ended = common::faults::run(begin(&out), &out, at, at % 2 == 0);
+        let ended = crate::common::faults::run(begin(&out), &out, at, at % 2 == 0);
         let said = ended.said();
         // Where an old file cannot be kept under a second name until its successor is there, it is replaced all the same.
         if ended.failed != "link" || !ended.output.status.success() {

@@ -5,10 +5,8 @@
 //! themselves, named with their versions in each format's file. The clients are Python packages; without them the tests say so and pass,
 //! with `FURROW_REQUIRE_PEERS=1` they fail.
 
-mod common;
-
-use common::program::{SMALL, small_text, trace};
-use common::python::{python, torch_with};
+use crate::common::program::{SMALL, small_text, trace};
+use crate::common::python::{python, torch_with};
 use furrow::dataset::format::{self, NAMES};
 use furrow::dataset::recipe::Made;
 use furrow::dataset::sample::IGNORE;
@@ -229,7 +227,7 @@ fn little_known(numbers: [u32; 2]) -> (tempfile::TempDir, PathBuf, Sample) {
     (sample.record.classes, sample.record.ignored) = annotate::classes(&sample);
     sample.record.plants = annotate::plants(&sample);
     assert_eq!((sample.record.ignored, sample.record.plants.len()), (1, 2));
-    let (folder, written) = common::program::scratch();
+    let (folder, written) = crate::common::program::scratch();
     let mut files = native::files(&recipe, &sample, "").unwrap();
     for (name, _) in NAMES {
         let writer = format::named(name).unwrap();

@@ -4,9 +4,7 @@
 //! are as far apart as halves of one; the same files whatever the threads; one clear error, exit code 2 and nothing written where folders
 //! hold no sets. Source: closed forms of what is drawn here.
 
-mod common;
-
-use common::program::{small_text, trace};
+use crate::common::program::{small_text, trace};
 use furrow::compare::Region;
 use furrow::compare::gap::advice::{self, Step, Way};
 use furrow::compare::gap::{Distance, FILES, Feature, Gap, Options};

@@ -4,9 +4,7 @@
 //! [`book::RUN`] works, and the files that a page names are there afterwards. Source: the pages. Commands are run in a reduced form, see
 //! [`SMALLER`] and [`reduced`]; CONTRIBUTING.md says so too.
 
-mod common;
-
-use common::book::{self, blocks, commands, program, quoted, read, root, shell};
+use crate::common::book::{self, blocks, commands, program, quoted, read, root, shell};
 use std::fs;
 use std::path::Path;
 

@@ -4,9 +4,7 @@
 //! images come in pixel by pixel; what we wrote in a format of others comes back as it was; a second import makes the same bytes;
 //! every fault is one sentence with a file in it and exit code 2. Source: the layouts in `src/dataset/import/`.
 
-mod common;
-
-use common::program::{SMALL, scratch, trace};
+use crate::common::program::{SMALL, scratch, trace};
 use furrow::dataset::record::Record;
 use furrow::dataset::split::Split;
 use furrow::dataset::{Sample, Set, native};
@@ -316,7 +314,7 @@ fn plants_beyond_16_bits_come_in_and_back() {
     assert!(finished.status.success(), "{}", String::from_utf8_lossy(&finished.stderr));
     let (_, back) = imported(&root.join("back"), &["--format", "coco", "--from", text(&out.join("coco"))]);
     assert_eq!(back[0].plants, samples[0].plants);
-    let Some(python) = common::python::python("import numpy, PIL") else { return };
+    let Some(python) = crate::common::python::python("import numpy, PIL") else { return };
     let module = Path::new(env!("CARGO_MANIFEST_DIR")).join("python");
     let words = "import furrow, sys; plants = furrow.Dataset(sys.argv[1])[0]['plants']; print(plants.dtype, *sorted(set(plants.flat)))";
     let read =

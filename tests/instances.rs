@@ -5,10 +5,8 @@
 //! has the plants, places, rows and cover of one whose plants have shapes of their own; nothing depends on threads or on what else is in view.
 //! Source: `accel::brute`, Möller & Trumbore 1997 in double precision, over the copies; the same scene file in other detail.
 
-mod common;
-
-use common::program::{field, hash, shoot};
-use common::scenes::{point, square, unit};
+use crate::common::program::{field, hash, shoot};
+use crate::common::scenes::{point, square, unit};
 use furrow::accel::{Brute, EmbreeAccel, Surface};
 use furrow::geometry::{AlphaMask, Interaction, Intersect, Mesh, PACKET, Placement, Ray};
 use furrow::math::{Mat3, vec2, vec3};

@@ -8,11 +8,9 @@
 //! the same numbers.
 //! Source: geometry; OpenCV's camera model for distorted images.
 
-mod common;
-
-use common::pictures;
-use common::program::{self, SMALL};
-use common::scenes::{sphere, square};
+use crate::common::pictures;
+use crate::common::program::{self, SMALL};
+use crate::common::scenes::{sphere, square};
 use furrow::accel::{Brute, EmbreeAccel};
 use furrow::film::{Film, Filter, Pixel};
 use furrow::geometry::{AlphaMask, Intersect, Mesh, Ray, Window};

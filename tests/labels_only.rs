@@ -4,11 +4,9 @@
 //! fields. Expected: maps and records equal to those of an ordinary dataset of the same scene, value by value; files of photographs missing and
 //! nothing else; formats that need photographs, and everything else that needs samples, refused in words. Source: the ordinary dataset.
 
-mod common;
-
-use common::dataset::{fail, path, succeed, tree, verb};
-use common::program::{SMALL, scratch, trace};
-use common::python::python;
+use crate::common::dataset::{fail, path, succeed, tree, verb};
+use crate::common::program::{SMALL, scratch, trace};
+use crate::common::python::python;
 use furrow::dataset::{Set, native};
 use std::path::Path;
 use std::process::Command;

@@ -4,10 +4,8 @@
 //! Expected: exact equality in single precision for every object and pixel; 32-bit ids up to 4 × 10⁹; equal bytes in every run.
 //! Source: cryptomatte-api 1.0.0, OpenEXR 3.5.3 (Python); without them the tests say so and pass, with `FURROW_REQUIRE_PEERS=1` they fail.
 
-mod common;
-
-use common::program::{field, shoot, small_text};
-use common::python::python;
+use crate::common::program::{field, shoot, small_text};
+use crate::common::python::python;
 use furrow::film::{Film, Pixel, Tally};
 use furrow::geometry::Window;
 use furrow::math::Vec3;

@@ -1,8 +1,6 @@
 //! Lights keep their promise, and the sun and the sky are where and as bright as published models say.
 
-mod common;
-
-use common::chi2::check_sphere;
+use crate::common::chi2::check_sphere;
 use furrow::light::clearsky::{clear_sky, optical_depth};
 use furrow::light::hosek::HosekWilkie;
 use furrow::light::{Emitter, HALF_ANGLE_DEG, Lamp, Light, LightDesc, Outline, Sun, Utc, daylight, sun_position};

@@ -4,9 +4,7 @@
 //! what scikit-learn and SciPy say, to 1e-12; outlines what a search over all pairs of pixels says; an interval of 95 % covers the truth
 //! in about 95 % of simulated sets. Source: the definitions in `src/train/measure`, the programs named in `tests/requirements.txt`.
 
-mod common;
-
-use common::python::python;
+use crate::common::python::python;
 use furrow::report::{Cell, Table};
 use furrow::sampling::rng::{Purpose, Stream};
 use furrow::train::baseline::{Baseline, Cut, Example, Kind, SizeRule};

@@ -12,11 +12,9 @@
 //! `tests/mitsuba/check.py` says what is estimated, from what the errors follow, and how seldom it fails without a fault: once
 //! in 10⁵ for each scene.
 
-mod common;
-
-use common::program::{names, scratch, trace};
-use common::python::python;
-use common::scenes::{camera, shoot};
+use crate::common::program::{names, scratch, trace};
+use crate::common::python::python;
+use crate::common::scenes::{camera, shoot};
 use furrow::accel::EmbreeAccel;
 use furrow::bsdf::{Bsdf, Leaf, OrenNayar};
 use furrow::film::{Film, Filter};
@@ -99,7 +97,7 @@ fn lamps() -> Scene {
     let parts = vec![
         Part { mesh: Arc::new(square(1.0)), mask: None, material: 0, tag: Tag::default(), instance: None },
         Part {
-            mesh: Arc::new(common::scenes::sphere(vec3(0.05, 0.0, 0.06), 0.06, 32)),
+            mesh: Arc::new(crate::common::scenes::sphere(vec3(0.05, 0.0, 0.06), 0.06, 32)),
             mask: None,
             material: 1,
             tag: Tag { class: Class::Crop, plant: 7, leaf: 0 },
@@ -157,7 +155,7 @@ fn field(page: &str, width: u32) -> Scene {
 fn agree(python: &Path, name: &str, tolerance: f32, scenes: &[PathBuf]) {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mitsuba/check.py");
     let mut command = Command::new(python);
-    command.arg(script).arg(common::pictures::folder(name)).arg(tolerance.to_string()).args(scenes);
+    command.arg(script).arg(crate::common::pictures::folder(name)).arg(tolerance.to_string()).args(scenes);
     let output = command.output().expect("python");
     let words = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     eprintln!("{words}");
@@ -379,7 +377,7 @@ fn what_is_lost_is_said() {
 #[test]
 fn the_program_exports_and_lists_what_it_wrote() {
     let (_keep, out) = scratch();
-    let page = common::program::SMALL;
+    let page = crate::common::program::SMALL;
     let output =
         trace(&["export", "--scene", page, "--format", "mitsuba", "--width", "40", "--out", out.to_str().unwrap()])
             .output()
@@ -397,7 +395,7 @@ fn exports_that_cannot_work_end_with_code_2_and_write_nothing() {
     let (_keep, out) = scratch();
     fs::write(&out, "a file").expect("a file");
     let below = out.join("x");
-    let page = common::program::SMALL;
+    let page = crate::common::program::SMALL;
     for (arguments, word) in [
         (vec!["export", "--scene", page, "--format", "mitsuba", "--out", below.to_str().unwrap()], "this is a file"),
         (vec!["export", "--scene", page, "--format", "mitsubishi"], "mitsuba"),

@@ -6,10 +6,8 @@
 //! Source: glTF 2.0 specification; Wavefront OBJ as its writers write it. The `gltf` crate, which shares no code with the
 //! program, checks what is written.
 
-mod common;
-
-use common::pictures;
-use common::program::{self, hash, scratch, shoot, small_text, trace};
+use crate::common::pictures;
+use crate::common::program::{self, hash, scratch, shoot, small_text, trace};
 use furrow::error::Kind;
 use furrow::geometry::Mesh;
 use furrow::light::Light;

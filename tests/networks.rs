@@ -5,10 +5,8 @@
 //! statistics that are not the initial ones, on pictures of odd size. Source: `tests/train/reference.py`, written from the papers, in
 //! NumPy (double precision) and, where a Python has it, in PyTorch.
 
-mod common;
-
-use common::python::{ask, python, torch};
-use common::training::{self, learn, normalised, pictures, stirred};
+use crate::common::python::{ask, python, torch};
+use crate::common::training::{self, learn, normalised, pictures, stirred};
 use furrow::train::data::Band;
 use furrow::train::fit::hyper::NormalizationMode;
 use furrow::train::fit::{Hyperparameters, Plan};

@@ -5,9 +5,7 @@
 //! that is full give a clear error, exit code 1 and no half-written file.
 //! Source: the documentation of `output` and `output::exr`.
 
-mod common;
-
-use common::program::{FILES, SMALL, bits, field, names, run, scratch, shoot, small_text, trace};
+use crate::common::program::{FILES, SMALL, bits, field, names, run, scratch, shoot, small_text, trace};
 use exr::prelude::*;
 use furrow::film::Film;
 use furrow::math::Spectrum;

@@ -5,11 +5,9 @@
 //! archives hold the files of the same dataset in folders, byte for byte; however it was made, cut up, killed, made longer or mended, its
 //! files are those of one run. Source: the dataset in folders; the packages `webdataset`, `datasets`, pandas, polars and DuckDB as readers.
 
-mod common;
-
-use common::dataset::{fail, path, same, succeed, tree, verb};
-use common::program::{SMALL, scratch, trace};
-use common::python::{ask, python, torch_with};
+use crate::common::dataset::{fail, path, same, succeed, tree, verb};
+use crate::common::program::{SMALL, scratch, trace};
+use crate::common::python::{ask, python, torch_with};
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::Read;
@@ -347,9 +345,9 @@ fn examples_of_the_guide_run() {
     make.args(["--split", "1,0,0", "--format", "coco", "--out"]).arg(&data);
     succeed(make);
     std::os::unix::fs::symlink(&data, folder.join("data/own")).expect("another name");
-    let page = common::book::read("docs/guide/datasets.md");
+    let page = crate::common::book::read("docs/guide/datasets.md");
     let mut ran = 0;
-    for block in common::book::blocks(&page) {
+    for block in crate::common::book::blocks(&page) {
         let lines = ["webdataset.WebDataset", "datasets.load_dataset", "from_coco", "furrow.Dataset"];
         let Some(line) = lines.into_iter().find(|line| block.text.contains(line)) else { continue };
         let mut command = Command::new(if line == "furrow.Dataset" { &with_torch } else { &python });

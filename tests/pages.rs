@@ -4,11 +4,9 @@
 //! Rationale: people judge by these pages, on desks and on phones. Expected: no request, no error in the console, a document no wider than its
 //! window, every picture decoded. Source: headless Chromium (Debian's `chromium`), windows 1280 and 400 pixels wide.
 
-mod common;
-
-use common::browser::browser;
-use common::devtools::Page;
-use common::program::{scratch, trace};
+use crate::common::browser::browser;
+use crate::common::devtools::Page;
+use crate::common::program::{scratch, trace};
 use furrow::report::chart::{Chart, Curve, Effect};
 use furrow::report::{Cell, Table};
 use furrow::train::figure::{self, Plot, Shot};

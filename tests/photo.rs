@@ -5,11 +5,9 @@
 //! makes a dataset one (shards, repairs, packs, checks) holds for JPEG as for PNG; datasets of before keep their bytes. Source: the crate
 //! `image` as another way to the decoder, Pillow, and the PNG dataset of the same scene.
 
-mod common;
-
-use common::dataset::{fail, path, same, succeed, tree, verb};
-use common::program::{SMALL, names, run, scratch, trace};
-use common::python::python;
+use crate::common::dataset::{fail, path, same, succeed, tree, verb};
+use crate::common::program::{SMALL, names, run, scratch, trace};
+use crate::common::python::python;
 use furrow::dataset::{Sample, Set, native};
 use furrow::output;
 use serde_json::Value;

@@ -5,10 +5,8 @@
 //! around the program that the tests built, so nothing is compiled for it. Without maturin the tests say so and pass, with
 //! `FURROW_REQUIRE_PEERS=1` they fail.
 
-mod common;
-
-use common::program::{SMALL, names, scratch, trace};
-use common::python::{python, torch_with};
+use crate::common::program::{SMALL, names, scratch, trace};
+use crate::common::python::{python, torch_with};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::LazyLock;

@@ -6,10 +6,8 @@
 //! each effect that is left out changes the picture and no label; equal input makes equal bits.
 //! Source: closed forms; the label pass, which `labels.rs` holds against double precision.
 
-mod common;
-
-use common::program::{self, FILES, SMALL, names, scratch, trace};
-use common::scenes::square;
+use crate::common::program::{self, FILES, SMALL, names, scratch, trace};
+use crate::common::scenes::square;
 use furrow::accel::EmbreeAccel;
 use furrow::bsdf::{Bsdf, Leaf, OrenNayar};
 use furrow::film::Filter;

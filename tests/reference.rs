@@ -7,14 +7,12 @@
 //! Šidák 1967.
 //!
 //! `tests/ref/*.exr` hold the mean of each band (f32) and its standard error (f16). Where pixels change on purpose, look at
-//! `target/test-failures/reference-*/`, then renew them: `FURROW_BLESS=1 cargo test --release --test reference`.
+//! `target/test-failures/reference-*/`, then renew them: `FURROW_BLESS=1 cargo test --release --test all reference::`.
 
-mod common;
-
-use common::layers::{read_layers, write_layers};
-use common::pictures;
-use common::scenes::{camera, scene, shoot_with, sphere, square};
-use common::stats::{p_value, sidak};
+use crate::common::layers::{read_layers, write_layers};
+use crate::common::pictures;
+use crate::common::scenes::{camera, scene, shoot_with, sphere, square};
+use crate::common::stats::{p_value, sidak};
 use furrow::bsdf::{Bsdf, Leaf, OrenNayar};
 use furrow::film::Film;
 use furrow::integrator::{PathTracer, Technique};
@@ -196,7 +194,7 @@ fn check(name: &str, scene: &Scene, ways: &[(&str, PathTracer, Points, u32)]) {
             let seen = keep(&format!("{name}-{way}"), &got, &reference);
             panic!(
                 "{name}, {way}: {fault}; if it should have changed, look at {seen} and renew the references with \
-                 FURROW_BLESS=1 cargo test --release --test reference"
+                 FURROW_BLESS=1 cargo test --release --test all reference::"
             );
         }
     }

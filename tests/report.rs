@@ -4,11 +4,9 @@
 //! added up here from the records; no request leaves the page; every picture is decoded; nothing hangs over a narrow window's edge.
 //! Source: the records on disk; headless Chromium (Debian's `chromium`).
 
-mod common;
-
-use common::browser::{browser, probe};
-use common::devtools::Page;
-use common::program::{SMALL, scratch, trace};
+use crate::common::browser::{browser, probe};
+use crate::common::devtools::Page;
+use crate::common::program::{SMALL, scratch, trace};
 use serde_json::Value;
 use std::path::Path;
 
@@ -218,13 +216,13 @@ fn images_are_filtered_sorted_searched_and_enlarged() {
 #[test]
 fn a_dataset_of_an_earlier_version_is_read_to_the_same_report() {
     let (_kept, out) = scratch();
-    for (name, bytes) in common::dataset::tree(Path::new("tests/data/dataset")) {
+    for (name, bytes) in crate::common::dataset::tree(Path::new("tests/data/dataset")) {
         let path = out.join(name);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(path, bytes).unwrap();
     }
     let run = |verb: &str| {
-        let said = common::dataset::succeed(common::dataset::verb(verb, &out, &[])).stderr;
+        let said = crate::common::dataset::succeed(crate::common::dataset::verb(verb, &out, &[])).stderr;
         String::from_utf8_lossy(&said).into_owned()
     };
     let said = run("verify");

@@ -4,9 +4,7 @@
 //! right. Expected: χ² tests pass for each pair, densities integrate to one, and no draw leaves its domain even at the ends of
 //! [0, 1). Source: the warps' references, closed-form areas.
 
-mod common;
-
-use common::chi2::{check_counts, check_sphere, check_square, upper_gamma};
+use crate::common::chi2::{check_counts, check_sphere, check_square, upper_gamma};
 use furrow::math::Vec3;
 use furrow::sampling::distribution::{Distribution1D, Distribution2D, pick};
 use furrow::sampling::{Purpose, Stream, warp};

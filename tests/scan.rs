@@ -4,11 +4,9 @@
 //! one's own in a field. Expected: the LiDAR equation for targets larger than the beam, a cos θ / r² (Wagner et al. 2006); normal errors of the
 //! range; two echoes at an edge, with the shares of a Gaussian beam; the labels of the geometry. Statistical bounds are 5 standard errors: false alarms of 6e-7.
 
-mod common;
-
-use common::dataset::fail;
-use common::program::{names, scratch, small_text, trace};
-use common::scenes::{camera, scene, square, with_world};
+use crate::common::dataset::fail;
+use crate::common::program::{names, scratch, small_text, trace};
+use crate::common::scenes::{camera, scene, square, with_world};
 use furrow::bsdf::{Bsdf, OrenNayar};
 use furrow::geometry::{Intersect, Mesh, Ray};
 use furrow::job::{Field, SceneFile, Threads};

@@ -3,7 +3,7 @@
 //!
 //! Rationale: people write pages by hand, at night, in editors that know nothing of them. Expected: a page builds or its
 //! error shows file, line, column, the characters at fault and a way out. Source: none; the words are ours. After a change of
-//! words: `FURROW_BLESS=1 cargo test --test scene_files` writes them anew; read the difference before committing it.
+//! words: `FURROW_BLESS=1 cargo test --test all scene_files::` writes them anew; read the difference before committing it.
 
 use furrow::Result;
 use furrow::model::{Model, Up};

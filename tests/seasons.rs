@@ -4,10 +4,8 @@
 //! more. Expected: identities and places stay, leaves come and grow, holes stay where they were on the leaf, weeds are not there before they
 //! emerge, and no byte depends on which other days are rendered. Equality is exact.
 
-mod common;
-
-use common::dataset::{fail, path, same, succeed, tree, verb};
-use common::program::{scratch, small_text, trace};
+use crate::common::dataset::{fail, path, same, succeed, tree, verb};
+use crate::common::program::{scratch, small_text, trace};
 use furrow::dataset::{Record, Set, native};
 use furrow::geometry::AlphaMask;
 use furrow::light::LightRecord;

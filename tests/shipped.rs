@@ -3,9 +3,7 @@
 //! Rationale: who has installed the program has no clone of the repository to name paths in. Expected: names lead to the files that ship,
 //! files of one's own come first, and a dataset made from names holds all that it needs. Source: the names in the species files.
 
-mod common;
-
-use common::program::{names, scratch};
+use crate::common::program::{names, scratch};
 use std::path::Path;
 use std::process::{Command, Output};
 

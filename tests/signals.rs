@@ -3,11 +3,8 @@
 //! Rationale: a scheduler tells "stopped, start me again" from "failed" by the exit code alone, and a folder of half-written
 //! images would be worse than none. Expected: exit code 75 on INT, TERM, HUP and USR1, no file left, whatever the program is
 //! at. Source: sysexits.h, EX_TEMPFAIL; Slurm's `--signal`, which sends USR1.
-#![cfg(unix)]
 
-mod common;
-
-use common::program::{SMALL, names, scratch, trace};
+use crate::common::program::{SMALL, names, scratch, trace};
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};

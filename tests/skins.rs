@@ -4,9 +4,7 @@
 //! file is its mesh within 1e-5 m; weights sum to one; a joint moves what lies beyond it and nothing else; meshes are those of an export
 //! without skins. Source: glTF 2.0 specification, 3.7.3 (skins); the `gltf` crate reads the file.
 
-mod common;
-
-use common::program::{SMALL, field, scratch, trace};
+use crate::common::program::{SMALL, field, scratch, trace};
 use furrow::math::{DMat4, DQuat, DVec3};
 use furrow::output;
 use furrow::scene::Field;

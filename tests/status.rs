@@ -3,12 +3,9 @@
 //! Rationale: whoever renders for a night wants to know in the evening what it takes and in between whether it gets there. Expected: the
 //! numbers of `status` are those of the files, whatever became of the runs; the bill's number of files is exact, its bytes are within
 //! 30 %, and nothing is left anywhere. Source: the files themselves, counted and measured here.
-#![cfg(target_os = "linux")]
 
-mod common;
-
-use common::dataset::{SIZE, fail, made, make, path, succeed, tree, verb};
-use common::program::{SMALL, names, scratch, trace};
+use crate::common::dataset::{SIZE, fail, made, make, path, succeed, tree, verb};
+use crate::common::program::{SMALL, names, scratch, trace};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;

@@ -5,13 +5,11 @@
 //! square. Few pixels of great weight decide such a figure, so the bounds leave room. Source: Burley 2020; the reference has
 //! independent numbers of another seed.
 //!
-//! The long test, at many more pixels: `cargo test --release --test stratification -- --ignored --nocapture`.
+//! The long test, at many more pixels: `cargo test --release --test all stratification:: -- --ignored --nocapture`.
 
 #![allow(clippy::print_stdout, reason = "the long test tells what it measured")]
 
-mod common;
-
-use common::scenes::with_world;
+use crate::common::scenes::with_world;
 use furrow::geometry::Window;
 use furrow::integrator::PathTracer;
 use furrow::render::{self, Settings};

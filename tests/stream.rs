@@ -5,11 +5,9 @@
 //! shards that give the whole; a reader that leaves, a signal and a field that cannot grow each end it as they should. Source: the dataset
 //! itself; the packages `webdataset` and `torch` as readers.
 
-mod common;
-
-use common::dataset::{fail, path, succeed, tree};
-use common::program::{SMALL, scratch, trace};
-use common::python::{python, torch_with};
+use crate::common::dataset::{fail, path, succeed, tree};
+use crate::common::program::{SMALL, scratch, trace};
+use crate::common::python::{python, torch_with};
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::Read;
@@ -142,14 +140,14 @@ fn a_reader_that_leaves_ends_it_quietly() {
         out.read_exact(&mut part).expect("a block");
         archive.extend(part);
     }
-    assert!(!common::program::names(&folder).is_empty(), "the scene is copied while it runs");
+    assert!(!crate::common::program::names(&folder).is_empty(), "the scene is copied while it runs");
     drop(out);
     let mut said = String::new();
     let mut stderr = child.stderr.take().expect("stderr");
     assert_eq!(end(child).code(), Some(0));
     stderr.read_to_string(&mut said).expect("text");
     assert_eq!(said, "");
-    assert_eq!(common::program::names(&folder), Vec::<String>::new());
+    assert_eq!(crate::common::program::names(&folder), Vec::<String>::new());
 }
 
 /// Expected: TERM ends it with 75, also while it waits for a reader that does not read; `--first` goes on where it stopped.
@@ -171,7 +169,7 @@ fn signals_end_it_while_nobody_reads() {
         let mut said = String::new();
         stderr.read_to_string(&mut said).expect("text");
         assert!(said.starts_with("stopped: ") && said.contains("\n help: --first "), "{signal}: {said}");
-        assert_eq!(common::program::names(&folder), Vec::<String>::new(), "{signal}");
+        assert_eq!(crate::common::program::names(&folder), Vec::<String>::new(), "{signal}");
     }
 }
 
@@ -262,8 +260,8 @@ fn python_reads_twenty_images_and_stops() {
 #[test]
 fn pytorch_trains_on_a_stream_as_the_guide_shows() {
     let Some(python) = torch_with("PIL") else { return };
-    let page = common::book::read("docs/guide/datasets.md");
-    let example = common::book::blocks(&page).into_iter().find(|block| block.text.contains("IterableDataset"));
+    let page = crate::common::book::read("docs/guide/datasets.md");
+    let example = crate::common::book::blocks(&page).into_iter().find(|block| block.text.contains("IterableDataset"));
     let (_keep, folder) = scratch();
     fs::create_dir_all(&folder).expect("a folder");
     let file = folder.join("example.py");

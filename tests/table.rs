@@ -4,10 +4,8 @@
 //! rows, the same command ends with the same weights and tables, bit for bit, on one thread; wrong input is exit code 2 and leaves
 //! nothing. Source: none needed, equality is exact.
 
-mod common;
-
-use common::dataset::{fail, make, path, same, succeed, tree};
-use common::program::scratch;
+use crate::common::dataset::{fail, make, path, same, succeed, tree};
+use crate::common::program::scratch;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -46,7 +44,7 @@ fn desk() -> &'static Path {
                     .expect("a copy");
             }
         }
-        let small = Path::new(env!("CARGO_MANIFEST_DIR")).join(common::program::SMALL);
+        let small = Path::new(env!("CARGO_MANIFEST_DIR")).join(crate::common::program::SMALL);
         std::fs::write(folder.join("page.ron"), PAGE.replace("SMALL", path(&small))).expect("the page");
         (keep, folder)
     });
@@ -164,7 +162,7 @@ fn a_disk_that_fails_is_told_and_the_table_goes_on() {
     let (_keep, out) = scratch();
     // One folder through all of them, as a disk that is cleared bit by bit: each run comes further than the one before.
     for at in [1, 4, 40, 150, 60, 30] {
-        let ended = common::faults::run(table(&out, &[]), &out, at, at % 4 == 0);
+        let ended = crate::common::faults::run(table(&out, &[]), &out, at, at % 4 == 0);
         let said = ended.said();
         assert_ne!(ended.failed, "none", "it ended before change {at}: {said}");
         assert_eq!(ended.output.status.code(), Some(1), "change {at}, {}: {said}", ended.failed);

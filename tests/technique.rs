@@ -5,11 +5,9 @@
 //! files; the limits that bias are found to bias. Source: Veach 1997, chapters 9 and 10. Every pixel by itself is tested in
 //! `tests/reference.rs`.
 
-mod common;
-
-use common::layers::read_layers;
-use common::program::{scratch, trace};
-use common::stats::{p_value, sidak};
+use crate::common::layers::read_layers;
+use crate::common::program::{scratch, trace};
+use crate::common::stats::{p_value, sidak};
 use furrow::math::Spectrum;
 use std::path::Path;
 

@@ -1,6 +1,6 @@
 //! The textures that ship with the program.
 //!
-//! After a change of the drawing code: `cargo test --test textures -- --ignored redraw` draws them all again; `ONLY=beet` before
+//! After a change of the drawing code: `cargo test --test all textures::redraw -- --ignored` draws them all again; `ONLY=beet` before
 //! it draws those whose path holds the word.
 
 use furrow::geometry::outline::Outline;

@@ -3,12 +3,9 @@
 //! Rationale: who writes a scene file must see each change, and each mistake in the program's own words, without asking for it; and nobody
 //! else may look or write. Expected: load → edit → change → break → error → mend, with the last good picture kept; wrong tokens, hosts and
 //! origins refused; values written into the file change no other byte; exit code 75 on a signal.
-#![cfg(unix)]
 
-mod common;
-
-use common::browser::browser;
-use common::devtools::Page;
+use crate::common::browser::browser;
+use crate::common::devtools::Page;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;

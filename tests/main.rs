@@ -1,0 +1,85 @@
+//! All tests that see the library and the programs from outside, a module a subject: `cargo test --test all labels::`.
+//!
+//! One program, for 70 would each be linked with all of the library, libtorch and Embree: that took longer than the tests.
+
+mod ablation;
+mod accel;
+#[cfg(feature = "train")]
+mod adapt;
+mod analytic;
+mod architecture;
+mod bsdf;
+mod camera;
+mod classes;
+mod cli;
+mod cloud;
+#[cfg(unix)]
+mod cluster;
+mod common;
+mod compare;
+mod condition;
+mod coverage;
+mod dataset;
+mod dataset_kill;
+mod denoise;
+mod dependencies;
+#[cfg(feature = "train")]
+mod deploy;
+mod determinism;
+mod documents;
+mod drive;
+mod embree;
+mod error_control;
+mod estimate;
+mod examples;
+mod experiment;
+mod explain;
+mod extents;
+#[cfg(all(target_os = "linux", target_arch = "x86_64"))]
+mod faults;
+mod fields;
+mod figures;
+#[cfg(feature = "train")]
+mod fit;
+mod formats;
+mod fuzz_corpus;
+mod gap;
+mod guide;
+mod import;
+mod instances;
+mod labels;
+mod labels_only;
+mod layers;
+mod light;
+mod measure;
+mod mitsuba;
+mod models;
+#[cfg(feature = "train")]
+mod networks;
+mod output;
+mod packs;
+mod pages;
+mod photo;
+mod python;
+#[cfg(feature = "raster")]
+mod raster;
+mod reference;
+mod report;
+mod sampling;
+mod scan;
+mod scene_files;
+mod seasons;
+mod shipped;
+#[cfg(unix)]
+mod signals;
+mod skins;
+#[cfg(target_os = "linux")]
+mod status;
+mod stratification;
+mod stream;
+#[cfg(feature = "train")]
+mod table;
+mod technique;
+mod textures;
+#[cfg(unix)]
+mod watch;
