@@ -159,7 +159,7 @@ fn opacity_follows_the_outline() {
             Margin::Entire | Margin::Toothed { .. } | Margin::Spined { .. } => {
                 assert!(share < outline * 1.01 && share > 0.75 * outline, "{name}: {share} for {outline}");
             }
-            Margin::Lobed { .. } | Margin::Lyrate(_) => assert!((0.25..0.85).contains(&share), "{name}: {share}"),
+            Margin::Lobed(_) | Margin::Lyrate(_) => assert!((0.25..0.85).contains(&share), "{name}: {share}"),
         }
         // Every point of an entire leaf's mesh is opaque.
         let uncut = recipe.notch.is_none() && recipe.sinus.is_none();
@@ -259,7 +259,7 @@ fn odd_leaves_are_drawn_too() {
             ),
             (
                 "Full",
-                "margin: Lobed(pairs: 12, rachis: 0, terminal: 0.01, lean_deg: 89), veins: Pinnate(pairs: 0, angle_deg: 0, midrib: 0, fine: 30)",
+                "margin: Lobed(pairs: 12, rachis: 0, terminal: 0.01, terminal_width: 0, lean_deg: 89, pointed: 1, teeth: (8, 1)), veins: Pinnate(pairs: 0, angle_deg: 0, midrib: 0, fine: 30)",
             ),
             (
                 "Power(a: 1, b: 1)",

@@ -8,6 +8,7 @@ mod crust;
 mod drawn;
 mod leaf;
 mod leaf_recipe;
+mod lobed;
 mod lyrate;
 mod shape;
 mod soil;
@@ -20,6 +21,7 @@ mod write;
 
 pub use drawn::{Drawn, Grey};
 pub use leaf_recipe::{LeafRecipe, LeafRelief, Look};
+pub use lobed::Lobed;
 pub use lyrate::Lyrate;
 pub use shape::{Margin, Sinus};
 pub use soil_recipe::{Crumbs, Ground, Litter, SoilRecipe};

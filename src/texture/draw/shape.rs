@@ -2,11 +2,12 @@
 //!
 //! Coordinates are in lengths of the leaf: Y along the midrib, 0 at the base and 1 at the tip, X to the right.
 
-use super::cells::{smooth_max, unit};
+use super::cells::unit;
+use super::lobed::{Lobed, Lobes};
 use super::lyrate::{Lyrate, Silhouette};
 use crate::geometry::outline::Outline;
 use crate::math::{Vec2, lerp, smoothstep, vec2};
-use crate::ron_file::{Count, Fraction, Num, Positive, PositiveCount};
+use crate::ron_file::{Fraction, Num, Positive, PositiveCount};
 use crate::sampling::rng::mix;
 use serde::{Deserialize, Serialize};
 
@@ -24,18 +25,9 @@ pub enum Margin {
         /// Depth of the sinuses, of the half-width.
         depth: Num<Fraction>,
     },
-    /// Cut nearly to the midrib into lobes that lean to the tip, the last one larger (pinnatifid). The outline is then the
+    /// Cut nearly to the midrib into lobes that lean to the tip and run together in the last (pinnatifid). The outline is then the
     /// envelope of the lobes' tips.
-    Lobed {
-        /// Pairs of lobes below the last.
-        pairs: Num<PositiveCount>,
-        /// Width of the strip along the midrib, of the leaf's width.
-        rachis: Num<Fraction>,
-        /// Length of the last lobe, of the leaf's length.
-        terminal: Num<Fraction>,
-        /// How far the lobes lean to the tip, degrees.
-        lean_deg: Num<Count>,
-    },
+    Lobed(Lobed),
     /// A large blade at the end, rounded lobes below it on a winged midrib. The outline is then `Full`.
     Lyrate(Lyrate),
     /// Shallow lobes that end in pale spines, with smaller spines between them: thistles.
@@ -68,7 +60,7 @@ pub(super) struct Shape {
     notch: f32,
     /// Depth and width of the sinus in the base, in lengths.
     sinus: Option<(f32, f32)>,
-    lobes: Vec<Lobe>,
+    lobed: Option<Lobes>,
     spines: Vec<Spine>,
     teeth: [Vec<(f32, f32)>; 2],
     lyrate: Option<Silhouette>,
@@ -84,16 +76,6 @@ struct Spine {
 /// Half-width of a spine at its foot, in lengths of the leaf.
 const SPINE: f32 = 0.0055;
 
-/// One lobe: its foot on the midrib, axis, length and half-width.
-struct Lobe {
-    foot: Vec2,
-    axis: Vec2,
-    length: f32,
-    half_width: f32,
-    /// Exponents of its own outline.
-    power: (f32, f32),
-}
-
 impl Shape {
     /// `aspect` is width over length; `notch` the depth of a notch in the tip, in lengths.
     pub(super) fn new(outline: Outline, aspect: Num<Positive>, margin: Margin, notch: f32, seed: u64) -> Self {
@@ -104,7 +86,7 @@ impl Shape {
             margin,
             notch,
             sinus: None,
-            lobes: Vec::new(),
+            lobed: None,
             spines: Vec::new(),
             teeth: [Vec::new(), Vec::new()],
             lyrate: None,
@@ -128,35 +110,7 @@ impl Shape {
                 }
             }
             Margin::Spined { lobes, spine, .. } => shape.arm(lobes.f32(), spine.f32(), random),
-            Margin::Lobed { pairs, terminal, lean_deg, .. } => {
-                let n = pairs.get() as usize;
-                let start = 1.0 - terminal.f32();
-                for i in 0..n {
-                    let even = (i as f32 + 0.5) / n as f32;
-                    for (k, side) in [-1.0f32, 1.0].into_iter().enumerate() {
-                        let k = k as u64;
-                        let pitch = start * 0.86 / n as f32;
-                        let y = 0.14 * start + even * start * 0.86 - 0.3 * pitch
-                            + (0.12 * side + 0.35 * random(i, k)) * pitch;
-                        let lean = (lean_deg.f32() * (1.0 + 0.5 * random(i, 2 + k))).to_radians();
-                        let axis = vec2(side * lean.cos(), lean.sin());
-                        // Lobes grow toward the tip and stay within the outline's half-width where they end.
-                        let tip = y + 0.5 * aspect * lean.tan();
-                        let room = aspect * outline.half_width(tip.min(0.97)).min(0.5) / lean.cos();
-                        let length = room * lerp(0.84, 0.98, random(i, 4 + k) + 0.5) * lerp(0.5, 1.0, even.powf(0.7));
-                        let half_width = pitch * lerp(0.36, 0.48, random(i, 6 + k) + 0.5);
-                        shape.lobes.push(Lobe { foot: vec2(0.0, y), axis, length, half_width, power: (0.16, 0.55) });
-                    }
-                }
-                let length = terminal.f32() * 1.12;
-                shape.lobes.push(Lobe {
-                    foot: vec2(0.0, 1.0 - length),
-                    axis: vec2(0.0, 1.0),
-                    length,
-                    half_width: 0.44 * aspect,
-                    power: (0.75, 0.55),
-                });
-            }
+            Margin::Lobed(plan) => shape.lobed = Some(Lobes::new(&plan, outline, aspect, seed)),
         }
         shape
     }
@@ -216,8 +170,7 @@ impl Shape {
 
     /// The axes of the lobes: where their veins run.
     pub(super) fn lobe_axes(&self) -> impl Iterator<Item = (Vec2, Vec2)> + '_ {
-        let pinnate = self.lobes.iter().map(|l| (l.foot, l.foot + l.axis * l.length * 0.92));
-        pinnate.chain(self.lyrate.iter().flat_map(Silhouette::lobe_axes))
+        self.lobed.iter().flat_map(Lobes::axes).chain(self.lyrate.iter().flat_map(Silhouette::lobe_axes))
     }
 
     /// About the distance to the margin, positive inside.
@@ -247,15 +200,9 @@ impl Shape {
                 let s = p.y - 0.35 * p.x.abs();
                 self.within(p.x, p.y, 1.0 - depth.f32() * self.sinus(side, s))
             }
-            Margin::Lobed { rachis, .. } => {
-                let strip = rachis.f32() * self.aspect * 0.5 * lerp(0.55, 1.0, p.y.clamp(0.0, 1.0));
-                let within_ends = p.y.min(0.94 - p.y);
-                let mut d = (strip - p.x.abs()).min(within_ends);
-                for lobe in &self.lobes {
-                    d = smooth_max(d, lobe.inside(p), 0.012);
-                }
-                // The outline bounds everything, as it bounds the mesh.
-                d.min(self.within(p.x, p.y, 1.0))
+            // The outline bounds everything, as it bounds the mesh.
+            Margin::Lobed(_) => {
+                self.lobed.as_ref().map_or(-1.0, |lobed| lobed.inside(p)).min(self.within(p.x, p.y, 1.0))
             }
         };
         let Some((depth, open)) = self.sinus.filter(|(depth, _)| p.y < *depth) else { return whole };
@@ -289,25 +236,6 @@ impl Shape {
         let fall = fall * fall * (1.4 - 0.4 * fall);
         let fade = smoothstep(0.10, 0.22, s) * (1.0 - smoothstep(0.72, 0.97, s));
         fall * if t < tip { a } else { b } * fade
-    }
-}
-
-impl Lobe {
-    fn inside(&self, p: Vec2) -> f32 {
-        let q = p - self.foot;
-        let (s, n) = (q.dot(self.axis) / self.length, q.perp_dot(self.axis));
-        if !(0.0..=1.0).contains(&s) {
-            return -((s - s.clamp(0.0, 1.0)) * self.length).hypot(n);
-        }
-        let (a, b) = self.power;
-        let half = |s: f32| Outline::Power { a, b }.half_width(s.clamp(0.0, 1.0)) * 2.0 * self.half_width;
-        let room = half(s) - n.abs();
-        if room < 0.0 {
-            // Farther than it is: the union then never grows spurs where two lobes' outsides meet.
-            return room;
-        }
-        let slope = (half(s + 0.01) - half(s - 0.01)) / (0.02 * self.length);
-        room / (1.0 + slope * slope).sqrt()
     }
 }
 

@@ -58,7 +58,7 @@ pub(super) fn grow(veins: &Veins, shape: &Shape, aspect: f32, margin: Margin, st
             along_lobes(&mut segments, shape, midrib.f32() * aspect);
             // Secondaries stand on the blade that ends a lyrate leaf, on all of one without lobes, on no pinnate one.
             let foot = match margin {
-                Margin::Lobed { .. } => None,
+                Margin::Lobed(_) => None,
                 Margin::Lyrate(plan) => Some(1.0 - plan.terminal.f32()),
                 _ => Some(shape.sinus_depth()),
             };

@@ -46,6 +46,19 @@ impl Features {
         y * self.size.0 + x
     }
 
+    /// Values of cells at a pixel of a picture of this size, linear between the centres of cells.
+    fn between(&self, values: &[f64], at: usize, (width, height): (usize, usize)) -> f64 {
+        let place = |pixel: usize, pixels: usize, cells: usize| {
+            let place = ((pixel as f64 + 0.5) * cells as f64 / pixels as f64 - 0.5).clamp(0.0, (cells - 1) as f64);
+            (place as usize, (place as usize + 1).min(cells - 1), place.fract())
+        };
+        let (left, right, x) = place(at % width, width, self.size.0);
+        let (above, below, y) = place(at / width, height, self.size.1);
+        let linear = |from: f64, to: f64, share: f64| from + (to - from) * share;
+        let row = |row: usize| linear(values[row * self.size.0 + left], values[row * self.size.0 + right], x);
+        linear(row(above), row(below), y)
+    }
+
     /// How many pixels of which region, from 0, lie in which cell.
     fn shared(&self, regions: &Components, size: (usize, usize)) -> BTreeMap<(usize, usize), f32> {
         let mut shared = BTreeMap::new();
@@ -114,7 +127,7 @@ impl Appearance {
         let value = |(at, region): (usize, &u32)| {
             let Some(region) = (*region as usize).checked_sub(1) else { return 0.0 };
             let whole = sums[region] / f64::from(regions.areas[region]);
-            WEIGHT * ((1.0 - PLACE) * whole + PLACE * near[features.cell(at, size)])
+            WEIGHT * ((1.0 - PLACE) * whole + PLACE * features.between(&near, at, size))
         };
         regions.labels.iter().enumerate().map(value).collect()
     }
@@ -200,6 +213,20 @@ mod tests {
         assert!(Appearance::learn(&[learnt(), Examples::default()]).is_none());
         assert!(Appearance::learn(&[]).is_none());
         assert!(Appearance::learn(&[learnt(), learnt()]).is_some());
+    }
+
+    /// Expected: of cells that hold their own centre's x + 10 y, each pixel between centres has the same of its own centre; beyond the outermost
+    /// centres values stay. Source: linear interpolation.
+    #[test]
+    fn values_are_linear_between_cells() {
+        let features = Features { size: (5, 4), planes: Vec::new() };
+        let centre = |c: usize| ((c % 5) as f64 + 0.5) * 8.0 + 10.0 * ((c / 5) as f64 + 0.5) * 8.0;
+        let values: Vec<f64> = (0..20).map(centre).collect();
+        for (x, y) in [(4, 4), (10, 4), (17, 21), (35, 27), (0, 0), (39, 31)] {
+            let (cx, cy) = ((x as f64 + 0.5).clamp(4.0, 36.0), (y as f64 + 0.5).clamp(4.0, 28.0));
+            let found = features.between(&values, y * 40 + x, (40, 32));
+            assert!((found - cx - 10.0 * cy).abs() < 1e-9, "({x}, {y}): {found}");
+        }
     }
 
     /// Expected: an even field stays even, up to its edges and whatever cells hold plants; a value beside plants becomes their mean. Source:

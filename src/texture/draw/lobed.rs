@@ -1,0 +1,191 @@
+//! Pinnatifid leaves: cut to a strip along the midrib into lobes that lean to the tip, stand closer to each other there and run together in the
+//! last one. Lobes may be blunt, as of groundsel, or pointed, as of poppies, and toothed.
+//!
+//! Coordinates as in [`super::shape`].
+
+use super::cells::{smooth_max, unit};
+use crate::geometry::outline::Outline;
+use crate::math::{Vec2, lerp, smoothstep, vec2};
+use crate::ron_file::{Count, Fraction, Num, PositiveCount};
+use crate::sampling::rng::mix;
+use serde::{Deserialize, Serialize};
+
+/// The plan of a pinnatifid leaf. The outline is then the envelope of the lobes' tips.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields, rename = "Lobed")]
+pub struct Lobed {
+    /// Pairs of lobes below the last.
+    pub pairs: Num<PositiveCount>,
+    /// Width of the strip along the midrib, of the leaf's width.
+    pub rachis: Num<Fraction>,
+    /// Length of the last lobe, of the leaf's length.
+    pub terminal: Num<Fraction>,
+    /// Width of the last lobe, of the leaf's width.
+    pub terminal_width: Num<Fraction>,
+    /// How far the lobes lean to the tip, degrees.
+    pub lean_deg: Num<Count>,
+    /// 0 for blunt lobes, 1 for long points.
+    pub pointed: Num<Fraction>,
+    /// Teeth on each side of each lobe, eight at most, and how deep the sinuses between them are, of the lobe's half-width.
+    pub teeth: (Num<Count>, Num<Fraction>),
+}
+
+/// Most teeth on each side of a lobe.
+pub(super) const MOST_TEETH: f64 = 8.0;
+/// How much the distance of lobes shrinks to the tip: exponent of their places.
+const CROWDING: f32 = 1.3;
+/// The part of the leaf's foot without lobes, of what is below the last.
+const BARE: f32 = 0.1;
+/// Exponent of a lobe's outline at its foot: broad from the start.
+const FOOT: f32 = 0.22;
+/// Teeth lean to the tip of their lobe by this share of their distance from its axis.
+const SHEAR: f32 = 0.3;
+/// Steps in which a lobe grows until its tip is at the envelope.
+const STEPS: u32 = 200;
+
+/// All lobes of a leaf, the last of them last.
+pub(super) struct Lobes {
+    lobes: Vec<Lobe>,
+    /// Half-width of the strip along the midrib near the tip, and where it ends.
+    strip: (f32, f32),
+    /// Radius that the sinuses between lobes are rounded by.
+    fillet: f32,
+}
+
+/// One lobe: a blade along an arched axis from its foot on the midrib.
+struct Lobe {
+    foot: Vec2,
+    axis: Vec2,
+    length: f32,
+    half_width: f32,
+    outline: Outline,
+    /// How far the axis arches to the left at its end, of the length.
+    arch: f32,
+    teeth: [Teeth; 2],
+}
+
+/// The teeth of one side: where along the lobe each ends, and how deep the sinus before it is.
+struct Teeth(Vec<(f32, f32)>);
+
+impl Lobes {
+    /// Of a leaf whose width is `aspect` of its length; `outline` holds the tips of the lobes.
+    pub(super) fn new(plan: &Lobed, outline: Outline, aspect: f32, seed: u64) -> Self {
+        let random = |i: u64, k: u64| unit(mix(mix(seed ^ (k << 40)) ^ i)) - 0.5;
+        let (pairs, pointed) = (plan.pairs.f32(), plan.pointed.f32());
+        let teeth = (plan.teeth.0.get().min(MOST_TEETH) as usize, plan.teeth.1.f32());
+        let terminal = plan.terminal.f32();
+        let top = 1.0 - terminal;
+        let place = |u: f32| top * lerp(BARE, 1.0, 1.0 - (1.0 - u.clamp(0.0, 1.0)).powf(CROWDING));
+        let mut lobes = Vec::new();
+        for i in 0..pairs as u64 {
+            for (side, k) in [(-1.0_f32, 0), (1.0, 10)] {
+                let even = i as f32 / pairs;
+                let share = even + (0.5 + 0.1 * side + 0.3 * random(i, k + 2)) / pairs;
+                let pitch = place(even + 1.0 / pairs) - place(even);
+                let y = place(share);
+                let lean = plan.lean_deg.f32() * (1.0 + 0.35 * random(i, k + 3)) * lerp(0.75, 1.3, share);
+                let axis = Vec2::from_angle(lean.min(85.0).to_radians()) * vec2(side, 1.0);
+                let room = reach(vec2(0.0, y), axis, outline, aspect);
+                let length = (room * (1.0 - 0.3 * (random(i, k + 4) + 0.5))).max(1e-3);
+                let half_width = (0.5 * pitch * (1.0 + 0.35 * random(i, k + 5))).min(0.5 * length);
+                lobes.push(Lobe {
+                    foot: vec2(0.0, y - 0.2 * pitch),
+                    axis,
+                    length,
+                    half_width,
+                    outline: Outline::Power { a: FOOT, b: lerp(0.42, 1.15, pointed) },
+                    arch: side * 0.16 * (1.0 + random(i, k + 6)),
+                    teeth: [70, 71].map(|t| Teeth::new(teeth, |j| random(100 * i + j, t + k))),
+                });
+            }
+        }
+        // The last lobe is rooted below its foot, so that the uppermost of the others run into it.
+        let length = 1.4 * terminal;
+        let more = if teeth.0 > 0 { (teeth.0 + 1, teeth.1) } else { teeth };
+        lobes.push(Lobe {
+            foot: vec2(0.0, 1.0 - length),
+            axis: Vec2::Y,
+            length: length.max(1e-3),
+            half_width: 0.5 * aspect * plan.terminal_width.f32(),
+            outline: Outline::Power { a: 0.55, b: lerp(0.5, 1.1, pointed) },
+            arch: 0.0,
+            teeth: [90, 91].map(|t| Teeth::new(more, |j| random(j, t))),
+        });
+        Self { lobes, strip: (0.5 * aspect * plan.rachis.f32(), top), fillet: lerp(0.03, 0.012, pointed) }
+    }
+
+    /// Foot and end of each lobe: where its vein runs.
+    pub(super) fn axes(&self) -> impl Iterator<Item = (Vec2, Vec2)> + '_ {
+        self.lobes.iter().map(|lobe| (lobe.foot, lobe.at(0.92)))
+    }
+
+    /// About the distance to the margin, positive inside.
+    pub(super) fn inside(&self, p: Vec2) -> f32 {
+        let (half, top) = self.strip;
+        let strip = (half * lerp(0.5, 1.0, p.y.clamp(0.0, 1.0)) - p.x.abs()).min(p.y).min(top - p.y);
+        self.lobes.iter().fold(strip, |d, lobe| smooth_max(d, lobe.inside(p), self.fillet))
+    }
+}
+
+/// How far one comes from a place along a direction within the outline.
+fn reach(from: Vec2, axis: Vec2, outline: Outline, aspect: f32) -> f32 {
+    let far = 0.9 * aspect.max(0.1) / axis.x.abs().max(0.1);
+    let within = |step: &u32| {
+        let p = from + axis * (far * *step as f32 / STEPS as f32);
+        p.x.abs() < 0.97 * aspect * outline.half_width(p.y.min(1.0))
+    };
+    let steps = (0..=STEPS).rev().find(within).unwrap_or(0);
+    far * steps as f32 / STEPS as f32
+}
+
+impl Lobe {
+    /// The axis at a share of the length.
+    fn at(&self, t: f32) -> Vec2 {
+        self.foot + (self.axis * t + self.axis.perp() * (self.arch * t * t)) * self.length
+    }
+
+    fn inside(&self, p: Vec2) -> f32 {
+        let q = p - self.foot;
+        let t = q.dot(self.axis) / self.length;
+        let n = self.axis.perp_dot(q) - self.arch * self.length * t * t;
+        if !(0.0..=1.0).contains(&t) {
+            return -((t - t.clamp(0.0, 1.0)) * self.length).hypot(n);
+        }
+        // Sheared coordinates make the teeth point to the lobe's tip.
+        let kept = 1.0 - self.teeth[usize::from(n > 0.0)].sinus(t - SHEAR * n.abs() / self.length);
+        let half = |t: f32| 2.0 * self.half_width * self.outline.half_width(t.clamp(0.0, 1.0)) * kept;
+        let room = half(t) - n.abs();
+        if room < 0.0 {
+            // Farther than it is: the union then never grows spurs where two lobes' outsides meet.
+            return room;
+        }
+        let slope = (half(t + 0.01) - half(t - 0.01)) / (0.02 * self.length);
+        room / (1.0 + slope * slope).sqrt()
+    }
+}
+
+impl Teeth {
+    fn new((count, depth): (usize, f32), random: impl Fn(u64) -> f32) -> Self {
+        let tooth = |j: usize| {
+            let shift = if (1..count).contains(&j) { 0.5 * random(j as u64) } else { 0.0 };
+            let deep = depth * (0.55 + 0.9 * (random(50 + j as u64) + 0.5));
+            (lerp(0.22, 0.97, (j as f32 + shift) / count as f32), deep)
+        };
+        Self(if count > 0 { (0..=count).map(tooth).collect() } else { Vec::new() })
+    }
+
+    /// What the sinuses take of the half-width at a place along the lobe.
+    fn sinus(&self, t: f32) -> f32 {
+        let i = self.0.partition_point(|(end, _)| *end <= t);
+        if i == 0 || i == self.0.len() {
+            return 0.0;
+        }
+        let ((start, low), (end, high)) = (self.0[i - 1], self.0[i]);
+        let v = (t - start) / (end - start);
+        // A tooth rises slowly from the lower sinus and falls steeply into the next.
+        let tip = 0.68;
+        let fall = if v < tip { 1.0 - v / tip } else { (v - tip) / (1.0 - tip) };
+        let fade = smoothstep(0.12, 0.3, t) * (1.0 - smoothstep(0.8, 1.0, t));
+        fall * fall * (1.4 - 0.4 * fall) * if v < tip { low } else { high } * fade
+    }
+}
