@@ -76,7 +76,7 @@ const ALLOWED: &[(&str, &str)] = &[
     ("half", "train/weights.rs"),
     // Checksums as text.
     ("hex", "scene/library.rs dataset/ train/data/photos.rs train/run.rs train/weights.rs report/page.rs"),
-    ("humantime", "bin/"),
+    ("humantime", "bin/ cli/mod.rs"),
     ("hw_skymodel", "light/hosek.rs"),
     // Photographs in, and small ones out for pages that people look at.
     ("image", "texture/ output/photo.rs"),

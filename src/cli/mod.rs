@@ -12,6 +12,7 @@ use std::fmt;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Duration;
 
 /// Writes a line to stderr as `eprintln!` does, and goes on where that fails: a full disk or a reader that is gone must not end hours of
 /// work.
@@ -42,6 +43,14 @@ pub fn end(done: Result<Vec<PathBuf>>) -> ExitCode {
         }
         _ => ExitCode::SUCCESS,
     }
+}
+
+/// Reads a time of a second to a year, with its unit.
+pub fn time(text: &str) -> Result<Duration, String> {
+    humantime::parse_duration(text)
+        .ok()
+        .filter(|t| *t >= Duration::from_secs(1) && *t <= Duration::from_secs(366 * 24 * 3600))
+        .ok_or_else(|| "write a time of a second or more with its unit, such as 30s, 2m or 1h30m".into())
 }
 
 /// Prints rows to stdout with their columns below each other. A closed pipe is no failure.

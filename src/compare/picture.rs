@@ -46,23 +46,26 @@ impl Picture {
 pub fn read_labels(path: &Path, size: (u32, u32)) -> Result<Vec<u8>> {
     let (w, h, map) = output::read_map(path)?;
     same_size(path, (w, h), size)?;
-    let wrong = |what: String| {
-        Error::input(what)
-            .help("labels are numbers: 0 soil, 1 crop, 2 weed, 255 none; --labels names others")
-            .in_file(path)
-    };
-    let numbers = match map {
-        Map::Numbers(numbers) | Map::Indexed(numbers, _) => numbers,
-        Map::Colors(_) => return Err(wrong("these labels are colours".into())),
-    };
-    let known = |n: u16| n < Class::ALL.len() as u16 || n == u16::from(NONE);
-    match numbers.iter().find(|n| !known(**n)) {
-        Some(n) => Err(wrong(format!("no class has the number {n}"))),
+    match map {
+        Map::Numbers(numbers) | Map::Indexed(numbers, _) => known(path, numbers),
+        Map::Colors(_) => Err(wrong(path, "these labels are colours".into())),
+    }
+}
+
+/// Labels that are classes; an error, naming the file, where one is none.
+pub(super) fn known(path: &Path, numbers: Vec<u16>) -> Result<Vec<u8>> {
+    let is_known = |n: u16| n < Class::ALL.len() as u16 || n == u16::from(NONE);
+    match numbers.iter().find(|n| !is_known(**n)) {
+        Some(n) => Err(wrong(path, format!("no class has the number {n}"))),
         None => Ok(numbers.into_iter().map(|n| n as u8).collect()),
     }
 }
 
-fn same_size(path: &Path, (w, h): (u32, u32), (width, height): (u32, u32)) -> Result<()> {
+fn wrong(path: &Path, what: String) -> Error {
+    Error::input(what).help("labels are numbers: 0 soil, 1 crop, 2 weed, 255 none; --labels names others").in_file(path)
+}
+
+pub(super) fn same_size(path: &Path, (w, h): (u32, u32), (width, height): (u32, u32)) -> Result<()> {
     if (w, h) == (width, height) {
         return Ok(());
     }

@@ -144,7 +144,7 @@ impl<'a, F: Files + ?Sized> Image<'a, F> {
     }
 
     /// A file that may be left out, with what errors call it.
-    fn optional(&self, file: &str) -> Result<Option<(PathBuf, Vec<u8>)>> {
+    pub(crate) fn optional(&self, file: &str) -> Result<Option<(PathBuf, Vec<u8>)>> {
         let place = self.place(file);
         match self.files.contents(&self.path(file)) {
             Ok(bytes) => Ok(Some((place, bytes))),

@@ -4,7 +4,7 @@
 //! plan with pinnules, and each pinnule is cut into lobes with a pointed tip. The ribbons are those of mayweed.
 
 use super::blade::Rest;
-use super::ribbons::{MOST, Ribbons, drawn, series};
+use super::ribbons::{MOST, Ribbons, series};
 use super::skeleton::Skeleton;
 use crate::math::{Vec3, lerp, vec3};
 use crate::sampling::{Purpose, Stream};
@@ -36,14 +36,7 @@ pub(super) fn blade(
     let (pairs, pinnules) = (pairs.min(MOST) as f32, pinnules.min(MOST) as f32);
     let pairs = pairs.min(length / (2.4 * segment)).max(1.0);
     let half_width = |t: f32| half_width(t) * width;
-    let mut ribbons = Ribbons {
-        rest: Rest::default(),
-        skeleton,
-        half_width: Some(&half_width),
-        width: segment,
-        count: 0,
-        drawn: drawn(segment, cell),
-    };
+    let mut ribbons = Ribbons::new(skeleton, &half_width, segment, cell);
     ribbons.strip(Vec3::ZERO, vec3(0.0, length, 0.0), Vec3::Z, Vec3::ZERO, segment, 2 * pairs.min(8.0) as u32);
     let whole =
         Limb { start: Vec3::ZERO, along: vec3(0.0, length, 0.0), up: Vec3::Z, pairs, reach: 0.5 * width / length };

@@ -145,7 +145,8 @@ pub struct LeafKind {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-example" = "60"))]
     pub branch_angle_deg: Option<Num<NonNegative>>,
-    /// How far a half rises at the two hinges of its branches, at the midrib and half-way out; negative hangs. Each branch draws its own.
+    /// How far a half rises at the two hinges of its branches, at the midrib and half-way out; negative hangs. Each branch draws its own. A stage's `fold_deg` is added at the
+    /// midrib.
     #[serde(default = "level", skip_serializing_if = "is_level")]
     pub branch_bend_deg: (Vary<Finite>, Vary<Finite>),
     /// Spines on its margin; only for `Sheet`.

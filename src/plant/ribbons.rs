@@ -41,11 +41,23 @@ pub(super) struct Ribbons<'a> {
 /// Share of the finest ribbons that a mesh with such cells draws, of ribbons so wide, metres. Stochastic simplification: where single elements cannot be told
 /// apart, some of them, scaled so that their area stays, show the same. Source: Cook, Halstead, Planck & Ryu 2007, "Stochastic
 /// Simplification of Aggregate Detail", ACM Transactions on Graphics 26(3).
-pub(super) fn drawn(width: f32, cell: f32) -> f32 {
+fn drawn(width: f32, cell: f32) -> f32 {
     if cell > CELL { (2.0 * width / cell).clamp(LEAST_DRAWN, 1.0) } else { 1.0 }
 }
 
-impl Ribbons<'_> {
+impl<'a> Ribbons<'a> {
+    /// None yet, of a divided blade: of segments so wide, for a mesh of such cells, metres.
+    pub(super) fn new(skeleton: &'a Skeleton, half_width: &'a dyn Fn(f32) -> f32, segment: f32, cell: f32) -> Self {
+        Self {
+            rest: Rest::default(),
+            skeleton,
+            half_width: Some(half_width),
+            width: segment,
+            count: 0,
+            drawn: drawn(segment, cell),
+        }
+    }
+
     /// Adds a strip from `start` along `along` (metres), bowed towards `bow`, tapering at both ends.
     pub(super) fn strip(&mut self, start: Vec3, along: Vec3, up: Vec3, bow: Vec3, width: f32, pieces: u32) {
         self.band((start, along, up, bow), pieces, |s| {
@@ -197,14 +209,7 @@ pub(super) fn blade(division: Division, width: f32, skeleton: &Skeleton, stream:
     let pairs = (pairs.min(MOST) as f32).min(length * (1.0 - bare) / (1.6 * segment)).max(1.0);
     let lobes = (lobes.min(MOST) as f32).min(0.5 * width / (3.0 * segment));
     let half_width = |t: f32| half_width(bare, t) * width;
-    let mut ribbons = Ribbons {
-        rest: Rest::default(),
-        skeleton,
-        half_width: Some(&half_width),
-        width: segment,
-        count: 0,
-        drawn: drawn(segment, cell),
-    };
+    let mut ribbons = Ribbons::new(skeleton, &half_width, segment, cell);
     let rachis = (Vec3::ZERO, vec3(0.0, length, 0.0), Vec3::Z, Vec3::ZERO);
     ribbons.band(rachis, (2 * pairs.min(12.0) as u32).max(8), |s| {
         // A thread that widens where the pinnae stand; with few of them the tip is a little blade itself.

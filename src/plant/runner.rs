@@ -43,10 +43,12 @@ pub(super) struct Habit {
     pub(super) sides: u32,
     /// Whether leaves stay where they stand round a lying stem, instead of turning to its two sides.
     pub(super) whorled: bool,
+    /// Standard deviation of a stem's turn to its left or right from one node to the next, radians.
+    pub(super) swerve: f32,
 }
 
 /// Round stems whose leaves turn to the light.
-const HABIT: Habit = Habit { profile: Profile::Channelled(1.0), sides: 10, whorled: false };
+const HABIT: Habit = Habit { profile: Profile::Channelled(1.0), sides: 10, whorled: false, swerve: 0.16 };
 
 /// Grows a plant.
 pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {
@@ -147,7 +149,7 @@ struct Shoots<'a> {
 impl Shoots<'_> {
     /// Grows a stem through nodes at these lengths along it; returns them.
     fn stem(&mut self, foot: &Foot, rise: &[f32], stream: &mut Stream) -> Nodes {
-        let Habit { profile, sides, .. } = self.habit;
+        let Habit { profile, sides, swerve, .. } = self.habit;
         let (sinks, lies) = (self.growth.desc.lies_at.0.f32(), self.growth.desc.lies_at.1.f32());
         let whole = rise.last().copied().unwrap_or(0.0);
         let sunk = smoothstep(sinks, lies, (foot.length + whole) / (2.0 * foot.radius));
@@ -162,7 +164,7 @@ impl Shoots<'_> {
             let radius = foot.radius * lerp(1.0, TAPER, if whole > 0.0 { rise / whole } else { 0.0 });
             let pieces = helix.map_or(PIECES, |helix| helix.steps(rise - below).max(PIECES));
             let step = (rise - below) / pieces as f32;
-            let (swerve, sway) = (0.16 * stream.normal() as f32, 0.07 * stream.normal() as f32);
+            let (swerve, sway) = (swerve * stream.normal() as f32, 0.07 * stream.normal() as f32);
             for piece in 1..=if step > 1e-6 { pieces } else { 0 } {
                 let t = (below + step * piece as f32) / whole;
                 heading += swerve / pieces as f32;

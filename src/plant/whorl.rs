@@ -6,8 +6,8 @@ use super::organ::Organ;
 use super::runner::{self, Habit};
 use super::tube::Profile;
 
-/// Square, slender; a leaf stays where it stands on the stem.
-const HABIT: Habit = Habit { profile: Profile::Square, sides: 12, whorled: true };
+/// Square, slender; a leaf stays where it stands on the stem, and stems wander over the ground (how much is an estimate).
+const HABIT: Habit = Habit { profile: Profile::Square, sides: 12, whorled: true, swerve: 0.32 };
 
 /// Grows whorls.
 pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {

@@ -388,8 +388,8 @@ pub struct SpeciesDesc {
     pub eppo: String,
     /// Crop or weed.
     pub role: Role,
-    /// Another species file from which all is taken that this one does not write, but `name`, `scientific`, `eppo` and `role`: fields, materials and
-    /// kinds of leaves one by one; lists, distributions and all other values whole. A path from this file's folder, or the name of a file that ships.
+    /// Another species file from which all is taken that this one does not write, but `name`, `scientific`, `eppo` and `role`: fields, materials,
+    /// kinds of leaves and flowers one by one; lists, distributions and all other values whole. A path from this file's folder, or the name of a file that ships.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-example" = "\"capsella.ron\""))]
     pub like: Option<String>,

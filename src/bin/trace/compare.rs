@@ -63,8 +63,8 @@ fn pixel_mm(text: &str) -> Result<f64, String> {
 /// Measures what was asked for, writes tables and a page, and shows the figures.
 pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     cli::check_folder(&args.out)?;
-    // Beside archives lie pictures of formats, label maps among them, which are no photographs.
-    [&args.a, &args.b, &args.real, &args.synthetic].into_iter().flatten().try_for_each(|path| refuse_archives(path))?;
+    // Beside archives lie pictures of formats, label maps among them, which are no photographs. Sets are read out of archives.
+    [&args.a, &args.b].into_iter().flatten().try_for_each(|path| refuse_archives(path))?;
     match (args.real.as_deref(), args.synthetic.as_deref(), args.a.as_deref(), args.b.as_deref()) {
         (Some(real), Some(synthetic), ..) => sets(args, real, synthetic),
         (.., Some(a), Some(b)) => pairs(args, a, b),

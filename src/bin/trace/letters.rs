@@ -1,4 +1,4 @@
-//! Letters of 5 × 7 dots, for words in pictures. Small letters look like capitals.
+//! Letters of 5 × 7 dots, for words in pictures. Small letters look like capitals, but for those of units.
 
 /// Dots of a letter across.
 pub(crate) const WIDTH: usize = 5;
@@ -9,7 +9,8 @@ pub(crate) const PITCH: usize = 6;
 
 /// The rows of a letter from the top, the leftmost dot in bit 4; empty for what is not here.
 pub(crate) fn glyph(letter: char) -> [u8; HEIGHT] {
-    match letter.to_ascii_uppercase() {
+    match if letter == 'm' { letter } else { letter.to_ascii_uppercase() } {
+        'm' => [0x00, 0x00, 0x1a, 0x15, 0x15, 0x15, 0x15],
         'A' => [0x0e, 0x11, 0x11, 0x1f, 0x11, 0x11, 0x11],
         'B' => [0x1e, 0x11, 0x11, 0x1e, 0x11, 0x11, 0x1e],
         'C' => [0x0e, 0x11, 0x10, 0x10, 0x10, 0x11, 0x0e],

@@ -1,6 +1,7 @@
 //! How a field is rendered: the flags that stand for [`RenderOptions`].
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use furrow::cli;
 use furrow::sampling::Sampler;
 use furrow::settings::{Engine, Quality, RenderOptions, Technique, Techniques};
 use std::time::Duration;
@@ -16,7 +17,7 @@ pub(crate) struct QualityArgs {
     #[arg(long, value_name = "ERROR", value_parser = error, group = "enough")]
     target_error: Option<f32>,
     /// Stop in time for the files to be there: 30s, 2m or 1h30m from the start. What more samples would change, it decides.
-    #[arg(long, value_name = "TIME", value_parser = time, group = "enough")]
+    #[arg(long, value_name = "TIME", value_parser = cli::time, group = "enough")]
     time: Option<Duration>,
     /// Most samples a pixel with --target-error or --time.
     #[arg(long, value_name = "SPP", default_value_t = Quality::MOST_SPP, value_parser = samples(), requires = "enough")]
@@ -78,13 +79,6 @@ fn error(text: &str) -> Result<f32, String> {
         .ok()
         .filter(|e: &f32| (1e-4..=1.0).contains(e))
         .ok_or_else(|| "write a share from 0.0001 to 1, such as 0.02 for 2 %".into())
-}
-
-fn time(text: &str) -> Result<Duration, String> {
-    humantime::parse_duration(text)
-        .ok()
-        .filter(|t| *t >= Duration::from_secs(1) && *t <= Duration::from_secs(366 * 24 * 3600))
-        .ok_or_else(|| "write a time of a second or more with its unit, such as 30s, 2m or 1h30m".into())
 }
 
 fn radiance(text: &str) -> Result<f32, String> {

@@ -40,7 +40,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "RUN")]
     init: Option<PathBuf>,
     /// Most time, such as 30m or 8h; the learning rate then falls with the clock, so that no two runs are the same.
-    #[arg(long, value_name = "DURATION", value_parser = humantime::parse_duration)]
+    #[arg(long, value_name = "DURATION", value_parser = cli::time)]
     time: Option<Duration>,
     #[command(flatten)]
     machine: MachineArgs,

@@ -50,7 +50,7 @@ pub(crate) struct Args {
     #[arg(long)]
     dry_run: bool,
     /// Most time of a training, such as 30m; its end is then where the clock says, and the tables are not the same twice.
-    #[arg(long, value_name = "DURATION", value_parser = humantime::parse_duration)]
+    #[arg(long, value_name = "DURATION", value_parser = cli::time)]
     time: Option<Duration>,
     /// Nothing: this program makes the sets itself. Kept for one version.
     #[arg(long, value_name = "PATH", hide = true)]

@@ -56,13 +56,9 @@ impl Known {
     }
 }
 
-/// The record beside a picture called `rgb.png`; `None` where there is none.
+/// The record of a picture; `None` where there is none.
 fn read(photo: &Photo) -> Result<Option<Record>> {
-    let path = photo.rgb.with_file_name("record.json");
-    if photo.rgb.file_stem().is_none_or(|stem| stem != "rgb") || !path.is_file() {
-        return Ok(None);
-    }
-    let bytes = std::fs::read(&path).map_err(Error::reading(&path))?;
+    let Some((path, bytes)) = photo.record()? else { return Ok(None) };
     let record = serde_json::from_slice(&bytes);
     record.map(Some).map_err(|e| Error::damaged(format!("this is no record: {e}")).in_file(path))
 }

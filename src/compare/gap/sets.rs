@@ -6,9 +6,9 @@ use super::pixel::{PixelSizes, coarsen, coarser_size};
 use super::source::{Photo, photos, warnings};
 use super::window::Window;
 use super::{frequency, measure, sampling, wasserstein};
-use crate::compare::{Picture, pairs, read_labels};
+use crate::Result;
+use crate::compare::pairs;
 use crate::sampling::rng::{Purpose, Stream};
-use crate::{Result, output};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -104,7 +104,7 @@ impl Gap {
         let mut least = u32::MAX;
         for (photos, factor) in [(&real, factors[0]), (&synthetic, factors[1])] {
             for photo in photos {
-                let (width, height) = coarser_size(output::photo_size(&photo.rgb)?, factor);
+                let (width, height) = coarser_size(photo.size()?, factor);
                 least = least.min(width).min(height);
             }
         }
@@ -175,8 +175,8 @@ fn one_sided(real: &[Photo], synthetic: &[Photo]) -> Vec<String> {
         };
         Some(format!("{set} has no {what}: {lost}"))
     };
-    let labels = missing("labels", "classes, cover and blobs are left out", &|photo| photo.labels.is_some());
-    let infrared = missing("near infrared", "NDVI is left out", &|photo| photo.nir.is_some());
+    let labels = missing("labels", "classes, cover and blobs are left out", &|photo| photo.has_labels());
+    let infrared = missing("near infrared", "NDVI is left out", &|photo| photo.has_nir());
     labels.into_iter().chain(infrared).collect()
 }
 
@@ -194,8 +194,7 @@ fn set(name: String, photos: Vec<Photo>, take: &Take, done: &(dyn Fn() + Sync)) 
     // Evenly over the names, the middle one of each part.
     let is_shown = |k: usize| (0..shown).any(|s| (2 * s + 1) * photos.len() / (2 * shown) == k);
     let measured = photos.par_iter().enumerate().map(|(k, photo)| {
-        let picture = Picture::read(&photo.rgb, photo.nir.as_deref())?;
-        let labels = photo.labels.as_ref().map(|path| read_labels(path, picture.size())).transpose()?;
+        let (picture, labels) = photo.read()?;
         let (picture, labels) = coarsen(picture, labels, take.factor);
         let samples = measure::measure(&picture, labels.as_deref(), take.tile);
         let window = is_shown(k).then(|| Window::take(&photo.name, &picture, labels.as_deref())).transpose()?;

@@ -2,28 +2,137 @@
 //!
 //! Pictures are found as `trace compare` finds them: below `images/` where there is such a folder; of datasets and renders each `rgb.png` or `rgb.jpg`.
 //! Labels are `labels/NAME.png` or `semantics.png` beside such a picture; near infrared is `nir/NAME.png`, or the file whose name begins with
-//! `nir` where the picture's begins with `rgb`.
+//! `nir` where the picture's begins with `rgb`. Images of a dataset in packs are read out of their archives.
 
 use crate::compare::pairs::{beside, beside_rgb, first, stem, told, walk};
+use crate::compare::picture::{self, Picture};
+use crate::dataset::native::Image;
+use crate::dataset::pack::refuse_archives;
+use crate::dataset::recipe::FILE;
+use crate::dataset::set::Set;
 use crate::{Error, Result, output};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// One picture and what is known of it.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct Photo {
     /// Name below the folder, without the extension.
     pub name: String,
-    /// Its colours.
-    pub rgb: PathBuf,
-    /// Near infrared.
-    pub nir: Option<PathBuf>,
-    /// Classes of the pixels.
-    pub labels: Option<PathBuf>,
+    place: Place,
 }
+
+/// Where a picture and what belongs to it lie.
+#[derive(Clone, Debug)]
+enum Place {
+    Files {
+        rgb: PathBuf,
+        nir: Option<PathBuf>,
+        labels: Option<PathBuf>,
+    },
+    /// In an archive of this dataset.
+    Pack {
+        set: Arc<Set>,
+        nir: bool,
+        labels: bool,
+    },
+}
+
+impl PartialEq for Photo {
+    fn eq(&self, other: &Self) -> bool {
+        (&self.name, self.path()) == (&other.name, other.path())
+    }
+}
+
+impl Photo {
+    /// Whether there is near infrared.
+    pub fn has_nir(&self) -> bool {
+        matches!(&self.place, Place::Files { nir: Some(_), .. } | Place::Pack { nir: true, .. })
+    }
+
+    /// Whether the classes of its pixels are known.
+    pub fn has_labels(&self) -> bool {
+        matches!(&self.place, Place::Files { labels: Some(_), .. } | Place::Pack { labels: true, .. })
+    }
+
+    /// Where it lies, or would.
+    fn path(&self) -> PathBuf {
+        match &self.place {
+            Place::Files { rgb, .. } => rgb.clone(),
+            Place::Pack { set, .. } => Image::of(set.as_ref(), &self.name).place("rgb.png"),
+        }
+    }
+
+    /// Width and height in pixels.
+    pub(super) fn size(&self) -> Result<(u32, u32)> {
+        match &self.place {
+            Place::Files { rgb, .. } => output::photo_size(rgb),
+            Place::Pack { set, .. } => {
+                let (width, height, _) = Image::of(set.as_ref(), &self.name).photograph()?;
+                Ok((width, height))
+            }
+        }
+    }
+
+    /// Reads it, and its labels where there are such.
+    pub(super) fn read(&self) -> Result<(Picture, Option<Vec<u8>>)> {
+        match &self.place {
+            Place::Files { rgb, nir, labels } => {
+                let picture = Picture::read(rgb, nir.as_deref())?;
+                let labels = labels.as_ref().map(|path| picture::read_labels(path, picture.size())).transpose()?;
+                Ok((picture, labels))
+            }
+            Place::Pack { set, nir, labels } => packed(&Image::of(set.as_ref(), &self.name), *nir, *labels),
+        }
+    }
+
+    /// The record beside a picture called `rgb.png`, and where it lies; `None` where there is none.
+    pub(super) fn record(&self) -> Result<Option<(PathBuf, Vec<u8>)>> {
+        match &self.place {
+            Place::Files { rgb, .. } => {
+                let path = rgb.with_file_name("record.json");
+                if rgb.file_stem().is_none_or(|stem| stem != "rgb") || !path.is_file() {
+                    return Ok(None);
+                }
+                let bytes = std::fs::read(&path).map_err(Error::reading(&path))?;
+                Ok(Some((path, bytes)))
+            }
+            Place::Pack { set, .. } => Image::of(set.as_ref(), &self.name).optional("record.json"),
+        }
+    }
+}
+
+/// An image of a dataset in packs, with near infrared and labels where it has such.
+fn packed(image: &Image<'_, Set>, nir: bool, labels: bool) -> Result<(Picture, Option<Vec<u8>>)> {
+    let (width, height, rgb) = image.photograph()?;
+    let near = if nir { image.band("nir")? } else { None };
+    if let Some(near) = &near {
+        picture::same_size(&near.place, (near.width, near.height), (width, height))?;
+    }
+    let labels = if labels {
+        let (w, h, numbers) = image.indexed(LABELS)?;
+        let place = image.place(LABELS);
+        picture::same_size(&place, (w, h), (width, height))?;
+        Some(picture::known(&place, numbers.into_iter().map(u16::from).collect())?)
+    } else {
+        None
+    };
+    Ok((Picture { width, height, rgb, nir: near.map_or_else(Vec::new, |near| near.values) }, labels))
+}
+
+/// The file of labels of a dataset's image.
+const LABELS: &str = "semantics.png";
 
 /// Finds the pictures of a folder, by name. `option` is what it was given as. An error where there is none.
 pub fn photos(folder: &Path, option: &str) -> Result<Vec<Photo>> {
+    if folder.join(FILE).is_file()
+        && let Ok(set) = Set::open(folder)
+        && set.recipe.pack.is_some()
+    {
+        return in_packs(set);
+    }
+    refuse_archives(folder)?;
     if !folder.is_dir() {
         let what = if folder.exists() { "this is no folder" } else { "there is no such folder" };
         return Err(Error::input(format!("{option} {}: {what}", folder.display()))
@@ -48,9 +157,30 @@ pub fn photos(folder: &Path, option: &str) -> Result<Vec<Photo>> {
     let photo = |(name, rgb): (String, PathBuf)| {
         let below = |other: &str| first([folder.join(other).join(format!("{name}.png"))]);
         let nir = beside_rgb(&rgb, "nir").or_else(|| below("nir"));
-        Photo { labels: beside(&rgb).or_else(|| below("labels")), nir, rgb, name }
+        let labels = beside(&rgb).or_else(|| below("labels"));
+        Photo { name, place: Place::Files { rgb, nir, labels } }
     };
     Ok(found.into_iter().map(photo).collect())
+}
+
+/// The images of a dataset in packs that are there. All have what the first has.
+fn in_packs(set: Set) -> Result<Vec<Photo>> {
+    let set = Arc::new(set);
+    let mut names = Vec::new();
+    for name in (0..set.recipe.count).map(Set::name) {
+        if Image::of(set.as_ref(), &name).has("record.json")? {
+            names.push(name);
+        }
+    }
+    let Some(first) = names.first() else {
+        return Err(Error::input("no image of this dataset is there yet").in_file(set.folder.clone()));
+    };
+    let image = Image::of(set.as_ref(), first);
+    let (nir, labels) = (image.band("nir")?.is_some(), image.has(LABELS)?);
+    Ok(names
+        .into_iter()
+        .map(|name| Photo { name, place: Place::Pack { set: Arc::clone(&set), nir, labels } })
+        .collect())
 }
 
 /// A sentence where only some pictures of a set have labels or near infrared.
@@ -60,8 +190,8 @@ pub(super) fn warnings(set: &str, photos: &[Photo]) -> Vec<String> {
         let mixed = !without.is_empty() && without.len() < photos.len();
         mixed.then(|| format!("{} pictures of {set} have no {what}: {}", without.len(), told(&without)))
     };
-    let labels = some("labels", &|photo| photo.labels.is_some());
-    [labels, some("near infrared", &|photo| photo.nir.is_some())].into_iter().flatten().collect()
+    let labels = some("labels", &|photo| photo.has_labels());
+    [labels, some("near infrared", &|photo| photo.has_nir())].into_iter().flatten().collect()
 }
 
 #[cfg(test)]
@@ -80,7 +210,7 @@ mod tests {
 
     fn found(files: &[&str]) -> Vec<(String, bool, bool)> {
         let photos = photos(folder(files).path(), "--real").unwrap();
-        photos.into_iter().map(|photo| (photo.name, photo.nir.is_some(), photo.labels.is_some())).collect()
+        photos.into_iter().map(|photo| (photo.name.clone(), photo.has_nir(), photo.has_labels())).collect()
     }
 
     #[test]

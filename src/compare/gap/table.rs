@@ -49,8 +49,8 @@ impl<'a> About<'a> {
         Self {
             name: &set.name,
             images: set.photos.len(),
-            labelled: set.photos.iter().filter(|photo| photo.labels.is_some()).count(),
-            near_infrared: set.photos.iter().filter(|photo| photo.nir.is_some()).count(),
+            labelled: set.photos.iter().filter(|photo| photo.has_labels()).count(),
+            near_infrared: set.photos.iter().filter(|photo| photo.has_nir()).count(),
             pixel_mm,
         }
     }

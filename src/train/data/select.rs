@@ -25,6 +25,9 @@ pub enum Pick {
     Random(u64),
 }
 
+/// Most that an image may be in an epoch.
+pub const MOST_REPEATS: u32 = 1000;
+
 /// Images of a set.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Selection {
@@ -53,7 +56,10 @@ impl Selection {
     /// Reads `DIR[@PICK[+MARGINpx]][*N]`; the margin may be `-2px`.
     pub fn parse(text: &str) -> Result<Self, String> {
         let (text, repeat) = match text.rsplit_once('*') {
-            Some((left, n)) => (left, n.parse().ok().filter(|n| *n >= 1).ok_or("write `*` and how often, such as *4")?),
+            Some((left, n)) => {
+                let repeat = n.parse().ok().filter(|n| (1..=MOST_REPEATS).contains(n));
+                (left, repeat.ok_or_else(|| format!("write `*` and how often, 1 to {MOST_REPEATS}, such as *4"))?)
+            }
             None => (text, 1),
         };
         let Some((folder, text)) = text.rsplit_once('@') else { return Ok(Self { repeat, ..Self::of(text) }) };
@@ -68,6 +74,7 @@ impl Selection {
 
     /// The set and the numbers of its images; `otherwise` where no pick was written.
     pub fn open(&self, otherwise: Pick, seed: u64) -> Result<(Set, Vec<u64>)> {
+        self.check()?;
         let set = Set::open(&self.folder)?;
         let count = set.recipe.count;
         let numbers: Vec<u64> = match self.pick.unwrap_or(otherwise) {
@@ -84,6 +91,18 @@ impl Selection {
         };
         let all = numbers.iter().copied().cycle().take(numbers.len() * self.repeat as usize).collect();
         Ok((set, all))
+    }
+
+    /// An error for what no command line says, but the file of a plan may.
+    fn check(&self) -> Result<()> {
+        let what = if !(1..=MOST_REPEATS).contains(&self.repeat) {
+            format!("an image cannot be {} times in an epoch: 1 to {MOST_REPEATS} times", self.repeat)
+        } else if matches!(self.pick, Some(Pick::Every(_, 0))) {
+            "every 0th image is none".into()
+        } else {
+            return Ok(());
+        };
+        Err(Error::input(what).in_file(&self.folder))
     }
 
     /// What decides what is seen: fingerprint of the set and margin of its outlines, and the numbers of its images.
@@ -165,8 +184,34 @@ mod tests {
         {
             assert_eq!(read(text).to_string(), text);
         }
-        for bad in ["d@", "d@5..5", "d@2/2", "d@random:0", "d*0", "d*x", "d@most", "d@all+17px", "d@all+px", "d@+2px"] {
+        for bad in [
+            "d@",
+            "d@5..5",
+            "d@2/2",
+            "d@random:0",
+            "d*0",
+            "d*x",
+            "d*1001",
+            "d*4294967295",
+            "d@most",
+            "d@all+17px",
+            "d@all+px",
+            "d@+2px",
+        ] {
             assert!(Selection::parse(bad).is_err(), "{bad}");
+        }
+    }
+
+    /// Expected: what no command line can say, but a file of a plan can, is an error and no panic.
+    #[test]
+    fn selections_of_files_are_checked() {
+        let check = |pick: &str| {
+            let json = format!(r#"{{"folder": "d", "pick": {pick}}}"#);
+            serde_json::from_str::<Selection>(&json).unwrap().check().map_err(|e| e.exit_code())
+        };
+        assert_eq!(check(r#"{"Every": [1, 2]}, "repeat": 1000"#), Ok(()));
+        for wrong in [r#"{"Every": [0, 0]}, "repeat": 1"#, r#""All", "repeat": 0"#, r#""All", "repeat": 4294967295"#] {
+            assert_eq!(check(wrong), Err(2), "{wrong}");
         }
     }
 

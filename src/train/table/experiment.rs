@@ -10,6 +10,7 @@ use crate::ron_file::{RonFile, Step, choose, place};
 use crate::sampling::Sampler;
 use crate::train::baseline::Kind;
 use crate::train::data::margin::MOST;
+use crate::train::data::select::MOST_REPEATS;
 use crate::train::data::{Band, Pick};
 use crate::train::fit::{Plan, Settings};
 use crate::train::net::Network;
@@ -370,6 +371,10 @@ impl Checker<'_> {
                 "an image that is in an epoch 0 times is not trained on",
                 "write 1 or more",
             ));
+        }
+        if desc.repeat > MOST_REPEATS {
+            let what = format!("an image cannot be {} times in an epoch", desc.repeat);
+            return Err(self.fault(&step("repeat"), what, format!("write 1 to {MOST_REPEATS}")));
         }
         let margin = desc.dilate_px.unwrap_or(0.0);
         if margin.is_nan() || margin.abs() > MOST {

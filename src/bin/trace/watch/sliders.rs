@@ -58,11 +58,11 @@ fn slider(text: &str, quantity: &Quantity) -> Option<Slider> {
         }
         Value::Drawn(Distribution::Uniform(low, high)) => (true, *low, *high, f64::midpoint(*low, *high)),
         Value::Drawn(Distribution::Normal { mean, sd, min, max }) => {
-            (true, (mean - BELL * sd).max(*min), (mean + BELL * sd).min(*max), mean.clamp(*min, *max))
+            (true, (mean - BELL * sd).max(*min), (mean + BELL * sd).min(*max), mean.max(*min).min(*max))
         }
         Value::Drawn(Distribution::LogNormal { median, sigma, min, max }) => {
             let reach = (BELL * sigma).exp();
-            (true, (median / reach).max(*min), (median * reach).min(*max), median.clamp(*min, *max))
+            (true, (median / reach).max(*min), (median * reach).min(*max), median.max(*min).min(*max))
         }
         Value::Drawn(Distribution::Choice(of)) => {
             values.clone_from(of);
@@ -151,6 +151,15 @@ mod tests {
         assert_eq!(stage.values, [12.0, 14.0]);
         assert_eq!((n.low, n.high, n.step, n.at), (1.0, 9.0, 1.0, 5.0));
         assert_eq!((yaw.drawn, yaw.low, yaw.high), (false, -10.0, 10.0));
+    }
+
+    /// Expected: bounds that hold nothing have no slider, and are told when the file is read as a scene.
+    #[test]
+    fn bounds_that_hold_nothing_have_no_slider() {
+        let normal =
+            "Field(a: Normal(mean: 3, sd: 1, min: 9, max: 2), b: LogNormal(median: 3, sigma: 1, min: 9, max: 2), c: 2)";
+        let paths: Vec<String> = sliders(normal).into_iter().map(|slider| slider.path).collect();
+        assert_eq!(paths, ["c"]);
     }
 
     /// Expected: of all bytes, those of one value are other ones; comments, line ends, a byte order mark and permissions stay.
