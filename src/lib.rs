@@ -51,9 +51,10 @@
 //!
 //! | layer | modules |
 //! |---|---|
-//! | 15 | [`prelude`], [`scene_format`], `reference` |
-//! | 14 | [`train`] |
-//! | 13 | [`dataset`], `compare` |
+//! | 16 | [`prelude`], [`scene_format`], `reference` |
+//! | 15 | [`train`] |
+//! | 14 | `compare` |
+//! | 13 | [`dataset`] |
 //! | 12 | [`job`] |
 //! | 11 | `ablation`, `output`, `raster` |
 //! | 10 | `render` |

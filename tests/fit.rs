@@ -129,7 +129,7 @@ fn a_training_that_is_stopped_or_killed_ends_with_the_same_bytes() {
         ("sgd", " --normalization fixed --loss entropy --class-weights median"),
     ] {
         let more = format!(
-            "--network unet --steps 40 --optimiser {method} --val {}@0..2 --validate-every 5 --patience 100{more}",
+            "--network unet --steps 24 --optimiser {method} --val {}@0..2 --validate-every 4 --patience 100{more}",
             set.display()
         );
         let whole = folder.join(format!("{method}-whole"));

@@ -178,9 +178,19 @@ fn distance_to_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> f32 {
 }
 
 fn distance(points: &[Vec3], mesh: &Mesh) -> f32 {
-    (0..mesh.triangles.len() as u32)
-        .flat_map(|i| points.iter().map(move |p| distance_to_triangle(*p, mesh.corners(i))))
-        .fold(f32::MAX, f32::min)
+    let mut least = f32::MAX;
+    for i in 0..mesh.triangles.len() as u32 {
+        let corners = mesh.corners(i);
+        // No point of a triangle is farther from a corner than its longest side from there.
+        let side = corners[1].distance(corners[0]).max(corners[2].distance(corners[0]));
+        for p in points {
+            if p.distance(corners[0]) >= least + side {
+                continue;
+            }
+            least = least.min(distance_to_triangle(*p, corners));
+        }
+    }
+    least
 }
 
 #[test]

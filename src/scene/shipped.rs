@@ -4,6 +4,7 @@ use super::desc::SpeciesDesc;
 use crate::input::shipped;
 use crate::ron_file::nearest;
 use crate::{Error, Result};
+use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 /// A species that ships.
@@ -38,8 +39,9 @@ type Faults = Vec<(PathBuf, Error)>;
 /// All species that ship, in order of their files' names, and what is wrong with files that cannot be read.
 pub fn all_species() -> Result<(Vec<Shipped>, Faults)> {
     let (mut all, mut faults) = (Vec::new(), Vec::new());
-    for file in shipped::species_files()? {
-        match SpeciesDesc::read(&file) {
+    let read = |file: PathBuf| (SpeciesDesc::read(&file), file);
+    for (desc, file) in shipped::species_files()?.into_par_iter().map(read).collect::<Vec<_>>() {
+        match desc {
             Ok(desc) => all.push(Shipped { file, desc }),
             Err(fault) => faults.push((file, fault)),
         }
@@ -51,16 +53,19 @@ pub fn all_species() -> Result<(Vec<Shipped>, Faults)> {
 /// English name that no other species has, `thistle`. `None` where it is the name of another file; an error where it is no file's name
 /// and no species is called that.
 pub fn species(name: &str) -> Result<Option<PathBuf>> {
-    let (all, faults) = all_species()?;
     let (wanted, is_file) = name.strip_suffix(".ron").map_or((name, false), |stem| (stem, true));
-    // A file that cannot be read has only its own name.
-    let stem = |file: &Path| file.file_stem().is_some_and(|stem| stem.eq_ignore_ascii_case(wanted));
-    if let Some((_, fault)) = faults.into_iter().find(|(file, _)| stem(file)) {
-        return Err(fault);
+    let called = |file: &&PathBuf| {
+        let stem = file.file_stem().unwrap_or_default();
+        if is_file { stem == wanted } else { stem.eq_ignore_ascii_case(wanted) }
+    };
+    if let Some(file) = shipped::species_files()?.iter().find(called) {
+        SpeciesDesc::read(file)?;
+        return Ok(Some(file.clone()));
     }
     if is_file {
-        return Ok(all.into_iter().find(|species| species.stem() == wanted).map(|species| species.file));
+        return Ok(None);
     }
+    let (all, _) = all_species()?;
     let called = |species: &&Shipped| species.names().iter().any(|own| own.eq_ignore_ascii_case(wanted));
     if let Some(species) = all.iter().find(called) {
         return Ok(Some(species.file.clone()));

@@ -6,10 +6,10 @@ use super::canvas::Canvas;
 use super::cells::Cells;
 use super::drawn::{Drawn, Grey};
 use super::leaf_recipe::{LeafRecipe, LeafRelief};
+use super::lyrate;
 use super::shape::{Margin, Shape};
 use super::tissue::Surface;
 use super::veins::{self, Segment, Veins};
-use super::{lobed, lyrate};
 use crate::error::{Error, Result};
 use crate::geometry::outline::{MARGIN, Outline};
 use crate::math::{Vec2, Vec3, lerp, smoothstep, vec2};
@@ -38,7 +38,7 @@ pub(super) fn draw(recipe: &LeafRecipe) -> Result<Drawn> {
     let cuts = match recipe.margin {
         Margin::Entire => 0.0,
         Margin::Toothed { count, .. } => count.get(),
-        Margin::Lobed(plan) => plan.pairs.get() * (1.0 + 2.0 * plan.teeth.0.get().min(lobed::MOST_TEETH)),
+        Margin::Lobed(plan) => plan.pairs.get(),
         Margin::Spined { lobes, .. } => lobes.get(),
         Margin::Lyrate(plan) => {
             let small = plan.lobe_teeth.map_or(0.0, |(count, _)| 2.0 * count.get().min(lyrate::MOST_TEETH));

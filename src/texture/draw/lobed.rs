@@ -31,7 +31,7 @@ pub struct Lobed {
 }
 
 /// Most teeth on each side of a lobe.
-pub(super) const MOST_TEETH: f64 = 8.0;
+const MOST_TEETH: f64 = 8.0;
 /// How much the distance of lobes shrinks to the tip: exponent of their places.
 const CROWDING: f32 = 1.3;
 /// The part of the leaf's foot without lobes, of what is below the last.
@@ -45,7 +45,7 @@ const STEPS: u32 = 200;
 
 /// All lobes of a leaf, the last of them last.
 pub(super) struct Lobes {
-    lobes: Vec<Lobe>,
+    all: Vec<Lobe>,
     /// Half-width of the strip along the midrib near the tip, and where it ends.
     strip: (f32, f32),
     /// Radius that the sinuses between lobes are rounded by.
@@ -111,19 +111,19 @@ impl Lobes {
             arch: 0.0,
             teeth: [90, 91].map(|t| Teeth::new(more, |j| random(j, t))),
         });
-        Self { lobes, strip: (0.5 * aspect * plan.rachis.f32(), top), fillet: lerp(0.03, 0.012, pointed) }
+        Self { all: lobes, strip: (0.5 * aspect * plan.rachis.f32(), top), fillet: lerp(0.03, 0.012, pointed) }
     }
 
     /// Foot and end of each lobe: where its vein runs.
     pub(super) fn axes(&self) -> impl Iterator<Item = (Vec2, Vec2)> + '_ {
-        self.lobes.iter().map(|lobe| (lobe.foot, lobe.at(0.92)))
+        self.all.iter().map(|lobe| (lobe.foot, lobe.at(0.92)))
     }
 
     /// About the distance to the margin, positive inside.
     pub(super) fn inside(&self, p: Vec2) -> f32 {
         let (half, top) = self.strip;
         let strip = (half * lerp(0.5, 1.0, p.y.clamp(0.0, 1.0)) - p.x.abs()).min(p.y).min(top - p.y);
-        self.lobes.iter().fold(strip, |d, lobe| smooth_max(d, lobe.inside(p), self.fillet))
+        self.all.iter().fold(strip, |d, lobe| smooth_max(d, lobe.inside(p), self.fillet))
     }
 }
 

@@ -13,27 +13,6 @@ const ROOM: usize = 3;
 /// Pictures from this side on have words of two pixels a dot.
 const LARGE: usize = 128;
 
-/// Where a picture is taken from.
-pub(super) struct View {
-    /// From the camera to what it looks at, metres.
-    pub(super) distance: f32,
-    /// Between the picture's left and right edges.
-    pub(super) angle_deg: f32,
-    /// Of the camera above the ground.
-    pub(super) elevation_deg: f32,
-    /// Height of what it looks at, metres.
-    pub(super) target: f32,
-}
-
-impl View {
-    /// How many millimetres a picture is wide where the plant stands.
-    pub(super) fn width_mm(&self) -> f32 {
-        // The foot lies farther from the camera than what it looks at.
-        let depth = self.distance + self.target * self.elevation_deg.to_radians().sin();
-        2e3 * depth * (0.5 * self.angle_deg).to_radians().tan()
-    }
-}
-
 /// A picture, sRGB, as wide as high, row by row from the top.
 pub(super) type Shot = Vec<[u8; 3]>;
 
@@ -161,14 +140,5 @@ mod tests {
             let (x, y) = layout.column(i);
             assert!(inked(y, x) && inked(y + 6, x) && inked(y, x + letters::PITCH));
         }
-    }
-
-    /// Expected: from 1 m a view of 53.13 degrees is as wide as the distance; a plant whose middle is looked at from 30 degrees stands half of its
-    /// middle's height farther away.
-    #[test]
-    fn a_view_is_as_wide_as_its_angle_says() {
-        let view = |elevation_deg, target| View { distance: 1.0, angle_deg: 53.130_1, elevation_deg, target };
-        assert!((view(90.0, 0.0).width_mm() - 1000.0).abs() < 0.01);
-        assert!((view(30.0, 0.5).width_mm() - 1250.0).abs() < 0.01);
     }
 }
