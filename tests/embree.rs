@@ -5,9 +5,9 @@
 
 #[path = "../build/embree.rs"]
 #[allow(dead_code, clippy::print_stdout, reason = "the script's own call is Cargo's")]
-mod embree;
+mod search;
 
-use embree::find;
+use search::find;
 use std::fs;
 use std::path::{Path, PathBuf};
 
