@@ -126,11 +126,11 @@ const LABELS: &str = "semantics.png";
 
 /// Finds the pictures of a folder, by name. `option` is what it was given as. An error where there is none.
 pub fn photos(folder: &Path, option: &str) -> Result<Vec<Photo>> {
-    if folder.join(FILE).is_file()
-        && let Ok(set) = Set::open(folder)
-        && set.recipe.pack.is_some()
-    {
-        return in_packs(set);
+    if folder.join(FILE).is_file() && folder.join("packs").is_dir() {
+        let set = Set::open(folder)?;
+        if set.recipe.pack.is_some() {
+            return in_packs(set);
+        }
     }
     refuse_archives(folder)?;
     if !folder.is_dir() {
