@@ -1,6 +1,6 @@
 //! All tests that see the library and the programs from outside, a module a subject: `cargo test --test all labels::`.
 //!
-//! One program, for 70 would each be linked with all of the library, libtorch and Embree: that took longer than the tests.
+//! One program, for 70 would each be linked with all of the library, libtorch and Embree: that takes minutes more.
 
 mod ablation;
 mod accel;
