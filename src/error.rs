@@ -126,6 +126,13 @@ impl Error {
         Self::new(Kind::Interrupted, message)
     }
 
+    /// What the system said when it refused a thread: [`Kind::Io`].
+    pub fn no_thread(source: std::io::Error) -> Self {
+        let mut error = Self::failed(format!("cannot start a thread: {source}"));
+        error.0.source = Some(source);
+        error.help("ask for fewer threads, or raise `ulimit -u`")
+    }
+
     /// What the system said when `path` was to be written or listed: [`Kind::Io`].
     pub fn io(path: &Path) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.to_path_buf();

@@ -447,6 +447,7 @@ fn mistakes_in_a_page_are_shown_where_they_are() {
         ("count: 6", "count: 0", "0", "0 images cannot be rendered", "from 1"),
         ("spp: 1)", "spp: 0)", "0", "0 samples", "from 1"),
         ("Scene(", "Scen(", "Scen", "unknown name `Scen`", "Scene"),
+        ("count: 6,", "count: 6, edit: \"rastr\",", "\"rastr\"", "there is no edit `rastr`", "did you mean `raster`?"),
         ("count: 6,", "count: 6, split: (0, 0, 0),", "(0, 0, 0)", "these are no shares", "train,val,test"),
         ("name: \"More\"", "name: \"few!\"", "\"few!\"", "there is another `few!`", "of its own"),
         ("name: \"More\"", "name: \"?\"", "\"?\"", "no letter and no digit", "letters"),
@@ -464,6 +465,14 @@ fn mistakes_in_a_page_are_shown_where_they_are() {
         ("\"0..2\"", "\"most\"", "\"most\"", "`most` picks no images", "train"),
         (frames, "(set: \"small\", images: \"0..7\")", "\"0..7\"", "`small` has 6 images", "fewer"),
         ("repeat: 2", "repeat: 0", "0", "0 times", "1 or more"),
+        ("(name: \"Few\",", "(name: \"Few\", hyperparameters: (steps: 0),", "0", "0 is out of range", "above 0"),
+        (
+            "(name: \"Few\",",
+            "(name: \"Few\", hyperparameters: (size: (64, 48)),",
+            "(64, 48)",
+            "`size` cannot differ between training sets",
+            "`hyperparameters` of the experiment",
+        ),
         ("repeat: 2", "dilate_px: -17", "-17", "not dilated by -17 pixels", "from -16 to 16"),
         (
             "set: \"frames\", images: \"6..8\"",
@@ -520,7 +529,9 @@ fn a_scale_changes_what_it_names_and_nothing_else() {
     let (plain, less) = (at(None).unwrap(), at(Some("less")).unwrap());
     assert_eq!((less.plan.hyper.steps, less.seeds.as_slice()), (5, &[7][..]));
     let hyper = Hyperparameters { steps: 10, ..less.plan.hyper.clone() };
-    let back = Experiment { plan: Plan { hyper, ..less.plan.clone() }, seeds: vec![1, 2], scale: None, ..less };
+    assert!(less.train.iter().all(|t| t.plan == less.plan));
+    let plan = Plan { hyper, ..less.plan.clone() };
+    let back = Experiment { plan, seeds: vec![1, 2], scale: None, train: plain.train.clone(), ..less };
     assert_eq!(back, plain);
     let error = at(Some("les")).unwrap_err();
     assert!(error.to_string().contains("no scale `les`\n help: did you mean `less`?"), "{error}");
@@ -533,11 +544,30 @@ fn a_scale_changes_what_it_names_and_nothing_else() {
     };
     assert_eq!(images(&large), (1300, (480, 360)));
     assert!(images(&small).0 < 1300 && large.plan.hyper.steps > small.plan.hyper.steps);
-    assert_eq!((large.train, large.test), (small.train, small.test));
+    let images = |e: &Experiment| e.train.iter().map(|t| (t.from.clone(), t.validation.clone())).collect::<Vec<_>>();
+    assert_eq!((images(&large), &large.test), (images(&small), &small.test));
 }
 
 /// Rationale: experiment files are kept for years. Expected: one with the names of version 0.1 is the same experiment, and each old name
 /// is warned of with its line and the new one; a fault of such a value is shown where the old name stands. Source: the changelog.
+/// Expected: what a training set says of its own holds for its rows alone, on top of the scale's.
+#[test]
+fn a_training_set_may_be_learnt_from_in_its_own_way() {
+    let own = PAGE.replace("(name: \"Few\",", "(name: \"Few\", hyperparameters: (batch: 1, rate: 0.25),");
+    for (scale, steps) in [(None, 10), (Some("less"), 5)] {
+        let experiment = Experiment::of(&page(&own), scale).unwrap();
+        let [few, more] = [0, 1].map(|i| experiment.train[i].plan.hyper.clone());
+        assert_eq!((few.batch, few.rate, few.steps), (1, 0.25, steps));
+        assert_eq!(more, experiment.plan.hyper);
+        assert_eq!((more.batch, more.steps), (2, steps));
+    }
+    let (_keep, out) = whole(&own);
+    let plan = |train: &str| -> Identity {
+        run::read_json(&out.join(format!("runs/unet/{train}/seed-1")).join(run::PLAN)).unwrap()
+    };
+    assert_eq!((plan("few").plan.hyper.batch, plan("more").plan.hyper.batch), (1, 2));
+}
+
 #[test]
 fn old_names_are_read_with_a_warning() {
     let new = PAGE.replace("steps: 10", "steps: 10, crop_size: (40, 32), rare_crops: 0.5, class_weights: \"annealed\"");

@@ -347,7 +347,7 @@ fn batches_do_not_depend_on_threads_or_on_where_a_training_goes_on() {
     let order =
         Order { seed, batch, crop_size, rare: 0.5, augment: Augment::default(), normalization: Normalization::Image };
     let batches = |memory, from, threads| -> Vec<_> {
-        Loader::start(&store(memory), &order, from, 12, threads).map(|b| b.unwrap()).collect()
+        Loader::start(&store(memory), &order, from, 12, threads).unwrap().map(|b| b.unwrap()).collect()
     };
     let plain = batches(1 << 30, 0, 1);
     assert_eq!(plain.len(), 12);

@@ -172,9 +172,9 @@ pub fn generate(set: &Set, work: &Work<'_>, callbacks: &Callbacks<'_>) -> Result
         failures.lock().unwrap_or_else(PoisonError::into_inner).insert(index, error);
     };
     let stopped = || callbacks.soon.load(Ordering::Relaxed) || callbacks.now.load(Ordering::Relaxed);
-    std::thread::scope(|scope| {
+    let refused = std::thread::scope(|scope| {
         for worker in &workers {
-            scope.spawn(|| {
+            let work = || {
                 let ended = || stopped() || failed.load(Ordering::Relaxed);
                 while let Some(field) = fields.get(next.fetch_add(1, Ordering::Relaxed)).filter(|_| !ended()) {
                     let mut kept = LastField::default();
@@ -192,8 +192,14 @@ pub fn generate(set: &Set, work: &Work<'_>, callbacks: &Callbacks<'_>) -> Result
                         }
                     }
                 }
-            });
+            };
+            if let Err(e) = std::thread::Builder::new().name("images".into()).spawn_scoped(scope, work) {
+                // Those that did start end with their images.
+                failed.store(true, Ordering::Relaxed);
+                return Some(Error::no_thread(e));
+            }
         }
+        None
     });
     let failures = failures.into_inner().unwrap_or_else(PoisonError::into_inner);
     // It may have been stopped after the last image was done.
@@ -208,6 +214,9 @@ pub fn generate(set: &Set, work: &Work<'_>, callbacks: &Callbacks<'_>) -> Result
         return Err(together(failures));
     }
     noted?;
+    if let Some(refused) = refused {
+        return Err(refused);
+    }
     if lacking == 0 { Ok(()) } else { Err(interrupted(&set.folder, wanted - lacking, wanted)) }
 }
 

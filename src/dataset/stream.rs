@@ -73,17 +73,24 @@ impl ImageStream {
         let (tell, told) = channel();
         let to_write = Arc::clone(&queue);
         // Not one of the scope's: the reader of a pipe may keep it waiting for ever, and a stop does not wait for it.
-        std::thread::spawn(move || {
+        let write = move || {
             let ended = archive(&to_write, out, &tell);
             to_write.end();
             let _ = tell.send(Said::Ended(ended));
-        });
+        };
+        std::thread::Builder::new().name("archive".into()).spawn(write).map_err(Error::no_thread)?;
         let failures: Mutex<BTreeMap<u64, Error>> = Mutex::default();
         let source = Source { set, scene, renderer, stop: &stop };
         let warn = listener.warn;
+        let mut refused = None;
         let (written, ended) = std::thread::scope(|scope| {
             for worker in &workers {
-                scope.spawn(|| self.serve(&queue, &source, worker, warn, &failures));
+                let work = || self.serve(&queue, &source, worker, warn, &failures);
+                if let Err(e) = std::thread::Builder::new().name("images".into()).spawn_scoped(scope, work) {
+                    refused = Some(Error::no_thread(e));
+                    queue.end();
+                    break;
+                }
             }
             let ends = listen(&told, listener, &queue, &stop);
             // Whoever still works works for nobody.
@@ -91,6 +98,9 @@ impl ImageStream {
             ends
         });
         let failures = failures.into_inner().unwrap_or_else(PoisonError::into_inner);
+        if let Some(refused) = refused {
+            return Err(refused);
+        }
         match ended {
             _ if failures.values().any(|e| !e.is_of_one_field()) => Err(together(failures)),
             None => {

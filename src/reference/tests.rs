@@ -49,7 +49,7 @@ fn examples_of_experiment_files_are_read() {
 fn examples_of_hyper_parameters_are_taken() {
     use crate::train::{Plan, Settings};
     let reference = super::experiment();
-    let section = reference.sections.iter().find(|section| section.path == "hyperparameters").unwrap();
+    let section = reference.sections.iter().find(|section| section.path.ends_with("hyperparameters")).unwrap();
     assert!(section.entries.len() > 20);
     for entry in &section.entries {
         let settings: Settings = ron::from_str(&format!("#![enable(implicit_some)]\n({})", entry.example)).unwrap();

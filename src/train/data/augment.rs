@@ -9,6 +9,7 @@ use super::erase;
 use super::example::Example;
 use super::normalise::{self, Normalization};
 use crate::sampling::Stream;
+use crate::sensor::Jpeg;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -35,6 +36,12 @@ pub struct Augment {
     /// Random erasing: patches of one colour, labelled as soil; see the module `erase`. Not part of `all`.
     #[serde(skip_serializing_if = "is_off")]
     pub erase: bool,
+    /// Half of the colour images compressed as JPEG does, at qualities of 30 to 95. Not part of `all`.
+    #[serde(skip_serializing_if = "is_off")]
+    pub jpeg: bool,
+    /// Half of the images in the style of another of the training set; see the module `fourier`. Not part of `all`.
+    #[serde(skip_serializing_if = "is_off")]
+    pub fourier: bool,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
@@ -44,14 +51,16 @@ fn is_off(part: &bool) -> bool {
 
 impl Default for Augment {
     fn default() -> Self {
-        Self { flip: true, rotate: true, scale: true, crop: true, colour: true, blur: true, noise: true, erase: false }
+        let (flip, rotate, scale, crop) = (true, true, true, true);
+        Self { flip, rotate, scale, crop, colour: true, blur: true, noise: true, ..Self::NONE }
     }
 }
 
 impl fmt::Display for Augment {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { flip, rotate, scale, crop, colour, blur, noise, erase } = *self;
-        let parts = [
+        let Self { flip, rotate, scale, crop, colour, blur, noise, erase, jpeg, fourier } = *self;
+        let all = [flip, rotate, scale, crop, colour, blur, noise].iter().all(|on| *on);
+        let usual = [
             (flip, "flip"),
             (rotate, "rotate"),
             (scale, "scale"),
@@ -59,15 +68,11 @@ impl fmt::Display for Augment {
             (colour, "colour"),
             (blur, "blur"),
             (noise, "noise"),
-            (erase, "erase"),
         ];
-        let names: Vec<&str> = parts.iter().filter(|(on, _)| *on).map(|(_, name)| *name).collect();
-        match names.len() {
-            0 => f.write_str("none"),
-            n if n + 1 == parts.len() && !erase => f.write_str("all"),
-            n if n == parts.len() => f.write_str("all,erase"),
-            _ => f.write_str(&names.join(",")),
-        }
+        let usual: Vec<(bool, &str)> = if all { vec![(true, "all")] } else { usual.into() };
+        let parts = usual.into_iter().chain([(erase, "erase"), (jpeg, "jpeg"), (fourier, "fourier")]);
+        let names: Vec<&str> = parts.filter(|(on, _)| *on).map(|(_, name)| name).collect();
+        f.write_str(if names.is_empty() { "none".into() } else { names.join(",") }.as_str())
     }
 }
 
@@ -82,6 +87,8 @@ impl Augment {
         blur: false,
         noise: false,
         erase: false,
+        jpeg: false,
+        fourier: false,
     };
 
     /// The parts of it that move a crop.
@@ -89,12 +96,15 @@ impl Augment {
         Moves { flip: self.flip, rotate: self.rotate, scale: self.scale, shift: self.crop }
     }
 
-    /// Reads `all` (all but `erase`), `none` or names with commas between.
+    /// Reads `all` (all but `erase`, `jpeg` and `fourier`), `none` or names with commas between.
     pub fn parse(text: &str) -> Result<Self, String> {
         let mut augment = Self::NONE;
         for name in text.split(',').map(str::trim) {
             match name {
-                "all" => augment = Self { erase: augment.erase, ..Self::default() },
+                "all" => {
+                    let Self { erase, jpeg, fourier, .. } = augment;
+                    augment = Self { erase, jpeg, fourier, ..Self::default() };
+                }
                 "none" => {}
                 "flip" => augment.flip = true,
                 "rotate" => augment.rotate = true,
@@ -104,9 +114,11 @@ impl Augment {
                 "blur" => augment.blur = true,
                 "noise" => augment.noise = true,
                 "erase" => augment.erase = true,
+                "jpeg" => augment.jpeg = true,
+                "fourier" => augment.fourier = true,
                 _ => {
                     return Err(format!(
-                        "there is no augmentation `{name}`: write all, none, or some of flip, rotate, scale, crop, colour, blur, noise, erase"
+                        "there is no augmentation `{name}`: write all, none, or some of flip, rotate, scale, crop, colour, blur, noise, erase, jpeg, fourier"
                     ));
                 }
             }
@@ -155,6 +167,9 @@ impl Augment {
         }
         if let Some(sd) = noise.filter(|_| before.is_none()) {
             add_noise(&mut pixels, sd, stream);
+        }
+        if self.jpeg && stream.chance(0.5) {
+            compress(&mut pixels, colour, size.0, stream);
         }
         let scales = if size == image {
             normalization.scales(&pixels, colour.len())
@@ -255,6 +270,22 @@ fn blur(pixels: &mut [f32], bands: usize, (w, h): (u32, u32), sigma: f32) {
         for (i, k) in kernel.iter().enumerate() {
             let from = (y + i).saturating_sub(reach).min(h as usize - 1) * row;
             add_times(out, &across[from..], *k);
+        }
+    }
+}
+
+/// What a JPEG of the colour photograph loses; nothing where it has not three colours.
+fn compress(pixels: &mut [f32], colour: &[bool], width: u32, stream: &mut Stream) {
+    let jpeg = Jpeg { quality: stream.range(30.0, 96.0) as u32, full_color: stream.chance(0.5) };
+    let places: Vec<usize> = (0..colour.len()).filter(|b| colour[*b]).collect();
+    let &[red, green, blue] = places.as_slice() else { return };
+    let coded = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
+    let mut rgb: Vec<u8> =
+        pixels.chunks_exact(colour.len()).flat_map(|p| [red, green, blue].map(|b| coded(p[b]))).collect();
+    jpeg.pass(&mut rgb, width);
+    for (pixel, rgb) in pixels.chunks_exact_mut(colour.len()).zip(rgb.as_chunks::<3>().0) {
+        for (band, v) in places.iter().zip(rgb) {
+            pixel[*band] = f32::from(*v) / 255.0;
         }
     }
 }
@@ -388,5 +419,30 @@ mod tests {
         assert_eq!(Augment::parse("none").unwrap(), Augment::NONE);
         assert_eq!(Augment::parse("flip, noise").unwrap(), Augment { flip: true, noise: true, ..Augment::NONE });
         assert!(Augment::parse("twist").is_err());
+        let style = Augment { jpeg: true, fourier: true, ..Augment::default() };
+        for (written, augment) in [("all,jpeg,fourier", style), ("none", Augment::NONE), ("all", Augment::default())] {
+            assert_eq!((Augment::parse(written).unwrap(), augment.to_string()), (augment, written.to_owned()));
+        }
+        assert_eq!(Augment::parse("fourier,all,jpeg").unwrap(), style);
+        assert_eq!(Augment { flip: true, erase: true, ..Augment::NONE }.to_string(), "flip,erase");
+    }
+
+    /// Expected: a crop compressed as a JPEG is the picture that was, within what such qualities lose of a smooth one, and near infrared
+    /// beside it is as it was; two bands are no colour photograph. Source: the rule.
+    #[test]
+    fn compression_changes_colours_a_little_and_nothing_else() {
+        let smooth: Vec<f32> = (0..48 * 32)
+            .flat_map(|i| {
+                let v = 0.3 + 0.4 * (i % 48) as f32 / 48.0;
+                [v, 0.8 * v, 0.5 * v, 0.123]
+            })
+            .collect();
+        let mut found = smooth.clone();
+        compress(&mut found, &[true, true, true, false], 48, &mut Stream::of(5, 0, Purpose::Test, 0));
+        assert!(found != smooth && found.iter().zip(&smooth).all(|(a, b)| (a - b).abs() < 0.1));
+        assert!(found.iter().skip(3).step_by(4).all(|v| *v == 0.123));
+        let mut gray = smooth.clone();
+        compress(&mut gray, &[false, true, true, false], 48, &mut Stream::of(5, 0, Purpose::Test, 0));
+        assert_eq!(gray, smooth);
     }
 }

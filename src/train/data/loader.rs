@@ -5,11 +5,13 @@
 
 use super::bands::Band;
 use super::crop::Crop;
+use super::fourier;
 use super::order::Order;
 use super::photos::{Photos, Views};
 use super::store::Store;
-use crate::Result;
 use crate::sampling::{Purpose, Stream};
+use crate::{Error, Result};
+use std::borrow::Cow;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, sync_channel};
 
@@ -36,7 +38,7 @@ const AHEAD: usize = 2;
 impl Loader {
     /// Begins to load the batches of steps `from..to` with `threads` threads; the store must hold an image. Threads end when the
     /// loader is dropped.
-    pub fn start(store: &Arc<Store>, order: &Order, from: u64, to: u64, threads: usize) -> Self {
+    pub fn start(store: &Arc<Store>, order: &Order, from: u64, to: u64, threads: usize) -> Result<Self> {
         let maker = || {
             let (store, order) = (Arc::clone(store), order.clone());
             let mut epochs = Epochs { seed: order.seed, current: None };
@@ -48,7 +50,7 @@ impl Loader {
 
 impl Loader<Views> {
     /// The same of crops of photographs; there must be one.
-    pub fn photos(photos: &Arc<Photos>, order: &Order, from: u64, to: u64, threads: usize) -> Self {
+    pub fn photos(photos: &Arc<Photos>, order: &Order, from: u64, to: u64, threads: usize) -> Result<Self> {
         let maker = || {
             let (photos, order) = (Arc::clone(photos), order.clone());
             move |step| Ok(photos.views(&order, step))
@@ -59,7 +61,7 @@ impl Loader<Views> {
 
 impl<T: Send + 'static> Loader<T> {
     /// What makers make of steps, one maker a thread.
-    fn of<M>(maker: impl Fn() -> M, from: u64, to: u64, threads: usize) -> Self
+    fn of<M>(maker: impl Fn() -> M, from: u64, to: u64, threads: usize) -> Result<Self>
     where
         M: FnMut(u64) -> Result<T> + Send + 'static,
     {
@@ -67,7 +69,7 @@ impl<T: Send + 'static> Loader<T> {
         let begin = |thread: u64| {
             let (sender, receiver) = sync_channel(AHEAD);
             let mut make = maker();
-            std::thread::spawn(move || {
+            let work = move || {
                 for step in (from + thread..to).step_by(threads as usize) {
                     let made = make(step);
                     let failed = made.is_err();
@@ -76,10 +78,11 @@ impl<T: Send + 'static> Loader<T> {
                         return;
                     }
                 }
-            });
-            receiver
+            };
+            std::thread::Builder::new().name("loader".into()).spawn(work).map_err(Error::no_thread)?;
+            Ok(receiver)
         };
-        Self { workers: (0..threads).map(begin).collect(), next: 0 }
+        Ok(Self { workers: (0..threads).map(begin).collect::<Result<_>>()?, next: 0 })
     }
 }
 
@@ -122,7 +125,13 @@ fn make(store: &Store, order: &Order, step: u64, epochs: &mut Epochs) -> Result<
     let mut batch = Batch { images: order.batch, pixels: Vec::new(), labels: Vec::new() };
     for slot in 0..order.batch as u64 {
         let place = step * order.batch as u64 + slot;
-        let example = store.get(epochs.at(place, store.len()))?;
+        let mut example = store.get(epochs.at(place, store.len()))?;
+        if order.augment.fourier {
+            let mut stream = Stream::of(order.seed, place, Purpose::Training, 5);
+            let other = store.get(stream.index(store.len()))?;
+            let restyled = fourier::restyled(&example, &other, crop.image, &mut stream);
+            example = restyled.map_or(example, Cow::Owned);
+        }
         let mut stream = Stream::of(order.seed, place, Purpose::Training, 2);
         let (pixels, labels) = order.augment.apply(&example, &crop, &colour, &order.normalization, &mut stream);
         batch.pixels.extend(pixels);

@@ -9,6 +9,7 @@
 //! | `store` | the selected images, decoded once and cached within a memory budget |
 //! | `augment` | data augmentation |
 //! | `erase` | random erasing |
+//! | `fourier` | the style of another image |
 //! | `crop` | random crops, some centred on rare-class pixels |
 //! | `normalise` | input normalization |
 //! | `order` | how batches are drawn |
@@ -22,6 +23,7 @@ pub mod bands;
 pub mod crop;
 mod erase;
 pub mod example;
+mod fourier;
 pub mod loader;
 pub mod margin;
 pub mod normalise;

@@ -17,7 +17,7 @@ use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::thread::{Scope, ScopedJoinHandle};
+use std::thread::{Builder, Scope, ScopedJoinHandle};
 use std::time::Instant;
 
 /// Options of a prediction.
@@ -86,9 +86,9 @@ pub fn predict(
     let (appearance, learnt) = learn(&models, card, pictures, options)?;
     std::thread::scope(|scope| -> Result<()> {
         let readers: Vec<_> =
-            (0..workers).map(|w| read(scope, card, pictures.iter().skip(w).step_by(workers))).collect();
-        let (writers, handles): (Vec<_>, Vec<_>) =
-            (0..workers).map(|_| write(scope, card, out, appearance.as_ref(), &failed)).unzip();
+            (0..workers).map(|w| read(scope, card, pictures.iter().skip(w).step_by(workers))).collect::<Result<_>>()?;
+        let begun = (0..workers).map(|_| write(scope, card, out, appearance.as_ref(), &failed));
+        let (writers, handles): (Vec<_>, Vec<_>) = begun.collect::<Result<Vec<_>>>()?.into_iter().unzip();
         let mut batch = Vec::new();
         for number in 0..pictures.len() {
             if options.stop.load(Ordering::Relaxed) || failed.load(Ordering::Relaxed) {
@@ -163,9 +163,9 @@ fn read<'s, 'a: 's>(
     scope: &'s Scope<'s, '_>,
     card: &'a ModelCard,
     pictures: impl Iterator<Item = &'a Picture> + Send + 's,
-) -> Receiver<Result<Ready<'a>>> {
+) -> Result<Receiver<Result<Ready<'a>>>> {
     let (sender, receiver) = sync_channel(AHEAD);
-    scope.spawn(move || {
+    let work = move || {
         for picture in pictures {
             let ready = Ready::read(picture, card);
             // Nobody listens any more: it was stopped.
@@ -173,8 +173,9 @@ fn read<'s, 'a: 's>(
                 return;
             }
         }
-    });
-    receiver
+    };
+    Builder::new().name("reader".into()).spawn_scoped(scope, work).map_err(Error::no_thread)?;
+    Ok(receiver)
 }
 
 /// Number, picture, and the values of its classes.
@@ -189,9 +190,9 @@ fn write<'s, 'a: 's>(
     out: &'a Path,
     appearance: Option<&'s Appearance>,
     failed: &'s AtomicBool,
-) -> (SyncSender<Scored<'a>>, ScopedJoinHandle<'s, Written>) {
+) -> Result<(SyncSender<Scored<'a>>, ScopedJoinHandle<'s, Written>)> {
     let (sender, receiver) = sync_channel::<Scored<'a>>(AHEAD);
-    let handle = scope.spawn(move || {
+    let work = move || {
         let mut written = Vec::new();
         for (number, ready, mut scores) in receiver {
             match draw(card, out, &ready, &mut scores, appearance) {
@@ -203,8 +204,9 @@ fn write<'s, 'a: 's>(
             }
         }
         Ok(written)
-    });
-    (sender, handle)
+    };
+    let handle = Builder::new().name("writer".into()).spawn_scoped(scope, work).map_err(Error::no_thread)?;
+    Ok((sender, handle))
 }
 
 /// Runs the networks on a batch and hands the scores on; seconds of the network.

@@ -150,8 +150,9 @@ pub struct Settings {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-example" = "\"colour,plants,rows,appearance\""))]
     pub refine: Option<String>,
-    /// Data augmentation: all, none, or some of flip, rotate, scale, crop, colour, blur, noise with commas between, and erase (random
-    /// erasing: patches of one colour labelled as soil), which is not part of all.
+    /// Data augmentation: all, none, or some of flip, rotate, scale, crop, colour, blur, noise with commas between; and, which
+    /// are not part of all, erase (random erasing: patches of one colour labelled as soil), jpeg (compression), fourier (style of another
+    /// training image: amplitudes of its lowest frequencies).
     #[arg(long, value_name = "NAMES", default_value = default_of("augment"))]
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-example" = "\"all,erase\""))]

@@ -115,9 +115,10 @@ pub fn train(
     };
     let mut log = TrainingLog::begin(folder, &plan.classes.names(), &at.history)?;
     let (first, last) = (at.step * hyper.accumulate, hyper.steps * hyper.accumulate);
-    let mut loader = Loader::start(&data.train, &order, first, last, data.loaders);
+    let mut loader = Loader::start(&data.train, &order, first, last, data.loaders)?;
     let photos = data.photos.as_ref();
-    let mut photos = photos.map(|photos| Loader::photos(photos, &order, first, last, data.loaders));
+    let photos = photos.map(|photos| Loader::photos(photos, &order, first, last, data.loaders));
+    let mut photos = photos.transpose()?;
     let (begun, before) = (Instant::now(), at.seconds);
     let every = (hyper.steps / POINTS).max(1);
     let out_of_patience = |at: &Checkpoint| at.history.since_best() >= hyper.patience && !data.val.is_empty();

@@ -1,7 +1,7 @@
 //! What changes do: every training set against one of them, seed by seed.
 //!
 //! Two trainings of one network with one seed begin with the same weights and take images in the same order, so the difference of
-//! their scores is that of their training sets, and of chance. The table has its mean over seeds, its standard deviation (n − 1), and
+//! their scores is that of their training sets with their hyper-parameters, and of chance. The table has its mean over seeds, its standard deviation (n − 1), and
 //! whether the mean is beyond that: a change that is not may be chance. Beside it stand what rendering took, and how far the images
 //! are from the unchanged ones, measured once and kept in `distance/`.
 

@@ -81,6 +81,9 @@ pub enum SetDesc {
         /// Seed, instead of the scene's.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         seed: Option<u64>,
+        /// One thing of the fields that is changed, by its name in `trace ablate --list`; nothing unless given.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        edit: Option<String>,
         /// Shares of training, validation and test set; 8 to 1 to 1 unless given.
         #[serde(default = "usual_split")]
         split: (u32, u32, u32),
@@ -97,6 +100,10 @@ pub enum SetDesc {
         #[serde(default)]
         about: String,
     },
+}
+
+fn is_usual(settings: &Settings) -> bool {
+    *settings == Settings::default()
 }
 
 fn some_samples() -> u32 {
@@ -119,6 +126,10 @@ pub struct TrainDesc {
     /// `from` that name no `images`. Where it is empty, all steps are done and the last counts.
     #[serde(default, alias = "watch", skip_serializing_if = "Option::is_none")]
     pub validation: Option<Vec<PartDesc>>,
+    /// Hyper-parameters that differ on this set from those of the experiment and its scale: the same images learnt from in another way. All but
+    /// `classes`, `bands` and `size`, by which sets are compared.
+    #[serde(default, skip_serializing_if = "is_usual")]
+    pub hyperparameters: Settings,
 }
 
 /// Images of a set.

@@ -3,6 +3,7 @@
 use super::desc::{ExperimentDesc, Named, PartDesc, ScaleDesc, SetDesc};
 use super::names::{slug, unknown};
 use super::renamed::old_name;
+use crate::ablation::EDITS;
 use crate::dataset::classes::Classes;
 use crate::dataset::recipe::{self, Recipe};
 use crate::dataset::split::Shares;
@@ -55,6 +56,8 @@ pub enum Source {
         spp: u32,
         /// Seed, instead of the scene's.
         seed: Option<u64>,
+        /// Name of what is changed, where anything is.
+        edit: Option<&'static str>,
         /// Shares of the splits.
         split: Shares,
     },
@@ -96,6 +99,8 @@ pub struct TrainSet {
     pub from: Vec<Part>,
     /// Validation images.
     pub validation: Vec<Part>,
+    /// The experiment's plan with what differs on this set.
+    pub plan: Plan,
 }
 
 /// A test set.
@@ -193,7 +198,7 @@ impl Checker<'_> {
         let seeds = other.and_then(|s| s.seeds.as_ref()).unwrap_or(&desc.seeds);
         self.seeds(seeds, &at("seeds", other.is_some_and(|s| s.seeds.is_some())))?;
         let sets = self.sets(other, (learn.shape.width, learn.shape.height))?;
-        let train = self.train(&sets)?;
+        let train = self.train(&sets, &learn)?;
         Ok(Experiment {
             networks,
             baselines: self.baselines(&learn)?,
@@ -312,7 +317,7 @@ impl Checker<'_> {
                     }
                     Source::Dataset { count: Recipe::read(&folder)?.count, folder }
                 }
-                SetDesc::Scene { file, count, size, spp, seed, split: (train, val, test) } => {
+                SetDesc::Scene { file, count, size, spp, seed, edit, split: (train, val, test) } => {
                     self.page.need_file(file)?;
                     self.count(*count, &at("count"))?;
                     self.spp(*spp, &at("spp"))?;
@@ -321,10 +326,11 @@ impl Checker<'_> {
                     if let Some(size) = size {
                         self.image_size(*size, &at("size"))?;
                     }
+                    let edit = edit.as_deref().map(|name| self.edit(name, &at("edit"))).transpose()?;
                     let size = scale.and_then(|s| s.size).or(*size).unwrap_or(seen);
                     let (count, spp) =
                         (scale.and_then(|s| s.count).unwrap_or(*count), scale.and_then(|s| s.spp).unwrap_or(*spp));
-                    Source::Scene { file: self.page.resolve(file), count, size, spp, seed: *seed, split }
+                    Source::Scene { file: self.page.resolve(file), count, size, spp, seed: *seed, edit, split }
                 }
             };
             sets.push((name.clone(), source));
@@ -346,6 +352,11 @@ impl Checker<'_> {
             return Ok(());
         }
         Err(self.fault(at, format!("{count} images cannot be rendered"), "write a number from 1 to 99999999"))
+    }
+
+    fn edit(&self, name: &str, at: At<'_>) -> Result<&'static str> {
+        let known: Vec<&str> = EDITS.iter().map(|edit| edit.name).collect();
+        known.iter().find(|known| **known == name).copied().ok_or_else(|| self.unknown(at, "edit", &known, name))
     }
 
     fn spp(&self, spp: u32, at: At<'_>) -> Result<()> {
@@ -412,7 +423,7 @@ impl Checker<'_> {
         Ok((set, pick))
     }
 
-    fn train(&self, sets: &[(String, Source)]) -> Result<Vec<TrainSet>> {
+    fn train(&self, sets: &[(String, Source)], plan: &Plan) -> Result<Vec<TrainSet>> {
         use crate::dataset::split::Split::{Train, Val};
         let mut all: Vec<TrainSet> = Vec::new();
         for (i, desc) in self.desc.train.iter().enumerate() {
@@ -440,13 +451,30 @@ impl Checker<'_> {
                 let open = desc.from.iter().zip(&from).filter(|(desc, _)| desc.images.is_none());
                 open.map(|(_, part)| Part { pick: Pick::Split(Val), repeat: 1, ..part.clone() }).collect()
             };
-            all.push(TrainSet { name: desc.name.clone(), slug, from, validation });
+            let plan = self.own_plan(&desc.hyperparameters, &step("hyperparameters"), plan)?;
+            all.push(TrainSet { name: desc.name.clone(), slug, from, validation, plan });
         }
         if all.is_empty() {
             let help = "name one at least: [(name: \"Real\", from: [(set: \"NAME\")])]";
             return Err(self.fault(&[Step::Field("train")], "there is no training set", help));
         }
         Ok(all)
+    }
+
+    /// The experiment's plan with the hyper-parameters of one training set.
+    fn own_plan(&self, own: &Settings, at: At<'_>, plan: &Plan) -> Result<Plan> {
+        let fixed = [("classes", own.classes.is_some()), ("bands", own.bands.is_some()), ("size", own.size.is_some())];
+        if let Some((name, _)) = fixed.iter().find(|(_, given)| *given) {
+            let what = format!("`{name}` cannot differ between training sets, which are evaluated alike");
+            return Err(self.fault(
+                &[at, &[Step::Field(name)]].concat(),
+                what,
+                "write it in `hyperparameters` of the experiment",
+            ));
+        }
+        let mut plan = plan.clone();
+        self.settings(own, at, &mut plan)?;
+        Ok(plan)
     }
 
     fn test(&self, sets: &[(String, Source)]) -> Result<Vec<TestSet>> {

@@ -2,6 +2,7 @@
 
 use super::experiment::{Experiment, Part, Source};
 use super::names::unknown;
+use crate::ablation::{Edit, FULL};
 use crate::dataset::generate::{Callbacks, Work};
 use crate::dataset::import::masks::{Folders, Masks};
 use crate::dataset::import::{self, Source as _};
@@ -162,12 +163,13 @@ impl Bound {
         }
         let progress = Progress::new(name, tell);
         let made = match (source, origin) {
-            (Source::Scene { file, count, size, spp, seed, split }, _) => {
+            (Source::Scene { file, count, size, spp, seed, edit, split }, _) => {
                 let order = dataset::Order {
                     seed: *seed,
                     width: Some(size.0),
                     height: Some(size.1),
                     split: *split,
+                    edit: edit.map_or(Ok(&FULL), Edit::named)?,
                     options: RenderOptions::path_traced(Quality::spp(*spp)),
                     ..dataset::Order::new(file, *count)
                 };

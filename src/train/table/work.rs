@@ -214,7 +214,7 @@ impl Work<'_> {
             Some(Identity { plan, .. }) => (plan.threads, plan.precision),
             None => (threads, precision.to_owned()),
         };
-        let plan = self.order.bound.experiment.plan.clone();
+        let plan = self.set().plan.clone();
         Ok(Plan { network, train, val, seed: self.seed(), threads, precision, seconds, ..plan })
     }
 

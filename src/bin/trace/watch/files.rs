@@ -63,7 +63,7 @@ pub(super) fn watch(session: Arc<Session>) -> Result<Files> {
     std::thread::Builder::new()
         .name("files".into())
         .spawn(move || wait(&receive, &session, &looked_at))
-        .map_err(|e| Error::failed(format!("cannot start a thread: {e}")))?;
+        .map_err(Error::no_thread)?;
     Ok(Files { watcher, folders: BTreeSet::new(), read: BTreeSet::new(), followed })
 }
 

@@ -6,6 +6,9 @@
 //!
 //! What a plant looks like is what the network's encoder makes of it: values of its levels of 8 and of 16 pixels.
 //!
+//! Looks count as far as they tell on pictures that they were not learnt from (cross-validation by picture). Where crop and weeds do not look
+//! different, or all plants are of one kind, a classifier says of each plant what most are; that is no evidence, and left out.
+//!
 //! Source: self-training on the arrangement of plants, Lottes & Stachniss 2017, "Semi-supervised online visual crop and weed classification in
 //! precision farming exploiting plant arrangement"; features and constants are our choice.
 
@@ -27,6 +30,9 @@ const BLUR: f64 = 1.0 / 60.0;
 const SURE: f64 = 8.0;
 /// Regions of a picture that are learnt from at most, the largest: noise would fill the memory.
 const MOST: usize = 2000;
+/// Share of the labels' information that looks tell of pictures that they were not learnt from, at which they begin to count, and at which
+/// they count fully.
+const TOLD: (f64, f64) = (0.05, 0.15);
 /// Pictures that are learnt from, at least: what one picture's rows say wrongly its plants repeat.
 const LEAST: usize = 2;
 
@@ -96,22 +102,29 @@ impl Examples {
 
 /// What crop and weeds of a field look like.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Appearance(Classifier);
+pub struct Appearance {
+    classifier: Classifier,
+    /// How far it counts, 0 to 1.
+    trust: f64,
+}
 
 impl Appearance {
-    /// Learns it from the plants of pictures; none where these are too few.
+    /// Learns it from the plants of pictures; none where these are too few, or where looks tell nothing.
     pub fn learn(pictures: &[Examples]) -> Option<Self> {
         let pictures: Vec<&Examples> = pictures.iter().filter(|picture| !picture.labels.is_empty()).collect();
         if pictures.len() < LEAST {
             return None;
         }
-        let mut all = Examples::default();
-        for picture in pictures {
+        let (mut all, mut numbers) = (Examples::default(), Vec::new());
+        for (number, picture) in pictures.into_iter().enumerate() {
             all.features.extend(&picture.features);
             all.labels.extend(&picture.labels);
             all.weights.extend(&picture.weights);
+            numbers.resize(all.labels.len(), number);
         }
-        all.classifier().map(Self)
+        let (classifier, told) = all.learn(&numbers)?;
+        let trust = ((told - TOLD.0) / (TOLD.1 - TOLD.0)).clamp(0.0, 1.0);
+        (trust > 0.0).then_some(Self { classifier, trust })
     }
 
     /// What is added to the log odds of crop over weed at each plant pixel of a picture; 0 elsewhere.
@@ -127,15 +140,15 @@ impl Appearance {
         let value = |(at, region): (usize, &u32)| {
             let Some(region) = (*region as usize).checked_sub(1) else { return 0.0 };
             let whole = sums[region] / f64::from(regions.areas[region]);
-            WEIGHT * ((1.0 - PLACE) * whole + PLACE * features.between(&near, at, size))
+            WEIGHT * self.trust * ((1.0 - PLACE) * whole + PLACE * features.between(&near, at, size))
         };
         regions.labels.iter().enumerate().map(value).collect()
     }
 
     /// The log odds of each cell.
     fn cells(&self, features: &Features) -> Vec<f64> {
-        let mut cells = vec![self.0.bias; features.size.0 * features.size.1];
-        for (plane, weight) in features.planes.iter().zip(&self.0.weights) {
+        let mut cells = vec![self.classifier.bias; features.size.0 * features.size.1];
+        for (plane, weight) in features.planes.iter().zip(&self.classifier.weights) {
             cells.iter_mut().zip(plane).for_each(|(cell, value)| *cell += weight * f64::from(*value));
         }
         cells
@@ -164,6 +177,7 @@ fn blurred(values: &[f64], counts: &[f64], (width, height): (usize, usize)) -> V
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sampling::{Purpose, Stream};
 
     /// A picture of 80 × 80 pixels in cells of 8: plants of 6 × 6 pixels, each within the cell at its place, with what a classifier that looks
     /// at features alone sees of them, and log odds by rows.
@@ -203,10 +217,40 @@ mod tests {
         assert!(regions.labels.iter().zip(&odds).all(|(region, odds)| (*region == 0) == (*odds == 0.0)));
     }
 
+    /// Expected: looks that labels of other pictures follow count fully; those that they do not follow, and those of a field where all plants
+    /// have one label, are left out; where a third of the labels follow them they count in part. Source: the rule.
+    #[test]
+    fn looks_count_as_far_as_they_tell_on_other_pictures() {
+        let mut s = Stream::of(4, 0, Purpose::Test, 0);
+        let mut field = |share: f64, kinds: bool| -> Vec<Examples> {
+            let mut one = |_| {
+                let mut examples = Examples::default();
+                for _ in 0..60 {
+                    let crop = s.chance(0.5);
+                    let follows = s.chance(share);
+                    let says = if follows { crop } else { s.chance(0.5) };
+                    let looks = if crop { 1.0 } else { -1.0 };
+                    examples.features.extend([looks + 0.2 * s.normal() as f32, s.normal() as f32]);
+                    examples.labels.push(if says || !kinds { 0.95 } else { 0.05 });
+                    examples.weights.push(s.range(0.5, 2.0));
+                }
+                examples
+            };
+            (0..8).map(&mut one).collect()
+        };
+        let trust = |pictures: &[Examples]| Appearance::learn(pictures).map_or(0.0, |found| found.trust);
+        assert_eq!(trust(&field(0.9, true)), 1.0);
+        assert_eq!(trust(&field(0.0, true)), 0.0);
+        assert_eq!(trust(&field(0.9, false)), 0.0);
+        let part = trust(&field(0.33, true));
+        assert!(part > 0.0 && part < 1.0, "{part}");
+    }
+
     /// Expected: one picture alone teaches nothing, nor do pictures without plants. Source: the rule.
     #[test]
     fn one_picture_says_too_little() {
-        let plants: Vec<_> = (0..10).map(|k| (k, k, if k % 2 == 0 { 1.0 } else { -1.0 }, 1.0)).collect();
+        let side = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let plants: Vec<_> = (0..10).map(|k| (k, k, side(k), f64::from(side(k)))).collect();
         let (regions, features, evidence) = picture(&plants);
         let learnt = || Examples::of(&regions, (80, 80), &evidence, &features);
         assert!(Appearance::learn(&[learnt()]).is_none());
