@@ -41,17 +41,19 @@ pub struct Examples {
 }
 
 impl Examples {
-    /// The log odds of examples by their features. None where there are too few to tell anything.
-    ///
-    /// Minimizes Σ u_i (−p_i ln q_i − (1 − p_i) ln(1 − q_i)) + ½ |β|², the weights u scaled so that their sum is the number of examples, over β and
-    /// a bias that is not penalized; q_i is the logistic function of the bias and β · y_i, and y_i are the example's principal components, each
-    /// scaled to a variance of 1. Source: Hastie, Tibshirani & Friedman 2009, sections 3.5.1 and 4.4.1.
+    /// [`Self::learn`] without pictures.
     #[cfg(test)]
     pub(super) fn classifier(&self) -> Option<Classifier> {
         self.learn(&[]).map(|(classifier, _)| classifier)
     }
 
-    /// The same, and the share of the labels' information that such a classifier tells of pictures that it was not learnt from: 0 where it is as
+    /// The log odds of examples by their features. None where there are too few to tell anything.
+    ///
+    /// Minimizes Σ u_i (−p_i ln q_i − (1 − p_i) ln(1 − q_i)) + ½ |β|², the weights u scaled so that their sum is the number of examples, over β and
+    /// a bias that is not penalized; q_i is the logistic function of the bias and β · y_i, and y_i are the example's principal components, each
+    /// scaled to a variance of 1. Source: Hastie, Tibshirani & Friedman 2009, sections 3.5.1 and 4.4.1.
+    ///
+    /// Beside it the share of the deviance explained (McFadden's pseudo-R²) in pictures that it was not learnt from: 0 where it is as
     /// good as the labels' mean, 1 where it is as sure as the labels themselves, below 0 where it misleads. `pictures` has of each example the
     /// number of its picture; 0 without.
     ///
