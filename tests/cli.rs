@@ -246,6 +246,28 @@ fn a_catalogue_shows_species_and_keeps_what_would_come_out_the_same() {
     assert!(text(&missing.stderr).contains("did you mean"), "{}", text(&missing.stderr));
 }
 
+/// Rationale: cut-outs of one stage had all stages measured. Expected: of a cut-out whose name tells a stage, that stage's rendered plants are measured
+/// and no others; the columns are explained; a photograph of a stage that the species lacks is told of.
+#[test]
+fn a_catalogue_measures_the_stages_of_its_photographs() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for name in ["echinochloa-bbch11.png", "echinochloa-bbch77.png"] {
+        std::fs::copy(root.join("textures/leaf/papaver.png"), folder.path().join(name)).unwrap();
+    }
+    let species = root.join("scenes/species");
+    let rest = ["--size", "64", "--spp", "1", "--beside", ".", "--species-dir", species.to_str().unwrap()];
+    let done = run(folder.path(), &[&["catalogue", "--species", "echinochloa"], rest.as_slice()].concat());
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    assert!(text(&done.stderr).contains("echinochloa has no stage BBCH 77"), "{}", text(&done.stderr));
+    let page = std::fs::read_to_string(folder.path().join("out/catalogue/catalogue.html")).unwrap();
+    for words in ["BBCH 11, 1 cut-out", "area of the plant over that of its convex hull"] {
+        assert!(page.contains(words), "no {words}");
+    }
+    let rendered: Vec<&str> = page.match_indices(", rendered").map(|(at, _)| &page[at - 7..at]).collect();
+    assert_eq!(rendered, ["BBCH 11"]);
+}
+
 /// Rationale: logs fill disks, and readers die. Expected: what cannot be said ends no work and changes no exit code; paths that are lost
 /// are a failure, told on stderr, with the files there; a reader that wants no more is none.
 /// Rationale: hours of work want a place to go. Expected: what is no folder and what nothing can be written into is told before anything grows.

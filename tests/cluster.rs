@@ -178,7 +178,8 @@ fn orders_that_make_no_sense_are_refused() {
         (&["--scheduler", "slurm", "--shards", "5"][..], "some would be empty"),
         (&["--scheduler", "slurm", "--shards", "0"], "1.."),
         (&["--scheduler", "slurm", "--shards", "2", "--time", "5m"], "--grace 300"),
-        (&["--scheduler", "slurm", "--shards", "2", "--time", "soon"], "4h"),
+        (&["--scheduler", "slurm", "--shards", "2", "--time", "soon"], "30s, 2m or 1h30m"),
+        (&["--scheduler", "slurm", "--shards", "2", "--time", "300s 900ms"], "--grace 300"),
         (&["--scheduler", "pbs", "--shards", "2"], "slurm, kubernetes, parallel"),
         (
             &["--scheduler", "kubernetes", "--shards", "2", "--claim", "a\nevil: b"],

@@ -240,6 +240,10 @@ fn what_cannot_be_drawn_is_refused_with_a_reason() {
             "Leaf(seed: 1, size: 64, length_mm: 9, aspect: 500, outline: Full, veins: Parallel(count: 3, midrib: 0.1), pigments: ())",
             "at most 4096",
         ),
+        (
+            "Leaf(seed: 1, size: 64, length_mm: 9, aspect: 0.5, outline: Full, margin: Lobed(pairs: 3, rachis: 0.1, terminal: 0.2, terminal_width: 0.3, lean_deg: 86, pointed: 1, teeth: (0, 0)), veins: Parallel(count: 3, midrib: 0.1), pigments: ())",
+            "between 0 and 85 degrees",
+        ),
     ] {
         std::fs::write(&path, page).unwrap();
         let message = draw::write(&path).unwrap_err().to_string();
@@ -259,7 +263,7 @@ fn odd_leaves_are_drawn_too() {
             ),
             (
                 "Full",
-                "margin: Lobed(pairs: 12, rachis: 0, terminal: 0.01, terminal_width: 0, lean_deg: 89, pointed: 1, teeth: (8, 1)), veins: Pinnate(pairs: 0, angle_deg: 0, midrib: 0, fine: 30)",
+                "margin: Lobed(pairs: 12, rachis: 0, terminal: 0.01, terminal_width: 0, lean_deg: 85, pointed: 1, teeth: (8, 1)), veins: Pinnate(pairs: 0, angle_deg: 0, midrib: 0, fine: 30)",
             ),
             (
                 "Power(a: 1, b: 1)",

@@ -21,6 +21,8 @@ const UPRIGHT: f32 = 0.1;
 const APART: (f32, f32) = (0.4, 1.1);
 /// Radius of the youngest sheath over that of the oldest.
 const TAPER: f32 = 0.5;
+/// Angle between neighbours of one rank of side shoots, as seen from above, radians.
+const FAN: f32 = 0.6;
 /// Side shoots stop here, whatever a species file asks for.
 const MOST: usize = 24;
 
@@ -35,14 +37,14 @@ pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {
         let size = stream.range32(TILLER.0, TILLER.1) * 0.93_f32.powi(k as i32);
         let grown = growth.tillers_grown;
         let size = lerp(size, 1.0, grown);
-        // A side shoot breaks out of the axil of an older leaf, across the ranks.
-        let towards =
-            growth.leaves.first().map_or(0.0, |l| l.azimuth) + PI * (k % 2) as f32 + stream.range32(-0.7, 0.7);
+        // A side shoot breaks out of the axil of an older leaf, across the ranks; those of one rank stand in a fan.
+        let rank = growth.leaves.first().map_or(0.0, |l| l.azimuth) + PI * (k % 2) as f32;
+        let towards = rank + fanned(k / 2) + stream.range32(-FAN / 3.0, FAN / 3.0);
         let axis = direction(lerp(stream.range32(SPREAD.0, SPREAD.1), UPRIGHT, grown), towards);
         let base = direction(FRAC_PI_2, towards) * (lerp(APART.0, APART.1, grown) * growth.stem);
         let turn = FRAC_PI_2 + stream.range32(-0.5, 0.5);
-        // Its leaves are as many as the main shoot has, less the oldest, which it had no time for.
-        let missing = lerp((1 + growth.leaves.len() / 3) as f32, 1.0, grown).round() as usize;
+        // Its leaves are as many as the main shoot has, less the oldest, which it had no time for unless it has caught up.
+        let missing = lerp((1 + growth.leaves.len() / 3) as f32, 0.0, grown).round() as usize;
         let leaves: Vec<_> = growth.leaves.iter().skip(missing).collect();
         let leaves: Vec<LeafNow<'_>> = leaves
             .into_iter()
@@ -62,6 +64,12 @@ pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {
         shoot(&mut organs, (0.5 * growth.stem * size.sqrt(), TAPER), axis, base, leaves.into_iter());
     }
     organs
+}
+
+/// Where the k-th side shoot of a rank stands in its fan, radians from the middle: there, then to one side and the other in turn.
+fn fanned(k: usize) -> f32 {
+    let steps = k.div_ceil(2) as f32;
+    FAN * if k.is_multiple_of(2) { -steps } else { steps }
 }
 
 /// The direction of the main shoot.

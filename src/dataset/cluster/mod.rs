@@ -78,8 +78,10 @@ fn check(set: &Set, job: &Job) -> Result<()> {
             return fault("--push is for slurm and parallel".into(), help);
         }
     }
-    if job.grace >= job.time {
-        let words = format!("--grace {} leaves nothing of --time {} s", job.grace.as_secs(), job.time.as_secs());
+    // Job files are in whole seconds.
+    let (grace, time) = (job.grace.as_secs(), job.time.as_secs());
+    if grace >= time {
+        let words = format!("--grace {grace} leaves nothing of --time {time} s");
         return fault(words, "--grace is how long before the end of --time a shard is told to stop");
     }
     Ok(())

@@ -4,11 +4,22 @@
 //! Coordinates as in [`super::shape`].
 
 use super::cells::{smooth_max, unit};
+use super::teeth::Teeth;
 use crate::geometry::outline::Outline;
-use crate::math::{Vec2, lerp, smoothstep, vec2};
-use crate::ron_file::{Count, Fraction, Num, PositiveCount};
+use crate::math::{Vec2, lerp, vec2};
+use crate::ron_file::{Bound, Count, Fraction, Num, PositiveCount};
 use crate::sampling::rng::mix;
 use serde::{Deserialize, Serialize};
+
+/// Degrees that a lobe leans to the tip: 0 stands square to the midrib, 85 nearly along it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Lean;
+
+impl Bound for Lean {
+    const MIN: f64 = 0.0;
+    const MAX: f64 = 85.0;
+    const WORDS: &'static str = "between 0 and 85 degrees";
+}
 
 /// The plan of a pinnatifid leaf. The outline is then the envelope of the lobes' tips.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -22,8 +33,8 @@ pub struct Lobed {
     pub terminal: Num<Fraction>,
     /// Width of the last lobe, of the leaf's width.
     pub terminal_width: Num<Fraction>,
-    /// How far the lobes lean to the tip, degrees.
-    pub lean_deg: Num<Count>,
+    /// How far the lobes lean to the tip, on average, degrees.
+    pub lean_deg: Num<Lean>,
     /// 0 for blunt lobes, 1 for long points.
     pub pointed: Num<Fraction>,
     /// Teeth on each side of each lobe, eight at most, and how deep the sinuses between them are, of the lobe's half-width.
@@ -64,9 +75,6 @@ struct Lobe {
     teeth: [Teeth; 2],
 }
 
-/// The teeth of one side: where along the lobe each ends, and how deep the sinus before it is.
-struct Teeth(Vec<(f32, f32)>);
-
 impl Lobes {
     /// Of a leaf whose width is `aspect` of its length; `outline` holds the tips of the lobes.
     pub(super) fn new(plan: &Lobed, outline: Outline, aspect: f32, seed: u64) -> Self {
@@ -84,7 +92,7 @@ impl Lobes {
                 let pitch = place(even + 1.0 / pairs) - place(even);
                 let y = place(share);
                 let lean = plan.lean_deg.f32() * (1.0 + 0.35 * random(i, k + 3)) * lerp(0.75, 1.3, share);
-                let axis = Vec2::from_angle(lean.min(85.0).to_radians()) * vec2(side, 1.0);
+                let axis = Vec2::from_angle(lean.min(Lean::MAX as f32).to_radians()) * vec2(side, 1.0);
                 let room = reach(vec2(0.0, y), axis, outline, aspect);
                 let length = (room * (1.0 - 0.3 * (random(i, k + 4) + 0.5))).max(1e-3);
                 let half_width = (0.5 * pitch * (1.0 + 0.35 * random(i, k + 5))).min(0.5 * length);
@@ -95,7 +103,7 @@ impl Lobes {
                     half_width,
                     outline: Outline::Power { a: FOOT, b: lerp(0.42, 1.15, pointed) },
                     arch: side * 0.16 * (1.0 + random(i, k + 6)),
-                    teeth: [70, 71].map(|t| Teeth::new(teeth, |j| random(100 * i + j, t + k))),
+                    teeth: [70, 71].map(|t| toothed(teeth, |j| random(100 * i + j, t + k))),
                 });
             }
         }
@@ -109,7 +117,7 @@ impl Lobes {
             half_width: 0.5 * aspect * plan.terminal_width.f32(),
             outline: Outline::Power { a: 0.55, b: lerp(0.5, 1.1, pointed) },
             arch: 0.0,
-            teeth: [90, 91].map(|t| Teeth::new(more, |j| random(j, t))),
+            teeth: [90, 91].map(|t| toothed(more, |j| random(j, t))),
         });
         Self { all: lobes, strip: (0.5 * aspect * plan.rachis.f32(), top), fillet: lerp(0.03, 0.012, pointed) }
     }
@@ -164,28 +172,15 @@ impl Lobe {
     }
 }
 
-impl Teeth {
-    fn new((count, depth): (usize, f32), random: impl Fn(u64) -> f32) -> Self {
-        let tooth = |j: usize| {
-            let shift = if (1..count).contains(&j) { 0.5 * random(j as u64) } else { 0.0 };
-            let deep = depth * (0.55 + 0.9 * (random(50 + j as u64) + 0.5));
-            (lerp(0.22, 0.97, (j as f32 + shift) / count as f32), deep)
-        };
-        Self(if count > 0 { (0..=count).map(tooth).collect() } else { Vec::new() })
+/// The teeth of one side of a lobe, so many and with sinuses about so deep, of the half-width.
+fn toothed((count, depth): (usize, f32), random: impl Fn(u64) -> f32) -> Teeth {
+    if count == 0 {
+        return Teeth::default();
     }
-
-    /// What the sinuses take of the half-width at a place along the lobe.
-    fn sinus(&self, t: f32) -> f32 {
-        let i = self.0.partition_point(|(end, _)| *end <= t);
-        if i == 0 || i == self.0.len() {
-            return 0.0;
-        }
-        let ((start, low), (end, high)) = (self.0[i - 1], self.0[i]);
-        let v = (t - start) / (end - start);
-        // A tooth rises slowly from the lower sinus and falls steeply into the next.
-        let tip = 0.68;
-        let fall = if v < tip { 1.0 - v / tip } else { (v - tip) / (1.0 - tip) };
-        let fade = smoothstep(0.12, 0.3, t) * (1.0 - smoothstep(0.8, 1.0, t));
-        fall * fall * (1.4 - 0.4 * fall) * if v < tip { low } else { high } * fade
-    }
+    let sinus = |j: usize| {
+        let shift = if (1..count).contains(&j) { 0.5 * random(j as u64) } else { 0.0 };
+        let deep = depth * (0.55 + 0.9 * (random(50 + j as u64) + 0.5));
+        (lerp(0.22, 0.97, (j as f32 + shift) / count as f32), deep)
+    };
+    Teeth { sinuses: (0..=count).map(sinus).collect(), fades: [(0.12, 0.3), (0.8, 1.0)] }
 }

@@ -14,6 +14,7 @@ mod shape;
 mod soil;
 mod soil_recipe;
 mod stamp;
+mod teeth;
 mod tile;
 mod tissue;
 mod veins;
@@ -21,7 +22,7 @@ mod write;
 
 pub use drawn::{Drawn, Grey};
 pub use leaf_recipe::{LeafRecipe, LeafRelief, Look};
-pub use lobed::Lobed;
+pub use lobed::{Lean, Lobed};
 pub use lyrate::Lyrate;
 pub use shape::{Margin, Sinus};
 pub use soil_recipe::{Crumbs, Ground, Litter, SoilRecipe};

@@ -5,6 +5,7 @@
 use super::cells::unit;
 use super::lobed::{Lobed, Lobes};
 use super::lyrate::{Lyrate, Silhouette};
+use super::teeth::Teeth;
 use crate::geometry::outline::Outline;
 use crate::math::{Vec2, lerp, smoothstep, vec2};
 use crate::ron_file::{Fraction, Num, Positive, PositiveCount};
@@ -62,7 +63,8 @@ pub(super) struct Shape {
     sinus: Option<(f32, f32)>,
     lobed: Option<Lobes>,
     spines: Vec<Spine>,
-    teeth: [Vec<(f32, f32)>; 2],
+    /// Of the left and the right side.
+    teeth: [Teeth; 2],
     lyrate: Option<Silhouette>,
 }
 
@@ -88,7 +90,7 @@ impl Shape {
             sinus: None,
             lobed: None,
             spines: Vec::new(),
-            teeth: [Vec::new(), Vec::new()],
+            teeth: Default::default(),
             lyrate: None,
         };
         let random = |i: usize, k: u64| unit(mix(mix(seed ^ (k << 40)) ^ i as u64)) - 0.5;
@@ -96,18 +98,7 @@ impl Shape {
             Margin::Entire => {}
             Margin::Lyrate(plan) => shape.lyrate = Some(Silhouette::new(&plan, aspect, seed)),
             Margin::Toothed { count, .. } => {
-                let n = count.get() as usize;
-                for side in 0..2 {
-                    // Ends of the teeth along the midrib, from the base; the widest stand low.
-                    shape.teeth[side] = (0..=n)
-                        .map(|i| {
-                            let even = i as f32 / n as f32;
-                            let inner = i > 0 && i < n;
-                            let shift = if inner { random(i, side as u64) * 0.55 / n as f32 } else { 0.0 };
-                            (lerp(0.16, 0.93, even.powf(0.9)) + shift, 0.65 + 0.7 * (random(i, 7 + side as u64) + 0.5))
-                        })
-                        .collect();
-                }
+                shape.teeth = [0, 1].map(|side| toothed(count.get() as usize, |i, k| random(i, k + side)));
             }
             Margin::Spined { lobes, spine, .. } => shape.arm(lobes.f32(), spine.f32(), random),
             Margin::Lobed(plan) => shape.lobed = Some(Lobes::new(&plan, outline, aspect, seed)),
@@ -198,7 +189,7 @@ impl Shape {
                 let side = usize::from(p.x > 0.0);
                 // Sheared coordinates make the teeth point to the tip.
                 let s = p.y - 0.35 * p.x.abs();
-                self.within(p.x, p.y, 1.0 - depth.f32() * self.sinus(side, s))
+                self.within(p.x, p.y, 1.0 - depth.f32() * self.teeth[side].sinus(s))
             }
             // The outline bounds everything, as it bounds the mesh.
             Margin::Lobed(_) => {
@@ -220,23 +211,17 @@ impl Shape {
             (self.half_width((y + step).min(1.0)) - self.half_width((y - step).max(0.0))) / (2.0 * step) * scale;
         (half - x.abs()) / (1.0 + slope * slope).sqrt()
     }
+}
 
-    /// 0 at the tips of teeth, up to 1 in the sinuses, at `s` along a side.
-    fn sinus(&self, side: usize, s: f32) -> f32 {
-        let teeth = &self.teeth[side];
-        let i = teeth.partition_point(|(end, _)| *end < s);
-        if i == 0 || i == teeth.len() {
-            return 0.0;
-        }
-        let ((start, a), (end, b)) = (teeth[i - 1], teeth[i]);
-        let t = (s - start) / (end - start);
-        // A tooth: rises slowly from the lower sinus, is blunt at its tip, falls steeply into the next.
-        let tip = 0.68;
-        let fall = if t < tip { 1.0 - t / tip } else { (t - tip) / (1.0 - tip) };
-        let fall = fall * fall * (1.4 - 0.4 * fall);
-        let fade = smoothstep(0.10, 0.22, s) * (1.0 - smoothstep(0.72, 0.97, s));
-        fall * if t < tip { a } else { b } * fade
-    }
+/// The teeth of one side of a leaf, their sinuses about 1 deep; the widest stand low.
+fn toothed(count: usize, random: impl Fn(usize, u64) -> f32) -> Teeth {
+    let sinus = |i: usize| {
+        let even = i as f32 / count as f32;
+        let inner = i > 0 && i < count;
+        let shift = if inner { random(i, 0) * 0.55 / count as f32 } else { 0.0 };
+        (lerp(0.16, 0.93, even.powf(0.9)) + shift, 0.65 + 0.7 * (random(i, 7) + 0.5))
+    };
+    Teeth { sinuses: (0..=count).map(sinus).collect(), fades: [(0.10, 0.22), (0.72, 0.97)] }
 }
 
 impl Spine {

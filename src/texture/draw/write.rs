@@ -111,7 +111,9 @@ fn unfinished(path: &Path, bytes: &[u8]) -> Result<NamedTempFile> {
 
 fn named_above(recipe_path: &Path, name: &str) -> bool {
     let needle = format!("`{name}`");
-    recipe_path
+    // Made absolute: of a name alone there is no folder above.
+    std::path::absolute(recipe_path)
+        .unwrap_or_else(|_| recipe_path.to_owned())
         .ancestors()
         .skip(1)
         .take(2)

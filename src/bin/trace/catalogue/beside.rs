@@ -14,7 +14,7 @@ const SHOWN: u32 = 320;
 /// One photograph of a species.
 pub(super) struct Photograph {
     pub(super) name: String,
-    /// The stage that its name tells; without one it stands beside all.
+    /// The stage that its name tells; without one it stands beside all, and is compared with all.
     pub(super) bbch: Option<u32>,
     pub(super) size: (u32, u32),
     pub(super) jpeg: Vec<u8>,
@@ -29,6 +29,11 @@ pub(super) fn photographs(folder: &Path, name: &str) -> Result<Vec<Photograph>> 
     files.retain(|file| is_of(file, name));
     files.sort();
     files.iter().map(|file| photograph(file)).collect()
+}
+
+/// Whether a cut-out is there to compare a stage with.
+pub(super) fn compare(photographs: &[Photograph], bbch: u32) -> bool {
+    photographs.iter().any(|p| p.measures.is_some() && p.bbch.is_none_or(|of| of == bbch))
 }
 
 fn stem(file: &Path) -> String {
@@ -89,5 +94,22 @@ mod tests {
         assert!(!of("poaceae.png") && !of("poa.txt") && !of("a-poa.png"));
         assert_eq!(stage(Path::new("poa-bbch12-b.jpeg")), Some(12));
         assert_eq!(stage(Path::new("poa-2.png")), None);
+    }
+
+    /// Expected: a stage is compared with cut-outs of it and with those of no known stage; other photographs are only looked at.
+    #[test]
+    fn a_stage_is_compared_with_cut_outs_of_it() {
+        let photo = |bbch, cut_out: bool| Photograph {
+            name: "poa".into(),
+            bbch,
+            size: (1, 1),
+            jpeg: Vec::new(),
+            measures: cut_out.then(Measures::default),
+        };
+        let compared = |photographs: &[Photograph]| [12, 16, 21].map(|bbch| compare(photographs, bbch));
+        assert_eq!(compared(&[photo(Some(16), true), photo(Some(12), false)]), [false, true, false]);
+        assert_eq!(compared(&[photo(Some(16), true), photo(None, false)]), [false, true, false]);
+        assert_eq!(compared(&[photo(Some(16), true), photo(None, true)]), [true; 3]);
+        assert_eq!(compared(&[]), [false; 3]);
     }
 }

@@ -3,7 +3,7 @@
 //! A species is one sheet, one column a stage: above, the camera looks straight down; below, from some 30° above the ground. It is
 //! the same plant in all of them. A sheet holds the pictures with the stages' names and bars to scale, and says in its comment what it was made of; asked
 //! again, one that would come out the same is kept. With a folder of photographs they stand beside the stages, and the
-//! outlines of cut-outs and of rendered plants are measured alike.
+//! outlines of cut-outs and of rendered plants of the same stages are measured alike.
 
 mod beside;
 mod outline;
@@ -52,8 +52,9 @@ pub(crate) struct Args {
     /// Folder of the species files; scenes/species unless given, or those that ship where there is no such folder.
     #[arg(long, alias = "pages", value_name = "DIR")]
     species_dir: Option<PathBuf>,
-    /// Folder of photographs to show beside the stages: PNG or JPEG, named sugar_beet.png, sugar_beet-2.png, sugar_beet-bbch16.jpg. Of PNGs with
-    /// transparent parts the outlines are measured, and so are those of ten rendered plants a stage.
+    /// Folder of photographs to show beside the stages: PNG or JPEG, named sugar_beet.png, sugar_beet-2.png, sugar_beet-bbch16.jpg. One whose name
+    /// tells its stage is compared with that stage, others with all. Of PNGs with transparent parts the outlines are measured, and so are those of
+    /// ten rendered plants of each stage that they are compared with.
     #[arg(long, value_name = "DIR")]
     beside: Option<PathBuf>,
     /// Samples a pixel.
@@ -159,12 +160,16 @@ impl Args {
             Some(folder) => beside::photographs(folder, &name)?,
             None => Vec::new(),
         };
-        let measures = if photographs.iter().any(|p| p.measures.is_some()) {
-            let of = |plant: &PlantRecord| self.measures(page, plant.bbch);
-            stages.iter().map(|(plant, ..)| of(plant)).collect::<Result<Vec<_>>>()?
-        } else {
-            vec![None; stages.len()]
+        let is_stage = |bbch: &u32| stages.iter().any(|(plant, ..)| plant.bbch == *bbch);
+        for photo in &photographs {
+            if let Some(bbch) = photo.bbch.filter(|bbch| !is_stage(bbch)) {
+                furrow::tell!("warning: {} is not shown: {name} has no stage BBCH {bbch}", photo.name);
+            }
+        }
+        let measures = |plant: &PlantRecord| {
+            if beside::compare(&photographs, plant.bbch) { self.measures(page, plant.bbch) } else { Ok(None) }
         };
+        let measures = stages.iter().map(|(plant, ..)| measures(plant)).collect::<Result<Vec<_>>>()?;
         let (width, height, pixels) = output::read_rgb(&path)?;
         let sheet = Sheet { width: width as usize, height: height as usize, pixels };
         let stages = stages.into_iter().enumerate().map(|(i, (plant, views, _))| {

@@ -1,17 +1,6 @@
 //! Measures of a plant's outline as it is seen from above, the same of a photograph's cut-out and of a rendered plant.
-//!
-//! | measure | is |
-//! |---|---|
-//! | blade L/W | long over short side of the smallest rectangle about a blade, the mean over its largest blades |
-//! | blade solidity | area of a blade over that of its convex hull, likewise |
-//! | solidity | area of the plant over that of its convex hull |
-//! | arms | maxima of the distance from its middle to its farthest place, direction by direction |
-//! | share of circle | area of the plant over that of the smallest circle about it |
-//!
-//! Blades are what is left of a plant when all that is narrower than a petiole is taken away (a morphological opening); blades that lie over
-//! each other count as one.
 
-/// What a petiole is narrower than, of the radius of the circle about the plant.
+/// What a petiole is narrower than, of the diameter of the smallest enclosing circle.
 const PETIOLE: f32 = 0.085;
 /// Blades smaller than this share of the largest are not measured.
 const LEAST: f32 = 0.3;
@@ -19,6 +8,22 @@ const LEAST: f32 = 0.3;
 const FALL: f32 = 0.12;
 /// Directions of the profile.
 const DIRECTIONS: usize = 180;
+
+/// Names of the measures, as [`Measures::values`] has them, and what each is.
+pub(super) const MEANINGS: [(&str, &str); 5] = [
+    ("blade L/W", "length over width of a blade: the sides of the smallest rectangle about it; mean over the blades"),
+    ("blade solidity", "area of a blade over that of its convex hull, which lobes, teeth and bends lower; mean over the blades"),
+    ("solidity", "area of the plant over that of its convex hull"),
+    (
+        "arms",
+        "leaves, or bundles of leaves, that stand out: maxima of the distance from the centroid to the outline, direction by direction",
+    ),
+    ("share of circle", "area of the plant over that of the smallest enclosing circle"),
+];
+
+/// What [`MEANINGS`] calls a blade.
+pub(super) const BLADES: &str = "Blades are what is left when parts narrower than 8.5 % of that circle's diameter, such as petioles, are taken away (morphological opening). \
+     Blades that lie over each other count as one; those below 30 % of the largest one's area are left out.";
 
 /// What is plant, row by row from the top.
 #[derive(Clone)]
@@ -28,7 +33,7 @@ pub(super) struct Silhouette {
     pub(super) inside: Vec<bool>,
 }
 
-/// The measures; see this file's head.
+/// The measures; [`MEANINGS`] says what they are.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Measures {
     pub(super) blade_ratio: f64,
@@ -52,6 +57,11 @@ impl Measures {
             arms: of(|m| m.arms),
             circle_share: of(|m| m.circle_share),
         })
+    }
+
+    /// All, in the order of [`MEANINGS`].
+    pub(super) fn values(&self) -> [f64; 5] {
+        [self.blade_ratio, self.blade_solidity, self.solidity, self.arms, self.circle_share]
     }
 
     /// Of what is plant; `None` where nothing is, or too little to have a shape.

@@ -1,8 +1,8 @@
 //! The HTML page that shows all species at all stages, in one file.
 
 use super::beside::Photograph;
-use super::outline::Measures;
-use furrow::report::{Cell, Page, Table, data_url, number, section};
+use super::outline::{BLADES, MEANINGS, Measures};
+use furrow::report::{Cell, Page, Table, count, data_url, number, pairs, section};
 use furrow::scene::PlantRecord;
 use furrow::scene::desc::{Role, SpeciesDesc};
 use maud::{Markup, html};
@@ -30,7 +30,7 @@ pub(super) struct Stage {
     pub(super) plant: PlantRecord,
     /// Its pictures, from above down.
     pub(super) looks: Vec<Look>,
-    /// Of its outline from above, where there are photographs to compare with.
+    /// Of its outline from above, where there are cut-outs to compare it with.
     pub(super) measures: Option<Measures>,
 }
 
@@ -50,7 +50,8 @@ pub(super) fn html(entries: &[Entry]) -> String {
             @let role = if *role == Role::Crop { "crop" } else { "weed" };
             (section(&format!("{name} · {eppo} · {role}"), html! {
                 div.stages { @for stage in &entry.stages { (figure(name, stage)) (photographs(entry, Some(stage.plant.bbch))) } (photographs(entry, None)) }
-                div.wide { (table(&entry.stages).html()) @if let Some(table) = outlines(entry) { (table.html()) } }
+                div.wide { (table(&entry.stages).html()) }
+                @if let Some(table) = outlines(entry) { div.wide { (table.html()) } (meanings()) }
             }))
         }
     };
@@ -94,25 +95,35 @@ fn photographs(entry: &Entry, bbch: Option<u32>) -> Markup {
     }
 }
 
-/// The measures of the outlines of stages and of cut-outs.
+/// The measures of outlines: of cut-outs that tell no stage, then stage by stage, of its cut-outs and of rendered plants.
 fn outlines(entry: &Entry) -> Option<Table> {
-    let head = ["outline from above", "blade L/W", "blade solidity", "solidity", "arms", "share of circle"];
-    let mut table = Table::new("", head);
-    let mut push = |name: String, m: &Measures| {
-        let cell = |x: f64| Cell::Shown(format!("{x:.2}"));
-        let shares = [m.blade_ratio, m.blade_solidity, m.solidity, m.arms, m.circle_share].map(cell);
-        let [a, b, c, d, e] = shares;
-        table.push([Cell::text(name), a, b, c, d, e]);
-    };
-    let photographs: Vec<Measures> = entry.photographs.iter().filter_map(|p| p.measures).collect();
-    let mean = Measures::mean(&photographs)?;
-    push(format!("{} cut-outs", photographs.len()), &mean);
-    for stage in &entry.stages {
-        if let Some(measures) = &stage.measures {
-            push(format!("BBCH {}", stage.plant.bbch), measures);
+    let mut table = Table::new("", ["outline from above"].into_iter().chain(MEANINGS.map(|(name, _)| name)));
+    let mut push = |name: String, all: &[Measures]| {
+        if let Some(mean) = Measures::mean(all) {
+            let numbers = mean.values().map(|x| Cell::Shown(format!("{x:.2}")));
+            table.push([Cell::text(name)].into_iter().chain(numbers));
         }
+    };
+    let cut_outs = |bbch: Option<u32>| -> Vec<Measures> {
+        entry.photographs.iter().filter(|p| p.bbch == bbch).filter_map(|p| p.measures).collect()
+    };
+    let counted = |all: &[Measures]| count(all.len() as u64, "cut-out", "cut-outs");
+    let any = cut_outs(None);
+    push(counted(&any), &any);
+    for Stage { plant, measures, .. } in &entry.stages {
+        let own = cut_outs(Some(plant.bbch));
+        push(format!("BBCH {}, {}", plant.bbch, counted(&own)), &own);
+        push(format!("BBCH {}, rendered", plant.bbch), measures.as_slice());
     }
-    Some(table)
+    (!table.rows.is_empty()).then_some(table)
+}
+
+/// What the columns of [`outlines`] are.
+fn meanings() -> Markup {
+    html! {
+        (pairs(&MEANINGS.map(|(name, words)| (name, html! { (words) }))))
+        p.reading { (BLADES) " Each line is a mean, of rendered plants over ten." }
+    }
 }
 
 /// The longest of 1, 2, 5, 10, 20, … that is not above `most`.
@@ -146,6 +157,15 @@ mod tests {
     fn scales_have_round_lengths() {
         for (most, length) in [(1.2, 1.0), (9.9, 5.0), (47.0, 20.0), (50.0, 50.0), (130.0, 100.0)] {
             assert_eq!(round_length(most), length);
+        }
+    }
+
+    /// Expected: the guide explains each column.
+    #[test]
+    fn the_guide_knows_the_measures() {
+        let guide = include_str!("../../../../docs/guide/species.md");
+        for (name, _) in MEANINGS {
+            assert!(guide.contains(&format!("| {name} |")), "no {name} in docs/guide/species.md");
         }
     }
 }

@@ -26,10 +26,10 @@ pub(crate) struct Args {
     #[arg(long, value_name = "GIB", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=4096))]
     memory: u32,
     /// Longest time of a shard, after which it is queued again and goes on; for slurm.
-    #[arg(long, value_name = "DURATION", default_value = "4h", value_parser = duration)]
+    #[arg(long, value_name = "DURATION", default_value = "4h", value_parser = cli::time)]
     time: Duration,
     /// How long before that it is told to finish its images; for slurm.
-    #[arg(long, value_name = "DURATION", default_value = "5m", value_parser = duration)]
+    #[arg(long, value_name = "DURATION", default_value = "5m", value_parser = cli::time)]
     grace: Duration,
     /// Images that are rendered again at the end, to check them.
     #[arg(long, value_name = "N", default_value_t = 3)]
@@ -92,11 +92,4 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
         furrow::tell!("warning: {warning}");
     }
     Ok(paths)
-}
-
-/// Whole seconds, up to a year.
-fn duration(text: &str) -> Result<Duration, String> {
-    let year = Duration::from_secs(365 * 86400);
-    let time = humantime::parse_duration(text).ok().filter(|t| *t >= Duration::from_secs(1) && *t <= year);
-    time.map(|t| Duration::from_secs(t.as_secs())).ok_or_else(|| "write a duration such as 30m, 4h or 2days".into())
 }
