@@ -12,7 +12,10 @@ const DIRECTIONS: usize = 180;
 /// Names of the measures, as [`Measures::values`] has them, and what each is.
 pub(super) const MEANINGS: [(&str, &str); 5] = [
     ("blade L/W", "length over width of a blade: the sides of the smallest rectangle about it; mean over the blades"),
-    ("blade solidity", "area of a blade over that of its convex hull, which lobes, teeth and bends lower; mean over the blades"),
+    (
+        "blade solidity",
+        "area of a blade over that of its convex hull, which lobes, teeth and bends lower; mean over the blades",
+    ),
     ("solidity", "area of the plant over that of its convex hull"),
     (
         "arms",
