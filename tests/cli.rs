@@ -220,6 +220,26 @@ fn a_texture_is_drawn_beside_its_recipe() {
     assert_eq!(first, std::fs::read(folder.path().join("small.png")).unwrap());
 }
 
+/// Rationale: the relief of `x.ron` and the picture of `x.height.ron` have one name. Expected: recipes that would be drawn to one file, or of which
+/// one cannot be, are refused before the first is drawn.
+#[test]
+fn all_that_textures_are_drawn_to_is_looked_at_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for name in ["x.ron", "x.height.ron", "y.png"] {
+        std::fs::write(at.join(name), "Soil(seed: 1, size: 32, period_mm: 60, ground: Dirt)").unwrap();
+    }
+    for (recipes, words) in [
+        (["x.ron", "x.height.ron"], "x.height.png: what x.ron draws and what x.height.ron draws would both go here"),
+        (["x.ron", "./x.ron"], "would both go here"),
+        (["x.ron", "y.png"], "y.png: the name of a texture recipe must end in .ron"),
+    ] {
+        let done = run(at, &["texture", recipes[0], recipes[1]]);
+        assert!(done.status.code() == Some(2) && text(&done.stderr).contains(words), "{}", text(&done.stderr));
+        assert!(!at.join("x.png").exists(), "{recipes:?}");
+    }
+}
+
 /// Expected: a sheet and a page that needs nothing beside it; asked again, the sheet is kept; a species that is not there is refused.
 #[test]
 fn a_catalogue_shows_species_and_keeps_what_would_come_out_the_same() {
@@ -246,8 +266,40 @@ fn a_catalogue_shows_species_and_keeps_what_would_come_out_the_same() {
     assert!(text(&missing.stderr).contains("did you mean"), "{}", text(&missing.stderr));
 }
 
-/// Rationale: cut-outs of one stage had all stages measured. Expected: of a cut-out whose name tells a stage, that stage's rendered plants are measured
-/// and no others; the columns are explained; a photograph of a stage that the species lacks is told of.
+/// Rationale: a photograph that could not be read cost the drawing of all sheets, and a pipe was waited for. Expected: it is refused by its name,
+/// with 2, before anything is drawn; so is a `--beside` that is no folder, and a stage that is no number.
+#[test]
+fn photographs_are_read_before_a_catalogue_is_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let species = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/species");
+    let refused = |beside: &str, words: &str| {
+        let rest = ["--beside", beside, "--species-dir", species.to_str().unwrap()];
+        let done = run(at, &[&["catalogue", "--species", "echinochloa"], rest.as_slice()].concat());
+        let said = text(&done.stderr);
+        assert!(done.status.code() == Some(2) && said.contains(words), "{beside}, {words}: {said}");
+        assert!(!at.join("out").exists(), "{words}: something was drawn");
+    };
+    let jpeg = furrow::output::encode_jpeg(64, 48, &[[90, 120, 30]; 64 * 48], 90).unwrap();
+    for (file, bytes, words) in [
+        ("echinochloa.png", &b"\x89PNG\r\n\x1a\n"[..], "echinochloa.png: the image"),
+        ("echinochloa-2.jpg", &jpeg[..jpeg.len() / 2], "echinochloa-2.jpg: this JPEG is cut short"),
+        ("echinochloa-bbch999999999999.png", b"", "`bbch999999999999` in this name is no growth stage"),
+    ] {
+        std::fs::write(at.join(file), bytes).unwrap();
+        refused(".", words);
+        refused(file, "this is no folder");
+        std::fs::remove_file(at.join(file)).unwrap();
+    }
+    std::fs::create_dir(at.join("echinochloa.png")).unwrap();
+    refused(".", "echinochloa.png: this is a folder");
+    std::fs::remove_dir(at.join("echinochloa.png")).unwrap();
+    assert!(Command::new("mkfifo").arg(at.join("echinochloa.png")).status().unwrap().success());
+    refused(".", "echinochloa.png: this is a pipe");
+}
+
+/// Rationale: cut-outs of one stage had all stages measured. Expected: of a cut-out whose name tells a stage, in colour or in gray, that stage's
+/// rendered plants are measured and no others; the columns are explained; a photograph of a stage that the species lacks is told of.
 #[test]
 fn a_catalogue_measures_the_stages_of_its_photographs() {
     let folder = tempfile::tempdir().unwrap();
@@ -255,13 +307,15 @@ fn a_catalogue_measures_the_stages_of_its_photographs() {
     for name in ["echinochloa-bbch11.png", "echinochloa-bbch77.png"] {
         std::fs::copy(root.join("textures/leaf/papaver.png"), folder.path().join(name)).unwrap();
     }
+    let gray = image::open(root.join("textures/leaf/papaver.png")).unwrap().into_luma_alpha8();
+    gray.save(folder.path().join("echinochloa-bbch11-gray.png")).unwrap();
     let species = root.join("scenes/species");
     let rest = ["--size", "64", "--spp", "1", "--beside", ".", "--species-dir", species.to_str().unwrap()];
     let done = run(folder.path(), &[&["catalogue", "--species", "echinochloa"], rest.as_slice()].concat());
     assert!(done.status.success(), "{}", text(&done.stderr));
     assert!(text(&done.stderr).contains("echinochloa has no stage BBCH 77"), "{}", text(&done.stderr));
     let page = std::fs::read_to_string(folder.path().join("out/catalogue/catalogue.html")).unwrap();
-    for words in ["BBCH 11, 1 cut-out", "area of the plant over that of its convex hull"] {
+    for words in ["BBCH 11, 2 cut-outs", "area of the plant over that of its convex hull"] {
         assert!(page.contains(words), "no {words}");
     }
     let rendered: Vec<&str> = page.match_indices(", rendered").map(|(at, _)| &page[at - 7..at]).collect();

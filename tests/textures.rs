@@ -234,7 +234,7 @@ fn what_cannot_be_drawn_is_refused_with_a_reason() {
         ("Soil(seed: 1, size: 32, period_mm: 90000, ground: Dirt)", "crumbs on the tile"),
         (
             "Leaf(seed: 1, size: 64, length_mm: 9, aspect: 0.5, outline: Power(a: 0, b: 1), veins: Parallel(count: 3, midrib: 0.1), pigments: ())",
-            "above 0",
+            "at least 0.001 and below 20",
         ),
         (
             "Leaf(seed: 1, size: 64, length_mm: 9, aspect: 500, outline: Full, veins: Parallel(count: 3, midrib: 0.1), pigments: ())",
@@ -244,10 +244,55 @@ fn what_cannot_be_drawn_is_refused_with_a_reason() {
             "Leaf(seed: 1, size: 64, length_mm: 9, aspect: 0.5, outline: Full, margin: Lobed(pairs: 3, rachis: 0.1, terminal: 0.2, terminal_width: 0.3, lean_deg: 86, pointed: 1, teeth: (0, 0)), veins: Parallel(count: 3, midrib: 0.1), pigments: ())",
             "between 0 and 85 degrees",
         ),
+        (
+            "Leaf(seed: 1, size: 64, length_mm: 3e9, aspect: 0.5, outline: Full, veins: Parallel(count: 3, midrib: 0.1), pigments: ())",
+            "mm of length or width: at most 100000",
+        ),
+        (
+            "Leaf(seed: 1, size: 64, length_mm: 9, aspect: 0.5, outline: Full, veins: Parallel(count: 3, midrib: 0.1), pigments: (), look: (areoles: (0.00000001, 0.14)))",
+            "areoles along the blade: at most 100000",
+        ),
+        (
+            "Leaf(seed: 1, size: 64, length_mm: 9, aspect: 0.5, outline: Full, margin: Lyrate(terminal: 0.3, outline: (1, 1), pairs: 60, lobe: 1, rachis: 0.1, teeth: (3, 0.1), lobe_teeth: (8, 0.1)), veins: Parallel(count: 3, midrib: 0.1), pigments: ())",
+            "60 pairs of lobes with so many teeth: at most 11",
+        ),
+        (
+            "Soil(seed: 1, size: 32, period_mm: 60, ground: Cracked(plate_mm: 0.0000001, crack_mm: 4, depth_mm: 8))",
+            "plates side by side",
+        ),
+        ("Soil(seed: 1, size: 32, period_mm: 1e12, crumbs: (cover: 0), ground: Dirt)", "from 10 to 100000 mm"),
+        (
+            "Soil(seed: 1, size: 32, period_mm: 120, ground: Stony(cover: 1, smallest_mm: 0.001, largest_mm: 0.1))",
+            "stones or fragments on the tile",
+        ),
     ] {
         std::fs::write(&path, page).unwrap();
         let message = draw::write(&path).unwrap_err().to_string();
         assert!(message.contains(words), "{message}");
+        assert!(message.starts_with(&path.display().to_string()), "no file in: {message}");
+    }
+}
+
+/// Rationale: a recipe of another name was overwritten by its picture. Expected: it is refused, and so is one whose picture, relief or words would go
+/// where a folder stands; nothing is written then.
+#[test]
+fn nothing_is_drawn_where_it_cannot_be_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let page = "Soil(seed: 1, size: 32, period_mm: 60, ground: Dirt)";
+    let recipe = folder.path().join("y.png");
+    std::fs::write(&recipe, page).unwrap();
+    let error = draw::write(&recipe).unwrap_err();
+    assert!(error.exit_code() == 2 && error.to_string().contains("y.png: the name of a texture recipe"), "{error}");
+    assert_eq!(std::fs::read_to_string(&recipe).unwrap(), page);
+    let recipe = folder.path().join("a.ron");
+    std::fs::write(&recipe, page).unwrap();
+    for name in ["a.png", "a.height.png", "a.source.md"] {
+        let taken = folder.path().join(name);
+        std::fs::create_dir(&taken).unwrap();
+        let error = draw::write(&recipe).unwrap_err();
+        assert!(error.exit_code() == 2 && error.to_string().contains(&format!("{name}: this is no file")), "{error}");
+        std::fs::remove_dir(&taken).unwrap();
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "{name}: something was written");
     }
 }
 

@@ -7,9 +7,18 @@
 //! length and width filling the image but for [`MARGIN`] on each side.
 
 use crate::math::{Vec2, vec2};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
+use std::ops::Range;
 
 /// Margin around the blade in its image, on each side, as a fraction of the blade's length and width.
 pub const MARGIN: f32 = 0.04;
+
+/// What an exponent may be: beyond, the widest place lies at an end, or a blade is too thin to be seen.
+const EXPONENTS: Range<f64> = 0.001..20.0;
+
+/// The same in words.
+const EXPONENTS_IN_WORDS: &str = "at least 0.001 and below 20";
 
 /// Texture coordinates of the point `x` (of the blade's full width, −½..½, right positive) and `t` (of its length).
 pub fn uv(x: f32, t: f32) -> Vec2 {
@@ -18,18 +27,29 @@ pub fn uv(x: f32, t: f32) -> Vec2 {
 }
 
 /// A blade's outline.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum Outline {
     /// `t^a (1 − t)^b`.
     Power {
         /// Exponent at the base: small is blunt, above 1 is drawn out.
+        #[serde(deserialize_with = "exponent")]
+        #[schemars(extend("x-range" = EXPONENTS_IN_WORDS))]
         a: f32,
         /// Exponent at the tip.
+        #[serde(deserialize_with = "exponent")]
+        #[schemars(extend("x-range" = EXPONENTS_IN_WORDS))]
         b: f32,
     },
     /// The whole rectangle of the image: for photographs and for lobed leaves, whose alpha cuts the shape.
     Full,
+}
+
+/// Reads an exponent of any outline that a file writes.
+fn exponent<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f32, D::Error> {
+    let x = f64::deserialize(deserializer)?;
+    let told = || D::Error::custom(format!("{x:?} is out of range: it must be {EXPONENTS_IN_WORDS}"));
+    EXPONENTS.contains(&x).then_some(x as f32).ok_or_else(told)
 }
 
 impl Outline {
@@ -60,6 +80,26 @@ mod tests {
             let n = 20_000;
             let sum: f32 = (0..n).map(|i| 2.0 * o.half_width((i as f32 + 0.5) / n as f32)).sum::<f32>() / n as f32;
             assert!((sum - area).abs() < 2e-3, "{a} {b}: {sum}");
+        }
+    }
+
+    /// Rationale: an exponent that is no shape's made meshes of NaN, and those a blade that was not there. Expected: a refusal that names the number
+    /// and stands at it; widths up to half at both ends of what may be written.
+    #[test]
+    fn exponents_of_no_shape_are_refused_where_they_stand() {
+        for wrong in ["1e-30", "0.0", "-1.0", "20.0", "1e20", "inf", "NaN"] {
+            for (text, column) in
+                [(format!("Power(a: {wrong}, b: 0.5)"), 10), (format!("Power(a: 0.5, b: {wrong})"), 18)]
+            {
+                let error = ron::from_str::<Outline>(&text).unwrap_err();
+                assert_eq!((error.span.start.line, error.span.start.col), (1, column), "{text}");
+                assert!(error.to_string().contains(&format!("{wrong} is out of range")), "{error}");
+            }
+        }
+        for (a, b) in [("0.001", "19.99"), ("19.99", "0.001"), ("0.001", "0.001"), ("19.99", "19.99")] {
+            let outline: Outline = ron::from_str(&format!("Power(a: {a}, b: {b})")).unwrap();
+            let widths = (0..=100).map(|i| outline.half_width(i as f32 / 100.0));
+            assert!(widths.into_iter().all(|w| (0.0..=0.5001).contains(&w)), "{a} {b}");
         }
     }
 }

@@ -27,13 +27,14 @@ pub fn read_photo(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
 /// The same; an error for a picture in gray, in which colours cannot be told from each other, and for a JPEG whose end is missing, which
 /// decoders fill with grey.
 pub fn read_color_photo(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
-    let bytes = std::fs::read(path).map_err(Error::reading(path))?;
+    // Not a pipe, on which reading would wait for ever.
+    let bytes = input::read(path, input::LARGEST).map_err(|refusal| refusal.into_error(path))?;
     if is_cut_short(&bytes) {
         return Err(Error::input(CUT_SHORT).help("copy it anew from the camera").in_file(path));
     }
     let photo = decode(path)?;
     if !photo.color().has_color() {
-        return Err(Error::input("this picture is gray, and the network sees colours")
+        return Err(Error::input("this picture is gray, and here colours are seen")
             .help("give photographs in red, green and blue")
             .in_file(path));
     }

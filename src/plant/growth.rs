@@ -5,9 +5,10 @@
 
 use super::desc::{PlantDesc, Stage};
 use super::kind::LeafKind;
+use super::numbers::{self, Numbers};
 use super::stage::{BUD, StageDesc};
 use crate::math::lerp;
-use crate::ron_file::{Bound, Vary};
+use crate::ron_file::{Bound, NonNegative, Vary};
 use crate::sampling::{Purpose, Stream};
 use std::f32::consts::PI;
 
@@ -54,11 +55,14 @@ pub(super) struct Growth<'a> {
     pub(super) hypocotyl: f32,
     /// Width of the stem at the soil, metres.
     pub(super) stem: f32,
-    pub(super) tillers: usize,
+    /// Side shoots or other stems: whole numbers at the stages, one that comes or goes in between counts in part.
+    pub(super) tillers: f32,
     /// How far the side shoots of a grass, or the other stems of an upright plant, have caught up with the main one, 0–1.
     pub(super) tillers_grown: f32,
-    /// Side shoots of each side shoot.
-    pub(super) branches: usize,
+    /// Side shoots of each side shoot, likewise.
+    pub(super) branches: f32,
+    /// Which numbers leaves bear.
+    pub(super) numbers: Numbers,
     /// Layer and azimuth of each axil from below, of withered leaves too.
     pub(super) axils: Vec<(usize, f32)>,
     /// Height of each layer over the first, metres.
@@ -79,6 +83,12 @@ impl Growth<'_> {
     pub(super) fn cell(&self) -> f32 {
         self.leaves.first().map_or(CELL, |leaf| leaf.cell)
     }
+}
+
+/// The shoots of so many, each with how far it has grown, 0–1.
+pub(super) fn shoots(many: f32) -> impl Iterator<Item = (usize, f32)> {
+    let most = (many.ceil().max(0.0) as usize).min(numbers::MOST);
+    (0..most).map(move |k| (k, (many - k as f32).clamp(0.0, 1.0)))
 }
 
 /// Two neighbouring stages and the way from the first to the second.
@@ -173,8 +183,12 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
     let vigour = vigour * desc.vigour.draw32(&mut own.child(Purpose::Plant, 0));
     let spin = turn(stream);
     let hypocotyl = between.draw(whole, None, &own, 2, |s| &s.hypocotyl_mm) * MM;
-    let tillers = between.draw(whole, None, &own, 4, |s| &s.tillers).round() as usize;
-    let branches = between.draw(whole, None, &own, 5, |s| &s.branches).round() as usize;
+    // Whole at both stages, so that as many shoots stand there as are written; between them one after the other comes or goes.
+    let whole_at = |slot: u64, pick: fn(&StageDesc) -> &Vary<NonNegative>| {
+        let drawn = |stage| pick(stage).draw32(&mut own.child(Purpose::Leaf, slot)).round();
+        lerp(drawn(from), drawn(to), u)
+    };
+    let (tillers, branches) = (whole_at(4, |s| &s.tillers), whole_at(5, |s| &s.branches));
     let (mut leaves, mut rise, mut height, mut number) = (Vec::new(), Vec::new(), 0.0, 0);
     let mut axils = Vec::new();
     for (k, layer) in to.layers.iter().enumerate() {
@@ -237,6 +251,7 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
         tillers,
         tillers_grown: lerp(from.tiller_growth.f32(), to.tiller_growth.f32(), u),
         branches,
+        numbers: Numbers::of(desc),
         axils,
         rise,
         leaves,

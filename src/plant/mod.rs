@@ -44,6 +44,7 @@ mod kind;
 mod leaf;
 mod leaflets;
 mod margin;
+mod numbers;
 mod organ;
 mod ribbons;
 mod rig;

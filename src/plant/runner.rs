@@ -5,8 +5,9 @@
 //! and only its tip turns to the light. A stem that twines ([`super::twine`]) does not lie. Along a creeping stem leaves turn to its two sides and face the sky, whatever their place on it.
 
 use super::axis;
-use super::growth::{Growth, LeafNow};
+use super::growth::{self, Growth, LeafNow};
 use super::leaf::{self, Lower, Seat};
+use super::numbers::MOST;
 use super::organ::{Organ, OrganKind};
 use super::tube::{self, Profile};
 use super::twine::Helix;
@@ -20,8 +21,6 @@ const CREEP: f32 = -0.35;
 const SIDE: (f32, f32) = (0.7, 0.95);
 /// Angle between upright and a side shoot at its foot, radians.
 const SPREAD: (f32, f32) = (0.95, 1.3);
-/// Side shoots stop here, whatever a species file asks for.
-const MOST: usize = 24;
 /// Rings of one internode.
 const PIECES: usize = 4;
 /// Width of a stem's top over that of its base.
@@ -58,10 +57,9 @@ pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {
 /// The main shoot, its side shoots, and theirs.
 pub(super) fn shoots(growth: &Growth<'_>, habit: Habit) -> Vec<Organ> {
     let mut plant = Shoots {
-        organs: Vec::with_capacity(2 + 2 * growth.leaves.len() * (1 + growth.tillers.min(MOST))),
+        organs: Vec::with_capacity(2 + 2 * growth.leaves.len() * (1 + growth.tillers as usize)),
         growth,
         habit,
-        number: growth.leaves.last().map_or(0, |leaf| leaf.number),
         line: Vec2::ZERO,
     };
     let mut stream = growth.stream.child(Purpose::Plant, 1);
@@ -78,20 +76,23 @@ pub(super) fn shoots(growth: &Growth<'_>, habit: Habit) -> Vec<Organ> {
     }
     let axils = axils(growth, habit);
     // The lowest axils break first.
-    for (k, axil) in axils.iter().take(growth.tillers.min(MOST)).enumerate() {
+    for ((k, there), axil) in growth::shoots(growth.tillers).zip(&axils) {
+        let Some(above) = growth.numbers.side(k) else { break };
         let stream = growth.stream.child(Purpose::Plant, 100 + k as u64);
-        let size = 0.95_f32.powi(k as i32);
-        let Some(shoot) = plant.side(&nodes, Axil { layer: axil.0, node: axil.0, azimuth: axil.1, size }, stream)
+        let size = 0.95_f32.powi(k as i32) * there;
+        let Some(shoot) =
+            plant.side(&nodes, Axil { layer: axil.0, node: axil.0, azimuth: axil.1, size }, above, stream)
         else {
             continue;
         };
         // Its own lowest axils, from its second layer on, so that it has left its mother's leaves behind.
-        let own = axils.iter().filter(|a| a.0 > axil.0 + 1).take(growth.branches.min(MOST));
-        for (m, (layer, azimuth)) in own.enumerate() {
+        let own = axils.iter().filter(|a| a.0 > axil.0 + 1);
+        for ((m, there), (layer, azimuth)) in growth::shoots(growth.branches).zip(own) {
+            let Some(above) = growth.numbers.branch(k, m) else { break };
             let stream = growth.stream.child(Purpose::Plant, 200 + (MOST * k + m) as u64);
             let azimuth = azimuth + shoot.turn;
-            let axil = Axil { layer: *layer, node: layer - axil.0 - 1, azimuth, size: 0.8 * shoot.size };
-            plant.side(&shoot.nodes, axil, stream);
+            let axil = Axil { layer: *layer, node: layer - axil.0 - 1, azimuth, size: 0.8 * shoot.size * there };
+            plant.side(&shoot.nodes, axil, above, stream);
         }
     }
     plant.organs
@@ -140,8 +141,6 @@ struct Shoots<'a> {
     organs: Vec<Organ>,
     growth: &'a Growth<'a>,
     habit: Habit,
-    /// Leaves so far.
-    number: u16,
     /// Where the main shoot stands; what twines winds round it, metres.
     line: Vec2,
 }
@@ -203,7 +202,7 @@ impl Shoots<'_> {
         let (out, stands) = if self.habit.whorled {
             // Carried over with the stem by the shortest turn from upright; what would point into the soil is pressed aside.
             let out = out - (Vec3::Z + along) * (along.dot(out) / (1.0 + along.z).max(0.1));
-            (out.with_z(out.z.max(-0.3)).normalize_or(out), along)
+            (out.with_z(out.z.max(-0.22)).normalize_or(out), along)
         } else {
             let lying = smoothstep(0.75, 0.3, along.z);
             let across = along.cross(Vec3::Z).normalize_or(out);
@@ -221,8 +220,8 @@ impl Shoots<'_> {
         );
     }
 
-    /// One side shoot from an axil: the main one's leaves above it, smaller.
-    fn side(&mut self, nodes: &Nodes, axil: Axil, mut stream: Stream) -> Option<Shoot> {
+    /// One side shoot from an axil: the main one's leaves above it, smaller; `above` is added to their numbers.
+    fn side(&mut self, nodes: &Nodes, axil: Axil, above: u16, mut stream: Stream) -> Option<Shoot> {
         let growth = self.growth;
         let size = stream.range32(SIDE.0, SIDE.1) * axil.size;
         let (point, along, radius) = nodes.get(axil.node.min(nodes.len().saturating_sub(1))).copied()?;
@@ -234,21 +233,22 @@ impl Shoots<'_> {
         let skip = axil.layer + 1;
         let shift = growth.rise.get(axil.layer).copied().unwrap_or(0.0);
         let rise: Vec<f32> = growth.rise[skip.min(growth.rise.len())..].iter().map(|r| (r - shift) * size).collect();
-        if rise.is_empty() {
+        // A shoot that is hardly there yet is hidden in its axil.
+        if rise.is_empty() || size < 0.02 {
             return None;
         }
         let nodes = self.stem(&foot, &rise, &mut stream);
         let turn = stream.range32(0.0, TAU);
         for leaf in growth.leaves.iter().filter(|l| l.layer >= skip && l.blade * size >= super::stage::BUD) {
-            self.number += 1;
+            let number = leaf.number + above;
             let leaf = LeafNow {
-                number: self.number,
+                number,
                 azimuth: leaf.azimuth + turn,
                 blade: leaf.blade * size,
                 width: leaf.width * size,
                 stalk: leaf.stalk * size,
                 cell: leaf.cell * SIDE_CELL,
-                stream: growth.stream.child(Purpose::Leaf, u64::from(self.number)),
+                stream: growth.stream.child(Purpose::Leaf, u64::from(number)),
                 ..leaf.clone()
             };
             self.seat(&leaf, &nodes, leaf.layer - skip);

@@ -1,8 +1,7 @@
 //! Several main stems from one place, as a seed tuber of potato sends them up.
 //!
 //! The first stem stands where the plant does; each other one has its foot some centimetres away, leans outward and is a little smaller.
-//! Nothing of a stem depends on how many there are. Leaves are numbered stem by stem, each stem as many numbers as a stem can have leaves,
-//! so a leaf keeps its number while others come out.
+//! Nothing of a stem depends on how many there are. Leaves are numbered stem by stem ([`super::numbers`]).
 //!
 //! | | |
 //! |---|---|
@@ -12,6 +11,7 @@
 use super::axis::Foot;
 use super::desc::Form;
 use super::growth::{self, Growth, LeafNow};
+use super::numbers::MOST;
 use super::stage::BUD;
 use crate::math::{direction, lerp};
 use crate::sampling::{Purpose, Stream};
@@ -27,10 +27,6 @@ const LEAN: (f32, f32) = (0.14, 0.44);
 const ROOT: f32 = 0.02;
 /// The golden angle, radians: stems stand apart however many there are.
 const GOLDEN: f32 = 2.399_963;
-/// Other stems stop here, whatever a species file asks for.
-const MOST: usize = 24;
-/// Numbers of a plant's leaves stop here.
-const MOST_LEAVES: usize = 1000;
 
 /// A stem beside the first.
 pub(super) struct OtherStem {
@@ -66,10 +62,9 @@ pub(super) fn others(growth: &Growth<'_>) -> Vec<OtherStem> {
     if growth.desc.form != Form::Erect {
         return Vec::new();
     }
-    let layers = growth.desc.stages.last().map_or(&[][..], |stage| &stage.layers);
-    let each = layers.iter().map(|layer| layer.leaves.get() as usize).sum::<usize>().max(1);
-    let count = growth.tillers.min(MOST).min((MOST_LEAVES / each).saturating_sub(1));
+    let count = (growth.tillers.round() as usize).min(MOST);
     let stem = |k: usize| {
+        let above = growth.numbers.side(k)?;
         let mut stream = growth.stream.child(Purpose::Plant, 100 + k as u64);
         let towards = growth::turn(growth.stream) + GOLDEN * k as f32 + stream.range32(-0.4, 0.4);
         let out = direction(FRAC_PI_2, towards);
@@ -80,7 +75,7 @@ pub(super) fn others(growth: &Growth<'_>) -> Vec<OtherStem> {
             root: ROOT,
             stream: stream.child(Purpose::Plant, 2),
         };
-        OtherStem { foot, above: ((k + 1) * each) as u16, turn: stream.range32(0.0, TAU), stream }
+        Some(OtherStem { foot, above, turn: stream.range32(0.0, TAU), stream })
     };
-    (0..count).map(stem).collect()
+    (0..count).map_while(stem).collect()
 }

@@ -1,7 +1,7 @@
 //! A table of leaves: the layers of all stages, in a CSV file instead of lists in the species file.
 //!
 //! A row is one layer of leaves at one stage. A cell that is empty holds what the leaf had at the stage before, so a table says what changes;
-//! so does a row that is left out. The rows become the text of `layers`, in which each value knows its cell.
+//! so does a row that is left out, and a stage without rows. The rows become the text of `layers`, in which each value knows its cell.
 //!
 //! Cells are names and numbers, so a comma always ends one. Lines are cut here, not by the `csv` crate, which does not tell where in the file a
 //! cell stands.
@@ -34,7 +34,7 @@ const NEEDED: [&str; 6] = ["leaf", "stage", "kind", "blade_mm", "width_mm", "ang
 /// A part of the text of `layers`, and the bytes of the table that it was made of.
 pub type Part = (String, Range<usize>);
 
-/// A stage of the species file of which the table has no row.
+/// The first stage of the species file, of which the table has no row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NoRows(pub u32);
 
@@ -108,7 +108,7 @@ impl<'t> LeafTable<'t> {
         for stage in stages {
             let oldest_new = known.keys().next_back().copied().unwrap_or(0);
             let rows: Vec<&Row<'t>> = self.rows.iter().filter(|row| row.stage == *stage).collect();
-            if rows.is_empty() {
+            if rows.is_empty() && known.is_empty() {
                 return Ok(Err(NoRows(*stage)));
             }
             for row in rows {
@@ -275,6 +275,15 @@ mod tests {
         );
     }
 
+    /// Rationale: what is left out stays as it was, so a stage that only flowers needs no rows. Expected: the layers of the stage before.
+    #[test]
+    fn a_stage_without_rows_keeps_its_leaves() {
+        let text = format!("{HEAD}1,10,seed,2,5,3,1,70\n1,12,,,6,,,\n2,65,leaf,1,9,4,2,50\n");
+        let all = layers(&text, &[10, 12, 51, 65, 89]).unwrap();
+        assert_eq!((&all[2], &all[4]), (&all[1], &all[3]));
+        assert_ne!(all[1], all[3]);
+    }
+
     /// Rationale: a table is long; what is wrong must be found at once. Expected: line, column and words for each mistake.
     #[test]
     fn a_mistake_is_told_with_its_line_and_column() {
@@ -298,6 +307,7 @@ mod tests {
             assert_eq!((span.line, span.column), (line, column), "{error}");
             assert!(error.advice().is_some(), "{error}");
         }
-        assert!(layers(&format!("{HEAD}{first}"), &[10, 12]).unwrap_err().message().contains("no rows of 12"));
+        let later = format!("{HEAD}1,12,seed,2,5,3,1,70\n");
+        assert!(layers(&later, &[10, 12]).unwrap_err().message().contains("no rows of 10"));
     }
 }

@@ -5,9 +5,10 @@
 //! blade, count where it leaves it. Source: the build of a grass shoot, e.g. Clifford & McLean 1962, "Grasses: their structure".
 
 use super::axis::ROOT;
-use super::growth::{Growth, LeafNow};
+use super::growth::{self, Growth, LeafNow};
 use super::leaf::{self, Lower, Seat};
 use super::organ::Organ;
+use super::stage::BUD;
 use crate::math::{Vec3, direction, lerp};
 use crate::sampling::Purpose;
 use std::f32::consts::{FRAC_PI_2, PI};
@@ -23,33 +24,30 @@ const APART: (f32, f32) = (0.4, 1.1);
 const TAPER: f32 = 0.5;
 /// Angle between neighbours of one rank of side shoots, as seen from above, radians.
 const FAN: f32 = 0.6;
-/// Side shoots stop here, whatever a species file asks for.
-const MOST: usize = 24;
+/// Layers of the main shoot that a side shoot lacks: it breaks out of their axils.
+const LACKS: usize = 3;
 
 /// Grows a tuft.
 pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {
-    let mut organs = Vec::with_capacity(2 * growth.leaves.len() * (1 + growth.tillers.min(MOST)));
-    let mut number = growth.leaves.last().map_or(0, |leaf| leaf.number);
+    let mut organs = Vec::with_capacity(2 * growth.leaves.len() * (1 + growth.tillers as usize));
     let axis = lean(growth);
     shoot(&mut organs, (0.5 * growth.stem, TAPER), axis, Vec3::ZERO, growth.leaves.iter().cloned());
-    for k in 0..growth.tillers.min(MOST) {
+    for (k, there) in growth::shoots(growth.tillers) {
+        let Some(above) = growth.numbers.side(k) else { break };
         let mut stream = growth.stream.child(Purpose::Plant, 100 + k as u64);
         let size = stream.range32(TILLER.0, TILLER.1) * 0.93_f32.powi(k as i32);
         let grown = growth.tillers_grown;
-        let size = lerp(size, 1.0, grown);
+        let size = lerp(size, 1.0, grown) * there;
         // A side shoot breaks out of the axil of an older leaf, across the ranks; those of one rank stand in a fan.
         let rank = growth.leaves.first().map_or(0.0, |l| l.azimuth) + PI * (k % 2) as f32;
         let towards = rank + fanned(k / 2) + stream.range32(-FAN / 3.0, FAN / 3.0);
         let axis = direction(lerp(stream.range32(SPREAD.0, SPREAD.1), UPRIGHT, grown), towards);
         let base = direction(FRAC_PI_2, towards) * (lerp(APART.0, APART.1, grown) * growth.stem);
         let turn = FRAC_PI_2 + stream.range32(-0.5, 0.5);
-        // Its leaves are as many as the main shoot has, less the oldest, which it had no time for unless it has caught up.
-        let missing = lerp((1 + growth.leaves.len() / 3) as f32, 0.0, grown).round() as usize;
-        let leaves: Vec<_> = growth.leaves.iter().skip(missing).collect();
+        let leaves = growth.leaves.iter().filter(|leaf| leaf.layer >= LACKS && leaf.blade * size >= BUD);
         let leaves: Vec<LeafNow<'_>> = leaves
-            .into_iter()
             .map(|leaf| {
-                number += 1;
+                let number = leaf.number + above;
                 LeafNow {
                     number,
                     azimuth: leaf.azimuth + turn,

@@ -66,6 +66,14 @@ impl Spliced {
         members(&self.page.text, whole).into_iter().find(|(key, _)| *key == Some(field)).map(|(_, value)| value)
     }
 
+    /// The keys of the table that `path` leads to, and where they stand with their quotes.
+    pub fn keys(&self, path: &[Step<'_>]) -> Vec<(&str, Range<usize>)> {
+        let text = &self.page.text;
+        let all = self.find(path).map_or_else(Vec::new, |whole| members(text, &whole));
+        let place = |key: &str| offset_in(text, key)..offset_in(text, key) + key.len();
+        all.into_iter().filter_map(|(key, _)| Some((key?.trim_matches('"'), place(key?)))).collect()
+    }
+
     /// The file that a byte of the text was written in.
     pub fn source_at(&self, offset: usize) -> &RonFile {
         &self.sources[self.piece(offset).source]

@@ -13,7 +13,7 @@ use crate::material::{LeafMaterial, Picture, Tones};
 use crate::math::{Spectrum, Vec2};
 use crate::model::{Model, Up};
 use crate::optics::{Pigments, measured, soil};
-use crate::ron_file::{Pick, RENAMED, RonFile, Step, choose};
+use crate::ron_file::{Pick, RENAMED, RonFile, nearest};
 use crate::sensor::Pose;
 use crate::soil::{LayerDesc, LayerMaps};
 use crate::texture::{ColorSpace, Height, HeightFromBrightness, Maps, Texture, Wrap};
@@ -117,23 +117,26 @@ impl Library {
         page.need_file(path)
     }
 
-    /// The same where `path` may also be the name of something that ships, which `find` looks up: where no such file lies beside the
-    /// page, and the page may name files anywhere.
+    /// The same where `path` may also be the name of something that ships, which `find` looks up among `all`: where no such file lies beside
+    /// the page, folders passed over, and the page may name files anywhere.
     pub(super) fn need_or_shipped(
         &mut self,
         page: &RonFile,
         path: &str,
         find: impl FnOnce(&str) -> Result<Option<PathBuf>>,
+        all: impl FnOnce() -> Result<Vec<PathBuf>>,
     ) -> Result<PathBuf> {
         if let Some(known) = self.shipped.get(path) {
             return Ok(known.clone());
         }
-        if self.scope == Scope::Anywhere && shipped::is_bare(path) && !page.resolve(path).exists() {
+        let beside = page.resolve(path);
+        if self.scope == Scope::Anywhere && shipped::is_bare(path) && (beside.is_dir() || !beside.exists()) {
             let found = find(path).map_err(|e| page.about(path, e.message(), e.advice().unwrap_or_default()))?;
             if let Some(full) = found {
                 self.shipped.insert(path.to_owned(), full.clone());
                 return Ok(full);
             }
+            return self.need(page, path).map_err(|error| likely(error, path, &all().unwrap_or_default()));
         }
         self.need(page, path)
     }
@@ -176,7 +179,7 @@ impl Library {
 
     /// The species file that `page` names.
     pub(super) fn species(&mut self, page: &RonFile, path: &str) -> Result<Arc<Species>> {
-        let full = self.need_or_shipped(page, path, shipped_species)?;
+        let full = self.need_or_shipped(page, path, shipped_species, shipped::species_files)?;
         if let Some(known) = self.species.get(&full) {
             return Ok(known.clone());
         }
@@ -191,22 +194,7 @@ impl Library {
         let own = file.page();
         let mut desc: SpeciesDesc = own.parse_all()?;
         self.told.insert(full.into(), file.sources().iter().flat_map(|source| source.renamed(RENAMED)).collect());
-        for key in desc.plant.materials() {
-            if !desc.materials.contains_key(&key) {
-                let known: Vec<&str> = desc.materials.keys().map(String::as_str).collect();
-                let message = format!("the plant uses a material \"{key}\", which `materials` does not have");
-                let help = format!(
-                    "add \"{key}\": Leaf(…) to `materials`, or name one of them; {}",
-                    choose("materials", &known, &key)
-                );
-                // Where the key is written, or else the table that lacks it: some keys are defaults.
-                return Err(if own.text.contains(&format!("\"{key}\"")) {
-                    own.about(&key, message, help)
-                } else {
-                    own.blame(&[Step::Field("materials")], Error::input(message).help(help)).lasting()
-                });
-            }
-        }
+        file.check_materials(&desc)?;
         let mut cuts: Vec<Vec<Cut>> = Vec::new();
         for leaf in desc.materials.values() {
             let paths = leaf.texture.as_ref().map_or(&[][..], Pick::all);
@@ -360,7 +348,7 @@ impl Library {
         }
         let mut need = |path: &Path| -> Result<(PathBuf, String)> {
             let text = path.to_string_lossy().into_owned();
-            let full = self.need_or_shipped(page, &text, shipped::soil_texture)?;
+            let full = self.need_or_shipped(page, &text, shipped::soil_texture, shipped::soil_textures)?;
             self.note(&full)?;
             Ok((full, text))
         };
@@ -399,6 +387,19 @@ fn digest(path: &Path) -> Result<[u8; 32]> {
 /// A file that `page` names where none may lie.
 fn outside(page: &RonFile, literal: &str) -> impl FnOnce(Outside) -> Error {
     move |outside| page.about(literal, outside.to_string(), outside.help)
+}
+
+/// An error about a file that is not there, which names the one of these that was probably meant.
+fn likely(error: Error, path: &str, shipped: &[PathBuf]) -> Error {
+    let names: Vec<&str> = shipped.iter().filter_map(|file| file.file_name()?.to_str()).collect();
+    let advice = error.advice().unwrap_or_default();
+    match nearest(&names, path) {
+        Some(near) if !advice.starts_with("did you mean") => {
+            let help = format!("did you mean `{near}`, which ships? {advice}");
+            error.help(help)
+        }
+        _ => error,
+    }
 }
 
 /// Heights 0 to 1 read off a soil's brightness, for a photograph without a height map.

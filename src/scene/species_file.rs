@@ -3,6 +3,7 @@
 use super::desc::SpeciesDesc;
 use super::library::Library;
 use super::species_text::SpeciesFile;
+use crate::input::shipped;
 use crate::plant::table::{LeafTable, NoRows};
 use crate::ron_file::{self, RonFile, Spliced, Step};
 use crate::{Error, Result};
@@ -47,7 +48,7 @@ impl Library {
         let Some(at) = own.find(&[Step::Field("like")]) else { return Ok(own) };
         page.check_syntax()?;
         let like = literal(&page, &at, "like: \"capsella.ron\"")?;
-        let full = self.need_or_shipped_file(&page, &like)?;
+        let full = self.need_or_shipped(&page, &like, shipped_file, shipped::species_files)?;
         heirs.push(real(path));
         if heirs.contains(&real(&full)) {
             let message = format!("`{like}` is like this file, so neither says what it is");
@@ -88,7 +89,11 @@ impl Library {
         let layers = table.layers(&codes)?.map_err(|NoRows(code)| {
             let place = stages.iter().find(|(known, _)| *known == code).map_or(0..1, |(_, place)| place.clone());
             let message = format!("the table of leaves has no row of BBCH {code}");
-            told(own.page.about_bytes(place.start..place.start + 1, message, "add its rows, or leave the stage out"))
+            told(own.page.about_bytes(
+                place.start..place.start + 1,
+                message,
+                "add its rows: the first stage has all its leaves",
+            ))
         })?;
         let mut out = own.clone();
         // From the end, so that places before stay where they are.
@@ -99,14 +104,12 @@ impl Library {
         let plant = plant(&out);
         Ok(out.without(&plant, "leaves"))
     }
+}
 
-    /// The species file that another names: beside it, or one that ships.
-    fn need_or_shipped_file(&mut self, page: &RonFile, like: &str) -> Result<PathBuf> {
-        self.need_or_shipped(page, like, |name| {
-            let is_file = Path::new(name).extension().is_some_and(|extension| extension == "ron");
-            if is_file { super::shipped::species(name) } else { Ok(None) }
-        })
-    }
+/// The species file of this name that ships.
+fn shipped_file(name: &str) -> Result<Option<PathBuf>> {
+    let is_file = Path::new(name).extension().is_some_and(|extension| extension == "ron");
+    if is_file { super::shipped::species(name) } else { Ok(None) }
 }
 
 /// A stage with layers of the table; `table` is where the table is named.
@@ -269,7 +272,7 @@ mod tests {
             (
                 vec![
                     ("own.ron", &own),
-                    ("a/base.csv", "leaf,stage,kind,blade_mm,width_mm,angle_deg\n1,10,leaf,8,5,60\n"),
+                    ("a/base.csv", "leaf,stage,kind,blade_mm,width_mm,angle_deg\n1,12,leaf,8,5,60\n"),
                 ],
                 "a/base.ron:9:",
             ),
@@ -277,6 +280,13 @@ mod tests {
             (vec![("own.ron", &own), ("a/base.ron", "Field()")], "own.ron:1:55: `a/base.ron` is no species file"),
             (vec![("own.ron", &OWN.replace("a/base", "a/bse"))], "own.ron:1:"),
             (vec![("own.ron", &format!("{OWN}plant: (forn: Erect))"))], "own.ron:1:77: unknown field `forn`"),
+            (
+                vec![(
+                    "own.ron",
+                    &format!("{OWN}plant: (kinds: {{\"leaf\": (shape: Sheet(outline: Power(a: 0.7, b: 1e-30)))}}))"),
+                )],
+                "own.ron:1:133: 1e-30 is out of range: it must be at least 0.001",
+            ),
             (
                 vec![("own.ron", "Species(like: \"a/base.ron\")")],
                 "own.ron:1:27: fields `name`, `eppo`, `role` of Species are missing",
@@ -289,6 +299,39 @@ mod tests {
             let words = told(&files);
             assert!(words.starts_with(begin), "{begin}: {words}");
         }
+    }
+
+    /// Rationale: a material that is misspelt would leave the plant as it was, without a word. Expected: a refusal at its name; none of what the
+    /// other file writes and this one has no use for.
+    #[test]
+    fn a_material_that_nothing_is_made_of_is_refused() {
+        let told = |own: &str, base: &str| {
+            let folder = folder(&[("own.ron", own), ("a/base.ron", base)]);
+            let page = RonFile { path: folder.path().join("field.ron"), text: "Field()".to_owned() };
+            let error = Library::default().species(&page, "own.ron").err().unwrap();
+            error.to_string().replace(&format!("{}/", folder.path().display()), "")
+        };
+        let words = told(&format!("{OWN}materials: {{\"leav\": Leaf(), \"stalk\": Leaf()}})"), BASE);
+        let begin = "own.ron:1:81: no leaf, stem or flower is made of the material `leav`";
+        assert!(words.starts_with(begin) && words.contains("did you mean `leaf`"), "{words}");
+        let idle = BASE.replace("\"stalk\": Leaf()", "\"stalk\": Leaf(), \"petal\": Leaf()");
+        // All that is wrong is that its picture is not there.
+        let words = told(&format!("{OWN})"), &idle);
+        assert!(words.contains("there is no file `a/../pictures/leaf.png`"), "{words}");
+    }
+
+    /// Rationale: names that are nearly right are told, and a folder is no species. Expected: the file that ships.
+    #[test]
+    fn files_that_ship_are_found_behind_folders_and_suggested() {
+        let folder = folder(&[("own.ron", &OWN.replace("a/base.ron\", ", "capsela.ron\")"))]);
+        let error = SpeciesDesc::read(&folder.path().join("own.ron")).unwrap_err();
+        assert!(error.message().contains("there is no file `capsela.ron`"), "{error}");
+        assert!(error.advice().unwrap().starts_with("did you mean `capsella.ron`, which ships?"), "{error}");
+        std::fs::create_dir(folder.path().join("potato")).unwrap();
+        let page = RonFile { path: folder.path().join("field.ron"), text: "Field()".to_owned() };
+        let find = crate::scene::shipped::species;
+        let found = Library::default().need_or_shipped(&page, "potato", find, shipped::species_files).unwrap();
+        assert_eq!(found, shipped::folder().unwrap().join("scenes/species/potato.ron"));
     }
 
     /// Rationale: what comes from elsewhere reads nothing outside its folder. Expected: a refusal of a file that is like one outside.

@@ -60,8 +60,6 @@ struct Grower<'a, 'b> {
     growth: &'b Growth<'a>,
     organs: &'b mut Vec<Organ>,
     pen: Pen,
-    /// Number of the last leaf.
-    number: u16,
     axes: usize,
     flowers: usize,
 }
@@ -73,13 +71,12 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, cell: f32) {
         return;
     }
     let tips = seat::tips(organs, growth);
-    let number = organs.iter().map(|o| o.leaf).max().unwrap_or(0);
-    let mut grower = Grower { growth, organs, pen: Pen::new(cell), number, axes: 0, flowers: 0 };
+    let mut grower = Grower { growth, organs, pen: Pen::new(cell), axes: 0, flowers: 0 };
     let mut grown: Vec<Vec<Grown>> = Vec::new();
     for (k, desc) in to.inflorescences.iter().enumerate() {
         let ends = (from.inflorescences.get(k), desc);
         let stream = growth.stream.child(Purpose::Plant, STREAM).child(Purpose::Plant, k as u64);
-        let axes = grower.sort(ends, &stream, &tips, &grown);
+        let axes = grower.sort(k, ends, &stream, &tips, &grown);
         grown.push(axes);
     }
     let drawn = grower.pen.finish();
@@ -95,9 +92,11 @@ fn held<T>(ends: Ends<'_, T>) -> &T {
 }
 
 impl<'a> Grower<'a, '_> {
-    /// Grows all axes of one sort.
+    /// Grows all axes of one sort. What an axis is drawn from, and the numbers of its leaves, follow from its place: axes of other places may
+    /// come and go.
     fn sort(
         &mut self,
+        sort: usize,
         ends: Ends<'a, InflorescenceDesc>,
         stream: &Stream,
         tips: &[Place],
@@ -105,21 +104,25 @@ impl<'a> Grower<'a, '_> {
     ) -> Vec<Grown> {
         let between = self.growth.between;
         let count = |stream: &Stream| between.draw(ends, Some(0.0), stream, 0, |d| &d.count).round() as usize;
-        let mut places: Vec<(Place, f32)> = Vec::new();
-        let base = |place: Place, stream: &Stream, places: &mut Vec<(Place, f32)>| {
-            places.extend(std::iter::repeat_n((place, 1.0), count(stream)));
+        let most = between.to.inflorescences[sort].count.largest().round() as usize;
+        let most = most.max(between.from.inflorescences.get(sort).map_or(0, |d| d.count.largest().round() as usize));
+        // With the size of its axes, and which of all that there may be they are.
+        let mut places: Vec<(Place, f32, usize)> = Vec::new();
+        let base = |nth: usize, place: Place, stream: &Stream, places: &mut Vec<(Place, f32, usize)>| {
+            places.extend((0..count(stream)).map(|i| (place, 1.0, nth * most + i)));
         };
         match &held(ends).at {
-            Seat::Tip => tips.iter().take(1).for_each(|tip| base(*tip, stream, &mut places)),
+            Seat::Tip => tips.iter().take(1).for_each(|tip| base(0, *tip, stream, &mut places)),
             Seat::Tips => {
-                for (k, tip) in (0..).zip(tips) {
-                    base(*tip, &stream.child(Purpose::Plant, k), &mut places);
+                for (k, tip) in tips.iter().enumerate() {
+                    base(k, *tip, &stream.child(Purpose::Plant, k as u64), &mut places);
                 }
             }
             Seat::Axils { first, last } => {
                 for number in *first..=*last {
                     if let Some(axil) = seat::axil(self.organs, number) {
-                        base(axil, &stream.child(Purpose::Leaf, u64::from(number)), &mut places);
+                        let nth = (number - first) as usize;
+                        base(nth, axil, &stream.child(Purpose::Leaf, u64::from(number)), &mut places);
                     }
                 }
             }
@@ -139,19 +142,19 @@ impl<'a> Grower<'a, '_> {
                         let (point, along, _) = parent.at(lerp(from, to, share));
                         let out = seat::across(along, parent.spin + GOLDEN * i as f32);
                         let size = lerp(1.0, self.blend(ends, |d| d.top.f32()), share);
-                        places.push((Place { point, along, out: Some(out) }, size));
+                        places.push((Place { point, along, out: Some(out) }, size, k as usize * most + i));
                     }
                 }
             }
         }
         let mut all = Vec::with_capacity(places.len());
-        for (i, (place, size)) in places.into_iter().enumerate() {
+        for (place, size, nth) in places {
             if self.axes >= MOST_AXES {
                 break;
             }
             self.axes += 1;
-            let own = stream.child(Purpose::Plant, 1 << 20 | i as u64);
-            if let Some(axis) = self.axis(ends, &own, (place, size), i) {
+            let own = stream.child(Purpose::Plant, 1 << 20 | nth as u64);
+            if let Some(axis) = self.axis((sort, nth), ends, &own, (place, size)) {
                 all.push(axis);
             }
         }
@@ -178,10 +181,10 @@ impl<'a> Grower<'a, '_> {
     /// Grows one axis with all that it bears itself.
     fn axis(
         &mut self,
+        (sort, nth): (usize, usize),
         ends: Ends<'a, InflorescenceDesc>,
         own: &Stream,
         (place, size): (Place, f32),
-        i: usize,
     ) -> Option<Grown> {
         let vigour = self.growth.vigour;
         let length = self.draw(ends, Some(0.0), (own, 1), |d| &d.length_mm) * MM * vigour * size;
@@ -193,7 +196,7 @@ impl<'a> Grower<'a, '_> {
         let bend = self.draw(ends, None, (own, 4), |d| &d.bend_deg).to_radians();
         let mut stream = own.child(Purpose::Plant, 10);
         let spin = stream.range32(0.0, std::f32::consts::TAU);
-        let out = place.out.unwrap_or_else(|| seat::across(place.along, spin + GOLDEN * i as f32));
+        let out = place.out.unwrap_or_else(|| seat::across(place.along, spin + GOLDEN * nth as f32));
         let along = (place.along * angle.cos() + out * angle.sin()).normalize_or(place.along);
         let radius = (0.5 * width).max(1.2e-4);
         let radii = (radius, radius * self.blend(ends, |d| d.taper.f32()));
@@ -205,7 +208,7 @@ impl<'a> Grower<'a, '_> {
         self.pen.strand(OrganKind::Stem, material, &axis.points, axis.radii);
         for (k, leaves) in ends.1.leaves.iter().enumerate() {
             let ends = (ends.0.and_then(|d| d.leaves.get(k)), leaves);
-            self.leaves(ends, &own.child(Purpose::Leaf, k as u64), &axis);
+            self.leaves((sort, nth, k), ends, &own.child(Purpose::Leaf, k as u64), &axis);
         }
         for (k, flowers) in ends.1.flowers.iter().enumerate() {
             let ends = (ends.0.and_then(|d| d.flowers.get(k)), flowers);
@@ -215,15 +218,19 @@ impl<'a> Grower<'a, '_> {
     }
 
     /// Grows an axis' leaves.
-    fn leaves(&mut self, ends: Ends<'a, StemLeafDesc>, stream: &Stream, axis: &Grown) {
+    fn leaves(
+        &mut self,
+        (sort, nth, row): (usize, usize, usize),
+        ends: Ends<'a, StemLeafDesc>,
+        stream: &Stream,
+        axis: &Grown,
+    ) {
         let count = self.draw(ends, Some(0.0), (stream, 0), |d| &d.count).round() as usize;
         let (low, high) = (self.blend(ends, |d| d.from.f32()), self.blend(ends, |d| d.to.f32()));
         let top = self.blend(ends, |d| d.top.f32());
         let Some((name, kind)) = self.growth.desc.kinds.get_key_value(&ends.1.kind) else { return };
         for i in 0..count {
-            if self.number >= 1000 {
-                return;
-            }
+            let Some(number) = self.growth.numbers.on_axis(sort, nth, row, i) else { return };
             let own = stream.child(Purpose::Leaf, i as u64);
             let share = spaced(i, count);
             let (point, along, radius) = axis.at(lerp(low, high, share));
@@ -234,9 +241,8 @@ impl<'a> Grower<'a, '_> {
             if blade < BUD {
                 continue;
             }
-            self.number += 1;
             let leaf = LeafNow {
-                number: self.number,
+                number,
                 layer: 0,
                 kind_name: name,
                 kind,

@@ -192,3 +192,41 @@ fn a_potato_has_several_stems_that_stay_what_they_are() {
     let mean = all.iter().sum::<usize>() as f32 / all.len() as f32;
     assert!((3.0..4.6).contains(&mean), "{mean}");
 }
+
+/// Rationale: leaves are followed over the days by their numbers. Expected: from one day to the next no leaf jumps to another's size, though
+/// side shoots and flowering axes come out before it; a change of 0.4 of its length and a fifth of the longest blade is growth or death.
+#[test]
+fn leaves_keep_their_numbers_while_others_come_out() {
+    let coarse = GrowOptions { cell: 0.02, ..GrowOptions::default() };
+    for page in pages() {
+        let ((first, last), stream) = (page.plant.days(), stream(0));
+        let lengths = |day: f32| -> BTreeMap<u16, f32> {
+            let plant = grow_with(&page.plant, Stage::Age(day), &stream, &coarse);
+            plant.leaf_axes().map(|axis| (axis.leaf, axis.size.length)).collect()
+        };
+        let (mut before, mut day) = (lengths(first), first);
+        while day < last {
+            day += 1.0;
+            let now = lengths(day);
+            let longest = now.values().fold(0.0_f32, |most, length| most.max(*length));
+            for (leaf, length) in &now {
+                let Some(was) = before.get(leaf) else { continue };
+                let most = 0.4 * was.max(*length) + 0.2 * longest;
+                assert!((length - was).abs() <= most, "{} day {day} leaf {leaf}: {was} to {length} m", page.eppo);
+            }
+            before = now;
+        }
+    }
+}
+
+/// Expected: no two shoots or axes share a number, and what 16 bits do not hold has none.
+#[test]
+fn blocks_of_numbers_do_not_overlap() {
+    for page in pages() {
+        let plant = grow(&page.plant, Stage::Bbch(page.plant.stages.last().unwrap().bbch), &stream(1));
+        let mut seen = std::collections::BTreeSet::new();
+        for axis in plant.leaf_axes() {
+            assert!(axis.leaf > 0 && seen.insert(axis.leaf), "{}: two leaves are number {}", page.eppo, axis.leaf);
+        }
+    }
+}

@@ -4,6 +4,9 @@
 use crate::math::{Vec2, vec2};
 use crate::sampling::rng::mix;
 
+/// Most cells side by side: more are beyond what their places hold, and no picture shows them.
+pub(super) const MOST_CELLS: f64 = 1e5;
+
 /// One jittered point in each unit square, repeating after a whole number of squares.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cells {

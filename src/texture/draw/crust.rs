@@ -10,7 +10,7 @@ use crate::math::{Vec2, lerp, smoothstep, vec2, vec3};
 use crate::sampling::rng::Purpose;
 
 /// Fragments: share of the ground that they would cover if none were kept from plates, and their lengths, mm.
-const FRAGMENTS: (f32, f32, f32) = (0.7, 0.8, 6.0);
+pub(super) const FRAGMENTS: (f32, f32, f32) = (0.7, 0.8, 6.0);
 
 /// Depth of cracks between plates, within plates, and of hairlines, over the deepest.
 const SHALLOW: [f32; 3] = [1.0, 0.8, 0.3];

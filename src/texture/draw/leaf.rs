@@ -3,10 +3,10 @@
 //! Relief is written apart, as height: no shading is painted in.
 
 use super::canvas::Canvas;
-use super::cells::Cells;
+use super::cells::{Cells, MOST_CELLS};
 use super::drawn::{Drawn, Grey};
 use super::leaf_recipe::{LeafRecipe, LeafRelief};
-use super::lyrate;
+use super::lyrate::{self, Lyrate};
 use super::shape::{Margin, Shape};
 use super::tissue::Surface;
 use super::veins::{self, Segment, Veins};
@@ -18,6 +18,9 @@ use crate::ron_file::Num;
 use crate::sampling::rng::{Purpose, Stream};
 use crate::texture::noise::Tiling;
 use crate::texture::srgb::ColorSpace;
+
+/// Most teeth or lobes on a side, those on lobes included.
+const MOST_CUTS: f64 = 200.0;
 
 /// Draws the leaf.
 pub(super) fn draw(recipe: &LeafRecipe) -> Result<Drawn> {
@@ -40,16 +43,23 @@ pub(super) fn draw(recipe: &LeafRecipe) -> Result<Drawn> {
         Margin::Toothed { count, .. } => count.get(),
         Margin::Lobed(plan) => plan.pairs.get(),
         Margin::Spined { lobes, .. } => lobes.get(),
-        Margin::Lyrate(plan) => {
-            let small = plan.lobe_teeth.map_or(0.0, |(count, _)| 2.0 * count.get().min(lyrate::MOST_TEETH));
-            (plan.pairs.get() * (1.0 + small)).max(plan.teeth.0.get())
-        }
+        Margin::Lyrate(plan) => plan.pairs.get().max(plan.teeth.0.get()),
     };
+    let (toothed, most_toothed) = match recipe.margin {
+        Margin::Lyrate(Lyrate { pairs, lobe_teeth: Some((teeth, _)), .. }) => {
+            (pairs.get(), (MOST_CUTS / (1.0 + 2.0 * teeth.get().min(lyrate::MOST_TEETH))).floor())
+        }
+        _ => (0.0, MOST_CUTS),
+    };
+    let longest = recipe.length_mm.get() * recipe.aspect.get().max(1.0);
     let marks = recipe.look.blotches.get().max(recipe.look.spots.get());
     for (what, asked, most) in [
         ("veins on a side", pairs, 200.0),
         ("points for fine veins", fine, 20_000.0),
-        ("teeth or lobes on a side", cuts, 200.0),
+        ("teeth or lobes on a side", cuts, MOST_CUTS),
+        ("pairs of lobes with so many teeth", toothed, most_toothed),
+        ("mm of length or width", longest, 1e5),
+        ("areoles along the blade", longest / recipe.look.areoles.0.get(), MOST_CELLS),
         ("blotches or spots", marks, 2000.0),
     ] {
         if asked > most {

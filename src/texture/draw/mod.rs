@@ -27,7 +27,7 @@ pub use lyrate::Lyrate;
 pub use shape::{Margin, Sinus};
 pub use soil_recipe::{Crumbs, Ground, Litter, SoilRecipe};
 pub use veins::Veins;
-pub use write::{encode, encode_height, write};
+pub use write::{encode, encode_height, targets, write};
 
 use crate::error::Result;
 use crate::ron_file::RonFile;

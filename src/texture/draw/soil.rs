@@ -4,6 +4,8 @@
 //! follows the power law of tilled soil, N(>L) ∝ L^−D. Source: Aubertot et al. 1999 (Soil Sci. Soc. Am. J. 63:1377), whose axes
 //! l/L = 0.77 and h/L = 0.55 are used too. Crusts crack along the borders of Voronoi cells.
 
+use super::cells::MOST_CELLS;
+use super::crust::FRAGMENTS;
 use super::drawn::Drawn;
 use super::soil_recipe::{Ground, SoilRecipe};
 use super::tile::Tile;
@@ -17,9 +19,13 @@ pub(super) fn draw(recipe: &SoilRecipe) -> Result<Drawn> {
     if size > 4096 {
         return Err(Error::input(format!("ground of {size} × {size} pixels: at most 4096 can be drawn")));
     }
+    let period = recipe.period_mm.get();
+    if !(10.0..=1e5).contains(&period) {
+        return Err(Error::input(format!("ground of {period} × {period} mm: from 10 to 100000 mm can be drawn")));
+    }
     let check = |what: &str, low: Num<Positive>, high: Num<Positive>| {
         let (low, high) = (low.get(), high.get());
-        if low < high && high * 2.0 < recipe.period_mm.get() && low * 200.0 > high {
+        if low < high && high * 2.0 < period && low * 200.0 > high {
             return Ok(());
         }
         Err(Error::input(format!(
@@ -31,12 +37,22 @@ pub(super) fn draw(recipe: &SoilRecipe) -> Result<Drawn> {
         check("stones", smallest_mm, largest_mm)?;
     }
     // Nearly all aggregates are of the smallest size.
-    let area = recipe.period_mm.get() * recipe.period_mm.get();
-    let smallest = recipe.crumbs.smallest_mm.get();
-    let crumbs = recipe.crumbs.cover.get() * area / (0.6 * smallest * smallest);
+    let area = period * period;
+    let many = |cover: f64, smallest: f64| cover * area / (0.6 * smallest * smallest);
+    let crumbs = many(recipe.crumbs.cover.get(), recipe.crumbs.smallest_mm.get());
+    let (pieces, plates) = match recipe.ground {
+        Ground::Dirt => (0.0, 0.0),
+        Ground::Stony { cover, smallest_mm, .. } => (many(cover.get(), smallest_mm.get()), 0.0),
+        Ground::Cracked { plate_mm, .. } => (many(FRAGMENTS.0.into(), FRAGMENTS.1.into()), period / plate_mm.get()),
+    };
     let litter = recipe.litter;
     let bits = litter.grains.get().max(litter.humus.get()).max(litter.fibres.get()) * area * 1e-6;
-    for (what, asked, most) in [("crumbs", crumbs, 4e6), ("bits of litter", bits, 1e5)] {
+    for (what, asked, most) in [
+        ("crumbs", crumbs, 4e6),
+        ("stones or fragments", pieces, 4e6),
+        ("plates side by side", plates, MOST_CELLS),
+        ("bits of litter", bits, 1e5),
+    ] {
         if asked > most {
             return Err(Error::input(format!("about {asked:.0} {what} on the tile: at most {most:.0} can be drawn")));
         }

@@ -9,20 +9,38 @@ use tempfile::NamedTempFile;
 /// Who may use a drawn texture, and how.
 const LICENCE: &str = "CC0-1.0 OR MIT OR Apache-2.0";
 
+/// Where the drawing of a recipe goes: its picture, its relief and the words on its source. An error where nothing can be written there.
+pub fn targets(recipe_path: &Path) -> Result<[PathBuf; 3]> {
+    // One of another name may be where its own picture goes.
+    if !recipe_path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ron")) {
+        return Err(Error::misuse("the name of a texture recipe must end in .ron")
+            .help("NAME.ron is drawn to NAME.png beside it")
+            .in_file(recipe_path));
+    }
+    let targets = ["png", "height.png", "source.md"].map(|ending| recipe_path.with_extension(ending));
+    match targets.iter().find(|target| target.exists() && !target.is_file()) {
+        None => Ok(targets),
+        Some(taken) => {
+            let error = Error::misuse(format!("this is no file, and what {} draws goes there", recipe_path.display()));
+            Err(error.help("move it away, or give the recipe another name").in_file(taken))
+        }
+    }
+}
+
 /// Draws the recipe in a file and writes, beside it, `NAME.png`, `NAME.height.png` where it has relief, and
 /// `NAME.source.md` unless a `SOURCE.md` in its folder or the one above names it. Returns what was written.
 pub fn write(recipe_path: &Path) -> Result<Vec<PathBuf>> {
+    let [picture, height, words] = targets(recipe_path)?;
     let recipe = read(recipe_path)?;
-    let drawn = draw(&recipe)?;
+    let drawn = draw(&recipe).map_err(|error| error.in_file(recipe_path))?;
     let name = recipe_path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let source = source(&recipe, &name);
-    let mut files = vec![(recipe_path.with_extension("png"), encode(&drawn, &source))];
+    let mut files = vec![(picture, encode(&drawn, &source))];
     if let Some(relief) = &drawn.relief {
-        files.push((recipe_path.with_extension("height.png"), encode_height(relief, &source)));
+        files.push((height, encode_height(relief, &source)));
     }
     if !named_above(recipe_path, &name) {
-        let words = format!("`{name}.png`: {source}. Licence: {LICENCE}.\n");
-        files.push((recipe_path.with_extension("source.md"), words.into_bytes()));
+        files.push((words, format!("`{name}.png`: {source}. Licence: {LICENCE}.\n").into_bytes()));
     }
     // All of them before the first gets its name: a picture does not stand beside the relief of another.
     let whole = files.iter().map(|(path, bytes)| unfinished(path, bytes)).collect::<Result<Vec<_>>>()?;

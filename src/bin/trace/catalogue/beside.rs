@@ -1,9 +1,8 @@
 //! Photographs beside the rendered stages of a species, and the measures of both.
 
 use super::outline::{Measures, Silhouette};
-use furrow::output;
 use furrow::texture::{ColorSpace, Texture};
-use furrow::{Error, Result};
+use furrow::{Error, Result, input, output};
 use std::path::{Path, PathBuf};
 
 /// Silhouettes are measured at most this many pixels wide or high.
@@ -24,6 +23,10 @@ pub(super) struct Photograph {
 
 /// The photographs of a species in a folder, by name: `NAME.png`, `NAME-3.png`, `NAME-bbch16.jpg`; `name` is its species file's.
 pub(super) fn photographs(folder: &Path, name: &str) -> Result<Vec<Photograph>> {
+    if folder.exists() && !folder.is_dir() {
+        let error = Error::misuse("this is no folder, so no photographs lie in it").in_file(folder);
+        return Err(error.help("give --beside the folder of the photographs"));
+    }
     let entries = std::fs::read_dir(folder).map_err(Error::reading(folder))?;
     let mut files: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
     files.retain(|file| is_of(file, name));
@@ -47,21 +50,49 @@ fn is_of(file: &Path, name: &str) -> bool {
 }
 
 /// The stage in a file's name.
-fn stage(file: &Path) -> Option<u32> {
-    stem(file).split('-').find_map(|part| part.strip_prefix("bbch")?.parse().ok())
+fn stage(file: &Path) -> Result<Option<u32>> {
+    let name = stem(file).to_ascii_lowercase();
+    let Some(code) = name.split('-').find_map(|part| part.strip_prefix("bbch")) else { return Ok(None) };
+    let wrong = |_| {
+        Error::input(format!("`bbch{code}` in this name is no growth stage"))
+            .help("end the name in a stage, such as -bbch16; one without `bbch` stands beside all stages")
+            .in_file(file)
+    };
+    code.parse().map(Some).map_err(wrong)
 }
 
 fn photograph(file: &Path) -> Result<Photograph> {
-    let (width, height, pixels) = output::read_color_photo(file)?;
-    let measures = if file.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) { cut_out(file)? } else { None };
+    let bbch = stage(file)?;
+    let bytes = input::read(file, input::LARGEST).map_err(|refusal| refusal.into_error(file))?;
+    check_whole(file, &bytes)?;
+    let wrong = |what: String| Error::input(what).in_file(file);
+    let picture = Texture::decode(&bytes, ColorSpace::Srgb).map_err(wrong)?;
+    let (width, height, pixels) = (picture.width(), picture.height(), picture.to_rgba8());
     let size = shown(width, height);
     let at = |i: u32| {
         let from = |i: u32, n: u32, of: u32| (u64::from(2 * i + 1) * u64::from(of) / u64::from(2 * n)) as usize;
-        pixels[from(i / size.0, size.1, height) * width as usize + from(i % size.0, size.0, width)]
+        over_white(pixels[from(i / size.0, size.1, height) * width as usize + from(i % size.0, size.0, width)])
     };
     let small: Vec<[u8; 3]> = (0..size.0 * size.1).map(at).collect();
     let jpeg = output::encode_jpeg(size.0, size.1, &small, 88)?;
-    Ok(Photograph { name: stem(file), bbch: stage(file), size, jpeg, measures })
+    let inside = pixels.iter().map(|[.., a]| *a > 127).collect();
+    let measures = cut_out(Silhouette { width: width as usize, height: height as usize, inside });
+    Ok(Photograph { name: stem(file), bbch, size, jpeg, measures })
+}
+
+/// Checks that a JPEG has its end: decoders fill what is missing with gray.
+fn check_whole(file: &Path, bytes: &[u8]) -> Result<()> {
+    if !bytes.starts_with(&[0xff, 0xd8]) {
+        return Ok(());
+    }
+    let color = output::decode_jpeg(file, bytes).map(drop);
+    color.or_else(|_| output::decode_gray_jpeg(file, bytes).map(drop))
+}
+
+/// What a transparent pixel hides is no part of a picture: it lies on white paper.
+fn over_white([r, g, b, a]: [u8; 4]) -> [u8; 3] {
+    let a = u32::from(a);
+    [r, g, b].map(|c| ((u32::from(c) * a + 255 * (255 - a) + 127) / 255) as u8)
 }
 
 /// The size at which a photograph is shown.
@@ -72,15 +103,8 @@ fn shown(width: u32, height: u32) -> (u32, u32) {
 }
 
 /// The measures of a picture with transparent parts.
-fn cut_out(file: &Path) -> Result<Option<Measures>> {
-    let picture = Texture::load(file, ColorSpace::Srgb)?;
-    let (width, height) = (picture.width(), picture.height());
-    let inside: Vec<bool> = picture.to_rgba8().iter().map(|p| p[3] > 127).collect();
-    if inside.iter().all(|i| *i) {
-        return Ok(None);
-    }
-    let whole = Silhouette { width: width as usize, height: height as usize, inside };
-    Ok(Measures::of(&whole.shrunk(LONGEST)))
+fn cut_out(whole: Silhouette) -> Option<Measures> {
+    if whole.inside.contains(&false) { Measures::of(&whole.shrunk(LONGEST)) } else { None }
 }
 
 #[cfg(test)]
@@ -92,8 +116,20 @@ mod tests {
         let of = |file: &str| is_of(Path::new(file), "poa");
         assert!(of("poa.png") && of("in/poa-2.JPG") && of("poa-bbch12-b.jpeg"));
         assert!(!of("poaceae.png") && !of("poa.txt") && !of("a-poa.png"));
-        assert_eq!(stage(Path::new("poa-bbch12-b.jpeg")), Some(12));
-        assert_eq!(stage(Path::new("poa-2.png")), None);
+        let stage = |file: &str| stage(Path::new(file));
+        assert_eq!(stage("poa-bbch12-b.jpeg").unwrap(), Some(12));
+        assert_eq!(stage("poa-BBCH12.png").unwrap(), Some(12));
+        assert_eq!(stage("poa-2.png").unwrap(), None);
+        for name in ["poa-bbch999999999999.png", "poa-bbch.png", "poa-bbch12b.png"] {
+            assert!(stage(name).unwrap_err().to_string().contains("is no growth stage"), "{name}");
+        }
+    }
+
+    #[test]
+    fn transparent_pixels_lie_on_white() {
+        assert_eq!(over_white([10, 20, 30, 255]), [10, 20, 30]);
+        assert_eq!(over_white([10, 20, 30, 0]), [255; 3]);
+        assert_eq!(over_white([0, 0, 0, 51]), [204; 3]);
     }
 
     /// Expected: a stage is compared with cut-outs of it and with those of no known stage; other photographs are only looked at.

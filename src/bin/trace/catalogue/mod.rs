@@ -12,6 +12,7 @@ mod sheet;
 mod view;
 
 use crate::quality::threads;
+use beside::Photograph;
 use furrow::accel::EmbreeAccel;
 use furrow::cli::{self, signal::Signals};
 use furrow::geometry::Window;
@@ -78,10 +79,12 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     cli::check_folder(&args.out)?;
     let pages = args.pages()?;
+    // All of them before anything is drawn: one that cannot be read does not cost the drawing.
+    let photographs = pages.iter().map(|page| args.photographs(page)).collect::<Result<Vec<_>>>()?;
     let pool = render::pool(args.threads)?;
     let (mut entries, mut paths) = (Vec::new(), Vec::new());
-    for page in &pages {
-        let (path, entry) = pool.install(|| args.species(page, signals))?;
+    for (page, photographs) in pages.iter().zip(photographs) {
+        let (path, entry) = pool.install(|| args.species(page, photographs, signals))?;
         paths.push(path);
         entries.push(entry);
     }
@@ -121,8 +124,14 @@ impl Args {
         }
     }
 
+    /// The photographs that stand beside a species.
+    fn photographs(&self, page: &Path) -> Result<Vec<Photograph>> {
+        let Some(folder) = &self.beside else { return Ok(Vec::new()) };
+        beside::photographs(folder, &name(page))
+    }
+
     /// One species: its sheet's path, and its entry on the page.
-    fn species(&self, page: &Path, signals: &Signals) -> Result<(PathBuf, Entry)> {
+    fn species(&self, page: &Path, photographs: Vec<Photograph>, signals: &Signals) -> Result<(PathBuf, Entry)> {
         let file = SpeciesFile::read(page)?;
         for warning in file.sources().iter().flat_map(|source| source.renamed(RENAMED)) {
             furrow::tell!("warning: {warning}");
@@ -155,11 +164,7 @@ impl Args {
         if !self.quiet {
             furrow::tell!("{}: {} stages{}", page.display(), stages.len(), if kept { ", kept" } else { "" });
         }
-        let name = page.file_stem().unwrap_or_default().to_string_lossy();
-        let photographs = match &self.beside {
-            Some(folder) => beside::photographs(folder, &name)?,
-            None => Vec::new(),
-        };
+        let name = name(page);
         let is_stage = |bbch: &u32| stages.iter().any(|(plant, ..)| plant.bbch == *bbch);
         for photo in &photographs {
             if let Some(bbch) = photo.bbch.filter(|bbch| !is_stage(bbch)) {
@@ -244,6 +249,11 @@ impl Args {
         let film = render::render(&world, &PathTracer::default(), &settings, &watch)?;
         Ok(field.photograph(&film).rgb.as_chunks::<3>().0.to_vec())
     }
+}
+
+/// The name of a species file.
+fn name(page: &Path) -> String {
+    page.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 fn contains(bytes: &[u8], part: &[u8]) -> bool {

@@ -109,7 +109,7 @@ fn outlines(entry: &Entry) -> Option<Table> {
     };
     let counted = |all: &[Measures]| count(all.len() as u64, "cut-out", "cut-outs");
     let any = cut_outs(None);
-    push(counted(&any), &any);
+    push(format!("all stages, {}", counted(&any)), &any);
     for Stage { plant, measures, .. } in &entry.stages {
         let own = cut_outs(Some(plant.bbch));
         push(format!("BBCH {}, {}", plant.bbch, counted(&own)), &own);
@@ -152,6 +152,17 @@ fn table(stages: &[Stage]) -> Table {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Expected: a row of cut-outs says which stages it is to be compared with, also where that is all of them.
+    #[test]
+    fn rows_of_cut_outs_tell_their_stages() {
+        let species = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/species/echinochloa.ron");
+        let desc = furrow::scene::species_text::SpeciesFile::read(&species).unwrap().parse().unwrap();
+        let measures = Some(Measures::default());
+        let photo = Photograph { name: "a".into(), bbch: None, size: (1, 1), jpeg: Vec::new(), measures };
+        let table = outlines(&Entry { desc, stages: Vec::new(), photographs: vec![photo] }).unwrap();
+        assert!(table.html().into_string().contains("all stages, 1 cut-out"));
+    }
 
     #[test]
     fn scales_have_round_lengths() {
