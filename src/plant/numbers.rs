@@ -74,7 +74,9 @@ impl Numbers {
 
     fn shoot(&self, slot: usize) -> Option<u16> {
         let above = (1 + slot) * self.each;
-        if above + self.each <= usize::from(u16::MAX) { Some(above as u16) } else { None }
+        // With all of its own.
+        u16::try_from(above + self.each).ok()?;
+        u16::try_from(above).ok()
     }
 
     /// The number of the i-th leaf of a row of leaves on an axis of a sort; `None` beyond what the species file lets there be.
