@@ -34,7 +34,7 @@ pub fn read_color_photo(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
     }
     let photo = decode(path)?;
     if !photo.color().has_color() {
-        return Err(Error::input("this picture is gray, and here colours are seen")
+        return Err(Error::input("this picture is gray, and colours are needed")
             .help("give photographs in red, green and blue")
             .in_file(path));
     }

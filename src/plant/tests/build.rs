@@ -219,7 +219,7 @@ fn leaves_keep_their_numbers_while_others_come_out() {
     }
 }
 
-/// Expected: no two shoots or axes share a number, and what 16 bits do not hold has none.
+/// Expected: no two leaves of a plant share a number.
 #[test]
 fn blocks_of_numbers_do_not_overlap() {
     for page in pages() {
