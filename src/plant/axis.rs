@@ -80,7 +80,7 @@ impl Foot {
 /// Grows hypocotyl and first stem.
 pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Section) -> Axis {
     let mut stream = growth.stream.child(Purpose::Plant, 1);
-    let lean = growth.desc.lean_deg.draw32(&mut stream).to_radians();
+    let lean = growth.lean(&mut stream);
     let towards = stream.range32(0.0, TAU);
     stem(organs, growth, section, Foot::first(growth, direction(lean, towards)), &mut stream)
 }

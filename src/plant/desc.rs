@@ -3,6 +3,7 @@
 use super::flower::desc::FlowerDesc;
 use super::inflorescence::check;
 use super::kind::LeafKind;
+use super::numbers;
 use super::stage::StageDesc;
 use super::twine::TwineDesc;
 use crate::ron_file::{self, Finite, NonNegative, Num, Positive, Step, Vary};
@@ -238,6 +239,14 @@ impl PlantDesc {
             if leaves > 1000.0 {
                 let message = format!("{leaves} leaves at BBCH {}: labels number at most 1000 of a plant", stage.bbch);
                 return Err((at, message, "write fewer layers, or fewer leaves in each".into()));
+            }
+            for (field, shoots) in [("tillers", &stage.tillers), ("branches", &stage.branches)] {
+                let most = shoots.usual().1;
+                if most > numbers::MOST as f64 {
+                    let at = vec![Field("stages"), Item(i), Field(field)];
+                    let message = format!("{most} side shoots at BBCH {}", stage.bbch);
+                    return Err((at, message, format!("a shoot bears at most {}", numbers::MOST)));
+                }
             }
             if let Some(k) = stage.layers.iter().position(|l| !self.kinds.contains_key(&l.kind)) {
                 at.extend([Item(k), Field("kind")]);

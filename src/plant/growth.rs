@@ -83,6 +83,21 @@ impl Growth<'_> {
     pub(super) fn cell(&self) -> f32 {
         self.leaves.first().map_or(CELL, |leaf| leaf.cell)
     }
+
+    /// How far the axis leans, radians; drawn from `stream`.
+    pub(super) fn lean(&self, stream: &mut Stream) -> f32 {
+        let of = |stage: &StageDesc, stream: &mut Stream| {
+            stage.lean_deg.as_ref().unwrap_or(&self.desc.lean_deg).draw32(stream)
+        };
+        let from = of(self.between.from, &mut stream.clone());
+        lerp(from, of(self.between.to, stream), self.between.u).to_radians()
+    }
+
+    /// How much further it leans than the plant does where a stage does not say, radians.
+    pub(super) fn lean_further(&self, stream: &Stream) -> f32 {
+        let plain = self.desc.lean_deg.draw32(&mut stream.clone()).to_radians();
+        self.lean(&mut stream.clone()) - plain
+    }
 }
 
 /// The shoots of so many, each with how far it has grown, 0–1.

@@ -63,7 +63,7 @@ pub(super) fn shoots(growth: &Growth<'_>, habit: Habit) -> Vec<Organ> {
         line: Vec2::ZERO,
     };
     let mut stream = growth.stream.child(Purpose::Plant, 1);
-    let lean = growth.desc.lean_deg.draw32(&mut stream).to_radians();
+    let lean = growth.lean(&mut stream);
     let towards = stream.range32(0.0, TAU);
     let upright = direction(lean, towards);
     let radius = (0.5 * growth.stem).max(2e-4);

@@ -68,6 +68,11 @@ pub struct StageDesc {
     /// Width of the stem at the soil.
     #[schemars(extend("x-example" = "2"))]
     pub stem_mm: Vary<NonNegative>,
+    /// How far the axis leans at this stage; absent: as the plant's `lean_deg` says. The other stems of an `Erect` plant lean further by as much
+    /// as this exceeds that.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "Uniform(10, 40)"))]
+    pub lean_deg: Option<Vary<Finite>>,
     /// Side shoots, each a smaller copy of the main one; of an `Erect` plant the other main stems from the same place: a seed tuber of potato
     /// sends up several. With the same distribution at all stages a plant has as many on all days.
     #[serde(default = "vary::<NonNegative>")]

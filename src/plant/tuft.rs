@@ -73,7 +73,7 @@ fn fanned(k: usize) -> f32 {
 /// The direction of the main shoot.
 pub(super) fn lean(growth: &Growth<'_>) -> Vec3 {
     let mut stream = growth.stream.child(Purpose::Plant, 1);
-    let lean = growth.desc.lean_deg.draw32(&mut stream).to_radians();
+    let lean = growth.lean(&mut stream);
     direction(lean, stream.range32(0.0, 2.0 * PI))
 }
 

@@ -64,7 +64,7 @@ fn culms(organs: &[Organ], growth: &Growth<'_>) -> Vec<Place> {
         }
     }
     let mut stream = growth.stream.child(Purpose::Plant, 1);
-    let lean = growth.desc.lean_deg.draw32(&mut stream).to_radians();
+    let lean = growth.lean(&mut stream);
     let upright = direction(lean, stream.range32(0.0, TAU));
     let culm = |(k, shoot): (usize, &Shoot)| {
         // The two oldest sheaths stand on either side.

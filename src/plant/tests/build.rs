@@ -230,3 +230,22 @@ fn blocks_of_numbers_do_not_overlap() {
         }
     }
 }
+
+/// Rationale: seedlings leave the soil bent over and straighten in some days. Expected: at BBCH 9 the axis leans by more than 25°, at 10 by what
+/// the plant's `lean_deg` allows, and in between by less from day to day. Source: the species files.
+#[test]
+fn seedlings_straighten_after_emergence() {
+    for eppo in ["BEAVX", "CHEAL"] {
+        let desc = page(eppo);
+        let most = desc.lean_deg.usual().1 as f32;
+        for seed in 0..10 {
+            let stream = stream(seed);
+            let leans = [1.0, 2.0, 3.0, 4.0].map(|days| {
+                let grown = growth::growth(&desc, Stage::Age(days), &stream, 1.0).unwrap();
+                grown.lean(&mut stream.child(Purpose::Plant, 1)).to_degrees()
+            });
+            assert!(leans[0] >= 25.0 && leans[3] <= most, "{eppo} {seed}: {leans:?}");
+            assert!(leans.windows(2).all(|w| w[1] < w[0]), "{eppo} {seed}: {leans:?}");
+        }
+    }
+}
