@@ -70,7 +70,10 @@ pub(super) fn others(growth: &Growth<'_>) -> Vec<OtherStem> {
         let out = direction(FRAC_PI_2, towards);
         let foot = Foot {
             point: out * stream.range32(APART.0, APART.1),
-            along: direction(stream.range32(LEAN.0, LEAN.1) + growth.lean_further(&stream.child(Purpose::Plant, 1)), towards),
+            along: direction(
+                stream.range32(LEAN.0, LEAN.1) + growth.lean_further(&stream.child(Purpose::Plant, 1)),
+                towards,
+            ),
             size: lerp(stream.range32(SIZE.0, SIZE.1), 1.0, growth.tillers_grown),
             root: ROOT,
             stream: stream.child(Purpose::Plant, 2),
