@@ -150,7 +150,7 @@ pub struct Grown {
     pub age_days: f32,
     /// Where its stem meets the ground, world, metres.
     pub position_m: [f32; 3],
-    /// Its growth axis, world, unit.
+    /// The axis that it was sown with, world, unit; `lean_deg` of its species comes on top.
     pub axis: [f32; 3],
     /// Its height, metres.
     pub height_m: f32,

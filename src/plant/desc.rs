@@ -3,8 +3,7 @@
 use super::flower::desc::FlowerDesc;
 use super::inflorescence::check;
 use super::kind::LeafKind;
-use super::numbers;
-use super::stage::StageDesc;
+use super::stage::{MOST_SHOOTS, StageDesc, Tilt};
 use super::twine::TwineDesc;
 use crate::ron_file::{self, Finite, NonNegative, Num, Positive, Step, Vary};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -103,7 +102,7 @@ pub struct PlantDesc {
     pub azimuth_deg: Vary<Finite>,
     /// How far the axis leans.
     #[schemars(default = "lean")]
-    pub lean_deg: Vary<Finite>,
+    pub lean_deg: Vary<Tilt>,
     /// Length over width at which a stem of a `Runner` or `Whorl` begins to sink under its own weight, and at which it lies on the soil.
     #[schemars(default = "lies_at")]
     pub lies_at: (Num<Positive>, Num<Positive>),
@@ -143,7 +142,7 @@ struct Written {
     #[serde(default = "azimuth")]
     azimuth_deg: Vary<Finite>,
     #[serde(default = "lean")]
-    lean_deg: Vary<Finite>,
+    lean_deg: Vary<Tilt>,
     #[serde(default = "lies_at")]
     lies_at: (Num<Positive>, Num<Positive>),
     #[serde(default)]
@@ -166,7 +165,7 @@ fn azimuth() -> Vary<Finite> {
     Vary::uniform(-10.0, 10.0)
 }
 
-fn lean() -> Vary<Finite> {
+fn lean() -> Vary<Tilt> {
     Vary::uniform(0.0, 5.0)
 }
 
@@ -241,11 +240,13 @@ impl PlantDesc {
                 return Err((at, message, "write fewer layers, or fewer leaves in each".into()));
             }
             for (field, shoots) in [("tillers", &stage.tillers), ("branches", &stage.branches)] {
-                let most = shoots.usual().1;
-                if most > numbers::MOST as f64 {
+                let most = shoots.largest().round();
+                if most > MOST_SHOOTS as f64 {
                     let at = vec![Field("stages"), Item(i), Field(field)];
-                    let message = format!("{most} side shoots at BBCH {}", stage.bbch);
-                    return Err((at, message, format!("a shoot bears at most {}", numbers::MOST)));
+                    let message = format!("up to {most} side shoots at BBCH {}", stage.bbch);
+                    let help =
+                        format!("a shoot bears at most {MOST_SHOOTS}: end the distribution there, max: {MOST_SHOOTS}");
+                    return Err((at, message, help));
                 }
             }
             if let Some(k) = stage.layers.iter().position(|l| !self.kinds.contains_key(&l.kind)) {

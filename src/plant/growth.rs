@@ -5,8 +5,8 @@
 
 use super::desc::{PlantDesc, Stage};
 use super::kind::LeafKind;
-use super::numbers::{self, Numbers};
-use super::stage::{BUD, StageDesc};
+use super::numbers::Numbers;
+use super::stage::{BUD, MOST_SHOOTS, StageDesc};
 use crate::math::lerp;
 use crate::ron_file::{Bound, NonNegative, Vary};
 use crate::sampling::{Purpose, Stream};
@@ -84,13 +84,13 @@ impl Growth<'_> {
         self.leaves.first().map_or(CELL, |leaf| leaf.cell)
     }
 
-    /// How far the axis leans, radians; drawn from `stream`.
+    /// How far the axis leans, radians; drawn from `stream`, which goes on as if the plant's own lean were drawn: whither the plant leans does
+    /// not depend on what its stages say.
     pub(super) fn lean(&self, stream: &mut Stream) -> f32 {
-        let of = |stage: &StageDesc, stream: &mut Stream| {
-            stage.lean_deg.as_ref().unwrap_or(&self.desc.lean_deg).draw32(stream)
-        };
-        let from = of(self.between.from, &mut stream.clone());
-        lerp(from, of(self.between.to, stream), self.between.u).to_radians()
+        let of = |stage: &StageDesc| stage.lean_deg.as_ref().unwrap_or(&self.desc.lean_deg).draw32(&mut stream.clone());
+        let degrees = lerp(of(self.between.from), of(self.between.to), self.between.u);
+        self.desc.lean_deg.draw32(stream);
+        degrees.to_radians()
     }
 
     /// How much further it leans than the plant does where a stage does not say, radians.
@@ -102,7 +102,7 @@ impl Growth<'_> {
 
 /// The shoots of so many, each with how far it has grown, 0–1.
 pub(super) fn shoots(many: f32) -> impl Iterator<Item = (usize, f32)> {
-    let most = (many.ceil().max(0.0) as usize).min(numbers::MOST);
+    let most = (many.ceil().max(0.0) as usize).min(MOST_SHOOTS);
     (0..most).map(move |k| (k, (many - k as f32).clamp(0.0, 1.0)))
 }
 

@@ -5,10 +5,7 @@
 
 use super::desc::{Form, PlantDesc};
 use super::inflorescence::check;
-use super::stage::StageDesc;
-
-/// Side shoots stop here, and those of each, whatever a species file asks for.
-pub(super) const MOST: usize = 24;
+use super::stage::{MOST_SHOOTS, StageDesc};
 
 /// The blocks of numbers of one species.
 #[derive(Clone, Debug)]
@@ -33,7 +30,8 @@ struct Sort {
 impl Numbers {
     pub(super) fn of(desc: &PlantDesc) -> Self {
         let stages = || desc.stages.iter();
-        let most = |pick: fn(&StageDesc) -> f64| (stages().map(pick).fold(0.0, f64::max).round() as usize).min(MOST);
+        let most =
+            |pick: fn(&StageDesc) -> f64| (stages().map(pick).fold(0.0, f64::max).round() as usize).min(MOST_SHOOTS);
         let branching = matches!(desc.form, Form::Runner | Form::Whorl);
         let last = desc.stages.last();
         let each = last.map_or(0, |stage| stage.layers.iter().map(|layer| layer.leaves.get() as usize).sum());

@@ -7,8 +7,8 @@
 use super::axis;
 use super::growth::{self, Growth, LeafNow};
 use super::leaf::{self, Lower, Seat};
-use super::numbers::MOST;
 use super::organ::{Organ, OrganKind};
+use super::stage::MOST_SHOOTS;
 use super::tube::{self, Profile};
 use super::twine::Helix;
 use crate::math::{Vec2, Vec3, direction, lerp, smoothstep};
@@ -89,7 +89,7 @@ pub(super) fn shoots(growth: &Growth<'_>, habit: Habit) -> Vec<Organ> {
         let own = axils.iter().filter(|a| a.0 > axil.0 + 1);
         for ((m, there), (layer, azimuth)) in growth::shoots(growth.branches).zip(own) {
             let Some(above) = growth.numbers.branch(k, m) else { break };
-            let stream = growth.stream.child(Purpose::Plant, 200 + (MOST * k + m) as u64);
+            let stream = growth.stream.child(Purpose::Plant, 200 + (MOST_SHOOTS * k + m) as u64);
             let azimuth = azimuth + shoot.turn;
             let axil = Axil { layer: *layer, node: layer - axil.0 - 1, azimuth, size: 0.8 * shoot.size * there };
             plant.side(&shoot.nodes, axil, above, stream);

@@ -10,6 +10,19 @@ use super::inflorescence::desc::InflorescenceDesc;
 use crate::ron_file::{Bound, Finite, Fraction, NonNegative, Num, PositiveCount, Vary};
 use serde::{Deserialize, Serialize};
 
+/// Side shoots stop here, and those of each, whatever a species file asks for.
+pub(super) const MOST_SHOOTS: usize = 24;
+
+/// How far an axis may lean: to the ground, not into it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tilt;
+
+impl Bound for Tilt {
+    const MIN: f64 = -90.0;
+    const MAX: f64 = 90.0;
+    const WORDS: &'static str = "between -90 and 90 degrees";
+}
+
 /// Blades shorter than this are hidden in the bud, metres.
 pub const BUD: f32 = 0.002;
 
@@ -72,9 +85,9 @@ pub struct StageDesc {
     /// as this exceeds that.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-example" = "Uniform(10, 40)"))]
-    pub lean_deg: Option<Vary<Finite>>,
+    pub lean_deg: Option<Vary<Tilt>>,
     /// Side shoots, each a smaller copy of the main one; of an `Erect` plant the other main stems from the same place: a seed tuber of potato
-    /// sends up several. With the same distribution at all stages a plant has as many on all days.
+    /// sends up several. At most 24. With the same distribution at all stages a plant has as many on all days.
     #[serde(default = "vary::<NonNegative>")]
     pub tillers: Vary<NonNegative>,
     /// How far the side shoots of a `Tuft` have caught up with the main shoot: at 0, the default, they are 0.45 to 0.7 times as large
@@ -82,7 +95,7 @@ pub struct StageDesc {
     /// the others are 0.75 to 0.95 times as large as the first, at 1 as large; their feet stand 10 to 40 mm from it, and they lean 8 to 25° outward.
     #[serde(default = "none", skip_serializing_if = "is_none")]
     pub tiller_growth: Num<Fraction>,
-    /// Side shoots of each side shoot of a `Runner` or `Whorl`.
+    /// Side shoots of each side shoot of a `Runner` or `Whorl`, at most 24.
     #[serde(default = "vary::<NonNegative>")]
     pub branches: Vary<NonNegative>,
     /// Layers from the oldest to the youngest, seed leaves first. A later stage may only add layers at the end; one that names none keeps

@@ -11,8 +11,7 @@
 use super::axis::Foot;
 use super::desc::Form;
 use super::growth::{self, Growth, LeafNow};
-use super::numbers::MOST;
-use super::stage::BUD;
+use super::stage::{BUD, MOST_SHOOTS};
 use crate::math::{direction, lerp};
 use crate::sampling::{Purpose, Stream};
 use std::f32::consts::{FRAC_PI_2, TAU};
@@ -62,7 +61,7 @@ pub(super) fn others(growth: &Growth<'_>) -> Vec<OtherStem> {
     if growth.desc.form != Form::Erect {
         return Vec::new();
     }
-    let count = (growth.tillers.round() as usize).min(MOST);
+    let count = (growth.tillers.round() as usize).min(MOST_SHOOTS);
     let stem = |k: usize| {
         let above = growth.numbers.side(k)?;
         let mut stream = growth.stream.child(Purpose::Plant, 100 + k as u64);

@@ -409,7 +409,8 @@ fn pages_that_do_not_fit_together_are_refused() {
             "lost",
         ),
         ("blade_mm: 5", "blade_mm: -5", "0 or above"),
-        ("stem_mm: 1,", "stem_mm: 1, tillers: 30,", "30 side shoots"),
+        ("stem_mm: 1,", "stem_mm: 1, tillers: 30,", "up to 30 side shoots"),
+        ("stem_mm: 1,", "stem_mm: 1, lean_deg: 91,", "between -90 and 90"),
         ("form: Rosette", "form: Rosete", "Rosete"),
         ("days: 3", "day: 3", "day"),
     ] {

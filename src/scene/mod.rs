@@ -48,7 +48,7 @@ pub struct PlantRecord {
     pub class: Class,
     /// Where its stem meets the ground, metres.
     pub position: Vec3,
-    /// Its growth axis, unit.
+    /// The axis that it was sown with, unit; what its species leans comes on top.
     pub axis: Vec3,
     /// Growth stage, BBCH.
     pub bbch: u32,

@@ -231,6 +231,26 @@ fn blocks_of_numbers_do_not_overlap() {
     }
 }
 
+/// Rationale: a stage may write its lean as a number where the next draws it, and the plant must not turn round between them. Expected: a plant
+/// that leans by 40° at BBCH 10 and 12 leans the same way on all days, however the two are written.
+#[test]
+fn plants_lean_one_way_whatever_their_stages_say() {
+    let mut desc = page("BEAVX");
+    desc.stages[1].lean_deg = Some(Vary::fixed(40.0));
+    let mut ways = Vec::new();
+    for at_12 in [Vary::fixed(40.0), Vary::uniform(40.0, 40.01)] {
+        desc.stages[2].lean_deg = Some(at_12);
+        for days in [4.0, 9.0, 14.0] {
+            let plant = grow(&desc, Stage::Age(days), &stream(5));
+            let below = plant.organs.iter().find(|o| o.kind == OrganKind::Hypocotyl).unwrap();
+            let high = |p: &&Vec3, q: &&Vec3| p.z.total_cmp(&q.z);
+            let ends = [below.mesh.positions.iter().min_by(high), below.mesh.positions.iter().max_by(high)];
+            ways.push((*ends[1].unwrap() - *ends[0].unwrap()).truncate().normalize());
+        }
+    }
+    assert!(ways.iter().all(|way| way.dot(ways[0]) > 0.95), "{ways:?}");
+}
+
 /// Rationale: seedlings leave the soil bent over and straighten in some days. Expected: at BBCH 9 the axis leans by more than 25°, at 10 by what
 /// the plant's `lean_deg` allows, and in between by less from day to day. Source: the species files.
 #[test]
