@@ -7,6 +7,7 @@
 use crate::common::program::{SMALL, field, scratch, trace};
 use furrow::math::{DMat4, DQuat, DVec3};
 use furrow::output;
+use furrow::plant::RigJoint;
 use furrow::scene::Field;
 use furrow::scene::assemble::Options;
 use gltf::Gltf;
@@ -28,6 +29,23 @@ fn grown(rigged: bool) -> Field {
         )"
     );
     field(&text, &Options { rigged, ..Options::default() })
+}
+
+/// A rape in flower and a wheat in ear.
+fn flowering() -> Field {
+    let plant = |species: &str, bbch: u32, x: f32| {
+        format!("(species: \"scenes/species/{species}.ron\", growth: Bbch({bbch}), position_m: ({x}, 3)),")
+    };
+    let all = plant("rape", 65, -0.3) + &plant("wheat", 65, 0.3);
+    let text = format!(
+        "Field(
+            seed: 12,
+            camera: Pinhole(size: (64, 48), intrinsics: FieldOfView(horizontal_deg: 50), pose: Nadir(height_m: 3, at_m: (0, 3))),
+            lights: [Constant(radiance: (1, 1, 1, 1))],
+            plants: [{all}],
+        )"
+    );
+    field(&text, &Options { rigged: true, ..Options::default() })
 }
 
 fn encoded(of: &Field) -> Vec<u8> {
@@ -130,10 +148,10 @@ fn the_pose_of_the_file_is_its_mesh() {
     }
     eprintln!("{} meshes, {} skins, at most {worst:.1e} m", all.len(), file.skins().count());
     assert!(worst < 1e-5, "{worst}");
-    // Every leaf has one skin, and all its parts wear it.
-    let leaves: usize = field.plants.iter().map(|plant| plant.leaf_axes.len()).sum();
-    assert_eq!(file.skins().count(), leaves);
-    let parts = field.scene.parts.iter().filter(|part| part.tag.leaf > 0);
+    // Every leaf and every plant's stems have one skin, and all parts of plants wear theirs.
+    let skins: usize = field.plants.iter().map(|plant| plant.leaf_axes.len() + 1).sum();
+    assert_eq!(file.skins().count(), skins);
+    let parts = field.scene.parts.iter().filter(|part| part.tag.plant > 0);
     assert_eq!(parts.count(), all.len());
 }
 
@@ -204,6 +222,48 @@ fn a_joint_moves_what_lies_beyond_it_and_nothing_else() {
         tested += 1;
     }
     assert!(tested >= 4, "{tested} blades");
+}
+
+/// Rationale: who bends a stem means all that stands on it. Expected: a joint of a stem of rape in flower moves the stem beyond it, flowers and
+/// leaves too, by about their distance from the joint times the angle, and nothing below it; those of a wheat's ear move no leaf.
+#[test]
+fn a_stems_joint_carries_its_leaves_and_flowers() {
+    let field = flowering();
+    let file = Gltf::from_slice(&encoded(&field)).unwrap();
+    let rest = places(&file, &BTreeMap::new());
+    let all = skinned(&file);
+    let angle = 0.2;
+    for plant in &field.plants {
+        let name = format!("crop {}", plant.number);
+        let nodes: BTreeMap<&str, usize> = file.nodes().filter_map(|node| Some((node.name()?, node.index()))).collect();
+        // The first stem's own joint half-way up, or the ear's first.
+        let follows = |(k, joint): &(usize, &RigJoint)| joint.parent.map(usize::from) == k.checked_sub(1);
+        let stem = plant.rig.iter().enumerate().take_while(follows).map(|(_, joint)| joint);
+        let joint = stem.filter(|joint| joint.at.z < 0.4 * plant.height).last().unwrap_or(&plant.rig[0]);
+        let node = nodes[&*format!("{name} {}", joint.name)];
+        let at = rest[&node].w_axis.truncate();
+        let change = BTreeMap::from([(node, DMat4::from_quat(DQuat::from_rotation_z(angle)))]);
+        let turned = places(&file, &change);
+        let (mut carried, mut still, mut leaves, mut flowers) = (0, 0, 0, 0);
+        for one in all.iter().filter(|one| one.name == name || one.name.starts_with(&format!("{name} leaf"))) {
+            for (before, after) in one.posed(&rest).iter().zip(one.posed(&turned)) {
+                let (moved, lever) = (before.distance(after), before.distance(at));
+                assert!(moved <= 1.05 * angle * lever + 1e-3, "{}: {moved} at {lever}", one.name);
+                let far = moved > 0.2 * angle * lever && lever > 0.02;
+                carried += usize::from(far);
+                leaves += usize::from(far && one.name.contains("leaf"));
+                flowers += usize::from(far && before.y > f64::from(0.8 * plant.height));
+                still += usize::from(moved < 1e-9);
+            }
+        }
+        eprintln!(
+            "{} ({} joints): {carried} corners carried, {leaves} of leaves, {still} still",
+            plant.species,
+            plant.rig.len()
+        );
+        assert!(carried > 100 && still > 100 && flowers > 50, "{}", plant.species);
+        assert_eq!(leaves > 0, plant.species.contains("rape"), "{}", plant.species);
+    }
 }
 
 #[test]

@@ -147,6 +147,7 @@ pub(super) fn stem(
         material: material(&growth.desc.stem_material),
         mesh,
         axis: None,
+        lines: if stemless { Vec::new() } else { vec![nodes.iter().map(|(point, _)| *point).collect()] },
     });
     Axis { nodes, radii, section, crown }
 }
@@ -176,7 +177,8 @@ pub(super) fn hypocotyl(organs: &mut Vec<Organ>, growth: &Growth<'_>, foot: Foot
     dome(&mut rings, along, radius, 0.5);
     let (mesh, material) =
         (tube::rigid(&rings, tube::sides(radius, 10, growth.cell())), material(&growth.desc.hypocotyl_material));
-    organs.push(Organ { kind: OrganKind::Hypocotyl, leaf: 0, material, mesh, axis: None });
+    let lines = vec![vec![point, point + along * length]];
+    organs.push(Organ { kind: OrganKind::Hypocotyl, leaf: 0, material, mesh, axis: None, lines });
 }
 
 /// A ring across `along`.

@@ -112,7 +112,14 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
         joints: skeleton.placed(root),
         rig: if leaf.rigged { rig::rig(&skeleton, root) } else { Vec::new() },
     };
-    organs.push(Organ { kind, leaf: leaf.number, material: material.to_owned(), mesh, axis: Some(axis) });
+    organs.push(Organ {
+        kind,
+        leaf: leaf.number,
+        material: material.to_owned(),
+        mesh,
+        axis: Some(axis),
+        lines: Vec::new(),
+    });
     let mut rest = stalk(leaf, &skeleton, &relief, lower, &mut stream);
     let ringed = rest.positions.len();
     rest.append(spined);
@@ -126,7 +133,8 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
         mesh.append(&skin::skin(stipules, &motions, leaf.rigged));
     }
     let kind = if lower == Lower::Petiole { OrganKind::Petiole } else { OrganKind::Sheath };
-    organs.push(Organ { kind, leaf: leaf.number, material: leaf.kind.stalk_material.clone(), mesh, axis: None });
+    let material = leaf.kind.stalk_material.clone();
+    organs.push(Organ { kind, leaf: leaf.number, material, mesh, axis: None, lines: Vec::new() });
 }
 
 /// Corners round the stalk.

@@ -21,6 +21,7 @@
 //! | `stipules` | what stands at the foot of a stalk |
 //! | `spines` | spines on a blade's margin |
 //! | `twine` | shoots that wind |
+//! | `rig`, `stem_rig` | the joints of leaves and stems, for programs that bend them further |
 //! | `stems` | several main stems from one place |
 //! | `condition` | age, health and damage of a plant and its leaves |
 //! | `rosette`, `whorl`, `erect`, `dissected`, `tuft`, `cane`, `runner` | growth forms |
@@ -54,6 +55,7 @@ pub mod skeleton;
 pub mod skin;
 mod spines;
 mod stage;
+mod stem_rig;
 mod stems;
 mod stipules;
 pub mod table;
@@ -94,6 +96,8 @@ pub struct Plant {
     pub height: f32,
     /// Radius of the upright cylinder about the origin that holds it, metres.
     pub radius: f32,
+    /// The joints of its stems; none unless asked for by [`GrowOptions::rigged`].
+    pub rig: Vec<RigJoint>,
 }
 
 impl Plant {
@@ -127,7 +131,7 @@ pub struct GrowOptions<'a> {
     pub condition: Option<(&'a ConditionDesc, &'a Condition)>,
     /// Shortest cell of a blade's mesh, metres. Coarser meshes change no random number and move a leaf by less than a cell.
     pub cell: f32,
-    /// Whether leaves keep the joints by which they bend ([`LeafAxis::rig`]) and the weights of their corners.
+    /// Whether leaves and stems keep the joints by which they bend ([`LeafAxis::rig`], [`Plant::rig`]) and the weights of their corners.
     pub rigged: bool,
 }
 
@@ -146,7 +150,15 @@ pub fn grow(desc: &PlantDesc, stage: Stage, stream: &Stream) -> Plant {
 /// Grows one plant with options.
 pub fn grow_with(desc: &PlantDesc, stage: Stage, stream: &Stream, options: &GrowOptions<'_>) -> Plant {
     let Some(mut growth) = growth::growth(desc, stage, stream, options.vigour) else {
-        return Plant { organs: Vec::new(), ages: BTreeMap::new(), bbch: 0, age_days: 0.0, height: 0.0, radius: 0.0 };
+        return Plant {
+            organs: Vec::new(),
+            ages: BTreeMap::new(),
+            bbch: 0,
+            age_days: 0.0,
+            height: 0.0,
+            radius: 0.0,
+            rig: Vec::new(),
+        };
     };
     if let Some((desc, condition)) = options.condition {
         condition::Posture::new(desc, condition, stream).apply(&mut growth.leaves);
@@ -161,7 +173,8 @@ pub fn grow_with(desc: &PlantDesc, stage: Stage, stream: &Stream, options: &Grow
     let corners = || organs.iter().flat_map(|o| &o.mesh.positions);
     let height = corners().fold(0.0_f32, |h, p| h.max(p.z));
     let radius = corners().fold(0.0_f32, |r, p| r.max(p.x.hypot(p.y)));
-    Plant { organs, ages: age::ages(&growth), bbch: growth.bbch, age_days: growth.age_days, height, radius }
+    let rig = if options.rigged { stem_rig::rig(&mut organs) } else { Vec::new() };
+    Plant { organs, ages: age::ages(&growth), bbch: growth.bbch, age_days: growth.age_days, height, radius, rig }
 }
 
 macro_rules! grow_by_form {

@@ -94,7 +94,7 @@ impl LeafAxis {
             joint.at = motion(joint.at);
         }
         for joint in &mut self.rig {
-            joint.moved(&motion);
+            *joint = joint.moved(&motion);
         }
         self
     }
@@ -114,4 +114,6 @@ pub struct Organ {
     pub mesh: Mesh,
     /// Of a blade, and of nothing else: its leaf's keypoints, size and joints, in the same coordinates.
     pub axis: Option<LeafAxis>,
+    /// The middle lines of the stems in it, each from its foot to its tip, in the same coordinates; none of what is no stem.
+    pub lines: Vec<Vec<Vec3>>,
 }

@@ -19,11 +19,12 @@ pub struct RigJoint {
 
 impl RigJoint {
     /// The same moved by a rigid motion.
-    pub(super) fn moved(&mut self, motion: impl Fn(Vec3) -> Vec3) {
+    #[must_use]
+    pub fn moved(&self, motion: impl Fn(Vec3) -> Vec3) -> Self {
         let at = motion(self.at);
         let axis = |k: usize| (motion(self.at + self.axes.col(k)) - at).normalize();
-        self.axes = Mat3::from_cols(axis(0), axis(1), axis(2));
-        self.at = at;
+        let axes = Mat3::from_cols(axis(0), axis(1), axis(2));
+        Self { name: self.name.clone(), parent: self.parent, at, axes }
     }
 }
 

@@ -191,7 +191,9 @@ impl Shoots<'_> {
             tube::rigid(&rings, tube::sides(radius, sides, self.growth.cell())),
             axis::material(&self.growth.desc.stem_material),
         );
-        self.organs.push(Organ { kind: OrganKind::Stem, leaf: 0, material, mesh, axis: None });
+        let line = std::iter::once(foot.point).chain(nodes.iter().map(|(point, ..)| *point));
+        let lines = vec![line.collect()];
+        self.organs.push(Organ { kind: OrganKind::Stem, leaf: 0, material, mesh, axis: None, lines });
         nodes
     }
 

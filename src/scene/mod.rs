@@ -21,7 +21,7 @@ use crate::film::Footprint;
 use crate::light::Light;
 use crate::material::Material;
 use crate::math::Vec3;
-use crate::plant::{Condition, LeafAxis};
+use crate::plant::{Condition, LeafAxis, RigJoint};
 use crate::sensor::Camera;
 use tag::{Class, Tag};
 
@@ -62,6 +62,8 @@ pub struct PlantRecord {
     pub leaves: u16,
     /// Base and tip of its leaves' blades, metres, world, by rising leaf; none of a model from disk, which has no midribs.
     pub leaf_axes: Vec<LeafAxis>,
+    /// The joints of its stems, metres, world; none unless asked for by [`assemble::Options::rigged`].
+    pub rig: Vec<RigJoint>,
     /// Its condition; none where no scene file says any.
     pub condition: Option<Condition>,
 }

@@ -20,7 +20,7 @@ pub(crate) struct Args {
     /// Folder for the files; `out/`, the scene file's name and the format's unless given.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Keep the joints of leaves as skins with weights, so that leaves bend in the other program; with `--format gltf`.
+    /// Keep the joints of leaves and stems as skins with weights, so that plants bend in the other program; with `--format gltf`.
     #[arg(long)]
     skins: bool,
     /// Points a square metre of surface; with `--format ply`, 100000 unless given.

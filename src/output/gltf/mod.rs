@@ -1,7 +1,7 @@
 //! A scene as glTF 2.0, in one GLB file: for Blender, for viewers, and for scene files that place it again.
 //!
 //! One node and mesh a part, in the order of the scene, named by its label, which also stands in its `extras` as class, plant
-//! and leaf. Leaves that keep their joints have skins (`skins`). Positions, normals, texture coordinates and indices are ours bit for bit; a node above them all turns z up into
+//! and leaf. Leaves and stems that keep their joints have skins (`skins`). Positions, normals, texture coordinates and indices are ours bit for bit; a node above them all turns z up into
 //! the format's y up. Opacity is 0 or 255, cut at ½ and read without a filter: the masks are ours bit for bit, too.
 //!
 //! A leaf returns R and passes T in every band. `KHR_materials_diffuse_transmission` mixes the two by one share f: base colour
@@ -42,7 +42,7 @@ const LUMENS: f64 = 683.0 * 106.857;
 /// Nearest depth that other programs should draw, metres.
 const NEAR: f64 = 0.01;
 
-/// Writes `scene.glb` into `folder`; `provenance` says where the scene came from. Leaves of `plants` that keep their joints get skins.
+/// Writes `scene.glb` into `folder`; `provenance` says where the scene came from. Leaves and stems of `plants` that keep their joints get skins.
 pub fn write(folder: &Path, scene: &Scene, plants: &[PlantRecord], provenance: &str) -> Result<Export> {
     let (bytes, warnings) = encode(scene, plants, provenance)?;
     let path = folder.join("scene.glb");
@@ -76,8 +76,7 @@ pub fn encode(scene: &Scene, plants: &[PlantRecord], provenance: &str) -> Result
         let extras = document.meshes[mesh].extras.clone();
         let name = document.meshes[mesh].name.clone();
         let weighted = !part.mesh.weights.is_empty();
-        let called = name.as_deref().filter(|_| weighted).unwrap_or_default();
-        let skin = if weighted { skins.of(part.tag, called, &mut document, &mut pack, &mut top) } else { None };
+        let skin = if weighted { skins.of(part.tag, self::name, &mut document, &mut pack, &mut top) } else { None };
         top.push(document.nodes.len());
         document.nodes.push(Node { name, mesh: Some(mesh), skin, extras, ..Node::default() });
     }

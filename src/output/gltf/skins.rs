@@ -1,6 +1,7 @@
-//! Skins: the joints by which leaves were bent, so that they can be bent further.
+//! Skins: the joints by which leaves were bent and along which stems stand, so that plants can be bent further.
 //!
-//! A leaf is one skin, a tree of nodes; all its parts (leaflets, petiole) are bent by it, a corner by up to four joints:
+//! A leaf is one skin, a tree of nodes; all its parts (leaflets, petiole) are bent by it. So is all of a plant that belongs to no leaf: its
+//! stems, flowers and fruits. A leaf's joints hang on the nearest one of its plant's stems, and go with it. A corner is carried by up to four joints:
 //! Σ wₖ · Gₖ · Iₖ · p, with Gₖ the place of joint k and Iₖ its inverse bind matrix. Iₖ is the inverse of Gₖ as the file is written, below
 //! the node that turns the axes, so the pose of the file is the mesh of the file. A joint turns about its own z axis; see
 //! [`RigJoint::axes`].
@@ -13,49 +14,74 @@ use crate::scene::PlantRecord;
 use crate::scene::tag::Tag;
 use std::collections::BTreeMap;
 
+/// The farthest that a leaf's foot is from the joint of the stem that carries it, metres: that of a grass stands on the ground, and what bears
+/// its ear begins where the sheaths end.
+const REACH: f32 = 0.1;
+
+/// A plant's stem, leaf 0, or one of its leaves.
+type Whose = (u32, u16);
+
+/// A skin that is written.
+struct Written {
+    number: usize,
+    /// Node of its first joint.
+    first: usize,
+    /// Its joints as a reader finds them, below the node that turns the axes.
+    places: Vec<DMat4>,
+}
+
 /// The skins of a document while it grows.
 pub(super) struct Skins<'a> {
-    /// Joints by plant and leaf.
-    rigs: BTreeMap<(u32, u16), &'a [RigJoint]>,
-    /// Numbers of those that are written.
-    written: BTreeMap<(u32, u16), usize>,
+    rigs: BTreeMap<Whose, &'a [RigJoint]>,
+    written: BTreeMap<Whose, Written>,
 }
 
 impl<'a> Skins<'a> {
-    /// Those of plants whose leaves keep their joints.
+    /// Those of plants whose leaves and stems keep their joints.
     pub(super) fn new(plants: &'a [PlantRecord]) -> Self {
-        let leaves = plants.iter().flat_map(|plant| plant.leaf_axes.iter().map(|axis| (plant.number, axis)));
-        let rigs = leaves.filter(|(_, axis)| !axis.rig.is_empty());
-        Self { rigs: rigs.map(|(plant, axis)| ((plant, axis.leaf), &*axis.rig)).collect(), written: BTreeMap::new() }
+        let of = |plant: &'a PlantRecord| {
+            let leaves = plant.leaf_axes.iter().map(|axis| ((plant.number, axis.leaf), &*axis.rig));
+            leaves.chain([((plant.number, 0), &*plant.rig)])
+        };
+        let rigs = plants.iter().flat_map(of).filter(|(_, rig)| !rig.is_empty()).collect();
+        Self { rigs, written: BTreeMap::new() }
     }
 
-    /// Number of the skin of what has this tag, if it has one; its joints are written the first time, and the first of them is told to
-    /// `top`. Their names begin with `name`.
+    /// Number of the skin of what has this tag, if it has one; its joints are written the first time, those of its plant's stem before, and
+    /// what hangs on no other joint is told to `top`. Their names begin with what `name` makes of the tag.
     pub(super) fn of(
         &mut self,
         tag: Tag,
-        name: &str,
+        name: fn(Tag) -> String,
         document: &mut Document,
         pack: &mut Pack,
         top: &mut Vec<usize>,
     ) -> Option<usize> {
-        let leaf = (tag.plant, tag.leaf);
-        let rig = self.rigs.get(&leaf)?;
-        if let Some(number) = self.written.get(&leaf) {
-            return Some(*number);
+        let whose = (tag.plant, tag.leaf);
+        let rig = *self.rigs.get(&whose)?;
+        if let Some(skin) = self.written.get(&whose) {
+            return Some(skin.number);
         }
+        if tag.leaf > 0 {
+            self.of(Tag { leaf: 0, ..tag }, name, document, pack, top);
+        }
+        let name = name(tag);
         let first = document.nodes.len();
-        top.push(first);
         let mut places: Vec<DMat4> = Vec::with_capacity(rig.len());
         for (k, joint) in rig.iter().enumerate() {
-            let (rotation, translation) = step(joint, joint.parent.map(|parent| &rig[usize::from(parent)]));
-            let above = joint.parent.map_or(DMat4::IDENTITY, |parent| places[usize::from(parent)]);
+            let above = match joint.parent.map(usize::from) {
+                Some(k) => Some(Above { node: first + k, place: places[k], joint: &rig[k] }),
+                None => self.bearer(whose, joint),
+            };
+            let (rotation, translation) = step(joint, above.as_ref().map(|above| above.joint));
             // As a reader finds it, whatever was rounded.
             let turn = DQuat::from_array(rotation.map(f64::from)).normalize();
             let moved = DVec3::from_array(translation.map(f64::from));
-            places.push(above * DMat4::from_rotation_translation(turn, moved));
-            if let Some(parent) = joint.parent {
-                document.nodes[first + usize::from(parent)].children.push(first + k);
+            let place = above.as_ref().map_or(DMat4::IDENTITY, |above| above.place);
+            places.push(place * DMat4::from_rotation_translation(turn, moved));
+            match above {
+                Some(above) => document.nodes[above.node].children.push(first + k),
+                None => top.push(first + k),
             }
             document.nodes.push(Node {
                 name: Some(format!("{name} {}", joint.name)),
@@ -66,15 +92,31 @@ impl<'a> Skins<'a> {
         }
         let binds: Vec<DMat4> = places.iter().map(DMat4::inverse).collect();
         document.skins.push(Skin {
-            name: Some(name.to_owned()),
+            name: Some(name),
             inverse_bind_matrices: Some(pack.matrices(&binds)),
             skeleton: Some(first),
             joints: (first..document.nodes.len()).collect(),
         });
         let number = document.skins.len() - 1;
-        self.written.insert(leaf, number);
+        self.written.insert(whose, Written { number, first, places });
         Some(number)
     }
+
+    /// The joint of its plant's stem that carries a leaf whose first joint this is, if one is near.
+    fn bearer(&self, (plant, leaf): Whose, joint: &RigJoint) -> Option<Above<'a>> {
+        let stem = (leaf > 0).then_some((plant, 0))?;
+        let (rig, written) = (*self.rigs.get(&stem)?, self.written.get(&stem)?);
+        let far = |k: &usize| rig[*k].at.distance(joint.at);
+        let k = (0..rig.len()).min_by(|a, b| far(a).total_cmp(&far(b))).filter(|k| far(k) <= REACH)?;
+        Some(Above { node: written.first + k, place: written.places[k], joint: &rig[k] })
+    }
+}
+
+/// The joint on which another hangs.
+struct Above<'a> {
+    node: usize,
+    place: DMat4,
+    joint: &'a RigJoint,
 }
 
 /// From a joint's parent, or from the world, to the joint: a unit quaternion x, y, z, w, and an offset in metres.

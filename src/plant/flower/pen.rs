@@ -94,14 +94,21 @@ impl Pen {
 
     /// Adds a mesh to the organ of this kind and material.
     pub(in crate::plant) fn add(&mut self, kind: OrganKind, material: &str, mesh: &Mesh) {
+        self.add_along(kind, material, mesh, None);
+    }
+
+    /// Adds a mesh to the organ of this kind and material, and the middle line of the stem that it is, if it is one.
+    fn add_along(&mut self, kind: OrganKind, material: &str, mesh: &Mesh, line: Option<&[Vec3]>) {
         if mesh.triangles.is_empty() {
             return;
         }
+        let line = line.map(<[Vec3]>::to_vec);
         if let Some(organ) = self.organs.iter_mut().find(|o| o.kind == kind && o.material == material) {
             organ.mesh.append(mesh);
+            organ.lines.extend(line);
         } else {
-            let (material, mesh) = (material.to_owned(), mesh.clone());
-            self.organs.push(Organ { kind, leaf: 0, material, mesh, axis: None });
+            let (material, mesh, lines) = (material.to_owned(), mesh.clone(), line.into_iter().collect());
+            self.organs.push(Organ { kind, leaf: 0, material, mesh, axis: None, lines });
         }
     }
 
@@ -188,6 +195,17 @@ impl Pen {
 
     /// Draws a round strand through points, of these radii at its base and tip, metres.
     pub(in crate::plant) fn strand(&mut self, kind: OrganKind, material: &str, points: &[Vec3], radii: (f32, f32)) {
+        let mesh = self.tube(points, radii);
+        self.add(kind, material, &mesh);
+    }
+
+    /// Draws a stem: a strand along which the plant bends.
+    pub(in crate::plant) fn stem(&mut self, material: &str, points: &[Vec3], radii: (f32, f32)) {
+        let mesh = self.tube(points, radii);
+        self.add_along(OrganKind::Stem, material, &mesh, Some(points));
+    }
+
+    fn tube(&self, points: &[Vec3], radii: (f32, f32)) -> Mesh {
         let sides = self.cells(6.0 * radii.0, 3.0, 10.0);
         let last = points.len().saturating_sub(1).max(1) as f32;
         let mut rings = Vec::with_capacity(points.len() + 3);
@@ -199,7 +217,7 @@ impl Pen {
             rings.push(axis::ring(*point, along, radius, Profile::Channelled(1.0)));
         }
         axis::dome(&mut rings, along, radii.1, 1.0);
-        self.add(kind, material, &tube::rigid(&rings, sides));
+        tube::rigid(&rings, sides)
     }
 }
 

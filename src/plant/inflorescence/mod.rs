@@ -205,7 +205,7 @@ impl<'a> Grower<'a, '_> {
         let of_stem = &self.growth.desc.stem_material;
         let material =
             [&held(ends).material, of_stem].into_iter().find(|m| !m.is_empty()).map_or("stalk", String::as_str);
-        self.pen.strand(OrganKind::Stem, material, &axis.points, axis.radii);
+        self.pen.stem(material, &axis.points, axis.radii);
         for (k, leaves) in ends.1.leaves.iter().enumerate() {
             let ends = (ends.0.and_then(|d| d.leaves.get(k)), leaves);
             self.leaves((sort, nth, k), ends, &own.child(Purpose::Leaf, k as u64), &axis);

@@ -135,6 +135,7 @@ impl Builder<'_> {
             radius: across,
             leaves: parts.iter().map(|p| p.tag.leaf).max().unwrap_or(0),
             leaf_axes: Vec::new(),
+            rig: Vec::new(),
             condition: None,
         }
     }

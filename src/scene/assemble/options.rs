@@ -29,7 +29,8 @@ pub struct Options {
     /// Whether the field is only labelled: what the ground looks like is not worked out, and it reflects nothing. Its shape, and everything that
     /// is told of the field, stays.
     pub unlit: bool,
-    /// Whether leaves keep the joints by which they bend ([`LeafAxis::rig`](crate::plant::LeafAxis::rig)) and the weights of their corners.
+    /// Whether leaves and stems keep the joints by which they bend ([`LeafAxis::rig`](crate::plant::LeafAxis::rig),
+    /// [`PlantRecord::rig`](crate::scene::PlantRecord::rig)) and the weights of their corners.
     pub rigged: bool,
     /// Given for a scan: the field is grown as far and as finely as a LiDAR sees it, not its cameras.
     pub scan: Option<Scanner>,

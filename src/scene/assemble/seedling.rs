@@ -66,7 +66,7 @@ pub(super) struct Place {
     pub(super) dust: Spectrum,
     /// Shortest cell of its mesh, metres.
     pub(super) cell: f32,
-    /// Whether its leaves keep their joints.
+    /// Whether its leaves and stems keep their joints.
     pub(super) rigged: bool,
 }
 
@@ -118,6 +118,7 @@ pub(super) fn grow(
         radius: plant.radius,
         leaves: plant.organs.iter().map(|o| o.leaf).filter(|leaf| kept(*leaf)).max().unwrap_or(0),
         leaf_axes,
+        rig: if kept(0) { plant.rig.iter().map(|joint| joint.moved(to_world)).collect() } else { Vec::new() },
         condition: ailing.as_ref().map(Ailing::drawn),
         ..unborn(s, normal, z)
     };
@@ -189,6 +190,7 @@ fn unborn(s: &Seedling, normal: Vec3, height: f32) -> PlantRecord {
         radius: 0.0,
         leaves: 0,
         leaf_axes: Vec::new(),
+        rig: Vec::new(),
         condition: None,
     }
 }

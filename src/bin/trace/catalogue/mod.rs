@@ -77,7 +77,7 @@ pub(crate) struct Args {
 
 /// Draws the sheets that are missing or would differ, then the page that shows them; returns their paths.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
-    cli::check_folder(&args.out)?;
+    args.check_folders()?;
     let pages = args.pages()?;
     // All of them before anything is drawn: one that cannot be read does not cost the drawing.
     let photographs = pages.iter().map(|page| args.photographs(page)).collect::<Result<Vec<_>>>()?;
@@ -95,6 +95,16 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
 }
 
 impl Args {
+    /// Sheets can be written, and take the place of no photograph.
+    fn check_folders(&self) -> Result<()> {
+        let place = |folder: &Path| std::fs::canonicalize(folder).ok();
+        if self.beside.as_deref().and_then(place).is_some_and(|beside| place(&self.out) == Some(beside)) {
+            let words = "--out names the folder of the photographs: a sheet would take the place of one of its name";
+            return Err(Error::misuse(words).in_file(&self.out).help("name another folder with --out"));
+        }
+        cli::check_folder(&self.out)
+    }
+
     /// The species files that are asked for, in order of their names.
     fn pages(&self) -> Result<Vec<PathBuf>> {
         let folder = self.folder()?;
