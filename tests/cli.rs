@@ -300,12 +300,13 @@ fn photographs_are_read_before_a_catalogue_is_drawn() {
     // A sheet has the name of its species.
     let photograph = furrow::output::encode_jpeg(8, 8, &[[90, 120, 30]; 64], 90).unwrap();
     std::fs::write(at.join("echinochloa.png"), &photograph).unwrap();
-    let into = at.join("../").join(at.file_name().unwrap());
-    let rest = ["--out", into.to_str().unwrap(), "--beside", ".", "--species-dir", species.to_str().unwrap()];
-    let done = run(at, &[&["catalogue", "--species", "echinochloa"], rest.as_slice()].concat());
-    let said = text(&done.stderr);
-    assert!(done.status.code() == Some(2) && said.contains("take the place"), "{said}");
-    assert_eq!(std::fs::read(at.join("echinochloa.png")).unwrap(), photograph);
+    for into in [".", "./no-folder/.."] {
+        let rest = ["--out", into, "--beside", ".", "--species-dir", species.to_str().unwrap()];
+        let done = run(at, &[&["catalogue", "--species", "echinochloa"], rest.as_slice()].concat());
+        let said = text(&done.stderr);
+        assert!(done.status.code() == Some(2) && said.contains("take the place"), "{into}: {said}");
+        assert_eq!(std::fs::read(at.join("echinochloa.png")).unwrap(), photograph);
+    }
 }
 
 /// Rationale: cut-outs of one stage had all stages measured. Expected: of a cut-out whose name tells a stage, in colour or in gray, that stage's

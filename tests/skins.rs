@@ -7,7 +7,6 @@
 use crate::common::program::{SMALL, field, scratch, trace};
 use furrow::math::{DMat4, DQuat, DVec3};
 use furrow::output;
-use furrow::plant::RigJoint;
 use furrow::scene::Field;
 use furrow::scene::assemble::Options;
 use gltf::Gltf;
@@ -31,16 +30,18 @@ fn grown(rigged: bool) -> Field {
     field(&text, &Options { rigged, ..Options::default() })
 }
 
-/// A rape in flower and a wheat in ear.
+/// Plants with flowers, ears and fruits on stems of several kinds.
 fn flowering() -> Field {
-    let plant = |species: &str, bbch: u32, x: f32| {
+    let sorts = [("rape", 65), ("wheat", 65), ("papaver", 75), ("potato", 75), ("sugar_beet", 65), ("maize", 69)];
+    let plant = |(k, (species, bbch)): (usize, &(&str, u32))| {
+        let x = k as f32 - 2.5;
         format!("(species: \"scenes/species/{species}.ron\", growth: Bbch({bbch}), position_m: ({x}, 3)),")
     };
-    let all = plant("rape", 65, -0.3) + &plant("wheat", 65, 0.3);
+    let all: String = sorts.iter().enumerate().map(plant).collect();
     let text = format!(
         "Field(
             seed: 12,
-            camera: Pinhole(size: (64, 48), intrinsics: FieldOfView(horizontal_deg: 50), pose: Nadir(height_m: 3, at_m: (0, 3))),
+            camera: Pinhole(size: (64, 48), intrinsics: FieldOfView(horizontal_deg: 50), pose: Nadir(height_m: 8, at_m: (0, 3))),
             lights: [Constant(radiance: (1, 1, 1, 1))],
             plants: [{all}],
         )"
@@ -68,6 +69,7 @@ struct Skinned {
     corners: Vec<Corner>,
     joints: Vec<usize>,
     binds: Vec<DMat4>,
+    triangles: Vec<[usize; 3]>,
     /// Whether its material has a mask.
     masked: bool,
 }
@@ -122,7 +124,9 @@ fn skinned(file: &Gltf) -> Vec<Skinned> {
             assert_eq!(used.iter().map(|(k, _)| *k).collect::<BTreeSet<_>>().len(), used.len(), "a joint twice");
             Corner { at: DVec3::from_array(at.map(f64::from)), uv, weights: used }
         };
+        let indices: Vec<usize> = reader.read_indices().unwrap().into_u32().map(|i| i as usize).collect();
         all.push(Skinned {
+            triangles: indices.as_chunks::<3>().0.to_vec(),
             name: node.name().unwrap().to_owned(),
             corners: corners.map(corner).collect(),
             joints: skin.joints().map(|joint| joint.index()).collect(),
@@ -224,45 +228,52 @@ fn a_joint_moves_what_lies_beyond_it_and_nothing_else() {
     assert!(tested >= 4, "{tested} blades");
 }
 
-/// Rationale: who bends a stem means all that stands on it. Expected: a joint of a stem of rape in flower moves the stem beyond it, flowers and
-/// leaves too, by about their distance from the joint times the angle, and nothing below it; those of a wheat's ear move no leaf.
+/// Rationale: who bends a stem means all that stands on it, and nothing torn: where corners went with the nearest stem, flowers that touched
+/// another shoot were drawn out to a quarter of a metre. Expected: whichever stem joint of rape, poppy, potato, bolting beet, wheat and maize is turned,
+/// no edge of a mesh grows beyond what a bend of its stem makes of it, and what is beyond the joint is carried; leaves of grasses stay.
 #[test]
-fn a_stems_joint_carries_its_leaves_and_flowers() {
+fn a_stems_joint_carries_its_leaves_and_flowers_whole() {
     let field = flowering();
     let file = Gltf::from_slice(&encoded(&field)).unwrap();
     let rest = places(&file, &BTreeMap::new());
     let all = skinned(&file);
+    let nodes: BTreeMap<&str, usize> = file.nodes().filter_map(|node| Some((node.name()?, node.index()))).collect();
     let angle = 0.2;
     for plant in &field.plants {
-        let name = format!("crop {}", plant.number);
-        let nodes: BTreeMap<&str, usize> = file.nodes().filter_map(|node| Some((node.name()?, node.index()))).collect();
-        // The first stem's own joint half-way up, or the ear's first.
-        let follows = |(k, joint): &(usize, &RigJoint)| joint.parent.map(usize::from) == k.checked_sub(1);
-        let stem = plant.rig.iter().enumerate().take_while(follows).map(|(_, joint)| joint);
-        let joint = stem.filter(|joint| joint.at.z < 0.4 * plant.height).last().unwrap_or(&plant.rig[0]);
-        let node = nodes[&*format!("{name} {}", joint.name)];
-        let at = rest[&node].w_axis.truncate();
-        let change = BTreeMap::from([(node, DMat4::from_quat(DQuat::from_rotation_z(angle)))]);
-        let turned = places(&file, &change);
-        let (mut carried, mut still, mut leaves, mut flowers) = (0, 0, 0, 0);
-        for one in all.iter().filter(|one| one.name == name || one.name.starts_with(&format!("{name} leaf"))) {
-            for (before, after) in one.posed(&rest).iter().zip(one.posed(&turned)) {
-                let (moved, lever) = (before.distance(after), before.distance(at));
-                assert!(moved <= 1.05 * angle * lever + 1e-3, "{}: {moved} at {lever}", one.name);
-                let far = moved > 0.2 * angle * lever && lever > 0.02;
-                carried += usize::from(far);
-                leaves += usize::from(far && one.name.contains("leaf"));
-                flowers += usize::from(far && before.y > f64::from(0.8 * plant.height));
-                still += usize::from(moved < 1e-9);
+        let name = format!("{} {}", plant.class.name(), plant.number);
+        let worn = all.iter().filter(|one| one.name == name || one.name.starts_with(&format!("{name} leaf")));
+        let worn: Vec<(&Skinned, Vec<DVec3>)> = worn.map(|one| (one, one.posed(&rest))).collect();
+        let (mut torn, mut flowers, mut leaves) = (0.0_f64, 0, 0);
+        // Every joint of a few, one in some of many.
+        for joint in plant.rig.iter().step_by(plant.rig.len().div_ceil(25)) {
+            let node = nodes[&*format!("{name} {}", joint.name)];
+            let change = BTreeMap::from([(node, DMat4::from_quat(DQuat::from_rotation_z(angle)))]);
+            let turned = places(&file, &change);
+            let at = rest[&node].w_axis.truncate();
+            for (one, before) in &worn {
+                let after = one.posed(&turned);
+                for triangle in &one.triangles {
+                    for (i, k) in [(0, 1), (1, 2), (2, 0)].map(|(i, k)| (triangle[i], triangle[k])) {
+                        torn = torn.max(after[i].distance(after[k]) - before[i].distance(before[k]));
+                    }
+                }
+                let far =
+                    |(p, q): (&DVec3, &DVec3)| p.distance(*q) > 0.5 * angle * p.distance(at) && p.distance(at) > 0.02;
+                let carried = before.iter().zip(&after).filter(|pair| far(*pair)).count();
+                *(if one.name.contains("leaf") { &mut leaves } else { &mut flowers }) += carried;
             }
         }
         eprintln!(
-            "{} ({} joints): {carried} corners carried, {leaves} of leaves, {still} still",
+            "{}, {} joints: edges grow by {:.1} mm at most; {leaves} corners of leaves, {flowers} others carried",
             plant.species,
-            plant.rig.len()
+            plant.rig.len(),
+            1e3 * torn
         );
-        assert!(carried > 100 && still > 100 && flowers > 50, "{}", plant.species);
-        assert_eq!(leaves > 0, plant.species.contains("rape"), "{}", plant.species);
+        assert!(torn < 0.006, "{}: {torn} m", plant.species);
+        assert!(flowers > 1000, "{}", plant.species);
+        let grass = ["Triticum", "Zea"].iter().any(|genus| plant.species.starts_with(genus))
+            || ["wheat", "maize"].iter().any(|word| plant.species.contains(word));
+        assert_eq!(leaves > 0, !grass, "{}", plant.species);
     }
 }
 

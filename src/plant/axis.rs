@@ -2,7 +2,7 @@
 
 use super::growth::{Growth, LeafNow};
 use super::leaf::Seat;
-use super::organ::{Organ, OrganKind};
+use super::organ::{self, Carried, OnStem, Organ, OrganKind, StemLine};
 use super::tube::{self, Profile, Ring};
 use crate::math::{Frame, Vec3, direction, lerp, smoothstep, vec3};
 use crate::sampling::{Purpose, Stream};
@@ -36,6 +36,8 @@ pub(super) struct Axis {
     nodes: Vec<(Vec3, Vec3)>,
     radii: Vec<f32>,
     section: Section,
+    /// Where each node is on the plant's stems.
+    on: Vec<OnStem>,
     /// Height of the crown's dome over its radius; 0 where a stem goes on.
     crown: f32,
 }
@@ -51,7 +53,8 @@ impl Axis {
         // On a crown the younger leaves stand higher up the dome, just under its surface.
         let whole = self.radii[0];
         let lift = whole * (self.crown * (1.0 - (r / whole).powi(2)).max(0.0).sqrt() - 0.1 * self.crown);
-        Seat { point: point + (out - axis * out.dot(axis)) * r + axis * lift, axis, out }
+        let on = self.on.get(leaf.layer.min(last)).copied();
+        Seat { point: point + (out - axis * out.dot(axis)) * r + axis * lift, axis, out, on }
     }
 }
 
@@ -118,7 +121,7 @@ pub(super) fn stem(
         nodes.push((base, direction_now));
         radii.push(radius);
     }
-    hypocotyl(organs, growth, foot, radius);
+    let foot = hypocotyl(organs, growth, foot, radius);
     let mut rings: Vec<Ring> = Vec::with_capacity(2 * nodes.len() + 4);
     if stemless {
         // Leaf bases close round a crown: it is green like them, however red the hypocotyl below.
@@ -141,15 +144,18 @@ pub(super) fn stem(
         }
     }
     let mesh = tube::rigid(&rings, tube::sides(radius, if stemless { 10 } else { 12 }, growth.cell()));
-    organs.push(Organ {
-        kind: OrganKind::Stem,
-        leaf: 0,
-        material: material(&growth.desc.stem_material),
-        mesh,
-        axis: None,
-        lines: if stemless { Vec::new() } else { vec![nodes.iter().map(|(point, _)| *point).collect()] },
-    });
-    Axis { nodes, radii, section, crown }
+    let material = material(&growth.desc.stem_material);
+    let on = if stemless {
+        let carried = vec![Carried { corners: mesh.positions.len(), line: foot.line, at: Some(foot.at) }];
+        organs.push(Organ { kind: OrganKind::Stem, leaf: 0, material, mesh, axis: None, lines: Vec::new(), carried });
+        vec![foot; nodes.len()]
+    } else {
+        let number = organ::next_line(organs);
+        let line = StemLine { number, points: nodes.iter().map(|(point, _)| *point).collect(), on: Some(foot) };
+        organs.push(Organ::stem(OrganKind::Stem, material, mesh, line));
+        (0..nodes.len()).map(|k| OnStem { line: number, at: k as f32 }).collect()
+    };
+    Axis { nodes, radii, section, on, crown }
 }
 
 /// The written name of a material, or that of stalks.
@@ -158,8 +164,8 @@ pub(super) fn material(own: &str) -> String {
 }
 
 /// Adds the stem below the seed leaves, from its foot on: round, of this radius at both ends. Where it is slender it is a little bowed and
-/// thinner in its middle, as one that has pushed itself out of the soil is.
-pub(super) fn hypocotyl(organs: &mut Vec<Organ>, growth: &Growth<'_>, foot: Foot, radius: f32) {
+/// thinner in its middle, as one that has pushed itself out of the soil is. Returns its upper end.
+pub(super) fn hypocotyl(organs: &mut Vec<Organ>, growth: &Growth<'_>, foot: Foot, radius: f32) -> OnStem {
     let Foot { point, along, size, root, mut stream } = foot;
     let length = growth.hypocotyl * size;
     let side = along.cross(direction(FRAC_PI_2, stream.range32(0.0, TAU))).normalize_or(Vec3::X);
@@ -177,8 +183,10 @@ pub(super) fn hypocotyl(organs: &mut Vec<Organ>, growth: &Growth<'_>, foot: Foot
     dome(&mut rings, along, radius, 0.5);
     let (mesh, material) =
         (tube::rigid(&rings, tube::sides(radius, 10, growth.cell())), material(&growth.desc.hypocotyl_material));
-    let lines = vec![vec![point, point + along * length]];
-    organs.push(Organ { kind: OrganKind::Hypocotyl, leaf: 0, material, mesh, axis: None, lines });
+    let line = StemLine { number: organ::next_line(organs), points: vec![point, point + along * length], on: None };
+    let end = line.end();
+    organs.push(Organ::stem(OrganKind::Hypocotyl, material, mesh, line));
+    end
 }
 
 /// A ring across `along`.

@@ -6,7 +6,7 @@ use super::growth::{CELL, LeafNow};
 use super::kind::Shape;
 use super::leaflets;
 use super::margin::LeafOutline;
-use super::organ::{LeafAxis, LeafSize, Organ, OrganKind};
+use super::organ::{LeafAxis, LeafSize, OnStem, Organ, OrganKind};
 use super::ribbons::{self, Division};
 use super::rig;
 use super::skeleton::{Measures, Pose, Skeleton};
@@ -41,6 +41,8 @@ pub(super) struct Seat {
     pub(super) axis: Vec3,
     /// The side of the axis on which the leaf stands; not along the axis.
     pub(super) out: Vec3,
+    /// Where that is on the plant's stems.
+    pub(super) on: Option<OnStem>,
 }
 
 /// What the lower part of a leaf is.
@@ -111,15 +113,10 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
         size: LeafSize { length: leaf.blade, width: leaf.width, petiole: leaf.stalk },
         joints: skeleton.placed(root),
         rig: if leaf.rigged { rig::rig(&skeleton, root) } else { Vec::new() },
+        on: seat.on,
+        bearer: None,
     };
-    organs.push(Organ {
-        kind,
-        leaf: leaf.number,
-        material: material.to_owned(),
-        mesh,
-        axis: Some(axis),
-        lines: Vec::new(),
-    });
+    organs.push(Organ::of_leaf(kind, leaf.number, material, mesh, Some(axis)));
     let mut rest = stalk(leaf, &skeleton, &relief, lower, &mut stream);
     let ringed = rest.positions.len();
     rest.append(spined);
@@ -133,8 +130,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
         mesh.append(&skin::skin(stipules, &motions, leaf.rigged));
     }
     let kind = if lower == Lower::Petiole { OrganKind::Petiole } else { OrganKind::Sheath };
-    let material = leaf.kind.stalk_material.clone();
-    organs.push(Organ { kind, leaf: leaf.number, material, mesh, axis: None, lines: Vec::new() });
+    organs.push(Organ::of_leaf(kind, leaf.number, &leaf.kind.stalk_material, mesh, None));
 }
 
 /// Corners round the stalk.

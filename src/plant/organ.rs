@@ -83,6 +83,48 @@ pub struct LeafAxis {
     pub joints: Vec<PlacedJoint>,
     /// All its joints with their axes; none unless asked for by [`GrowOptions::rigged`](super::GrowOptions::rigged).
     pub rig: Vec<RigJoint>,
+    /// Where it stands on its plant's stems; nowhere where its sheath begins at the soil.
+    pub on: Option<OnStem>,
+    /// The joint of its plant's stems that bears it, a place in [`Plant::rig`](super::Plant::rig); none without that.
+    pub bearer: Option<u16>,
+}
+
+/// A place on a plant's stems.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OnStem {
+    /// [`StemLine::number`].
+    pub line: u32,
+    /// How far along it: 1.5 is half-way from its second point to its third.
+    pub at: f32,
+}
+
+/// The middle line of a stem.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StemLine {
+    /// Its number, from 0: that of a stem is larger than that of the one that bears it.
+    pub number: u32,
+    /// Its points from foot to tip, metres.
+    pub points: Vec<Vec3>,
+    /// Where it stands on another; nowhere where it leaves the soil.
+    pub on: Option<OnStem>,
+}
+
+impl StemLine {
+    /// Its tip.
+    pub(super) fn end(&self) -> OnStem {
+        OnStem { line: self.number, at: self.points.len().saturating_sub(1) as f32 }
+    }
+}
+
+/// Corners of an organ that follow each other in its mesh, and the stem that carries them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Carried {
+    /// How many they are.
+    pub corners: usize,
+    /// Its number.
+    pub line: u32,
+    /// How far along it they stand, of what is borne by it; without, each corner is carried by what is next to it.
+    pub at: Option<f32>,
 }
 
 impl LeafAxis {
@@ -114,6 +156,33 @@ pub struct Organ {
     pub mesh: Mesh,
     /// Of a blade, and of nothing else: its leaf's keypoints, size and joints, in the same coordinates.
     pub axis: Option<LeafAxis>,
-    /// The middle lines of the stems in it, each from its foot to its tip, in the same coordinates; none of what is no stem.
-    pub lines: Vec<Vec<Vec3>>,
+    /// The middle lines of the stems in it, in the same coordinates.
+    pub lines: Vec<StemLine>,
+    /// What carries its mesh; empty where that is its leaf.
+    pub carried: Vec<Carried>,
+}
+
+impl Organ {
+    /// An organ of a leaf.
+    pub(super) fn of_leaf(kind: OrganKind, leaf: u16, material: &str, mesh: Mesh, axis: Option<LeafAxis>) -> Self {
+        Self { kind, leaf, material: material.to_owned(), mesh, axis, lines: Vec::new(), carried: Vec::new() }
+    }
+
+    /// A stem along a line.
+    pub(super) fn stem(kind: OrganKind, material: String, mesh: Mesh, line: StemLine) -> Self {
+        let carried = vec![Carried { corners: mesh.positions.len(), line: line.number, at: None }];
+        Self { kind, leaf: 0, material, mesh, axis: None, lines: vec![line], carried }
+    }
+
+    /// Where what is last in its mesh ends, of a stem.
+    pub(super) fn end(&self) -> Option<OnStem> {
+        let last = self.carried.last()?;
+        let own = self.lines.iter().find(|line| line.number == last.line).map(StemLine::end);
+        own.or_else(|| Some(OnStem { line: last.line, at: last.at? }))
+    }
+}
+
+/// The number of the next line of these organs' stems.
+pub(super) fn next_line(organs: &[Organ]) -> u32 {
+    organs.iter().map(|organ| organ.lines.len()).sum::<usize>() as u32
 }

@@ -7,7 +7,7 @@
 use super::axis;
 use super::growth::{self, Growth, LeafNow};
 use super::leaf::{self, Lower, Seat};
-use super::organ::{Organ, OrganKind};
+use super::organ::{self, OnStem, Organ, OrganKind, StemLine};
 use super::stage::MOST_SHOOTS;
 use super::tube::{self, Profile};
 use super::twine::Helix;
@@ -30,8 +30,22 @@ const TWINE: u64 = 1 << 16;
 /// Cells of a side shoot's blades over those of the main shoot's: there are many of them.
 const SIDE_CELL: f32 = 1.2;
 
-/// A stem's nodes: where leaves sit, and the stem's direction and radius there.
-type Nodes = Vec<(Vec3, Vec3, f32)>;
+/// A grown stem.
+struct Stem {
+    /// Its number among the plant's stems.
+    line: u32,
+    /// Its nodes: where leaves sit, and the stem's direction and radius there.
+    nodes: Vec<(Vec3, Vec3, f32)>,
+}
+
+impl Stem {
+    /// A node, and where it is on the plant's stems; the last one beyond it.
+    fn node(&self, node: usize) -> Option<((Vec3, Vec3, f32), OnStem)> {
+        let k = node.min(self.nodes.len().saturating_sub(1));
+        // Its line begins at its foot, before its first node.
+        Some((*self.nodes.get(k)?, OnStem { line: self.line, at: (k + 1) as f32 }))
+    }
+}
 
 /// How a plant of side shoots is built.
 #[derive(Clone, Copy, Debug)]
@@ -67,12 +81,12 @@ pub(super) fn shoots(growth: &Growth<'_>, habit: Habit) -> Vec<Organ> {
     let towards = stream.range32(0.0, TAU);
     let upright = direction(lean, towards);
     let radius = (0.5 * growth.stem).max(2e-4);
-    let foot = Foot { point: upright * growth.hypocotyl, along: upright, radius, length: growth.hypocotyl };
+    let on = axis::hypocotyl(&mut plant.organs, growth, axis::Foot::first(growth, upright), radius);
+    let foot = Foot { point: upright * growth.hypocotyl, along: upright, radius, length: growth.hypocotyl, on };
     plant.line = foot.point.truncate();
-    axis::hypocotyl(&mut plant.organs, growth, axis::Foot::first(growth, upright), radius);
-    let nodes = plant.stem(&foot, &growth.rise, &mut stream);
+    let stem = plant.stem(&foot, &growth.rise, &mut stream);
     for leaf in &growth.leaves {
-        plant.seat(leaf, &nodes, leaf.layer);
+        plant.seat(leaf, &stem, leaf.layer);
     }
     let axils = axils(growth, habit);
     // The lowest axils break first.
@@ -80,8 +94,7 @@ pub(super) fn shoots(growth: &Growth<'_>, habit: Habit) -> Vec<Organ> {
         let Some(above) = growth.numbers.side(k) else { break };
         let stream = growth.stream.child(Purpose::Plant, 100 + k as u64);
         let size = 0.95_f32.powi(k as i32) * there;
-        let Some(shoot) =
-            plant.side(&nodes, Axil { layer: axil.0, node: axil.0, azimuth: axil.1, size }, above, stream)
+        let Some(shoot) = plant.side(&stem, Axil { layer: axil.0, node: axil.0, azimuth: axil.1, size }, above, stream)
         else {
             continue;
         };
@@ -92,7 +105,7 @@ pub(super) fn shoots(growth: &Growth<'_>, habit: Habit) -> Vec<Organ> {
             let stream = growth.stream.child(Purpose::Plant, 200 + (MOST_SHOOTS * k + m) as u64);
             let azimuth = azimuth + shoot.turn;
             let axil = Axil { layer: *layer, node: layer - axil.0 - 1, azimuth, size: 0.8 * shoot.size * there };
-            plant.side(&shoot.nodes, axil, above, stream);
+            plant.side(&shoot.stem, axil, above, stream);
         }
     }
     plant.organs
@@ -116,6 +129,8 @@ struct Foot {
     radius: f32,
     /// Length of the stem below it, metres: it is carried too.
     length: f32,
+    /// Where that is on the plant's stems.
+    on: OnStem,
 }
 
 /// Where a side shoot begins: its layer of the plant, the node of the stem that bears it, its azimuth, and its size over that of the main
@@ -130,7 +145,7 @@ struct Axil {
 
 /// A side shoot.
 struct Shoot {
-    nodes: Nodes,
+    stem: Stem,
     /// What is added to its leaves' azimuths.
     turn: f32,
     size: f32,
@@ -146,8 +161,8 @@ struct Shoots<'a> {
 }
 
 impl Shoots<'_> {
-    /// Grows a stem through nodes at these lengths along it; returns them.
-    fn stem(&mut self, foot: &Foot, rise: &[f32], stream: &mut Stream) -> Nodes {
+    /// Grows a stem through nodes at these lengths along it.
+    fn stem(&mut self, foot: &Foot, rise: &[f32], stream: &mut Stream) -> Stem {
         let Habit { profile, sides, swerve, .. } = self.habit;
         let (sinks, lies) = (self.growth.desc.lies_at.0.f32(), self.growth.desc.lies_at.1.f32());
         let whole = rise.last().copied().unwrap_or(0.0);
@@ -157,7 +172,7 @@ impl Shoots<'_> {
         let start = foot.along.z.clamp(-1.0, 1.0).asin();
         let mut heading = foot.along.x.atan2(foot.along.y);
         let (mut point, mut along, mut below) = (foot.point, foot.along, 0.0);
-        let (mut nodes, mut rings) = (Nodes::new(), Vec::new());
+        let (mut nodes, mut rings) = (Vec::new(), Vec::new());
         rings.push(axis::ring(point - along * (1.2 * foot.radius), along, foot.radius, profile));
         for rise in rise {
             let radius = foot.radius * lerp(1.0, TAPER, if whole > 0.0 { rise / whole } else { 0.0 });
@@ -191,15 +206,16 @@ impl Shoots<'_> {
             tube::rigid(&rings, tube::sides(radius, sides, self.growth.cell())),
             axis::material(&self.growth.desc.stem_material),
         );
-        let line = std::iter::once(foot.point).chain(nodes.iter().map(|(point, ..)| *point));
-        let lines = vec![line.collect()];
-        self.organs.push(Organ { kind: OrganKind::Stem, leaf: 0, material, mesh, axis: None, lines });
-        nodes
+        let points = std::iter::once(foot.point).chain(nodes.iter().map(|(point, ..)| *point)).collect();
+        let line = organ::next_line(&self.organs);
+        let middle = StemLine { number: line, points, on: Some(foot.on) };
+        self.organs.push(Organ::stem(OrganKind::Stem, material, mesh, middle));
+        Stem { line, nodes }
     }
 
     /// Seats a leaf at a node and grows it.
-    fn seat(&mut self, leaf: &LeafNow<'_>, nodes: &Nodes, node: usize) {
-        let Some((point, along, radius)) = nodes.get(node.min(nodes.len().saturating_sub(1))).copied() else { return };
+    fn seat(&mut self, leaf: &LeafNow<'_>, stem: &Stem, node: usize) {
+        let Some(((point, along, radius), on)) = stem.node(node) else { return };
         let out = direction(FRAC_PI_2, leaf.azimuth);
         let (out, stands) = if self.habit.whorled {
             // Carried over with the stem by the shortest turn from upright; what would point into the soil is pressed aside.
@@ -217,20 +233,20 @@ impl Shoots<'_> {
         leaf::grow(
             &mut self.organs,
             leaf,
-            Seat { point: point + level * (0.6 * radius), axis: stands, out },
+            Seat { point: point + level * (0.6 * radius), axis: stands, out, on: Some(on) },
             Lower::Petiole,
         );
     }
 
     /// One side shoot from an axil: the main one's leaves above it, smaller; `above` is added to their numbers.
-    fn side(&mut self, nodes: &Nodes, axil: Axil, above: u16, mut stream: Stream) -> Option<Shoot> {
+    fn side(&mut self, mother: &Stem, axil: Axil, above: u16, mut stream: Stream) -> Option<Shoot> {
         let growth = self.growth;
         let size = stream.range32(SIDE.0, SIDE.1) * axil.size;
-        let (point, along, radius) = nodes.get(axil.node.min(nodes.len().saturating_sub(1))).copied()?;
+        let ((point, along, radius), on) = mother.node(axil.node)?;
         let out = direction(FRAC_PI_2, axil.azimuth + stream.range32(-0.3, 0.3));
         let spread = stream.range32(SPREAD.0, SPREAD.1);
         let start = (Vec3::Z.lerp(along, 0.3) * spread.cos() + out * spread.sin()).normalize_or(out);
-        let foot = Foot { point: point + out * (0.3 * radius), along: start, radius: 0.8 * radius, length: 0.0 };
+        let foot = Foot { point: point + out * (0.3 * radius), along: start, radius: 0.8 * radius, length: 0.0, on };
         // It had less time than the main shoot: it lacks seed leaves and as many layers as stand below its axil.
         let skip = axil.layer + 1;
         let shift = growth.rise.get(axil.layer).copied().unwrap_or(0.0);
@@ -239,7 +255,7 @@ impl Shoots<'_> {
         if rise.is_empty() || size < 0.02 {
             return None;
         }
-        let nodes = self.stem(&foot, &rise, &mut stream);
+        let stem = self.stem(&foot, &rise, &mut stream);
         let turn = stream.range32(0.0, TAU);
         for leaf in growth.leaves.iter().filter(|l| l.layer >= skip && l.blade * size >= super::stage::BUD) {
             let number = leaf.number + above;
@@ -253,8 +269,8 @@ impl Shoots<'_> {
                 stream: growth.stream.child(Purpose::Leaf, u64::from(number)),
                 ..leaf.clone()
             };
-            self.seat(&leaf, &nodes, leaf.layer - skip);
+            self.seat(&leaf, &stem, leaf.layer - skip);
         }
-        Some(Shoot { nodes, turn, size })
+        Some(Shoot { stem, turn, size })
     }
 }

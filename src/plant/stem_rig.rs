@@ -1,104 +1,144 @@
-//! The joints of a plant's stems: what a program needs to bend them further, with all flowers on them.
+//! The joints of a plant's stems: what a program needs to bend them further, with all leaves and flowers on them.
 //!
-//! Every stem organ knows its middle lines ([`Organ::lines`](super::Organ::lines)). A line is a chain of joints, one at each of its points; it
-//! hangs on the joint nearest to its foot, of those that were there before. A corner of what belongs to no leaf goes with the nearest link; half-way
-//! between two joints it is one's alone, at a joint it is shared evenly by those of the links that meet there, so that a bent stem does not kink.
+//! A stem is a chain of links along its middle line ([`StemLine`]); a joint stands where a link begins. A stem hangs on that link of another
+//! at which it stands, so do leaves, flowers and fruits. The corners of a stem go with the nearest link of its own; near a joint both links that
+//! meet there share them, so that a bent stem does not kink.
 
-use super::organ::Organ;
+use super::organ::{OnStem, Organ, StemLine};
 use super::rig::RigJoint;
 use crate::geometry::JointWeights;
 use crate::math::{Mat3, Vec3};
+use std::collections::BTreeMap;
 
-/// What is nearer to a joint is at it, metres.
-const SAME: f32 = 1e-5;
+/// A link shorter than this has no joint of its own, metres.
+const SHORT: f32 = 1e-5;
+/// Share of a link at each of its ends that the next link moves, too.
+const SHARED: f32 = 0.2;
 
-/// The joints of the stems of these organs, parents before children; the organs without a leaf are tied to them.
+/// The joints of the stems of these organs, parents before children; organs without a leaf are tied to them, and leaves are told which one
+/// bears them.
 pub(super) fn rig(organs: &mut [Organ]) -> Vec<RigJoint> {
-    let mut joints: Vec<RigJoint> = Vec::new();
-    for line in organs.iter().flat_map(|organ| &organ.lines) {
-        if u16::try_from(joints.len() + line.len()).is_ok() {
-            hang(&mut joints, line);
+    let mut lines: Vec<&StemLine> = organs.iter().flat_map(|organ| &organ.lines).collect();
+    lines.sort_by_key(|line| line.number);
+    let mut stems = Stems::default();
+    for line in lines {
+        stems.add(line);
+    }
+    for organ in organs {
+        organ.mesh.weights = stems.weights(organ).unwrap_or_else(|| std::mem::take(&mut organ.mesh.weights));
+        if let Some(axis) = &mut organ.axis {
+            axis.bearer = axis.on.and_then(|on| stems.bearer(on));
         }
     }
-    if !joints.is_empty() {
-        let links = links(&joints);
-        for organ in organs.iter_mut().filter(|organ| organ.leaf == 0) {
-            organ.mesh.weights = organ.mesh.positions.iter().map(|p| weights(*p, &joints, &links)).collect();
+    stems.joints
+}
+
+/// A stem as a chain.
+struct Chain {
+    points: Vec<Vec3>,
+    /// The joint of each of its links.
+    links: Vec<u16>,
+    /// The joint that bears it.
+    parent: Option<u16>,
+}
+
+/// All stems of a plant.
+#[derive(Default)]
+struct Stems {
+    joints: Vec<RigJoint>,
+    chains: BTreeMap<u32, Chain>,
+}
+
+impl Stems {
+    fn add(&mut self, line: &StemLine) {
+        let parent = line.on.and_then(|on| self.bearer(on));
+        let mut links = Vec::with_capacity(line.points.len());
+        for (k, ends) in line.points.windows(2).enumerate() {
+            let last = links.last().copied();
+            let along = (ends[1] - ends[0]).normalize_or(Vec3::Z);
+            match (last, u16::try_from(self.joints.len())) {
+                (Some(last), _) if ends[0].distance(ends[1]) < SHORT => links.push(last),
+                (_, Ok(number)) => {
+                    let name = format!("stem {}", k + 1);
+                    let name = if line.number > 0 { format!("stem {}.{}", line.number + 1, k + 1) } else { name };
+                    self.joints.push(RigJoint { name, parent: last.or(parent), at: ends[0], axes: axes(along) });
+                    links.push(number);
+                }
+                // More joints than a file can number: the rest does not bend.
+                (last, Err(_)) => links.extend(last.or(parent)),
+            }
+        }
+        self.chains.insert(line.number, Chain { points: line.points.clone(), links, parent });
+    }
+
+    /// The joint of the link that bears what stands there: at a joint, of the link that ends there.
+    fn bearer(&self, on: OnStem) -> Option<u16> {
+        let chain = self.chains.get(&on.line)?;
+        let Some(last) = chain.links.len().checked_sub(1) else { return chain.parent };
+        if on.at <= 0.0 && chain.parent.is_some() {
+            return chain.parent;
+        }
+        let link = (on.at.ceil() as usize).saturating_sub(1).min(last);
+        Some(chain.links[link])
+    }
+
+    /// What carries the corners of an organ; nothing of a leaf's.
+    fn weights(&self, organ: &Organ) -> Option<Vec<JointWeights>> {
+        if self.joints.is_empty() || organ.carried.is_empty() {
+            return None;
+        }
+        let mut all = Vec::with_capacity(organ.mesh.positions.len());
+        for run in &organ.carried {
+            let corners = &organ.mesh.positions[all.len()..][..run.corners];
+            match run.at {
+                Some(at) => {
+                    let bearer = self.bearer(OnStem { line: run.line, at }).unwrap_or(0);
+                    all.extend(corners.iter().map(|_| tied((bearer, 1.0), None)));
+                }
+                None => all.extend(corners.iter().map(|corner| self.along(run.line, *corner))),
+            }
+        }
+        Some(all)
+    }
+
+    /// What carries a corner of a stem.
+    fn along(&self, line: u32, corner: Vec3) -> JointWeights {
+        let Some(chain) = self.chains.get(&line).filter(|chain| !chain.links.is_empty()) else {
+            return tied((self.chains.get(&line).and_then(|chain| chain.parent).unwrap_or(0), 1.0), None);
+        };
+        let (mut best, mut found) = (f32::INFINITY, (0, 0.0));
+        for (k, ends) in chain.points.windows(2).take(chain.links.len()).enumerate() {
+            let (way, out) = (ends[1] - ends[0], corner - ends[0]);
+            let t = (out.dot(way) / way.length_squared().max(SHORT * SHORT)).clamp(0.0, 1.0);
+            let far = (out - way * t).length_squared();
+            if far < best {
+                (best, found) = (far, (k, t));
+            }
+        }
+        let (k, t) = found;
+        let own = chain.links[k];
+        let (other, near) = if t < 0.5 {
+            (self.joints[usize::from(own)].parent, t)
+        } else {
+            (chain.links[k..].iter().copied().find(|next| *next != own), 1.0 - t)
+        };
+        let share = 0.5 * (1.0 - near / SHARED).max(0.0);
+        match other {
+            Some(other) if share > 0.0 => tied((own, 1.0 - share), Some((other, share))),
+            _ => tied((own, 1.0), None),
         }
     }
-    joints
 }
 
-/// Adds the joints of a line.
-fn hang(joints: &mut Vec<RigJoint>, line: &[Vec3]) {
-    let mut points = line.to_vec();
-    points.dedup_by(|a, b| a.distance(*b) < SAME);
-    let Some(foot) = points.first() else { return };
-    let mut parent = nearest(joints, *foot);
-    let there = parent.is_some_and(|k| joints[usize::from(k)].at.distance(*foot) < SAME);
-    let first = usize::from(there);
-    let mut along = Vec3::Z;
-    for (k, at) in points.iter().enumerate() {
-        along = points.get(k + 1).map_or(along, |next| (*next - *at).normalize_or(along));
-        if k < first {
-            continue;
-        }
-        joints.push(RigJoint { name: format!("stem {}", joints.len() + 1), parent, at: *at, axes: axes(along) });
-        parent = Some((joints.len() - 1) as u16);
-    }
+fn tied(one: (u16, f32), other: Option<(u16, f32)>) -> JointWeights {
+    [one, other.unwrap_or((0, 0.0)), (0, 0.0), (0, 0.0)]
 }
 
-/// The joint nearest to a point.
-fn nearest(joints: &[RigJoint], to: Vec3) -> Option<u16> {
-    let far = |joint: &RigJoint| joint.at.distance_squared(to);
-    (0..joints.len()).min_by(|a, b| far(&joints[*a]).total_cmp(&far(&joints[*b]))).map(|k| k as u16)
-}
-
-/// The axes of a joint whose link has this direction: a positive turn about z raises what lies, and bends what stands towards −x of the plant.
+/// The axes of a joint whose link has this direction: a positive turn about z raises what lies.
 fn axes(along: Vec3) -> Mat3 {
-    let level = Vec3::Z.cross(along);
-    // x × y = z, and y is the upper side of what lies.
-    let hinge = if level.length() > 0.05 { -level.normalize() } else { along.cross(Vec3::NEG_X).normalize_or(Vec3::Y) };
+    let level = along.cross(Vec3::Z);
+    let hinge = if level.length() > 0.05 { level.normalize() } else { along.cross(Vec3::NEG_X).normalize_or(Vec3::Y) };
     Mat3::from_cols(along, hinge.cross(along), hinge)
-}
-
-/// From a joint to one that hangs on it; from one that bears none to itself.
-type Link = (u16, u16);
-
-fn links(joints: &[RigJoint]) -> Vec<Link> {
-    let mut bears = vec![false; joints.len()];
-    let mut links: Vec<Link> = Vec::with_capacity(joints.len());
-    for (k, joint) in joints.iter().enumerate() {
-        if let Some(parent) = joint.parent {
-            bears[usize::from(parent)] = true;
-            links.push((parent, k as u16));
-        }
-    }
-    links.extend((0..joints.len()).filter(|k| !bears[*k]).map(|k| (k as u16, k as u16)));
-    links
-}
-
-/// The joints that carry a corner.
-fn weights(p: Vec3, joints: &[RigJoint], links: &[Link]) -> JointWeights {
-    let joint = |k: u16| &joints[usize::from(k)];
-    let (mut best, mut found) = (f32::INFINITY, ((0, 0), 0.0));
-    for link in links {
-        let (from, to) = (joint(link.0).at, joint(link.1).at);
-        let (way, out) = (to - from, p - from);
-        let t = (out.dot(way) / way.length_squared().max(1e-12)).clamp(0.0, 1.0);
-        let far = (out - way * t).length_squared();
-        if far < best {
-            (best, found) = (far, (*link, t));
-        }
-    }
-    let ((from, to), t) = found;
-    let (other, share) = match (joint(from).parent, t) {
-        _ if from == to => (0, 0.0),
-        (Some(parent), t) if t < 0.5 => (parent, 0.5 - t),
-        (_, t) if t >= 0.5 => (to, t - 0.5),
-        _ => (0, 0.0),
-    };
-    [(from, 1.0 - share), (if share > 0.0 { other } else { 0 }, share), (0, 0.0), (0, 0.0)]
 }
 
 #[cfg(test)]
@@ -106,33 +146,39 @@ mod tests {
     use super::*;
     use crate::math::vec3;
 
-    /// Rationale: a stem that hangs on the wrong joint, or a corner on the wrong link, tears a plant when it is bent. Expected: a stem of three
-    /// joints goes on from that below without a joint twice, a side shoot hangs on the joint nearest to its foot; a corner half-way along a link
-    /// is its joint's alone, one at a joint is shared evenly. Source: by hand.
+    /// Rationale: a stem that hangs on the wrong link, or a corner on another stem's, tears a plant when it is bent. Expected: a stem has a joint
+    /// for each link that has a length; a side shoot hangs on the link on which it stands, at a joint on the one that ends there; a corner in the
+    /// middle of a link is its joint's alone, one at a joint is shared evenly, whatever other stem is near. Source: by hand.
     #[test]
-    fn stems_hang_on_stems_and_corners_on_the_nearest_link() {
-        let mut joints = Vec::new();
-        hang(&mut joints, &[Vec3::ZERO, vec3(0.0, 0.0, 0.1)]);
-        hang(&mut joints, &[vec3(0.0, 0.0, 0.1), vec3(0.0, 0.0, 0.2), vec3(0.0, 0.0, 0.2), vec3(0.0, 0.0, 0.3)]);
-        hang(&mut joints, &[vec3(0.01, 0.0, 0.21), vec3(0.1, 0.0, 0.25)]);
-        let parents: Vec<_> = joints.iter().map(|joint| joint.parent).collect();
-        assert_eq!(parents, [None, Some(0), Some(1), Some(2), Some(2), Some(4)]);
-        let links = links(&joints);
-        let at = |x: f32, z: f32| {
-            let mut all: Vec<_> =
-                weights(vec3(x, 0.0, z), &joints, &links).into_iter().filter(|(_, w)| *w > 1e-6).collect();
+    fn stems_hang_on_links_and_corners_on_their_own_stem() {
+        let mut stems = Stems::default();
+        let up = |z: f32| vec3(0.0, 0.0, z);
+        let on = |line: u32, at: f32| Some(OnStem { line, at });
+        for (number, points, on) in [
+            (0, vec![Vec3::ZERO, up(0.1)], None),
+            (1, vec![up(0.1), up(0.2), up(0.2), up(0.3)], on(0, 1.0)),
+            (2, vec![vec3(0.01, 0.0, 0.28), vec3(0.1, 0.0, 0.3)], on(1, 2.8)),
+            (3, vec![vec3(0.01, 0.0, 0.2), vec3(0.01, 0.0, 0.3)], on(1, 1.0)),
+            (4, vec![vec3(0.5, 0.0, 0.0), vec3(0.5, 0.0, 0.1)], None),
+        ] {
+            stems.add(&StemLine { number, points, on });
+        }
+        let parents: Vec<_> = stems.joints.iter().map(|joint| joint.parent).collect();
+        assert_eq!(parents, [None, Some(0), Some(1), Some(2), Some(1), None]);
+        let near = |line: u32, corner: Vec3| {
+            let mut all: Vec<_> = stems.along(line, corner).into_iter().filter(|(_, w)| *w > 1e-6).collect();
             all.sort_by_key(|(k, _)| *k);
             all
         };
-        assert_eq!(at(0.002, -0.01), [(0, 1.0)]);
-        let [(0, a), (1, b)] = at(0.002, 0.1)[..] else { panic!("{:?}", at(0.002, 0.1)) };
+        assert_eq!(near(0, vec3(0.002, 0.0, -0.01)), [(0, 1.0)]);
+        assert_eq!(near(1, vec3(0.002, 0.0, 0.15)), [(1, 1.0)]);
+        assert_eq!(near(1, vec3(0.01, 0.0, 0.25)), [(2, 1.0)]);
+        let [(1, a), (2, b)] = near(1, up(0.2))[..] else { panic!("{:?}", near(1, up(0.2))) };
         assert!((a - 0.5).abs() < 1e-5 && (b - 0.5).abs() < 1e-5);
-        let [(1, whole)] = at(-0.002, 0.15)[..] else { panic!("{:?}", at(-0.002, 0.15)) };
-        assert!((whole - 1.0).abs() < 1e-5);
-        assert!(at(0.1, 0.25).iter().any(|(k, _)| *k == 4));
-        for joint in &joints {
-            let axes = joint.axes;
-            assert!((axes.determinant() - 1.0).abs() < 1e-5 && axes.x_axis.is_normalized());
+        assert_eq!(stems.bearer(OnStem { line: 1, at: 0.0 }), Some(0));
+        assert_eq!(stems.bearer(OnStem { line: 1, at: 3.0 }), Some(2));
+        for joint in &stems.joints {
+            assert!((joint.axes.determinant() - 1.0).abs() < 1e-5 && joint.axes.x_axis.is_normalized());
         }
         // A turn about z raises what lies.
         let lying = axes(vec3(1.0, 0.0, 0.1).normalize());

@@ -94,7 +94,7 @@ pub(super) fn shoot<'a>(
         let out = (out - axis * out.dot(axis)).normalize_or(Vec3::X);
         // The sheath stands in the soil; its length counts from there up.
         let leaf = LeafNow { stalk: leaf.stalk + foot, pitch: leaf.pitch + leaf.angle, angle: 0.0, ..leaf };
-        let seat = Seat { point: base + out * radius - axis * foot, axis, out };
+        let seat = Seat { point: base + out * radius - axis * foot, axis, out, on: None };
         leaf::grow(organs, &leaf, seat, Lower::Sheath(radius));
     }
 }

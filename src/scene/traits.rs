@@ -339,6 +339,8 @@ mod tests {
             size,
             joints: Vec::new(),
             rig: Vec::new(),
+            on: None,
+            bearer: None,
         }
     }
 

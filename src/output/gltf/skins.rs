@@ -1,7 +1,7 @@
 //! Skins: the joints by which leaves were bent and along which stems stand, so that plants can be bent further.
 //!
 //! A leaf is one skin, a tree of nodes; all its parts (leaflets, petiole) are bent by it. So is all of a plant that belongs to no leaf: its
-//! stems, flowers and fruits. A leaf's joints hang on the nearest one of its plant's stems, and go with it. A corner is carried by up to four joints:
+//! stems, flowers and fruits. A leaf's joints hang on the one of its plant's stems that bears it, and go with it. A corner is carried by up to four joints:
 //! Σ wₖ · Gₖ · Iₖ · p, with Gₖ the place of joint k and Iₖ its inverse bind matrix. Iₖ is the inverse of Gₖ as the file is written, below
 //! the node that turns the axes, so the pose of the file is the mesh of the file. A joint turns about its own z axis; see
 //! [`RigJoint::axes`].
@@ -9,17 +9,20 @@
 use super::pack::Pack;
 use crate::math::{DMat4, DQuat, DVec3, Mat3, Quat};
 use crate::model::document::{Document, Node, Skin};
-use crate::plant::RigJoint;
+use crate::plant::{LeafAxis, RigJoint};
 use crate::scene::PlantRecord;
 use crate::scene::tag::Tag;
 use std::collections::BTreeMap;
 
-/// The farthest that a leaf's foot is from the joint of the stem that carries it, metres: that of a grass stands on the ground, and what bears
-/// its ear begins where the sheaths end.
-const REACH: f32 = 0.1;
-
 /// A plant's stem, leaf 0, or one of its leaves.
 type Whose = (u32, u16);
+
+/// The joints of a skin, and the joint of its plant's stem on which the first hangs.
+#[derive(Clone, Copy)]
+struct Rig<'a> {
+    joints: &'a [RigJoint],
+    bearer: Option<u16>,
+}
 
 /// A skin that is written.
 struct Written {
@@ -32,7 +35,7 @@ struct Written {
 
 /// The skins of a document while it grows.
 pub(super) struct Skins<'a> {
-    rigs: BTreeMap<Whose, &'a [RigJoint]>,
+    rigs: BTreeMap<Whose, Rig<'a>>,
     written: BTreeMap<Whose, Written>,
 }
 
@@ -40,10 +43,10 @@ impl<'a> Skins<'a> {
     /// Those of plants whose leaves and stems keep their joints.
     pub(super) fn new(plants: &'a [PlantRecord]) -> Self {
         let of = |plant: &'a PlantRecord| {
-            let leaves = plant.leaf_axes.iter().map(|axis| ((plant.number, axis.leaf), &*axis.rig));
-            leaves.chain([((plant.number, 0), &*plant.rig)])
+            let leaf = |axis: &'a LeafAxis| ((plant.number, axis.leaf), Rig { joints: &axis.rig, bearer: axis.bearer });
+            plant.leaf_axes.iter().map(leaf).chain([((plant.number, 0), Rig { joints: &plant.rig, bearer: None })])
         };
-        let rigs = plants.iter().flat_map(of).filter(|(_, rig)| !rig.is_empty()).collect();
+        let rigs = plants.iter().flat_map(of).filter(|(_, rig)| !rig.joints.is_empty()).collect();
         Self { rigs, written: BTreeMap::new() }
     }
 
@@ -58,7 +61,7 @@ impl<'a> Skins<'a> {
         top: &mut Vec<usize>,
     ) -> Option<usize> {
         let whose = (tag.plant, tag.leaf);
-        let rig = *self.rigs.get(&whose)?;
+        let Rig { joints: rig, bearer } = *self.rigs.get(&whose)?;
         if let Some(skin) = self.written.get(&whose) {
             return Some(skin.number);
         }
@@ -71,7 +74,7 @@ impl<'a> Skins<'a> {
         for (k, joint) in rig.iter().enumerate() {
             let above = match joint.parent.map(usize::from) {
                 Some(k) => Some(Above { node: first + k, place: places[k], joint: &rig[k] }),
-                None => self.bearer(whose, joint),
+                None => bearer.and_then(|bearer| self.bearer(tag.plant, bearer)),
             };
             let (rotation, translation) = step(joint, above.as_ref().map(|above| above.joint));
             // As a reader finds it, whatever was rounded.
@@ -94,7 +97,8 @@ impl<'a> Skins<'a> {
         document.skins.push(Skin {
             name: Some(name),
             inverse_bind_matrices: Some(pack.matrices(&binds)),
-            skeleton: Some(first),
+            // Stems that leave the soil by themselves have no joint in common.
+            skeleton: (rig.iter().filter(|joint| joint.parent.is_none()).count() == 1).then_some(first),
             joints: (first..document.nodes.len()).collect(),
         });
         let number = document.skins.len() - 1;
@@ -102,13 +106,11 @@ impl<'a> Skins<'a> {
         Some(number)
     }
 
-    /// The joint of its plant's stem that carries a leaf whose first joint this is, if one is near.
-    fn bearer(&self, (plant, leaf): Whose, joint: &RigJoint) -> Option<Above<'a>> {
-        let stem = (leaf > 0).then_some((plant, 0))?;
-        let (rig, written) = (*self.rigs.get(&stem)?, self.written.get(&stem)?);
-        let far = |k: &usize| rig[*k].at.distance(joint.at);
-        let k = (0..rig.len()).min_by(|a, b| far(a).total_cmp(&far(b))).filter(|k| far(k) <= REACH)?;
-        Some(Above { node: written.first + k, place: written.places[k], joint: &rig[k] })
+    /// A joint of a plant's stems, if they are written.
+    fn bearer(&self, plant: u32, bearer: u16) -> Option<Above<'a>> {
+        let (rig, written) = (self.rigs.get(&(plant, 0))?, self.written.get(&(plant, 0))?);
+        let k = usize::from(bearer);
+        Some(Above { node: written.first + k, place: *written.places.get(k)?, joint: rig.joints.get(k)? })
     }
 }
 

@@ -8,7 +8,7 @@ use crate::geometry::outline::{self, Outline};
 use crate::math::{Frame, Vec3, vec2};
 use crate::plant::axis;
 use crate::plant::blade::Rest;
-use crate::plant::organ::{Organ, OrganKind};
+use crate::plant::organ::{Carried, OnStem, Organ, OrganKind, StemLine};
 use crate::plant::skeleton::Weights;
 use crate::plant::tube::{self, Profile};
 use std::f32::consts::TAU;
@@ -16,6 +16,8 @@ use std::f32::consts::TAU;
 /// Draws a plant's flowers.
 pub(in crate::plant) struct Pen {
     organs: Vec<Organ>,
+    /// What bears what is drawn.
+    on: OnStem,
     /// Shortest cell of its meshes, metres.
     pub(in crate::plant) cell: f32,
 }
@@ -84,7 +86,12 @@ pub(super) const ROUND: Outline = Outline::Power { a: 0.5, b: 0.5 };
 impl Pen {
     /// One that draws no cell shorter than this, metres.
     pub(in crate::plant) fn new(cell: f32) -> Self {
-        Self { organs: Vec::new(), cell }
+        Self { organs: Vec::new(), on: OnStem { line: 0, at: 0.0 }, cell }
+    }
+
+    /// Says where on the plant's stems the flowers stand that are drawn from now on.
+    pub(in crate::plant) fn stand(&mut self, on: OnStem) {
+        self.on = on;
     }
 
     /// What was drawn.
@@ -94,21 +101,22 @@ impl Pen {
 
     /// Adds a mesh to the organ of this kind and material.
     pub(in crate::plant) fn add(&mut self, kind: OrganKind, material: &str, mesh: &Mesh) {
-        self.add_along(kind, material, mesh, None);
+        let carried = Carried { corners: mesh.positions.len(), line: self.on.line, at: Some(self.on.at) };
+        self.add_carried(kind, material, mesh, carried, None);
     }
 
-    /// Adds a mesh to the organ of this kind and material, and the middle line of the stem that it is, if it is one.
-    fn add_along(&mut self, kind: OrganKind, material: &str, mesh: &Mesh, line: Option<&[Vec3]>) {
+    /// Adds a mesh to the organ of this kind and material with what carries it, and the middle line of the stem that it is, if it is one.
+    fn add_carried(&mut self, kind: OrganKind, material: &str, mesh: &Mesh, carried: Carried, line: Option<StemLine>) {
         if mesh.triangles.is_empty() {
             return;
         }
-        let line = line.map(<[Vec3]>::to_vec);
         if let Some(organ) = self.organs.iter_mut().find(|o| o.kind == kind && o.material == material) {
             organ.mesh.append(mesh);
             organ.lines.extend(line);
+            organ.carried.push(carried);
         } else {
             let (material, mesh, lines) = (material.to_owned(), mesh.clone(), line.into_iter().collect());
-            self.organs.push(Organ { kind, leaf: 0, material, mesh, axis: None, lines });
+            self.organs.push(Organ { kind, leaf: 0, material, mesh, axis: None, lines, carried: vec![carried] });
         }
     }
 
@@ -200,9 +208,10 @@ impl Pen {
     }
 
     /// Draws a stem: a strand along which the plant bends.
-    pub(in crate::plant) fn stem(&mut self, material: &str, points: &[Vec3], radii: (f32, f32)) {
-        let mesh = self.tube(points, radii);
-        self.add_along(OrganKind::Stem, material, &mesh, Some(points));
+    pub(in crate::plant) fn stem(&mut self, material: &str, line: StemLine, radii: (f32, f32)) {
+        let mesh = self.tube(&line.points, radii);
+        let carried = Carried { corners: mesh.positions.len(), line: line.number, at: None };
+        self.add_carried(OrganKind::Stem, material, &mesh, carried, Some(line));
     }
 
     fn tube(&self, points: &[Vec3], radii: (f32, f32)) -> Mesh {

@@ -20,7 +20,7 @@ use super::flower::head::GOLDEN;
 use super::flower::pen::Pen;
 use super::growth::{Between, Growth, LeafNow};
 use super::leaf::{self, Lower};
-use super::organ::{Organ, OrganKind};
+use super::organ::{self, OnStem, Organ, OrganKind, StemLine};
 use super::stage::BUD;
 use crate::math::{Frame, Vec3, lerp};
 use crate::ron_file::{Bound, Vary};
@@ -36,6 +36,8 @@ const MM: f32 = 1e-3;
 
 /// A grown axis.
 struct Grown {
+    /// Its number among the plant's stems.
+    line: u32,
     points: Vec<Vec3>,
     ways: Vec<Vec3>,
     /// Metres, at base and tip.
@@ -45,6 +47,11 @@ struct Grown {
 }
 
 impl Grown {
+    /// Where a share of its length is on the plant's stems.
+    fn on(&self, share: f32) -> OnStem {
+        OnStem { line: self.line, at: share.clamp(0.0, 1.0) * (self.points.len() - 1) as f32 }
+    }
+
     /// Point, direction and radius at a share of its length.
     fn at(&self, share: f32) -> (Vec3, Vec3, f32) {
         let last = self.points.len() - 1;
@@ -60,6 +67,8 @@ struct Grower<'a, 'b> {
     growth: &'b Growth<'a>,
     organs: &'b mut Vec<Organ>,
     pen: Pen,
+    /// The number of the next axis among the plant's stems.
+    line: u32,
     axes: usize,
     flowers: usize,
 }
@@ -71,7 +80,8 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, cell: f32) {
         return;
     }
     let tips = seat::tips(organs, growth);
-    let mut grower = Grower { growth, organs, pen: Pen::new(cell), axes: 0, flowers: 0 };
+    let line = organ::next_line(organs);
+    let mut grower = Grower { growth, organs, pen: Pen::new(cell), line, axes: 0, flowers: 0 };
     let mut grown: Vec<Vec<Grown>> = Vec::new();
     for (k, desc) in to.inflorescences.iter().enumerate() {
         let ends = (from.inflorescences.get(k), desc);
@@ -142,7 +152,8 @@ impl<'a> Grower<'a, '_> {
                         let (point, along, _) = parent.at(lerp(from, to, share));
                         let out = seat::across(along, parent.spin + GOLDEN * i as f32);
                         let size = lerp(1.0, self.blend(ends, |d| d.top.f32()), share);
-                        places.push((Place { point, along, out: Some(out) }, size, k as usize * most + i));
+                        let on = Some(parent.on(lerp(from, to, share)));
+                        places.push((Place { point, along, out: Some(out), on }, size, k as usize * most + i));
                     }
                 }
             }
@@ -201,11 +212,13 @@ impl<'a> Grower<'a, '_> {
         let radius = (0.5 * width).max(1.2e-4);
         let radii = (radius, radius * self.blend(ends, |d| d.taper.f32()));
         let (points, ways) = curve(place.point, along, (length, bend), radius, &mut stream);
-        let axis = Grown { points, ways, radii, spin };
+        let axis = Grown { line: self.line, points, ways, radii, spin };
+        self.line += 1;
         let of_stem = &self.growth.desc.stem_material;
         let material =
             [&held(ends).material, of_stem].into_iter().find(|m| !m.is_empty()).map_or("stalk", String::as_str);
-        self.pen.stem(material, &axis.points, axis.radii);
+        let line = StemLine { number: axis.line, points: axis.points.clone(), on: place.on };
+        self.pen.stem(material, line, axis.radii);
         for (k, leaves) in ends.1.leaves.iter().enumerate() {
             let ends = (ends.0.and_then(|d| d.leaves.get(k)), leaves);
             self.leaves((sort, nth, k), ends, &own.child(Purpose::Leaf, k as u64), &axis);
@@ -260,7 +273,8 @@ impl<'a> Grower<'a, '_> {
                 rigged: self.growth.rigged,
                 stream: own,
             };
-            let seat = leaf::Seat { point: point + out * (0.8 * radius), axis: along, out };
+            let on = Some(axis.on(lerp(low, high, share)));
+            let seat = leaf::Seat { point: point + out * (0.8 * radius), axis: along, out, on };
             leaf::grow(self.organs, &leaf, seat, Lower::Petiole);
         }
     }
@@ -288,6 +302,7 @@ impl<'a> Grower<'a, '_> {
             let angle = self.draw(ends, None, (&own, 3), |d| &d.angle_deg).to_radians();
             let nod = self.draw(ends, None, (&own, 4), |d| &d.nod_deg).to_radians();
             let (point, along, radius) = axis.at(lerp(low, high, share));
+            self.pen.stand(axis.on(lerp(low, high, share)));
             let out = seat::across(along, axis.spin + GOLDEN * i as f32 + 0.15 * stream.normal() as f32);
             let way = (along * angle.cos() + out * angle.sin()).normalize_or(along);
             let mut base = point + out * (0.5 * radius * angle.sin());

@@ -1,9 +1,8 @@
 //! Where flowering axes begin: tips of shoots and axils of leaves, as the grown organs have them.
 
-use crate::geometry::Mesh;
 use crate::math::{Vec3, direction};
 use crate::plant::growth::Growth;
-use crate::plant::organ::{Organ, OrganKind};
+use crate::plant::organ::{OnStem, Organ, OrganKind};
 use crate::sampling::Purpose;
 use std::f32::consts::{FRAC_PI_2, TAU};
 
@@ -19,17 +18,19 @@ pub(super) struct Place {
     pub(super) along: Vec3,
     /// Direction across it in which the axil opens, unit; of a tip: none in particular.
     pub(super) out: Option<Vec3>,
+    /// Where it is on the plant's stems; nowhere on a grass, whose culms begin at the soil.
+    pub(super) on: Option<OnStem>,
 }
 
 /// The tips of all shoots, the main one's first.
 pub(super) fn tips(organs: &[Organ], growth: &Growth<'_>) -> Vec<Place> {
-    let stems: Vec<Place> =
-        organs.iter().filter(|o| o.kind == OrganKind::Stem).filter_map(|o| end_of(&o.mesh)).collect();
+    let stems: Vec<Place> = organs.iter().filter(|o| o.kind == OrganKind::Stem).filter_map(end_of).collect();
     if stems.is_empty() { culms(organs, growth) } else { stems }
 }
 
 /// The end of a stem: the mesh of one is rings from its base to its tip, and v tells them apart.
-fn end_of(mesh: &Mesh) -> Option<Place> {
+fn end_of(stem: &Organ) -> Option<Place> {
+    let mesh = &stem.mesh;
     let middle_of = |v: f32| {
         // The corner that closes a ring stands where its first does.
         let ring = || mesh.positions.iter().zip(&mesh.uvs).filter(|(_, uv)| uv.y == v && uv.x < 1.0).map(|(p, _)| *p);
@@ -38,7 +39,7 @@ fn end_of(mesh: &Mesh) -> Option<Place> {
     let last = mesh.uvs.last()?.y;
     let before = mesh.uvs.iter().rev().find(|uv| uv.y != last)?.y;
     let (point, below) = (middle_of(last), middle_of(before));
-    Some(Place { point, along: (point - below).normalize_or(Vec3::Z), out: None })
+    Some(Place { point, along: (point - below).normalize_or(Vec3::Z), out: None, on: stem.end() })
 }
 
 /// A grass' shoot.
@@ -71,7 +72,7 @@ fn culms(organs: &[Organ], growth: &Growth<'_>) -> Vec<Place> {
         let two = &shoot.feet[..shoot.feet.len().min(2)];
         let foot = two.iter().sum::<Vec3>() / two.len() as f32;
         let (point, along) = if k == 0 { (Vec3::ZERO, upright) } else { (foot, shoot.along) };
-        Place { point, along, out: None }
+        Place { point, along, out: None, on: None }
     };
     shoots.iter().enumerate().map(culm).collect()
 }
@@ -85,7 +86,7 @@ pub(super) fn axil(organs: &[Organ], number: u32) -> Option<Place> {
     let ahead = (axis.tip - axis.base).with_z(0.0).normalize_or(Vec3::X);
     let along = if sheathed { (axis.base - foot).normalize_or(Vec3::Z) } else { Vec3::Z };
     let point = if sheathed { axis.base - along * 0.004 } else { foot };
-    Some(Place { point, along, out: Some(ahead) })
+    Some(Place { point, along, out: Some(ahead), on: axis.on })
 }
 
 /// A unit vector across `along`, at this azimuth about it.

@@ -43,6 +43,7 @@ impl Individual {
             organ.mesh.transform(turn, Vec3::ZERO);
             organ.axis = organ.axis.take().map(|axis| axis.moved(|p| turn * p));
         }
+        plant.rig = plant.rig.iter().map(|joint| joint.moved(|p| turn * p)).collect();
         plant
     }
 }

@@ -29,7 +29,7 @@ use furrow::{Error, Result};
 use outline::{Measures, Silhouette};
 use page::{Entry, Look, Stage};
 use sheet::{Bar, Column, Layout, Sheet, Shot};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use view::{VIEW_DEG, View};
 
 /// From farther than this a field is as fine as its pixels, metres: what a tall plant covers is seen from far.
@@ -97,12 +97,12 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
 impl Args {
     /// Sheets can be written, and take the place of no photograph.
     fn check_folders(&self) -> Result<()> {
-        let place = |folder: &Path| std::fs::canonicalize(folder).ok();
-        if self.beside.as_deref().and_then(place).is_some_and(|beside| place(&self.out) == Some(beside)) {
+        cli::check_folder(&self.out)?;
+        if self.beside.as_deref().is_some_and(|beside| place(beside) == place(&self.out)) {
             let words = "--out names the folder of the photographs: a sheet would take the place of one of its name";
             return Err(Error::misuse(words).in_file(&self.out).help("name another folder with --out"));
         }
-        cli::check_folder(&self.out)
+        Ok(())
     }
 
     /// The species files that are asked for, in order of their names.
@@ -259,6 +259,19 @@ impl Args {
         let film = render::render(&world, &PathTracer::default(), &settings, &watch)?;
         Ok(field.photograph(&film).rgb.as_chunks::<3>().0.to_vec())
     }
+}
+
+/// A folder whatever names it: without links and `..`, also where it is not there yet.
+fn place(folder: &Path) -> PathBuf {
+    let mut place = PathBuf::new();
+    for part in std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned()).components() {
+        match part {
+            Component::ParentDir => drop(place.pop()),
+            part => place.push(part),
+        }
+        place = place.canonicalize().unwrap_or(place);
+    }
+    place
 }
 
 /// The name of a species file.
