@@ -59,8 +59,7 @@ impl Stems {
             match (last, u16::try_from(self.joints.len())) {
                 (Some(last), _) if ends[0].distance(ends[1]) < SHORT => links.push(last),
                 (_, Ok(number)) => {
-                    let name = format!("stem {}", k + 1);
-                    let name = if line.number > 0 { format!("stem {}.{}", line.number + 1, k + 1) } else { name };
+                    let name = format!("stem {}.{}", line.number + 1, k + 1);
                     self.joints.push(RigJoint { name, parent: last.or(parent), at: ends[0], axes: axes(along) });
                     links.push(number);
                 }
@@ -103,9 +102,10 @@ impl Stems {
 
     /// What carries a corner of a stem.
     fn along(&self, line: u32, corner: Vec3) -> JointWeights {
-        let Some(chain) = self.chains.get(&line).filter(|chain| !chain.links.is_empty()) else {
-            return tied((self.chains.get(&line).and_then(|chain| chain.parent).unwrap_or(0), 1.0), None);
-        };
+        let Some(chain) = self.chains.get(&line) else { return tied((0, 1.0), None) };
+        if chain.links.is_empty() {
+            return tied((chain.parent.unwrap_or(0), 1.0), None);
+        }
         let (mut best, mut found) = (f32::INFINITY, (0, 0.0));
         for (k, ends) in chain.points.windows(2).take(chain.links.len()).enumerate() {
             let (way, out) = (ends[1] - ends[0], corner - ends[0]);
