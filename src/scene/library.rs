@@ -3,6 +3,7 @@
 use super::desc::{ModelDesc, SpeciesDesc};
 use super::drive;
 use super::growing::Growing;
+use super::layer::Layer;
 use super::shipped::species as shipped_species;
 use super::species_text::SpeciesFile;
 use crate::error::{Kind, Place};
@@ -10,12 +11,12 @@ use crate::geometry::{AlphaMask, Margin};
 use crate::input::{self, Outside, Scope, shipped};
 use crate::light::{Infrared, Table};
 use crate::material::{LeafMaterial, Picture, Tones};
-use crate::math::{Spectrum, Vec2};
+use crate::math::Spectrum;
 use crate::model::{Model, Up};
-use crate::optics::{Pigments, measured, soil};
+use crate::optics::{Pigments, measured};
 use crate::ron_file::{Pick, RENAMED, RonFile, nearest};
 use crate::sensor::Pose;
-use crate::soil::{LayerDesc, LayerMaps};
+use crate::soil::LayerDesc;
 use crate::texture::{ColorSpace, Height, HeightFromBrightness, Maps, Texture, Wrap};
 use crate::{Error, Result};
 use sha2::{Digest, Sha256};
@@ -367,7 +368,7 @@ impl Library {
             None => read_off(&albedo),
             Some((height, text)) => Height::load(&height, 1.0).map_err(|e| at_its_place(page, &text, IMAGE_HELP, e))?,
         };
-        let layer = Arc::new(Layer { albedo, height: height.wrapped(Wrap::Repeat) });
+        let layer = Arc::new(Layer::new(albedo, height.wrapped(Wrap::Repeat)));
         self.layers.insert(key, layer.clone());
         Ok(layer)
     }
@@ -446,38 +447,6 @@ fn at_its_place(page: &RonFile, literal: &str, help: &str, error: Error) -> Erro
             page.about(literal, message, error.advice().unwrap_or(help))
         }
         _ => error,
-    }
-}
-
-/// The textures of one soil layer.
-pub(super) struct Layer {
-    albedo: Texture,
-    height: Height,
-}
-
-/// One is equal to itself alone: its files may have changed.
-impl PartialEq for Layer {
-    fn eq(&self, other: &Self) -> bool {
-        std::ptr::eq(self, other)
-    }
-}
-
-impl Layer {
-    /// Mean colour of the dry soil, in four bands.
-    pub(super) fn mean(&self) -> Spectrum {
-        let [r, g, b, _] = self.albedo.sample(Vec2::splat(0.5), 32.0);
-        soil::at([r, g, b], soil::LOESS)
-    }
-}
-
-impl LayerMaps for Layer {
-    fn height(&self, uv: Vec2) -> f32 {
-        self.height.at(uv)
-    }
-
-    fn albedo(&self, uv: Vec2) -> [f32; 3] {
-        let [r, g, b, _] = self.albedo.sample(uv, 0.0);
-        [r, g, b]
     }
 }
 

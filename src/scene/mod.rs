@@ -6,6 +6,7 @@ pub mod desc;
 pub mod drive;
 pub mod estimate;
 mod growing;
+mod layer;
 mod library;
 mod part;
 mod part_kind;

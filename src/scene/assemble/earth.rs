@@ -2,7 +2,8 @@
 
 use crate::material::{BakedGround, Material};
 use crate::math::Spectrum;
-use crate::scene::library::Layer;
+use crate::scene::desc::Detail;
+use crate::scene::layer::Layer;
 use crate::scene::{Part, PartKind};
 use crate::soil::{Debris, Ground, Pile, Site, SoilDesc};
 use std::sync::Arc;
@@ -11,6 +12,7 @@ use std::sync::Arc;
 #[derive(Clone, PartialEq)]
 pub(super) struct Soil {
     pub(super) desc: SoilDesc,
+    pub(super) detail: Detail,
     /// Reflectances of its layers, and their textures.
     pub(super) colors: Vec<Spectrum>,
     pub(super) maps: Vec<Arc<Layer>>,

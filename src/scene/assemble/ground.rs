@@ -14,11 +14,12 @@ use crate::sampling::Purpose;
 use crate::sampling::rng::mix;
 use crate::scatter::{Disc, Rows};
 use crate::scene::desc::Detail;
-use crate::scene::library::Layer;
+use crate::scene::layer::Layer;
 use crate::scene::tag::Tag;
 use crate::scene::{Part, PartKind, PlantRecord};
 use crate::soil::{
-    self, Canopy, Clods, Debris, DebrisKind, Expected, Ground, Pile, Rect, SeedRows, Site, SoilDesc, SoilRecord,
+    self, Canopy, Clods, Debris, DebrisKind, Expected, Ground, LayerDesc, Pile, Rect, SeedRows, Site, SoilDesc,
+    SoilRecord,
 };
 use crate::{Error, Result};
 use std::sync::Arc;
@@ -112,7 +113,7 @@ impl Builder<'_> {
         let mut read = |file: &str| self.library.soil_spectrum(self.page, file);
         let colors = desc.colors.iter().map(|color| color.reflectance(&mut read)).collect::<Result<Vec<Spectrum>>>()?;
         let (site, texel, of) = (self.site(view), self.texel(view), (self.seed, self.index));
-        Ok(Soil { desc: self.weathered(desc), colors, maps, site, texel, of })
+        Ok(Soil { desc: self.weathered(desc), detail: self.desc.detail, colors, maps, site, texel, of })
     }
 
     /// The soil of the field's day: as moist as is drawn for it, with what it has of crusts.
@@ -226,11 +227,16 @@ fn beyond(view: View) -> f32 {
     (a - lo).max(hi - b).max_element().max(0.0)
 }
 
-/// What the ground shows.
-fn bake(ground: &Ground, Soil { maps, texel, .. }: &Soil) -> BakedGrounds {
-    let fabric = |wet| Arc::new(BakedGround::bake(&ground.fabric(maps, *texel, wet)));
+/// What the ground shows; each texel the mean of what of its layers it covers unless `detail` is full.
+fn bake(ground: &Ground, Soil { desc, detail, maps, texel, .. }: &Soil) -> BakedGrounds {
+    let coarser = |(map, layer): (&Arc<Layer>, &LayerDesc)| Arc::new(map.coarser(texel / layer.size_m.f32()));
+    let seen = match detail {
+        Detail::Full => maps.clone(),
+        Detail::ByPixel | Detail::Instanced => maps.iter().zip(&desc.layers).map(coarser).collect(),
+    };
+    let fabric = |wet| Arc::new(BakedGround::bake(&ground.fabric(&seen, *texel, wet)));
     BakedGrounds {
-        ground: Arc::new(BakedGround::bake(&ground.bake(maps, *texel))),
+        ground: Arc::new(BakedGround::bake(&ground.bake(&seen, *texel))),
         clods: ground.clods_moisture().map(fabric),
         dust: ground.mean_dry(maps),
     }
