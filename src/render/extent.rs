@@ -9,8 +9,8 @@ use super::LabelMap;
 use crate::accel::Brute;
 use crate::geometry::{Ray, Window};
 use crate::math::{Vec3, vec3};
-use crate::scene::Scene;
 use crate::scene::tag::Tag;
+use crate::scene::{Part, Scene};
 use crate::sensor::{Camera, PixelBox};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -46,10 +46,12 @@ pub fn extents(scene: &Scene, labels: &LabelMap) -> BTreeMap<(u32, u16), Extent>
     let window = Area::of(labels.window);
     let seen = visible(labels);
     let reach = reach(&scene.camera);
+    let organs: Vec<_> = (0..).zip(&scene.parts).filter(|(_, part)| part.tag.plant > 0).collect();
+    let area = |(_, part): &(u32, &Part)| image_of(part.bounds(), &scene.camera).meet(reach);
+    let areas: Vec<Area> = organs.par_iter().map(area).collect();
     let mut things: BTreeMap<(u32, u16), Thing> = BTreeMap::new();
-    for (i, part) in scene.parts.iter().enumerate().filter(|(_, p)| p.tag.plant > 0) {
-        let area = image_of(part.bounds(), &scene.camera).meet(reach);
-        things.entry((part.tag.plant, part.tag.leaf)).or_default().add(i as u32, area);
+    for ((i, part), area) in organs.into_iter().zip(areas) {
+        things.entry((part.tag.plant, part.tag.leaf)).or_default().add(i, area);
     }
     for (key, (_, area)) in &seen {
         // Anything that is seen has a part.

@@ -4,7 +4,7 @@
 //! whole; bending keeps them. Angles are of the leaf as it is held.
 
 use super::{Field, Part};
-use crate::geometry::{AlphaMask, Coverage, Mesh};
+use crate::geometry::{AlphaMask, Coverage};
 use crate::math::{Vec2, Vec3, vec2};
 use crate::plant::{LeafAxis, OrganKind};
 use rayon::prelude::*;
@@ -77,10 +77,10 @@ struct Organ<'a> {
 type Shown = (Coverage, f64);
 
 /// A mesh and its mask by where they lie: many parts are instances of one.
-type Sheet = (*const Mesh, Option<*const AlphaMask>);
+type Sheet = (usize, Option<usize>);
 
 fn sheet(part: &Part) -> Sheet {
-    (Arc::as_ptr(&part.mesh), part.mask.as_ref().map(Arc::as_ptr))
+    (Arc::as_ptr(&part.mesh).addr(), part.mask.as_ref().map(|mask| Arc::as_ptr(mask).addr()))
 }
 
 impl Traits {
@@ -93,8 +93,14 @@ impl Traits {
     /// measured where nothing was.
     #[must_use]
     pub fn of_next_image(self, field: &Field) -> Self {
-        let parts: Vec<(&Part, OrganKind)> =
-            field.scene.parts.iter().zip(&field.kinds).filter_map(|(part, kind)| Some((part, kind.organ()?))).collect();
+        let view = View::of(field);
+        let measured = !self.plants.is_empty();
+        let seen = |part: &Part| view.as_ref().is_some_and(|view| view.may_hold(part));
+        // Of a field that is measured already only what lies in the image is asked about.
+        let parts: Vec<(&Part, OrganKind)> = (field.scene.parts.par_iter().zip(&field.kinds))
+            .filter_map(|(part, kind)| Some((part, kind.organ()?)))
+            .filter(|(part, _)| !measured || seen(part))
+            .collect();
         // Looked at once, whatever the number of instances: a mask is asked about each triangle that it may cut.
         let sheets: BTreeMap<Sheet, &Part> = parts.iter().map(|(part, _)| (sheet(part), *part)).collect();
         let sheets: Vec<&Part> = sheets.into_values().collect();
@@ -102,9 +108,9 @@ impl Traits {
         let shown: BTreeMap<Sheet, &[Shown]> =
             sheets.iter().map(|part| sheet(part)).zip(looked.iter().map(Vec::as_slice)).collect();
         let organs: Vec<Organ<'_>> =
-            parts.into_iter().map(|(part, kind)| Organ::new(part, kind, shown[&sheet(part)])).collect();
-        let canopy = Canopy::of(field, &organs);
-        if !self.plants.is_empty() {
+            parts.into_par_iter().map(|(part, kind)| Organ::new(part, kind, shown[&sheet(part)])).collect();
+        let canopy = view.and_then(|view| Canopy::of(field, &view, &organs));
+        if measured {
             return Self { canopy, ..self };
         }
         let mut by_plant: BTreeMap<u32, Vec<&Organ<'_>>> = BTreeMap::new();
@@ -124,16 +130,42 @@ impl Traits {
     }
 }
 
+/// The ground that a camera sees.
+struct View {
+    border: Vec<Vec2>,
+    /// Its south-west and north-east corner.
+    corners: [Vec2; 2],
+}
+
+impl View {
+    /// That of the field's camera; `None` where it sees beyond the horizon.
+    fn of(field: &Field) -> Option<Self> {
+        let border = field.scene.camera.outline(0.0, BORDER)?;
+        let corners = border.iter().fold(None, |corners: Option<[Vec2; 2]>, p| {
+            Some(corners.map_or([*p; 2], |[lo, hi]| [lo.min(*p), hi.max(*p)]))
+        })?;
+        Some(Self { border, corners })
+    }
+
+    /// Whether some of a part may lie over it: no part that does is denied.
+    fn may_hold(&self, part: &Part) -> bool {
+        let [lo, hi] = self.corners;
+        part.bounds().is_some_and(|(low, high)| low.truncate().cmple(hi).all() && high.truncate().cmpge(lo).all())
+    }
+}
+
 impl Canopy {
     /// The canopy over what the field's camera sees.
-    fn of(field: &Field, organs: &[Organ<'_>]) -> Option<Self> {
-        let border = field.scene.camera.outline(0.0, BORDER)?;
-        let ground = polygon_area(&border);
+    fn of(field: &Field, view: &View, organs: &[Organ<'_>]) -> Option<Self> {
+        let ground = polygon_area(&view.border);
         let unknown =
             field.scene.parts.iter().zip(&field.kinds).any(|(part, kind)| part.tag.plant > 0 && kind.organ().is_none());
         let over = |organ: &Organ<'_>| {
+            if !view.may_hold(organ.part) {
+                return 0.0;
+            }
             let middle = |i: u32| organ.part.corners(i).into_iter().sum::<Vec3>() / 3.0;
-            (0..).zip(&organ.areas).filter(|(i, _)| within(&border, middle(*i))).map(|(_, area)| area).sum()
+            (0..).zip(&organ.areas).filter(|(i, _)| within(&view.border, middle(*i))).map(|(_, area)| area).sum()
         };
         let areas: Vec<f64> = organs.par_iter().map(over).collect();
         // From a zero of its own: an empty sum is a negative one.
@@ -299,7 +331,7 @@ fn within(corners: &[Vec2], point: Vec3) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Placement;
+    use crate::geometry::{Mesh, Placement};
     use crate::math::{Mat3, vec3};
     use crate::plant::LeafSize;
     use crate::scene::tag::{Class, Tag};

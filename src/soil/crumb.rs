@@ -9,6 +9,8 @@ use super::{ClodsDesc, Rect, cell_stream, cells};
 use crate::math::{Vec2, vec2};
 use crate::sampling::{Purpose, Stream};
 use crate::texture::noise::Perlin;
+use rayon::prelude::*;
+use std::ops::Range;
 
 /// Length at which the local exponents pivot.
 const PIVOT_MM: f32 = 5.0;
@@ -27,6 +29,10 @@ const BREAKS: usize = 6;
 
 /// Side of the cells that the aggregates are addressed by.
 const CELL_M: f32 = 0.02;
+
+/// About how many bands a raster is drawn in, and the fewest rows of cells of each: aggregates at their borders are drawn twice.
+const BANDS: i32 = 32;
+const LEAST_CELLS: i32 = 8;
 
 /// The law of the aggregates of one ground.
 #[derive(Clone, Debug)]
@@ -203,6 +209,27 @@ impl Raster {
         let far = self.origin + vec2(self.width as f32, self.height as f32) * self.step;
         Rect::new(self.origin.x, self.origin.y, far.x, far.y)
     }
+
+    /// The first column in cells of number `i` and on, and the first row likewise.
+    fn first_column(self, i: i32) -> usize {
+        ((i as f32 * CELL_M - self.origin.x) / self.step).ceil().clamp(0.0, self.width as f32) as usize
+    }
+
+    fn first_row(self, j: i32) -> usize {
+        ((j as f32 * CELL_M - self.origin.y) / self.step).ceil().clamp(0.0, self.height as f32) as usize
+    }
+}
+
+/// Rows of a raster while they are drawn.
+struct Band<'a> {
+    raster: Raster,
+    /// Which rows of cells are its own.
+    cells: Range<i32>,
+    /// Which rows of the raster they are.
+    rows: Range<usize>,
+    height: &'a mut [f32],
+    tint: &'a mut [u8],
+    dry: &'a mut [u8],
 }
 
 impl Crumbs {
@@ -214,40 +241,72 @@ impl Crumbs {
         seen: [Part; 2],
         unseen: [Part; 2],
         stream: &Stream,
-        share: impl Fn(Vec2) -> f32,
+        share: impl Fn(Vec2) -> f32 + Sync,
     ) -> Self {
         let n = raster.width * raster.height;
         let mut crumbs = Self { height: vec![0.0; n], tint: vec![0; n], dry: vec![0; n] };
-        for (k, part) in seen.into_iter().enumerate().filter(|(_, part)| part.is_some()) {
-            let stream = if k == 0 { stream.clone() } else { stream.child(Purpose::Debris, k as u64) };
-            law.scatter(
-                raster.area().grown(part.mm.1 * 1e-3),
-                part.mm,
-                &stream,
-                |p| part.amount * share(p),
-                |p, length, s| crumbs.add(raster, p, length, part.gain, law, s),
-            );
-        }
-        if unseen.iter().any(Part::is_some) {
-            crumbs.fill(raster, law, unseen, &stream.child(Purpose::Debris, seen.len() as u64), share);
-        }
+        crumbs.bands(raster).into_par_iter().for_each(|mut band| {
+            for (k, part) in seen.into_iter().enumerate().filter(|(_, part)| part.is_some()) {
+                let stream = if k == 0 { stream.clone() } else { stream.child(Purpose::Debris, k as u64) };
+                law.scatter(
+                    band.area().grown(part.mm.1 * 1e-3),
+                    part.mm,
+                    &stream,
+                    |p| part.amount * share(p),
+                    |p, length, s| band.add(p, length, part.gain, law, s),
+                );
+            }
+            if unseen.iter().any(Part::is_some) {
+                band.fill(law, unseen, &stream.child(Purpose::Debris, seen.len() as u64), &share);
+            }
+        });
         crumbs
     }
 
+    /// The raster in bands of rows that hold whole cells, so that each can be drawn by itself.
+    fn bands(&mut self, raster: Raster) -> Vec<Band<'_>> {
+        let Rect { y0, y1, .. } = raster.area();
+        let mut cells = (y0 / CELL_M).floor() as i32..(y1 / CELL_M).ceil() as i32;
+        let mut left = (self.height.as_mut_slice(), self.tint.as_mut_slice(), self.dry.as_mut_slice());
+        let many = (cells.len() as i32 / BANDS).max(LEAST_CELLS);
+        let mut bands = Vec::new();
+        let mut first = 0;
+        while !cells.is_empty() {
+            let own = cells.start..(cells.start + many).min(cells.end);
+            cells.start = own.end;
+            let end = if cells.is_empty() { raster.height } else { raster.first_row(own.end) };
+            let (height, tint, dry);
+            let texels = (end - first) * raster.width;
+            ((height, left.0), (tint, left.1), (dry, left.2)) =
+                (left.0.split_at_mut(texels), left.1.split_at_mut(texels), left.2.split_at_mut(texels));
+            if texels > 0 {
+                bands.push(Band { raster, cells: own, rows: first..end, height, tint, dry });
+            }
+            first = end;
+        }
+        bands
+    }
+}
+
+impl Band<'_> {
+    /// What it covers.
+    fn area(&self) -> Rect {
+        let row = |j: usize| self.raster.origin.y + j as f32 * self.raster.step;
+        Rect { y0: row(self.rows.start), y1: row(self.rows.end), ..self.raster.area() }
+    }
+
     /// Lays aggregates that are smaller than samples are apart where nothing lies yet.
-    fn fill(&mut self, raster: Raster, law: &Law, parts: [Part; 2], stream: &Stream, share: impl Fn(Vec2) -> f32) {
-        let from = |cell: i32, origin: f32, size: usize| {
-            ((cell as f32 * CELL_M - origin) / raster.step).ceil().clamp(0.0, size as f32) as usize
-        };
-        for (i, j) in cells(raster.area(), CELL_M) {
+    fn fill(&mut self, law: &Law, parts: [Part; 2], stream: &Stream, share: impl Fn(Vec2) -> f32) {
+        let Raster { width, .. } = self.raster;
+        for (i, j) in cells(self.area(), CELL_M).filter(|(_, j)| self.cells.contains(j)) {
             let centre = (vec2(i as f32, j as f32) + 0.5) * CELL_M;
             let local = law.at(centre, share(centre));
             let cover = parts.map(|part| if part.is_some() { part.amount * local.cover(part.mm) } else { 0.0 });
             let [bare, first] = [(-cover[0] - cover[1]).exp(), cover[0] / (cover[0] + cover[1]).max(f32::MIN_POSITIVE)];
             let mut s = cell_stream(stream, i, j);
-            for y in from(j, raster.origin.y, raster.height)..from(j + 1, raster.origin.y, raster.height) {
-                for x in from(i, raster.origin.x, raster.width)..from(i + 1, raster.origin.x, raster.width) {
-                    let k = y * raster.width + x;
+            for y in self.raster.first_row(j)..self.raster.first_row(j + 1) {
+                for x in self.raster.first_column(i)..self.raster.first_column(i + 1) {
+                    let k = (y - self.rows.start) * width + x;
                     if self.tint[k] == 0 && s.uniform32() >= bare {
                         let part = &parts[usize::from(s.uniform32() >= first)];
                         let u = [s.uniform32(), s.uniform32(), s.uniform32()];
@@ -258,7 +317,7 @@ impl Crumbs {
         }
     }
 
-    fn add(&mut self, raster: Raster, p: Vec2, length_mm: f32, gain: fn(f32) -> f32, law: &Law, s: &mut Stream) {
+    fn add(&mut self, p: Vec2, length_mm: f32, gain: fn(f32) -> f32, law: &Law, s: &mut Stream) {
         // As many numbers whatever happens, so that a crumb outside the area leaves its neighbours as they are.
         let mut u = [0.0; 18];
         u.fill_with(|| s.uniform32());
@@ -277,10 +336,11 @@ impl Crumbs {
             Vec2::from_angle((at + u[17]) * std::f32::consts::TAU) * (1.02 + 0.38 * u[11 + (k + 2) % BREAKS])
         });
 
+        let Self { raster, rows, .. } = self;
         let q = (p - raster.origin) / raster.step;
         let reach = a / raster.step;
-        let lo = (q - reach).ceil().max(Vec2::ZERO);
-        let hi = (q + reach).floor().min(vec2(raster.width as f32 - 1.0, raster.height as f32 - 1.0));
+        let lo = (q - reach).ceil().max(vec2(0.0, rows.start as f32));
+        let hi = (q + reach).floor().min(vec2(raster.width as f32, rows.end as f32) - 1.0);
         let scale = vec2(raster.step / a.max(1e-9), raster.step / b.max(1e-9));
         for y in lo.y as i32..=hi.y as i32 {
             for x in lo.x as i32..=hi.x as i32 {
@@ -293,7 +353,7 @@ impl Crumbs {
                 // Steeper at the rim and flatter on top than an ellipsoid.
                 let dome = inside.sqrt() * (1.35 - 0.35 * inside);
                 let z = centre + top * dome.min(0.75 + f.dot(d)).min(0.85 + g.dot(d));
-                let k = y as usize * raster.width + x as usize;
+                let k = (y as usize - rows.start) * raster.width + x as usize;
                 if z > self.height[k] {
                     self.height[k] = z;
                     self.tint[k] = tint;

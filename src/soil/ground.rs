@@ -507,21 +507,30 @@ fn slowly(raster: Raster, every: usize, f: impl Fn(Vec2) -> f32 + Sync) -> Vec<f
 /// Mean over a square of ±`reach` samples, its ends held.
 pub(super) fn blur(values: &[f32], width: usize, reach: usize) -> Vec<f32> {
     let height = values.len() / width;
-    let pass = |from: &[f32], to: &mut [f32], count: usize, stride: usize, start: usize| {
-        let at = |i: i64| from[start + stride * i.clamp(0, count as i64 - 1) as usize];
-        let r = reach as i64;
-        let mut sum: f64 = (-r..=r).map(|i| f64::from(at(i))).sum();
-        for i in 0..count as i64 {
-            to[start + stride * i as usize] = (sum / (2 * r + 1) as f64) as f32;
-            sum += f64::from(at(i + r + 1)) - f64::from(at(i - r));
+    let r = reach as i64;
+    let held = |i: i64, count: usize| i.clamp(0, count as i64 - 1) as usize;
+    let mean = |sum: f64| (sum / (2 * r + 1) as f64) as f32;
+    let mut rows = vec![0.0; values.len()];
+    rows.par_chunks_mut(width).zip(values.par_chunks(width)).for_each(|(to, from)| {
+        let at = |i: i64| f64::from(from[held(i, width)]);
+        let mut sum: f64 = (-r..=r).map(at).sum();
+        for (i, to) in (0..).zip(to) {
+            *to = mean(sum);
+            sum += at(i + r + 1) - at(i - r);
         }
-    };
-    let (mut rows, mut both) = (vec![0.0; values.len()], vec![0.0; values.len()]);
-    for j in 0..height {
-        pass(values, &mut rows, width, 1, j * width);
+    });
+    // All columns side by side, so that memory is read in its order.
+    let row = |j: i64| &rows[held(j, height) * width..][..width];
+    let mut sums = vec![0.0; width];
+    for j in -r..=r {
+        sums.iter_mut().zip(row(j)).for_each(|(sum, v)| *sum += f64::from(*v));
     }
-    for i in 0..width {
-        pass(&rows, &mut both, height, width, i);
+    let mut both = vec![0.0; values.len()];
+    for (j, to) in (0..).zip(both.chunks_mut(width)) {
+        for ((to, sum), (next, last)) in to.iter_mut().zip(&mut sums).zip(row(j + r + 1).iter().zip(row(j - r))) {
+            *to = mean(*sum);
+            *sum += f64::from(*next) - f64::from(*last);
+        }
     }
     both
 }
