@@ -2,8 +2,9 @@
 //!
 //! The surface that the eye sees asks every light; the surfaces behind it ask one, chosen by what it can give there. The same
 //! emission is also found by scattered rays, and multiple importance sampling (Veach & Guibas 1995, the balance heuristic)
-//! weighs the two. How many rays go on from the first surface, and which paths end, follows from what they can still bring
-//! beside what was found ([`RouletteSplitting`]). Unbiased: every contribution is divided by its sampling probability.
+//! weighs the two, at the first surface by how many of each are to be expected. How many rays go on from there, and which
+//! paths end, follows from what they can still bring beside what was found ([`RouletteSplitting`]). Unbiased: every
+//! contribution is divided by its sampling probability.
 
 use super::roulette::RouletteSplitting;
 use super::vertex::Vertex;
@@ -56,8 +57,30 @@ struct Origin {
     normal: Vec3,
     two_sided: bool,
     pdf: f32,
-    /// Whether every light was asked there, not one of them.
-    asked_all: bool,
+    asked: Asked,
+}
+
+/// Which lights a surface asked.
+#[derive(Clone, Copy)]
+enum Asked {
+    /// Every one; `rays` are the scattered rays to be expected for each time that a wide one was asked.
+    All { rays: f32 },
+    /// One of them, by its share of the importance of all.
+    One,
+}
+
+/// The direct light at a first surface.
+#[derive(Clone, Copy)]
+struct Direct {
+    found: Spectrum,
+    /// As [`Asked::All`] tells.
+    rays: f32,
+}
+
+impl Default for Direct {
+    fn default() -> Self {
+        Self { found: Spectrum::ZERO, rays: 1.0 }
+    }
 }
 
 /// The first surfaces of a packet, with the numbers of their samples.
@@ -77,7 +100,7 @@ struct Flight {
 impl Flight {
     /// The ray that leaves `vertex` by the numbers `u`, before anyone asks whether it is worth following.
     #[inline]
-    fn leave(vertex: &Vertex, u: [f32; 3], throughput: Spectrum, asked_all: bool) -> Option<Self> {
+    fn leave(vertex: &Vertex, u: [f32; 3], throughput: Spectrum, asked: Asked) -> Option<Self> {
         let s = vertex.sample(u)?;
         let at = &vertex.at;
         let (normal, two_sided) = (vertex.normal(), vertex.bsdf.transmits());
@@ -86,7 +109,7 @@ impl Flight {
             width: at.footprint,
             spread: DIFFUSE_SPREAD,
             throughput: throughput * s.weight,
-            from: Origin { p: at.p, normal, two_sided, pdf: s.pdf, asked_all },
+            from: Origin { p: at.p, normal, two_sided, pdf: s.pdf, asked },
         })
     }
 }
@@ -129,66 +152,76 @@ impl PathTracer {
             (false, _) => 1.0,
             (true, false) => 0.0,
             (true, true) => {
-                let chance = if from.asked_all {
-                    1.0
-                } else {
-                    let total = total_importance(world, from.p, from.normal, from.two_sided);
-                    light.importance(from.p, from.normal, from.two_sided) / total.max(f32::MIN_POSITIVE)
+                let (rays, asks) = match from.asked {
+                    Asked::All { rays } => (if light.is_narrow() { 1.0 } else { rays }, 1.0),
+                    Asked::One => {
+                        let total = total_importance(world, from.p, from.normal, from.two_sided);
+                        let own = light.importance(from.p, from.normal, from.two_sided);
+                        (1.0, own / total.max(f32::MIN_POSITIVE))
+                    }
                 };
-                from.pdf / (from.pdf + chance * light_pdf())
+                rays * from.pdf / (rays * from.pdf + asks * light_pdf())
             }
         }
     }
 
     /// Light from `light`, asked with the probability `chance`, that scatters to the eye if nothing stands in the way, and the
-    /// ray that tells.
+    /// ray that tells; `rays` scattered ones are to be expected beside it.
     #[inline(always)]
-    fn ask(&self, vertex: &Vertex, light: &Light, chance: f32, u: [f32; 2]) -> Option<(Spectrum, Ray)> {
+    fn ask(&self, vertex: &Vertex, light: &Light, chance: f32, rays: f32, u: [f32; 2]) -> Option<(Spectrum, Ray)> {
         let s = light.sample_li(vertex.at.p, u)?;
         let (f, bsdf_pdf) = vertex.eval_pdf(s.wi);
         if f.is_black() || s.pdf <= 0.0 {
             return None;
         }
         let light_pdf = chance * s.pdf;
-        let weight = if self.technique.mis { light_pdf / (light_pdf + bsdf_pdf) } else { 1.0 };
+        let weight = if self.technique.mis { light_pdf / (light_pdf + rays * bsdf_pdf) } else { 1.0 };
         // A lamp stands at a finite distance; the ray stops just short of it.
         Some((f * s.radiance * (weight / light_pdf), vertex.at.ray(s.wi, s.distance * (1.0 - 1e-5))))
     }
 
     /// Direct light at the first surfaces of a packet: every light, in order, as often as it matters beside those before it.
-    fn ask_all(&self, world: &World<'_>, seen: &Seen, roulette: &RouletteSplitting) -> [Spectrum; PACKET] {
-        let mut found = [Spectrum::ZERO; PACKET];
+    fn ask_all(&self, world: &World<'_>, seen: &Seen, roulette: &RouletteSplitting) -> [Direct; PACKET] {
+        let mut direct = [Direct::default(); PACKET];
+        // Whether a wide light was asked: what the first of them finds known settles the weights of all.
+        let mut weighed = [false; PACKET];
         for (k, light) in world.scene.lights.iter().enumerate() {
-            let mut rays = [None; PACKET];
+            let mut shadow = [None; PACKET];
             let mut brings = [Spectrum::ZERO; PACKET];
             for (i, (vertex, sampler)) in seen.iter().enumerate().filter_map(|(i, seen)| Some((i, seen.as_ref()?))) {
                 let importance = light.importance(vertex.at.p, vertex.normal(), vertex.bsdf.transmits());
                 if importance <= 0.0 {
                     continue;
                 }
-                let chance = roulette.light(importance, vertex.albedo(), found[i]);
+                let Direct { found, rays } = &mut direct[i];
+                let chance = roulette.light(importance, vertex.albedo(), *found);
+                if !light.is_narrow() && !weighed[i] {
+                    *rays = roulette.split(vertex.returned(), *found) / chance;
+                    weighed[i] = true;
+                }
                 let u = sampler.get4(sets::first_light(k as u32));
                 if u[2] >= chance {
                     continue;
                 }
+                let rays = if light.is_narrow() { 1.0 } else { *rays };
                 // The weight of the other technique knows nothing of this probability, so the division by it stands outside.
-                if let Some((light, ray)) = self.ask(vertex, light, 1.0, [u[0], u[1]]) {
+                if let Some((light, ray)) = self.ask(vertex, light, 1.0, rays, [u[0], u[1]]) {
                     brings[i] = light * (1.0 / chance);
-                    rays[i] = Some(ray);
+                    shadow[i] = Some(ray);
                 }
             }
             let dark = if light.is_narrow() {
-                world.geometry.occluded_packet(&rays)
+                world.geometry.occluded_packet(&shadow)
             } else {
-                rays.map(|ray| ray.is_some_and(|ray| world.geometry.occluded(&ray)))
+                shadow.map(|ray| ray.is_some_and(|ray| world.geometry.occluded(&ray)))
             };
             for i in 0..PACKET {
                 if !dark[i] {
-                    found[i] += brings[i];
+                    direct[i].found += brings[i];
                 }
             }
         }
-        found
+        direct
     }
 
     /// Direct light at a surface further on: one light, by its share of what all can give there.
@@ -211,7 +244,7 @@ impl PathTracer {
                 }
             }
         }
-        match chosen.and_then(|(light, chance)| self.ask(vertex, light, chance, [u[1], u[2]])) {
+        match chosen.and_then(|(light, chance)| self.ask(vertex, light, chance, 1.0, [u[1], u[2]])) {
             Some((light, ray)) if !world.geometry.occluded(&ray) => light,
             _ => Spectrum::ZERO,
         }
@@ -246,7 +279,7 @@ impl PathTracer {
                 radiance += throughput * self.ask_one(world, &vertex, [lights[0], lights[1], lights[2]]);
             }
             let [lobe, u, v, _] = sampler.get4(sets::scatter(branch, depth));
-            let Some(next) = Flight::leave(&vertex, [lobe, u, v], throughput, false) else { break };
+            let Some(next) = Flight::leave(&vertex, [lobe, u, v], throughput, Asked::One) else { break };
             flight = next;
             let chance = roulette.survive(flight.throughput, found + radiance);
             if lights[3] >= chance {
@@ -257,18 +290,16 @@ impl PathTracer {
         radiance
     }
 
-    /// What the first surface sends to the eye of the light that did not come straight from a light, of which it sends `direct`.
+    /// What the first surface sends to the eye of the light that did not come straight from a light, of which it sends what was found.
     fn indirect(
         &self,
         world: &World<'_>,
         vertex: &Vertex,
         roulette: &RouletteSplitting,
         sampler: Sampler,
-        direct: Spectrum,
+        Direct { found: direct, rays }: Direct,
     ) -> Spectrum {
-        // What a leaf lets through counts as what it reflects.
-        let returned = if vertex.bsdf.transmits() { vertex.albedo() * 2.0 } else { vertex.albedo() };
-        let mean = roulette.split(returned, direct);
+        let mean = roulette.split(vertex.returned(), direct);
         let [lobe, _, _, extra] = sampler.get4(sets::scatter(0, 0));
         let count = (mean + extra) as u32;
         let mut radiance = Spectrum::ZERO;
@@ -280,7 +311,9 @@ impl PathTracer {
                 let [lobe, u, v, _] = sampler.get4(sets::scatter(branch, 0));
                 [lobe, u, v]
             };
-            let Some(flight) = Flight::leave(vertex, u, Spectrum::splat(1.0 / mean), true) else { continue };
+            let Some(flight) = Flight::leave(vertex, u, Spectrum::splat(1.0 / mean), Asked::All { rays }) else {
+                continue;
+            };
             radiance += self.follow(world, flight, roulette, sampler, branch, direct + radiance);
         }
         radiance
@@ -311,7 +344,7 @@ impl Integrator for PathTracer {
         let direct = if self.technique.light_sampling {
             self.ask_all(world, &seen, &roulette)
         } else {
-            [Spectrum::ZERO; PACKET]
+            [Direct::default(); PACKET]
         };
         let mut sightings = [Sighting::default(); PACKET];
         for i in 0..PACKET {
@@ -319,7 +352,7 @@ impl Integrator for PathTracer {
             let (radiance, first) = match (&seen[i], &hits[i]) {
                 (Some((vertex, sampler)), Some(hit)) => {
                     let indirect = self.indirect(world, vertex, &roulette, *sampler, direct[i]);
-                    (direct[i] + indirect, Some(vertex.describe(hit.t)))
+                    (direct[i].found + indirect, Some(vertex.describe(hit.t)))
                 }
                 _ => (self.escaped(world, &sample.ray, None), None),
             };

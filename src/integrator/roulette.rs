@@ -3,8 +3,10 @@
 //! An eye, a network and a relative error ask about each pixel's noise beside its own brightness. In the sun a bounce adds a
 //! tenth of what is there and may be followed now and then; in a shadow it is nearly all, and worth several rays. So roulette
 //! and splitting follow `expected contribution / light found so far`, a small share of the scene's usual radiance standing in
-//! for the light of what is nearly black. Both numbers are known before the contribution is drawn, so dividing by the
-//! probability keeps the estimate unbiased. After Arvo & Kirk 1990, "Particle transport and image synthesis", with the weight
+//! for the light of what is nearly black. Numbers grow with its square root: a path that is worth a quarter as much, and may yet find
+//! more than expected, is followed half as often. Both numbers are known before the contribution is drawn, so dividing by the
+//! probability keeps the estimate unbiased. The factors are those of least error × time among some forty tried on four scene files.
+//! After Arvo & Kirk 1990, "Particle transport and image synthesis", with the weight
 //! relative to the pixel as in Vorba & Křivánek 2016, "Adjoint-driven Russian roulette and splitting".
 
 use super::World;
@@ -14,11 +16,15 @@ use std::f32::consts::FRAC_1_PI;
 /// Reflectance of what most light in a field comes back from.
 const USUAL_ALBEDO: f32 = 0.2;
 /// Radiance, as a share of the usual one, below which noise matters no more than it does there.
-const DARK: f32 = 0.1;
+const DARK: f32 = 0.2;
 /// The least chance of anything: weights stay below its inverse.
 const LEAST: f32 = 0.1;
 /// The most scattered rays that leave the first surface.
 const MOST: f32 = 4.0;
+/// Worth of scattered rays at the first surface over that of what they find indirectly: they find the sky too.
+const SPLIT: f32 = 2.0;
+/// Worth of a path further on over that of the usual radiance: what it meets there is mostly in the shade.
+const SURVIVAL: f32 = 0.2;
 
 /// Russian roulette and splitting in a scene: what is usual there.
 #[derive(Clone, Copy)]
@@ -51,7 +57,7 @@ impl RouletteSplitting {
         if !self.on {
             return 1.0;
         }
-        self.worth(albedo * (irradiance * FRAC_1_PI), found).clamp(LEAST, 1.0)
+        self.worth(albedo * (irradiance * FRAC_1_PI), found).sqrt().clamp(LEAST, 1.0)
     }
 
     /// Mean number of rays to scatter from the first surface, which returns about `albedo` of what it receives.
@@ -60,7 +66,7 @@ impl RouletteSplitting {
         if !self.on {
             return 1.0;
         }
-        self.worth(albedo * self.usual, found).clamp(LEAST, MOST)
+        (SPLIT * self.worth(albedo * self.usual, found)).sqrt().clamp(LEAST, MOST)
     }
 
     /// Chance of following a path on whose next light arrives with `throughput`: never so small that one path could outweigh
@@ -70,7 +76,7 @@ impl RouletteSplitting {
         if !self.on {
             return 1.0;
         }
-        self.worth(throughput * self.usual, found).max(LEAST * throughput.max()).min(1.0)
+        (SURVIVAL * self.worth(throughput * self.usual, found)).sqrt().max(LEAST * throughput.max()).min(1.0)
     }
 }
 

@@ -51,6 +51,12 @@ impl Vertex {
         self.bsdf.reflectance(self.seen.z)
     }
 
+    /// What it sends on of the light from all sides, about: what a leaf lets through counts as what it reflects.
+    #[inline]
+    pub(super) fn returned(&self) -> Spectrum {
+        if self.bsdf.transmits() { self.albedo() * 2.0 } else { self.albedo() }
+    }
+
     /// The normal by which lights are chosen: on the side that scatters, which is that of the eye unless light passes through.
     #[inline]
     pub(super) fn normal(&self) -> Vec3 {

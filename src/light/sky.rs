@@ -5,8 +5,9 @@
 //! element is dω = 2 (|x| + |y| + z)³ ds dt. Source: Cigolle et al. 2014, "A Survey of Efficient Representations for
 //! Independent Unit Vectors", JCGT 3(2).
 //!
-//! Radiance is constant within a cell (about 1°), so a density proportional to radiance × solid angle of the cell is an exact
-//! table, and the irradiance that the table gives is known and can be set. Zero below the horizon. A camera that looks at the sky sees the table
+//! Radiance is constant within a cell (about 1°), and so is the density of drawn directions, proportional to radiance × solid angle ×
+//! (1 − w + w cos θ), w = 0.9: by what a cell gives the ground, and a little more for what leans. The irradiance that the table gives
+//! is known and can be set. Zero below the horizon. A camera that looks at the sky sees the table
 //! interpolated between the cells' centres, and below the horizon, where no ground is, the haze on it.
 
 use super::sample::{Emitter, LampHit, LightSample};
@@ -18,6 +19,9 @@ const SIDE: usize = 128;
 
 /// Points along a side of a cell over which a radiance is averaged.
 const SUB: usize = 3;
+
+/// How far directions are drawn by the cosine to the zenith; the rest keeps what stands upright from waiting long for the horizon.
+const BY_COSINE: f32 = 0.9;
 
 /// A table of radiances over the upper hemisphere.
 #[derive(Clone, Debug)]
@@ -100,14 +104,14 @@ impl Sky {
         let mut weights = Vec::with_capacity(SIDE * SIDE);
         for (cell, radiance) in dome.cells.iter().enumerate() {
             let mean = radiance.mean();
-            let mut solid = 0.0;
+            let mut worth = 0.0;
             for (d, solid_angle) in points(cell) {
-                solid += solid_angle;
+                worth += solid_angle * (1.0 - BY_COSINE + BY_COSINE * d.z);
                 for (face, cos) in faces.iter_mut().zip([d.x, -d.x, d.y, -d.y, d.z]) {
                     *face += mean * cos.max(0.0) * solid_angle;
                 }
             }
-            weights.push(mean * solid);
+            weights.push(mean * worth);
         }
         let distribution = Distribution2D::new(&weights, SIDE)?;
         Some(Self { irradiance: dome.irradiance(), dome, distribution, faces })

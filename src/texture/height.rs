@@ -1,6 +1,6 @@
 //! Heights over uv: relief to displace with or to derive normals from.
 
-use super::pyramid::{Wrap, halve};
+use super::pyramid::Wrap;
 use crate::error::Result;
 use crate::math::{Vec2, vec2};
 use std::path::Path;
@@ -41,29 +41,6 @@ impl Height {
     pub fn scaled(mut self, factor: f32) -> Self {
         self.values.iter_mut().for_each(|v| *v *= factor);
         self
-    }
-
-    /// Level of detail of a footprint that spans `extent` of uv: 0 at a texel or less, 1 at two texels.
-    pub fn lod(&self, extent: f32) -> f32 {
-        (extent * self.width.max(self.rows) as f32).max(1.0).log2()
-    }
-
-    /// The same relief on the level of the mip pyramid that is nearest to `lod` (0 is the finest): means of 2 × 2 texels, and so on.
-    #[must_use]
-    pub fn coarser(&self, lod: f32) -> Self {
-        let mut coarse = self.clone();
-        for _ in 0..(lod.max(0.0) + 0.5) as usize {
-            let (width, rows) = coarse.size();
-            let value = |x: u32, y: u32| [coarse.values[y as usize * width as usize + x as usize]];
-            let Some(half) = halve(width, rows, value) else { break };
-            coarse = Self {
-                width: half.width,
-                rows: half.height,
-                values: half.values.into_iter().map(|[v]| v).collect(),
-                wrap: self.wrap,
-            };
-        }
-        coarse
     }
 
     /// What lies outside uv ∈ [0, 1]².

@@ -227,7 +227,7 @@ fn beyond(view: View) -> f32 {
     (a - lo).max(hi - b).max_element().max(0.0)
 }
 
-/// What the ground shows; each texel the mean of what of its layers it covers unless `detail` is full.
+/// What the ground shows; each texel has the mean colour of what of its layers it covers, unless `detail` is full.
 fn bake(ground: &Ground, Soil { desc, detail, maps, texel, .. }: &Soil) -> BakedGrounds {
     let coarser = |(map, layer): (&Arc<Layer>, &LayerDesc)| Arc::new(map.coarser(texel / layer.size_m.f32()));
     let seen = match detail {
