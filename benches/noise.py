@@ -52,10 +52,7 @@ def main():
     print("| scene file | error | time | efficiency |\n|---|---|---|---|")
     for scene in options.scenes:
         reference, _ = render(programs[0], scene, options.reference_spp, options)
-        error, seconds = [], []
-        for program in programs:
-            image, _ = render(program, scene, options.spp, options)
-            error.append(relmse(image, reference))
+        error = [relmse(render(program, scene, options.spp, options)[0], reference) for program in programs]
         taken = [[], []]
         for _ in range(options.rounds):
             for k, program in enumerate(programs):

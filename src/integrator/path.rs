@@ -183,7 +183,7 @@ impl PathTracer {
     /// Direct light at the first surfaces of a packet: every light, in order, as often as it matters beside those before it.
     fn ask_all(&self, world: &World<'_>, seen: &Seen, roulette: &RouletteSplitting) -> [Direct; PACKET] {
         let mut direct = [Direct::default(); PACKET];
-        // Whether a wide light was asked: what the first of them finds known settles the weights of all.
+        // Whether a wide light was asked: what is found before the first of them settles the weights of all.
         let mut weighed = [false; PACKET];
         for (k, light) in world.scene.lights.iter().enumerate() {
             let mut shadow = [None; PACKET];
@@ -290,7 +290,7 @@ impl PathTracer {
         radiance
     }
 
-    /// What the first surface sends to the eye of the light that did not come straight from a light, of which it sends what was found.
+    /// What the first surface sends to the eye of the light that scattered rays find, beside the direct light.
     fn indirect(
         &self,
         world: &World<'_>,
