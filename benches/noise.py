@@ -3,9 +3,10 @@
 
     python benches/noise.py OLD NEW scenes/field.ron scenes/04-weeds.ron
 
-For each scene file both render the same pixels with as many samples. Error: relMSE as in `race.py`, against a long render by OLD. OLD's
-samples are the beginning of that render's, so its error is understated by one part in --reference-spp / --spp, and NEW has the worse of
-it. Time: core seconds of the process less those of one sample a pixel, which growing and building take. Efficiency is
+For each scene file both render the same pixels with as many samples. Error: relMSE as in `race.py`, against a long render by OLD, put right
+for the noise of the reference: OLD's samples are its beginning, so 1/N is missing; NEW's are taken for others, so 1/N is too much. Where
+both draw the same numbers, say so (--same-samples).
+Time: core seconds of the process less those of one sample a pixel, which growing and building take. Efficiency is
 1 / (error × time): at twice of it an error is reached in half the time. It needs a Python with mitsuba and numpy, as `race.py` does.
 """
 
@@ -46,13 +47,16 @@ def main():
     parser.add_argument("--width", type=int, default=324)
     parser.add_argument("--spp", type=int, default=32)
     parser.add_argument("--reference-spp", type=int, default=768)
+    parser.add_argument("--same-samples", action="store_true", help="NEW draws the numbers that OLD draws")
     parser.add_argument("--rounds", type=int, default=3)
     options = parser.parse_args()
     programs = [str(Path(p).resolve()) for p in (options.old, options.new)]
     print("| scene file | error | time | efficiency |\n|---|---|---|---|")
     for scene in options.scenes:
         reference, _ = render(programs[0], scene, options.reference_spp, options)
-        error = [relmse(render(program, scene, options.spp, options)[0], reference) for program in programs]
+        share = options.spp / options.reference_spp
+        put_right = [1 / (1 - share), 1 / (1 - share) if options.same_samples else 1 / (1 + share)]
+        error = [relmse(render(program, scene, options.spp, options)[0], reference) * p for program, p in zip(programs, put_right)]
         taken = [[], []]
         for _ in range(options.rounds):
             for k, program in enumerate(programs):

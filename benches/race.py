@@ -20,8 +20,11 @@ the error of a pixel about threefold and ties its noise to that of its neighbour
 Error: relMSE = mean over pixels and R, G, B of (x − ref)² / (ref² + 0.01 mean(ref)²), put right for the noise of the
 reference: Mitsuba's N samples are others than the n of a run, so 1/N is too much; Furrow's run is the beginning of its reference, so 1/N is
 missing. Runs of the two alternate, --rounds times; medians are shown. From the errors, which fall as 1/n, follow the
-samples that reach --target; a last run with that many confirms error and time. Seconds are those of rendering; Mitsuba's first
+samples that reach --target; a last run with that many confirms error and time. As samples come in blocks of 16 or in squares, it has
+some too many or too few: its seconds times its error over the target are compared. Seconds are those of rendering; Mitsuba's first
 kernels are compiled before, and their time and that of loading stand below the table, beside the whole time of Furrow's process.
+A render of Mitsuba's takes some time before its first sample, more of it with many materials; what further samples alone cost, times the
+error, stands below the table too.
 """
 
 import argparse
@@ -132,7 +135,8 @@ class Mitsuba:
         text = (folder / "scene" / "scene.xml").read_text()
         path = folder / "scene" / "scene-race.xml"
         path.write_text(text.replace('type="independent"', f'type="{options.sampler}"'))
-        self.scene = mi.load_file(str(path), sun_weight=str(options.sun_weight))
+        # Loading in parallel takes a thread for each of thousands of textures, more than many machines allow.
+        self.scene = mi.load_file(str(path), parallel=False, sun_weight=str(options.sun_weight))
         self.depth = int(re.search(r'"max_depth" value="(\d+)"', text).group(1))
         width, height = self.scene.sensors()[0].film().size()
         self.pixels = int(width) * int(height)
@@ -202,6 +206,12 @@ def fit(points, target):
     error, seconds = points[spp]
     needed = max(1, math.ceil(error * spp / target))
     return needed, seconds / spp * needed
+
+
+def further(points):
+    """Seconds of a sample between the fewest and the most that were measured, times error and number of the most."""
+    few, many = min(points), max(points)
+    return (points[many][1] - points[few][1]) / (many - few) * points[many][0] * many
 
 
 @contextlib.contextmanager
@@ -274,8 +284,8 @@ def race(options, name):
         }
         needed, predicted = fit(points, options.target)
         needed = program.possible(needed)
-        confirmed, seconds = measure(program, needed, 500) if needed < program.possible(options.reference_spp) else (math.nan, predicted)
-        rows.append((program, points, needed, confirmed, seconds))
+        confirmed, seconds = measure(program, needed, 500) if needed < program.possible(options.reference_spp) else (options.target, predicted)
+        rows.append((program, points, needed, confirmed, seconds * confirmed / options.target))
 
     ours, others = rows[0][4], rows[1][4]
     middle = sorted(options.spp)[len(options.spp) // 2]
@@ -291,6 +301,9 @@ def race(options, name):
     print()
     for program, *_ in rows:
         print(f"{program.name}: {program.words()}")
+    if len(options.spp) > 1:
+        ratio = further(rows[1][1]) / further(rows[0][1])
+        print(f"Seconds that further samples take, times the error: {ratio:.2f} times as many with {theirs.name}.")
     print(f"{name}, filter {options.filter}, {theirs.pixels} pixels, {os.cpu_count()} cores, {options.variant}, {options.sampler}; Furrow is {others / ours:.2f} times as fast.")
 
 

@@ -124,7 +124,7 @@ const ALLOWED: &[(&str, &str)] = &[
     ("signal_hook", "cli/signal.rs"),
     // Parts that a pixel met: one or two, nearly always.
     ("smallvec", "film/tally.rs output/exr/cryptomatte.rs"),
-    ("sobol_burley", "sampling/sampler.rs"),
+    ("sobol_burley", "sampling/sobol.rs"),
     ("solar_positioning", "light/position.rs"),
     // How far a misspelt name is from those that are known.
     ("strsim", "ron_file/suggest.rs"),

@@ -180,8 +180,15 @@ impl PathTracer {
         Some((f * s.radiance * (weight / light_pdf), vertex.at.ray(s.wi, s.distance * (1.0 - 1e-5))))
     }
 
-    /// Direct light at the first surfaces of a packet: every light, in order, as often as it matters beside those before it.
-    fn ask_all(&self, world: &World<'_>, seen: &Seen, roulette: &RouletteSplitting) -> [Direct; PACKET] {
+    /// Direct light at the first surfaces of a packet: every light, in order, as often as it matters beside those before it. The place on
+    /// light `narrow` is stratified together with that in the pixel: both move the edges of its shadows.
+    fn ask_all(
+        &self,
+        world: &World<'_>,
+        seen: &Seen,
+        roulette: &RouletteSplitting,
+        narrow: Option<usize>,
+    ) -> [Direct; PACKET] {
         let mut direct = [Direct::default(); PACKET];
         // Whether a wide light was asked: what is found before the first of them settles the weights of all.
         let mut weighed = [false; PACKET];
@@ -199,13 +206,19 @@ impl PathTracer {
                     *rays = roulette.split(vertex.returned(), *found) / chance;
                     weighed[i] = true;
                 }
-                let u = sampler.get4(sets::first_light(k as u32));
-                if u[2] >= chance {
+                let [own_u, own_v, asks, _] = sampler.get4(sets::first_light(k as u32));
+                if asks >= chance {
                     continue;
                 }
+                let place = if Some(k) == narrow {
+                    let [_, _, u, v] = sampler.get4(sets::FIRST);
+                    [u, v]
+                } else {
+                    [own_u, own_v]
+                };
                 let rays = if light.is_narrow() { 1.0 } else { *rays };
                 // The weight of the other technique knows nothing of this probability, so the division by it stands outside.
-                if let Some((light, ray)) = self.ask(vertex, light, 1.0, rays, [u[0], u[1]]) {
+                if let Some((light, ray)) = self.ask(vertex, light, 1.0, rays, place) {
                     brings[i] = light * (1.0 / chance);
                     shadow[i] = Some(ray);
                 }
@@ -298,20 +311,26 @@ impl PathTracer {
         roulette: &RouletteSplitting,
         sampler: Sampler,
         Direct { found: direct, rays }: Direct,
+        narrow: Option<usize>,
     ) -> Spectrum {
         let mean = roulette.split(vertex.returned(), direct);
-        let [lobe, _, _, extra] = sampler.get4(sets::scatter(0, 0));
+        let [lobe, own_u, own_v, extra] = sampler.get4(sets::scatter(0, 0));
         let count = (mean + extra) as u32;
         let mut radiance = Spectrum::ZERO;
         for branch in 0..count {
-            let u = if branch == 0 {
-                let [_, _, u, v] = sampler.get4(sets::FIRST);
-                [lobe, u, v]
-            } else {
-                let [lobe, u, v, _] = sampler.get4(sets::scatter(branch, 0));
-                [lobe, u, v]
+            let [lobe, u, v] = match (branch, narrow) {
+                (0, Some(_)) => [lobe, own_u, own_v],
+                (0, None) => {
+                    let [_, _, u, v] = sampler.get4(sets::FIRST);
+                    [lobe, u, v]
+                }
+                _ => {
+                    let [lobe, u, v, _] = sampler.get4(sets::scatter(branch, 0));
+                    [lobe, u, v]
+                }
             };
-            let Some(flight) = Flight::leave(vertex, u, Spectrum::splat(1.0 / mean), Asked::All { rays }) else {
+            let Some(flight) = Flight::leave(vertex, [lobe, u, v], Spectrum::splat(1.0 / mean), Asked::All { rays })
+            else {
                 continue;
             };
             radiance += self.follow(world, flight, roulette, sampler, branch, direct + radiance);
@@ -341,8 +360,9 @@ impl Integrator for PathTracer {
             }
         }
         let roulette = RouletteSplitting::new(world, self.technique.roulette);
+        let narrow = world.scene.lights.iter().position(Light::is_narrow).filter(|_| self.technique.light_sampling);
         let direct = if self.technique.light_sampling {
-            self.ask_all(world, &seen, &roulette)
+            self.ask_all(world, &seen, &roulette, narrow)
         } else {
             [Direct::default(); PACKET]
         };
@@ -351,7 +371,7 @@ impl Integrator for PathTracer {
             let Some(sample) = &samples[i] else { continue };
             let (radiance, first) = match (&seen[i], &hits[i]) {
                 (Some((vertex, sampler)), Some(hit)) => {
-                    let indirect = self.indirect(world, vertex, &roulette, *sampler, direct[i]);
+                    let indirect = self.indirect(world, vertex, &roulette, *sampler, direct[i], narrow);
                     (direct[i].found + indirect, Some(vertex.describe(hit.t)))
                 }
                 _ => (self.escaped(world, &sample.ray, None), None),

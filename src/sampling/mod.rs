@@ -4,6 +4,7 @@ pub mod bootstrap;
 pub mod distribution;
 pub mod rng;
 pub mod sampler;
+mod sobol;
 pub mod warp;
 
 pub use rng::{Purpose, Stream};

@@ -1,16 +1,17 @@
 //! Owen-scrambled Sobol points, four dimensions at a time.
 //!
-//! Every pixel scrambles the same sequence with its own hash, so any number of samples may be taken in any order by any
-//! thread. Source: Burley 2020, "Practical Hash-based Owen Scrambling", JCGT 9(4), as carried out by `sobol_burley`.
+//! Every set of four dimensions of every pixel scrambles the same sequence with its own hash, so any number of samples may be taken in any
+//! order by any thread. Source: Burley 2020, "Practical Hash-based Owen Scrambling", JCGT 9(4), with the hashes of `sobol_burley`.
 //!
 //! Independent numbers can take their place ([`Points::Independent`]): the mean of an image must not depend on which.
 
 use super::rng::mix;
+use super::sobol;
 
 /// What each set of four dimensions is for.
 pub mod sets {
-    /// Place in the pixel, and the direction in which its surface scatters first: what a pixel's error depends on most,
-    /// stratified together.
+    /// Place in the pixel, and what a pixel's error depends on most beside it, stratified together: where on the first narrow light;
+    /// where there is none, the direction in which the first surface scatters.
     pub const FIRST: u32 = 0;
     /// Place on the lens.
     pub const LENS: u32 = (1 << 24) - 1;
@@ -69,16 +70,14 @@ impl Sampler {
         Self { index, seed: mix(seed ^ (u64::from(y) << 32 | u64::from(x))) as u32, points }
     }
 
-    /// The four numbers in [0, 1) of dimension set `set`; each set is stratified by itself over the samples of a pixel.
-    /// The direction numbers of far sets are used again under another scramble and another order of the samples.
+    /// The four numbers in [0, 1) of dimension set `set`; each set is stratified by itself over the samples of a pixel, and has nothing
+    /// to do with the others.
     #[inline]
     pub fn get4(&self, set: u32) -> [f32; 4] {
-        const SETS: u32 = sobol_burley::NUM_DIMENSION_SETS_4D;
-        if self.points == Points::Independent {
-            return self.independent4(set);
+        match self.points {
+            Points::Sobol => sobol::point(self.index, mix(u64::from(self.seed) << 32 | u64::from(set)) as u32),
+            Points::Independent => self.independent4(set),
         }
-        let seed = if set < SETS { self.seed } else { mix(u64::from(self.seed) << 32 | u64::from(set / SETS)) as u32 };
-        sobol_burley::sample_4d(self.index, set % SETS, seed)
     }
 
     /// Four numbers that have nothing to do with those of any other sample or set: a hash of their address.
