@@ -284,8 +284,11 @@ def race(options, name):
         }
         needed, predicted = fit(points, options.target)
         needed = program.possible(needed)
-        confirmed, seconds = measure(program, needed, 500) if needed < program.possible(options.reference_spp) else (options.target, predicted)
-        rows.append((program, points, needed, confirmed, seconds * confirmed / options.target))
+        confirmed, seconds = math.nan, predicted
+        if needed < program.possible(options.reference_spp):
+            confirmed, taken_there = measure(program, needed, 500)
+            seconds = taken_there * confirmed / options.target
+        rows.append((program, points, needed, confirmed, seconds))
 
     ours, others = rows[0][4], rows[1][4]
     middle = sorted(options.spp)[len(options.spp) // 2]
