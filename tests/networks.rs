@@ -109,6 +109,27 @@ fn an_encoder_that_begins_with_imagenet_computes_what_its_package_does() {
     }
 }
 
+/// Rationale: positions that lie across where they lie down, or a class token without its own, make a transformer that was trained for
+/// weeks one that has to learn again. Expected: with a file under timm's names the program computes what timm does with that very file.
+/// Source: PyPI's timm 0.9.16, `vit_small_patch14_dinov2`, in PyTorch, with random weights: those of DINOv2 are the user's to bring.
+#[test]
+fn a_transformer_that_begins_with_a_published_file_computes_what_timm_does() {
+    let Some(python) = torch() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("dinov2.safetensors");
+    ask(&python, "train/reference.py", &["--write-vit", file.to_str().unwrap()]);
+    let begun = training::learn_with(
+        &SET,
+        &folder.path().join("frozen"),
+        Plan { network: Network::VitUnet, ..Plan::default() },
+        Hyperparameters { pretrained: Pretrained::File(file.clone()), freeze: 6, ..Hyperparameters::default() },
+    );
+    let compared = folder.path().join("compared");
+    record(&begun, &compared);
+    let [file, compared] = [&file, &compared].map(|path| path.to_str().unwrap());
+    ask(&python, "train/reference.py", &["--engine", "torch", "--encoder", file, compared]);
+}
+
 /// How far values are from others: the largest distance, and the mean one, as shares of the others' deviation.
 fn apart(a: &[f32], b: &[f32]) -> (f64, f64) {
     let spread = Tensor::from_slice(b).std(false).double_value(&[]);
@@ -149,7 +170,7 @@ fn an_answer_depends_neither_on_precision_nor_batch_nor_layout() {
         let half = half.scores(&pixels, training::SIZE).unwrap();
         let half = apart(&half, &scores);
         eprintln!("{}: batch {batch:?}, layout {layout:?}, bf16 {half:?}", network.name());
-        if matches!(network, Network::Unet | Network::LiteUnet) {
+        if matches!(network, Network::Unet | Network::LiteUnet | Network::VitUnet) {
             // `lite-unet` has twice the convolutions, so twice the roundings.
             let rounding = if network == Network::Unet { 0.05 } else { 0.1 };
             assert!(batch.0 < 1e-4 && layout.0 < 1e-4 && half.1 < rounding, "{batch:?} {layout:?} {half:?}");

@@ -19,7 +19,7 @@ if ! cmp -s tests/requirements.txt target/venv/installed; then
   cp tests/requirements.txt target/venv/installed
 fi
 # PyPI's torch for Linux needs three gigabytes of CUDA. Debian's is for the CPU, and is found by Debian's Python only.
-beside_torch="$(grep '^safetensors==' tests/requirements.txt) efficientnet-lite-pytorch==0.1.0 ultralytics==8.4.190 opencv-python-headless==4.10.0.84"
+beside_torch="$(grep '^safetensors==' tests/requirements.txt) efficientnet-lite-pytorch==0.1.0 timm==0.9.16 ultralytics==8.4.190 opencv-python-headless==4.10.0.84"
 if [ "$(cat target/venv-torch/installed 2>/dev/null || true)" != "$beside_torch" ]; then
   /usr/bin/python3 -m venv --system-site-packages target/venv-torch
   # shellcheck disable=SC2086 # a list of packages

@@ -1,6 +1,6 @@
 //! Self-training of a trained network on photographs without labels, from files to files.
 
-use super::data::{Augment, Normalization, Photos, Selection};
+use super::data::{Augment, Photos, Selection};
 use super::deploy::pictures::Picture;
 use super::fit::class_weights::ClassWeights;
 use super::fit::hyper::NormalizationMode;
@@ -69,11 +69,7 @@ impl Asked<'_> {
             ema: if hyper.ema > 0.0 { hyper.ema } else { EMA },
             resize: card.resize.clone(),
             refine: card.refine,
-            normalization: match card.normalization {
-                Normalization::Band => NormalizationMode::Band,
-                Normalization::Image => NormalizationMode::Image,
-                Normalization::Fixed { .. } => NormalizationMode::Fixed,
-            },
+            normalization: NormalizationMode::of(&card.normalization),
             ..hyper
         };
         // Before any photograph is read.

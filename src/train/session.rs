@@ -5,13 +5,14 @@ use super::deploy::enlarge::classes_at;
 use super::ensemble::Ensemble;
 use super::fit::calibrate::calibrate;
 use super::fit::checkpoint::Checkpoint;
+use super::fit::hyper::NormalizationMode;
 use super::fit::logits;
 use super::fit::{self, Callbacks, Data, Plan};
 use super::measure::{Evaluation, Prediction, Report};
 use super::net::{Parameter, parameters};
 use super::run::{self, Identity, ModelCard, Results, TrainedModel};
 use super::torch::{Model, Precision, Where, device, multiscale};
-use super::weights;
+use super::weights::{self, Array};
 use crate::dataset::split::Split;
 use crate::output::remove_unfinished;
 use crate::{Error, Result};
@@ -59,6 +60,21 @@ pub fn fit(
     train(plan, begin, None, machine, folder, callbacks)
 }
 
+/// The weights of a run to begin with, which must see images as the plan does.
+fn begun(plan: &Plan, run: &Path) -> Result<Vec<Array>> {
+    let TrainedModel { card, values } = TrainedModel::open(run)?;
+    let normalization = NormalizationMode::of(&card.normalization).name();
+    let is = [("network", card.network.name()), ("normalization", normalization)];
+    let asked = [plan.network.name(), plan.hyper.normalization.name()];
+    match is.iter().zip(asked).find(|((_, is), asked)| is != asked) {
+        Some(((flag, is), asked)) => {
+            let what = format!("a run cannot begin with another of {flag} {is}: its own is {asked}");
+            Err(Error::misuse(what).in_file(run).help(format!("--{flag} {is}")))
+        }
+        None => Ok(values),
+    }
+}
+
 /// The same with photographs without labels, where the plan is a self-training.
 pub(super) fn train(
     plan: &Plan,
@@ -94,7 +110,7 @@ pub(super) fn train(
             return Err(Error::misuse("a run to begin with and pretrained weights exclude each other")
                 .help("--init goes on with all weights of a run, --pretrained begins an encoder: give one"));
         }
-        Some(run) => TrainedModel::open(run)?.values,
+        Some(run) => begun(plan, run)?,
         None => plan.hyper.pretrained.begin(plan.network, &plan.shape.bands, plan.classes.len(), plan.seed)?,
     };
     let plan = Plan { begin_with: (!begin.is_empty()).then(|| weights::hash(&begin)), ..plan.clone() };

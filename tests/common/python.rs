@@ -36,7 +36,7 @@ fn first(before: impl Iterator<Item = PathBuf>, probe: &str) -> Option<PathBuf> 
 /// A Python with PyTorch: `$FURROW_TORCH_PYTHON`, then `target/venv-torch/bin/python`, which `tests/peers.sh` makes, then those of
 /// [`python`], to which it is equal otherwise.
 pub fn torch() -> Option<PathBuf> {
-    torch_with("safetensors, efficientnet_lite_pytorch")
+    torch_with("safetensors, efficientnet_lite_pytorch, timm")
 }
 
 /// The same with other modules beside PyTorch and numpy.

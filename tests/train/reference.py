@@ -1,6 +1,7 @@
 """The networks, written once more from their papers and independently of `src/train`: parameter counts and values must agree.
 
-    reference.py [--engine numpy|torch] FOLDER...
+    reference.py [--engine numpy|torch] [--encoder FILE] FOLDER...
+    reference.py --write-vit FILE
 
 Each folder holds `model.json` and `weights.safetensors` as `train fit` leaves them, and `io.safetensors`: `images` (images x bands x
 height x width, normalised) and `scores`, what the program makes of them. Two engines:
@@ -8,7 +9,11 @@ height x width, normalised) and `scores`, what the program makes of them. Two en
 numpy   convolutions as sums over shifted pictures, everything in double precision.
 torch   `torch.nn` modules named as in the papers' public implementations (SegNet's encoder as torchvision's `vgg16_bn`, the
         U-Net's as torchvision's `resnet18`, its decoder as segmentation_models_pytorch's `UnetDecoder`), in double precision; the
-        encoder of `lite-unet` is that of PyPI's `efficientnet-lite-pytorch`, other people's code.
+        encoder of `lite-unet` is that of PyPI's `efficientnet-lite-pytorch` and that of `vit-unet` timm's
+        `vit_small_patch14_dinov2`, other people's code.
+
+With `--encoder` the values of the transformer of `vit-unet` are those of a file under timm's names, which `train` began with, whatever
+the program made of them; `--write-vit` writes such a file, of random values.
 
 A pooling that puts maxima back where they lay is discontinuous: where the two largest of four values are nearly equal, rounding
 decides. Images in which that happens (a gap below GAP of the layer's deviation, in double precision) decide nothing and are counted
@@ -17,6 +22,7 @@ apart; two images at least must decide.
 
 import json
 import sys
+from functools import partial
 
 import numpy as np
 from safetensors.numpy import load_file
@@ -93,6 +99,38 @@ class Arrays:
     def nearest(self, x, h, w):
         rows, columns = np.arange(h) * x.shape[2] // h, np.arange(w) * x.shape[3] // w
         return x[:, :, rows][:, :, :, columns]
+
+
+    def layer_norm(self, x, name, epsilon=1e-6):
+        centred = x - x.mean(axis=-1, keepdims=True)
+        y = centred / np.sqrt((centred**2).mean(axis=-1, keepdims=True) + epsilon)
+        return y * self.get(name + ".weight") + self.get(name + ".bias")
+
+    def linear(self, x, name):
+        return x @ self.get(name + ".weight")[:, :, 0, 0].T + self.get(name + ".bias")
+
+
+def kernel_linear(t):
+    return np.maximum(0, 1 - np.abs(t))
+
+
+def kernel_cubic(t, a=-0.75):
+    t = np.abs(t)
+    near = (a + 2) * t**3 - (a + 3) * t**2 + 1
+    return np.where(t <= 1, near, np.where(t < 2, a * t**3 - 5 * a * t**2 + 8 * a * t - 4 * a, 0))
+
+
+def resized(x, height, width, kernel):
+    """Between pixels' centres, the edge's values beyond the edge, nothing averaged where it becomes smaller."""
+    for axis, to in ((2, height), (3, width)):
+        size = x.shape[axis]
+        at = (np.arange(to) + 0.5) * size / to - 0.5
+        matrix = np.zeros((to, size))
+        for k in range(-3, 4):
+            source = np.floor(at).astype(int) + k
+            np.add.at(matrix, (np.arange(to), np.clip(source, 0, size - 1)), kernel(at - source))
+        x = np.moveaxis(np.tensordot(matrix, x, (1, axis)), 0, axis)
+    return x
 
 
 def numpy_segnet(o, x):
@@ -174,10 +212,50 @@ def numpy_lite_unet(o, x):
     return numpy_decoder(o, x, skips, size)
 
 
+def numpy_vit_unet(o, x):
+    import math
+
+    n, _, *size = x.shape
+    h, w = (-(-side // 14) for side in size)
+    patches = resized(x, 14 * h, 14 * w, kernel_linear).reshape(n, -1, h, 14, w, 14)
+    patches = np.einsum("ncyixj,ocij->nyxo", patches, o.get("stem.weight"), optimize=True) + o.get("stem.bias")
+    patches = patches + resized(o.get("enc.position"), h, w, kernel_cubic).transpose(0, 2, 3, 1)
+    tokens = patches.reshape(n, h * w, 384)
+    tokens = np.concatenate([np.broadcast_to(o.get("enc.class")[:, :, 0, 0], (n, 1, 384)), tokens], axis=1)
+    gelu = np.vectorize(lambda t: t * (1 + math.erf(t / math.sqrt(2))) / 2)
+    seen = []
+    for block in range(12):
+        name = f"enc{block}"
+        qkv = o.linear(o.layer_norm(tokens, name + ".norm1"), name + ".qkv")
+        q, k, v = qkv.reshape(n, -1, 3, 6, 64).transpose(2, 0, 3, 1, 4)
+        products = q @ k.transpose(0, 1, 3, 2) / 8
+        shares = np.exp(products - products.max(axis=-1, keepdims=True))
+        shares /= shares.sum(axis=-1, keepdims=True)
+        y = o.linear((shares @ v).transpose(0, 2, 1, 3).reshape(tokens.shape), name + ".proj")
+        tokens = tokens + y * o.get(name + ".scale1.gamma")
+        y = gelu(o.linear(o.layer_norm(tokens, name + ".norm2"), name + ".fc1"))
+        tokens = tokens + o.linear(y, name + ".fc2") * o.get(name + ".scale2.gamma")
+        if block in (5, 11):
+            y = o.layer_norm(tokens, name + ".norm")[:, 1:]
+            seen.append(y.reshape(n, h, w, 384).transpose(0, 3, 1, 2))
+    fine = [x]
+    for level in range(3):
+        fine.append(o.unit(fine[-1], f"fine{level}", stride=2, bias=False))
+    x = np.concatenate(seen, axis=1)
+    for level in range(4):
+        skip = fine.pop()
+        x = o.nearest(x, *skip.shape[2:])
+        if level < 3:
+            x = np.concatenate([x, skip], axis=1)
+        for i in range(2):
+            x = o.unit(x, f"dec{level}_{i}", bias=False)
+    return o.conv(x, "head.conv")
+
+
 def run_numpy(network, weights, images, classes):
     o = Arrays(weights)
     walk = {"segnet": numpy_segnet, "basic-segnet": numpy_basic_segnet, "unet": numpy_unet}
-    walk = (walk | {"lite-unet": numpy_lite_unet})[network]
+    walk = (walk | {"lite-unet": numpy_lite_unet, "vit-unet": numpy_vit_unet})[network]
     scores = walk(o, images.astype(np.float64))
     learnt = sum(size for name, size in o.used.items() if "running" not in name)
     return scores, learnt, o.doubt, set(o.used)
@@ -192,7 +270,7 @@ def torch_networks():
     from torch.nn import functional as F
 
     class Base(nn.Module):
-        doubt = None
+        doubt, twice = None, 0
 
         def pool(self, x):
             n, c, h, w = x.shape
@@ -373,25 +451,110 @@ def torch_networks():
             names += [f"dec{d}_{i}.{what}" for d in range(5) for i in range(2) for what in ("conv", "bn")]
             return names + ["head.conv"]
 
-    return {"segnet": SegNet, "basic-segnet": BasicSegNet, "unet": UNet, "lite-unet": LiteUNet}
+    class VitUNet(Base):
+        """The encoder is timm's; where positions lie, and that its last norm is here twice, is written here."""
+
+        twice = 384  # The class token's position, which is added to the token.
+
+        def __init__(self, bands, classes):
+            super().__init__()
+            import timm
+
+            self.vit = timm.create_model("vit_small_patch14_dinov2", pretrained=False, in_chans=bands, num_classes=0)
+            self.vit.norm, self.norms = nn.Identity(), nn.ModuleList(nn.LayerNorm(384, eps=1e-6) for _ in range(2))
+            def unit(inputs, outputs):
+                return nn.Sequential(nn.Conv2d(inputs, outputs, 3, 2, 1, bias=False), nn.BatchNorm2d(outputs), nn.ReLU())
+
+            self.fine = nn.ModuleList(unit(*sizes) for sizes in zip([bands, 16, 32], [16, 32, 64]))
+            decoder, skips, inputs = [128, 64, 32, 16], [64, 32, 16, 0], [768, 128, 64, 32]
+            self.decoder = nn.ModuleList(DecoderBlock(*sizes) for sizes in zip(inputs, skips, decoder))
+            self.segmentation_head = nn.Conv2d(16, classes, 3, padding=1)
+
+        def forward(self, x):
+            size = x.shape[2:]
+            h, w = (-(-side // 14) for side in size)
+            fine = [x]
+            for unit in self.fine:
+                fine.append(unit(fine[-1]))
+            y = F.interpolate(x, size=(14 * h, 14 * w), mode="bilinear", align_corners=False)
+            y = self.vit.patch_embed.proj(y).flatten(2).transpose(1, 2)
+            grid = self.vit.pos_embed[:, 1:].transpose(1, 2).reshape(1, 384, 37, 37)
+            grid = F.interpolate(grid, size=(h, w), mode="bicubic", align_corners=False)
+            token = self.vit.cls_token + self.vit.pos_embed[:, :1]
+            y = torch.cat([token.expand(len(y), -1, -1), y + grid.flatten(2).transpose(1, 2)], dim=1)
+            seen = []
+            for i, block in enumerate(self.vit.blocks):
+                y = block(y)
+                if i in (5, 11):
+                    seen.append(self.norms[i // 6](y)[:, 1:].transpose(1, 2).reshape(-1, 384, h, w))
+            x, skips = torch.cat(seen, dim=1), fine[:0:-1] + [None]
+            for block, skip in zip(self.decoder, skips):
+                x = block(x, skip, size if skip is None else skip.shape[2:])
+            return self.segmentation_head(x)
+
+        def names(self):
+            names = [f"fine{i}.{what}" for i in range(3) for what in ("conv", "bn")]
+            names += [f"dec{d}_{i}.{what}" for d in range(4) for i in range(2) for what in ("conv", "bn")]
+            return names + ["head.conv"]
+
+        def load_encoder(self, weights):
+            """Under timm's names, as `train` reads them; returns our names of all that was read."""
+            ours = {n: torch.tensor(a) for n, a in weights.items() if n.startswith(("stem", "enc"))}
+            state = {"patch_embed.proj." + n[5:]: a for n, a in ours.items() if n.startswith("stem.")}
+            # The class token holds its position's embedding here.
+            position = ours["enc.position"].flatten(2).transpose(1, 2)
+            state["cls_token"] = ours["enc.class"].reshape(1, 1, 384)
+            state["pos_embed"] = torch.cat([torch.zeros(1, 1, 384), position], dim=1)
+            parts = {"qkv": "attn.qkv", "proj": "attn.proj", "fc1": "mlp.fc1", "fc2": "mlp.fc2", "scale1": "ls1", "scale2": "ls2"}
+            for name, array in ours.items():
+                place, part, what = (name.split(".") + [""])[:3]
+                if not what:
+                    continue
+                if part == "norm":
+                    getattr(self.norms[0 if place == "enc5" else 1], what).data = array
+                else:
+                    state[f"blocks.{place[3:]}.{parts.get(part, part)}.{what}"] = array.squeeze()
+            self.vit.load_state_dict(state)
+            return set(ours)
+
+        def load_published(self, state):
+            for norm in self.norms:
+                norm.load_state_dict({what: state["norm." + what] for what in ("weight", "bias")})
+            self.vit.load_state_dict({name: array for name, array in state.items() if not name.startswith("norm.")})
+
+    return {"segnet": SegNet, "basic-segnet": BasicSegNet, "unet": UNet, "lite-unet": LiteUNet, "vit-unet": VitUNet}
 
 
-def run_torch(network, weights, images, classes):
+def write_vit(path):
+    import timm
+    import torch
+    from safetensors.torch import save_file
+
+    torch.manual_seed(1)
+    vit = timm.create_model("vit_small_patch14_dinov2", pretrained=False, num_classes=0)
+    # As far from zero and one as trained ones are.
+    save_file({name: array + 0.05 * torch.randn(array.shape) for name, array in vit.state_dict().items()}, path)
+
+
+def run_torch(network, weights, images, classes, encoder=None):
     import torch
 
     net = torch_networks()[network](images.shape[1], classes)
-    holders = [m for m in net.modules() if isinstance(m, (torch.nn.Conv2d, torch.nn.BatchNorm2d))]
+    used = net.load_encoder(weights) if hasattr(net, "load_encoder") else set()
+    apart = set(net.vit.modules()) if used else set()
+    holders = [m for m in net.modules() if isinstance(m, (torch.nn.Conv2d, torch.nn.BatchNorm2d)) and m not in apart]
     names = net.names()
     assert len(holders) == len(names), f"{len(holders)} modules, {len(names)} names"
-    used = set()
     for holder, name in zip(holders, names):
         state = {k: torch.tensor(weights[f"{name}.{k}"]) for k in holder.state_dict() if k != "num_batches_tracked"}
         used |= {f"{name}.{k}" for k in state}
         holder.load_state_dict(state, strict=False)
+    if encoder:
+        net.load_published({name: torch.tensor(array) for name, array in load_file(encoder).items()})
     net = net.double().eval()
     with torch.no_grad():
         scores = net(torch.tensor(images, dtype=torch.float64)).numpy()
-    learnt = sum(p.numel() for p in net.parameters())
+    learnt = sum(p.numel() for p in net.parameters()) - net.twice
     doubt = None if net.doubt is None else net.doubt.numpy()
     return scores, learnt, doubt, used
 
@@ -399,11 +562,11 @@ def run_torch(network, weights, images, classes):
 # --- comparison --------------------------------------------------------------------------------------------------------------
 
 
-def check(folder, engine):
+def check(folder, engine, encoder):
     card = json.load(open(f"{folder}/model.json"))
     weights = load_file(f"{folder}/weights.safetensors")
     io = load_file(f"{folder}/io.safetensors")
-    run = {"numpy": run_numpy, "torch": run_torch}[engine]
+    run = {"numpy": run_numpy, "torch": partial(run_torch, encoder=encoder)}[engine]
     scores, learnt, doubt, used = run(card["network"], weights, io["images"], len(card["classes"]))
     assert used == set(weights), f"{folder}: not used {set(weights) - used}, not there {used - set(weights)}"
     assert learnt == card["parameters"], f"{folder}: {learnt} parameters, the program says {card['parameters']}"
@@ -423,8 +586,10 @@ def check(folder, engine):
 
 if __name__ == "__main__":
     arguments = sys.argv[1:]
-    engine = "numpy"
-    if arguments[0] == "--engine":
-        engine, arguments = arguments[1], arguments[2:]
+    options = {"--engine": "numpy", "--encoder": None, "--write-vit": None}
+    while arguments and arguments[0] in options:
+        options[arguments[0]], arguments = arguments[1], arguments[2:]
+    if options["--write-vit"]:
+        write_vit(options["--write-vit"])
     for folder in arguments:
-        check(folder, engine)
+        check(folder, options["--engine"], options["--encoder"])

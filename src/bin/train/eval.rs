@@ -19,7 +19,7 @@ pub(crate) struct Args {
     /// Test set: images with labels; all of the dataset unless it says DIR@PICK.
     #[arg(long = "set", value_name = "DIR[@PICK]", value_parser = Selection::parse)]
     set: Selection,
-    /// Folder for the report; `eval/NAME` in the run's, after the set, unless given. Needed for a network that ships.
+    /// Folder for the report; `eval/NAME` in the run's, after the set and its pick, unless given. Needed for a network that ships.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -36,7 +36,13 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     if args.out.is_none() {
         zoo::needs_out(&args.run, "report")?;
     }
-    let out = args.out.clone().unwrap_or_else(|| args.run.join("eval").join(set));
+    let name = args.set.to_string();
+    let pick = name.strip_prefix(&*args.set.folder.to_string_lossy()).unwrap_or_default().replace('/', "-");
+    let out = args.out.clone().unwrap_or_else(|| {
+        let mut name = set.to_owned();
+        name.push(pick);
+        args.run.join("eval").join(name)
+    });
     cli::check_folder(&out)?;
     let (machine, threads) = (args.machine.machine(), args.machine.threads());
     let card = &trained.card;
@@ -48,7 +54,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     };
     let report =
         session::evaluate(&trained, &args.set, &args.machine.precision, threads, &machine, signals.heed(), &mut see)?;
-    let title = format!("{} on {}", args.run.display(), args.set.folder.display());
+    let title = format!("{} on {}", args.run.display(), args.set);
     let lead = format!(
         "{}, {} parameters, {}{}{}.",
         card.network.about().trim_end_matches('.'),

@@ -69,7 +69,8 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let predicted = predicted?;
     if !args.quiet && predicted.done > 0 {
         let each = predicted.seconds / predicted.done as f64;
-        furrow::tell!("{} pictures, {each:.3} s of the network for each", predicted.done);
+        let pictures = if predicted.done == 1 { "picture" } else { "pictures" };
+        furrow::tell!("{} {pictures}, {each:.3} s of the network for each", predicted.done);
     }
     outcome(predicted, pictures.len())
 }

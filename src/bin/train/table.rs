@@ -91,6 +91,9 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         furrow::tell!("warning: `{name}` is left out: --without {}", args.without.join(" --without "));
     }
     if args.dry_run {
+        if let Err(error) = bound.check() {
+            furrow::tell!("warning: {error}");
+        }
         furrow::tell!("{}", table::listing(&bound, &out)?.markdown().trim_end());
         return Ok(Vec::new());
     }

@@ -3,7 +3,6 @@
 //! What a [`Material`] is made of is its own affair; here it is asked, point by point on a flat patch, how it scatters: at each
 //! texel of the one level that its pictures are read on, see [`super::level`].
 
-use super::mean::Cover;
 use crate::bsdf::microfacet::Ggx;
 use crate::bsdf::{Bsdf, SurfaceLayer};
 use crate::geometry::{Hit, Interaction, Mesh};
@@ -42,14 +41,6 @@ pub(super) struct Texel {
     pub(super) normal: Vec3,
 }
 
-impl Texel {
-    /// The same under a cover, as part of what is diffuse.
-    pub(super) fn under(&self, cover: &Cover) -> Self {
-        let side = |i: usize| self.reflect[i] * cover.sides[i].0 + cover.sides[i].1;
-        Self { reflect: [side(0), side(1)], transmit: self.transmit * cover.across, ..*self }
-    }
-}
-
 /// A material's scattering over an image of `width` × `height` texels; one texel where it varies nowhere.
 #[derive(Clone, Debug)]
 pub(super) struct Look {
@@ -81,6 +72,16 @@ impl Look {
         Self { kind, width, height, texels }
     }
 
+    /// Whether the shading normal is anywhere another than the mesh's.
+    pub(super) fn has_relief(&self) -> bool {
+        self.texels.iter().any(|t| t.normal.x != 0.0 || t.normal.y != 0.0)
+    }
+
+    /// The mean share under water.
+    pub(super) fn mean_film(&self) -> f32 {
+        self.texels.iter().map(|t| t.film).sum::<f32>() / self.texels.len().max(1) as f32
+    }
+
     /// The one value of `what` where it is the same in all texels.
     pub(super) fn constant<T: PartialEq>(&self, what: impl Fn(&Texel) -> T) -> Option<T> {
         let first = what(self.texels.first()?);
@@ -105,6 +106,12 @@ impl Kind {
 pub(super) fn colors(material: &Material, mesh: &Mesh) -> Vec<Spectrum> {
     let corner = |(p, n): (&Vec3, &Vec3)| at(material, &patch(*p, *n), Vec2::ZERO).1.reflect[0];
     mesh.positions.iter().zip(&mesh.normals).map(corner).collect()
+}
+
+/// The shading normal at a point of a material's texture, in the frame of ∂p/∂u, its normal to the side, and the surface's normal: where pictures
+/// are read on one level the one that is written.
+pub(super) fn relief(material: &Material, uv: Vec2) -> Vec3 {
+    at(material, &patch(Vec3::ZERO, Vec3::Z), uv).1.normal
 }
 
 /// A triangle at `p` with the unit normal `n` whose barycentrics are the texture coordinates, on which an image is 1 m high.

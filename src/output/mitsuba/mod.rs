@@ -86,12 +86,12 @@ pub fn write(folder: &Path, scene: &Scene, text: &str) -> Result<Export> {
     }
     let mut masks: HashMap<usize, String> = HashMap::new();
     let mut lost = BTreeSet::new();
-    let mean = Mean::of(scene);
+    let mean = Mean::of(scene, &leveled)?;
     let mut surfaces = Vec::with_capacity(groups.len());
     for group in &groups {
         let mask = group.mask.as_ref().map(|m| mask_file(m, text, &mut masks, &mut files)).transpose()?;
         let look = Look::of(&leveled.materials[group.material as usize]);
-        let factor = Surface::corner_factor(look.kind, &mean);
+        let factor = Surface::corner_factor(&look, &mean);
         let colors: Option<Vec<Spectrum>> = group.colors.as_ref().map(|c| c.iter().map(|s| *s * factor).collect());
         let surface = match colors {
             Some(_) => Surface::of_corners(&look, &group.name, &mean, &mut files)?,

@@ -4,12 +4,13 @@
 //! |---|---|---|
 //! | Lambert | `diffuse` | exact |
 //! | sheet without coats | blend of `diffuse` on either side and `principledthin` that only transmits | exact |
-//! | Oren–Nayar | `diffuse` of (A + m B) times the albedo, m by [`Mean`] | as bright on the mean over the scene's light and view |
+//! | Oren–Nayar | `diffuse` of k times the albedo, k by [`Mean`] | as bright on the mean over the scene's light and view |
 //! | hairs and bloom | part of the `diffuse` below them | the same |
 //! | coats, films of water | blend with `roughplastic` that has no base | Smith's masking is uncorrelated there |
-//! | what lies under a coat | Lambert | as bright where it is seen along the normal and lit from all sides alike |
+//! | what lies under a film of water | in k | the same |
+//! | what lies under a leaf's coat | Lambert | as bright on the mean over the leaves in view |
 //! | coats rougher across than along | `roughplastic` of the geometric mean | as bright, of another shape |
-//! | relief | `normalmap` | in the frame of the mesh's normal, not added to its slope |
+//! | relief | `normalmap` | in the frame of the mesh's normal, not added to its slope; of the ground as bright, in k |
 //!
 //! (`roughplastic` with a base would darken it towards the horizon, but its account of inner reflections loses 30 %.)
 //!
@@ -18,8 +19,8 @@
 //! `furrow_leaf`, see `tests/mitsuba/bsdfs.py`) all of this is exact; they read the same pictures and are told the factors.
 
 use super::files::{Band, Files, Plugins};
-use super::look::{Kind, Look};
-use super::mean::Mean;
+use super::look::{Kind, Look, Texel};
+use super::mean::{Cover, Mean};
 use super::xml::Element;
 use crate::bsdf::microfacet::Ggx;
 use crate::math::{Spectrum, Vec3};
@@ -107,17 +108,22 @@ impl Surface {
         files: &mut Files<'_>,
     ) -> Result<Self> {
         let (factor, through) = match look.kind {
-            Kind::Soil { .. } => ([Self::corner_factor(look.kind, mean); 2], 0.0),
+            Kind::Soil { .. } => ([Self::corner_factor(look, mean); 2], 0.0),
             Kind::Sheet { coats, .. } => {
-                let side = |c: Option<Ggx>| 1.0 / ((1.0 - THROUGH) * c.map_or(1.0, |_| 1.0 - COAT));
-                (coats.map(side), 1.0 / THROUGH)
+                let side =
+                    |c: Option<Ggx>| mean.coats([c; 2], false) / ((1.0 - THROUGH) * c.map_or(1.0, |_| 1.0 - COAT));
+                (coats.map(side), mean.coats(coats, true) / THROUGH)
             }
         };
         let bare = Shares::write(look, factor, through, stem, files)?;
         let covered = match look.kind {
-            Kind::Sheet { layers, .. } if layers.iter().any(Option::is_some) => {
-                let cover = mean.cover(layers);
-                let texels = look.texels.iter().map(|texel| texel.under(&cover)).collect();
+            Kind::Sheet { layers, coats } if layers.iter().any(Option::is_some) => {
+                let mut cover = mean.cover(layers);
+                // Hairs stand on the coat, which dims no light of theirs.
+                for (side, coat) in cover.sides.iter_mut().zip(coats) {
+                    side.1 *= 1.0 / mean.coats([coat; 2], false);
+                }
+                let texels = look.texels.iter().map(|texel| under(texel, &cover)).collect();
                 let below = Look { texels, ..look.clone() };
                 Some(Shares::write(&below, factor, through, &format!("{stem}-covered"), files)?)
             }
@@ -131,8 +137,7 @@ impl Surface {
             let values = look.texels.iter().map(|t| t.film / FILM).collect();
             files.numbers(&format!("{film}.exr"), look.width, look.height, &[("Y", values)])?;
         }
-        let flat = look.texels.iter().all(|t| t.normal.x == 0.0 && t.normal.y == 0.0);
-        let normal = (!flat).then(|| format!("textures/{stem}-normal"));
+        let normal = look.has_relief().then(|| format!("textures/{stem}-normal"));
         if let Some(normal) = &normal {
             // Not of unit length: slopes, not directions, are what lies evenly between two texels.
             let slope = |n: Vec3, k: usize| 0.5 * n[k] / n.z.max(0.02) + 0.5;
@@ -154,7 +159,7 @@ impl Surface {
         Ok(Self {
             kind,
             bare: Shares { reflect: [Paint::Corners, Paint::Corners], transmit: None },
-            factor: [Self::corner_factor(kind, mean); 2],
+            factor: [Self::corner_factor(look, mean); 2],
             through: 0.0,
             covered: None,
             film,
@@ -164,9 +169,12 @@ impl Surface {
     }
 
     /// What reflectances at a mesh's corners are multiplied by.
-    pub(super) fn corner_factor(kind: Kind, mean: &Mean) -> f32 {
-        match kind {
-            Kind::Soil { shape: [a, b], film } => (a + mean.retroreflection() * b) / film.map_or(1.0, |_| 1.0 - FILM),
+    pub(super) fn corner_factor(look: &Look, mean: &Mean) -> f32 {
+        match look.kind {
+            Kind::Soil { shape, film } => {
+                let below = film.map(|coat| (coat, look.mean_film()));
+                mean.soil(shape, below, look.has_relief()) / film.map_or(1.0, |_| 1.0 - FILM)
+            }
             Kind::Sheet { .. } => 1.0,
         }
     }
@@ -216,7 +224,9 @@ impl Surface {
                     Kind::Sheet { coats, .. } => self.sheet(coats, band),
                 };
                 match &self.normal {
+                    // Ours darkens no light that both the relief and the mesh see, as Conty Estevez et al. 2019 do.
                     Some(normal) => Element::plugin("bsdf", "normalmap")
+                        .boolean("use_shadowing_function", false)
                         .inside([picture("normalmap", &format!("{normal}.exr"), "bilinear"), inner]),
                     None => inner,
                 }
@@ -305,6 +315,12 @@ impl Surface {
         }
         own
     }
+}
+
+/// What lies under a cover together with it, as part of what is diffuse.
+fn under(texel: &Texel, cover: &Cover) -> Texel {
+    let side = |i: usize| texel.reflect[i] * cover.sides[i].0 + cover.sides[i].1;
+    Texel { reflect: [side(0), side(1)], transmit: texel.transmit * cover.across, ..*texel }
 }
 
 /// A coat alone, its reflectance multiplied by `weight`.

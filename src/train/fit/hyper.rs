@@ -9,7 +9,7 @@
 use super::class_weights::ClassWeights;
 use super::schedule::Schedule;
 use crate::Error;
-use crate::train::data::{Augment, Resize, Shape};
+use crate::train::data::{Augment, Normalization, Resize, Shape};
 use crate::train::net::Pretrained;
 use crate::train::refine::Refine;
 use serde::{Deserialize, Serialize};
@@ -110,6 +110,15 @@ impl NormalizationMode {
             "image" => Ok(Self::Image),
             "fixed" => Ok(Self::Fixed),
             _ => Err(format!("there is no normalization `{text}`: write band, image or fixed")),
+        }
+    }
+
+    /// That of a trained network.
+    pub fn of(normalization: &Normalization) -> Self {
+        match normalization {
+            Normalization::Band => Self::Band,
+            Normalization::Image => Self::Image,
+            Normalization::Fixed { .. } => Self::Fixed,
         }
     }
 

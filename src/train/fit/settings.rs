@@ -116,7 +116,7 @@ pub struct Settings {
     #[schemars(extend("x-example" = "0.5"))]
     pub logit_adjustment: Option<f64>,
     /// What the encoder begins with: none (random weights), imagenet (EfficientNet-Lite0's, for lite-unet), or a safetensors file with
-    /// the names of torchvision's resnet18 (unet) or vgg16_bn (segnet).
+    /// the names of torchvision's resnet18 (unet) or vgg16_bn (segnet), or of timm's vit_small_patch14_dinov2 (vit-unet).
     #[arg(long, value_name = "NAME", default_value = default_of("pretrained"))]
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-example" = "\"none\""))]

@@ -11,6 +11,7 @@ mod parameters;
 mod pretrained;
 mod segnet;
 mod unet;
+mod vit_unet;
 
 pub use parameters::{Parameter, Role, fitting, is_encoder, parameters};
 pub use pretrained::Pretrained;
@@ -78,7 +79,7 @@ impl Conv {
     }
 }
 
-/// A batch norm's numbers.
+/// A batch or layer norm's numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Norm {
     /// Channels.
@@ -115,6 +116,21 @@ pub trait Operations {
     fn pool3(&mut self, x: &Self::Value) -> Self::Value;
     /// To the height and width of `like`, by the nearest pixel.
     fn enlarge(&mut self, x: &Self::Value, like: &Self::Value) -> Self::Value;
+    /// To the next height and width that so many pixels divide, bilinearly.
+    fn to_multiple(&mut self, x: &Self::Value, pixels: usize) -> Self::Value;
+    /// A map's pixels, each with its position's embedding added, behind a class token: images × channels × 1 × (1 + pixels), with
+    /// `name.class` (1 × channels × 1 × 1) and `name.position` (1 × channels × grid × grid, brought to the map's size bicubically).
+    fn tokens(&mut self, x: &Self::Value, name: &str, channels: usize, grid: usize) -> Self::Value;
+    /// Tokens without the class token, as a map of the height and width of `like`.
+    fn map(&mut self, tokens: &Self::Value, like: &Self::Value) -> Self::Value;
+    /// Layer normalisation (Ba et al. 2016) of each pixel's channels, with `name.weight` and `name.bias`.
+    fn layer_norm(&mut self, x: &Self::Value, name: &str, norm: Norm) -> Self::Value;
+    /// x · Φ(x), Φ being the normal distribution (Hendrycks & Gimpel 2016).
+    fn gelu(&mut self, x: &Self::Value) -> Self::Value;
+    /// Self-attention (Vaswani et al. 2017) between tokens, each with so many channels of its query, then of its key, then of its value.
+    fn attention(&mut self, x: &Self::Value, channels: usize, heads: usize) -> Self::Value;
+    /// Each channel times its number in `name.gamma`: LayerScale (Touvron et al. 2021).
+    fn scale(&mut self, x: &Self::Value, name: &str, channels: usize) -> Self::Value;
     /// Told of the last value of the encoder that is halved so many times: its features at that size.
     fn features(&mut self, _x: &Self::Value, _halvings: usize) {}
 }
@@ -155,6 +171,7 @@ networks! {
     Segnet, segnet, "segnet", "SegNet of Badrinarayanan et al. 2017: the 13 convolutions of VGG16 with batch norm, and their mirror.";
     LiteUnet, lite_unet, "lite-unet", "U-Net with the encoder of EfficientNet-Lite0 (Tan & Le 2019), which may begin with weights learnt from ImageNet.";
     Unet, unet, "unet", "U-Net (Ronneberger et al. 2015) with the residual encoder of ResNet-18 (He et al. 2016).";
+    VitUnet, vit_unet, "vit-unet", "U-Net decoder over a ViT-S/14 (Dosovitskiy et al. 2021), which may begin with weights of DINOv2 (Oquab et al. 2023) that one brings.";
 }
 
 impl Network {
@@ -163,7 +180,7 @@ impl Network {
         match self {
             Self::BasicSegnet => 16,
             Self::Segnet | Self::LiteUnet => 32,
-            Self::Unet => 1,
+            Self::Unet | Self::VitUnet => 1,
         }
     }
 

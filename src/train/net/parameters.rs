@@ -10,11 +10,11 @@ use crate::{Error, Result};
 pub enum Role {
     /// Weights of a convolution.
     Weight,
-    /// What a convolution adds.
+    /// What a convolution adds; a class token, embeddings of positions.
     Bias,
-    /// What a batch norm multiplies by.
+    /// What a norm or a LayerScale multiplies by.
     Gain,
-    /// What a batch norm adds.
+    /// What a norm adds.
     Shift,
     /// A batch norm's running mean; not trained by gradients.
     Mean,
@@ -154,6 +154,26 @@ impl Operations for List {
     fn unpool(&mut self, (): &(), (): ()) {}
     fn pool3(&mut self, (): &()) {}
     fn enlarge(&mut self, (): &(), (): &()) {}
+    fn to_multiple(&mut self, (): &(), _pixels: usize) {}
+
+    fn tokens(&mut self, (): &(), name: &str, channels: usize, grid: usize) {
+        self.note(format!("{name}.class"), &[1, channels, 1, 1], Role::Bias);
+        self.note(format!("{name}.position"), &[1, channels, grid, grid], Role::Bias);
+    }
+
+    fn map(&mut self, (): &(), (): &()) {}
+
+    fn layer_norm(&mut self, (): &(), name: &str, norm: Norm) {
+        self.note(format!("{name}.weight"), &[norm.channels], Role::Gain);
+        self.note(format!("{name}.bias"), &[norm.channels], Role::Shift);
+    }
+
+    fn gelu(&mut self, (): &()) {}
+    fn attention(&mut self, (): &(), _channels: usize, _heads: usize) {}
+
+    fn scale(&mut self, (): &(), name: &str, channels: usize) {
+        self.note(format!("{name}.gamma"), &[channels], Role::Gain);
+    }
 }
 
 #[cfg(test)]
@@ -194,6 +214,10 @@ mod tests {
             .map(Parameter::len)
             .sum();
         assert_eq!(lite, 4_652_008 - 1_281_000 - 412_160);
+        // DINOv2's ViT-S/14 has 22 056 576, 384 of them a mask token that is not here, and 384 of the class token's position, which is
+        // added to it; its last norm is here twice.
+        let vit: usize = parameters(Network::VitUnet, 3, 3).iter().filter(|p| p.is_encoder()).map(Parameter::len).sum();
+        assert_eq!(vit, 22_056_576 - 384 - 384 + 768);
     }
 
     #[test]

@@ -8,8 +8,9 @@
 //! | `lite-unet` | `efficientnet_lite_pytorch`, `efficientnet-lite0` |
 //! | `unet` | torchvision's `resnet18` |
 //! | `segnet` | torchvision's `vgg16_bn` |
+//! | `vit-unet` | DINOv2's `dinov2_vits14`, timm's `vit_small_patch14_dinov2` |
 
-use super::{Network, Parameter, lite_unet, parameters, segnet, unet};
+use super::{Network, Parameter, lite_unet, parameters, segnet, unet, vit_unet};
 use crate::train::data::Band;
 use crate::train::weights::{self, Array};
 use crate::{Error, Result};
@@ -100,6 +101,7 @@ fn values(network: Network, parameter: &Parameter, bands: Option<&[Band]>, found
         Network::LiteUnet => lite_unet::published(&parameter.name),
         Network::Unet => unet::published(&parameter.name),
         Network::Segnet => segnet::published(&parameter.name),
+        Network::VitUnet => vit_unet::published(&parameter.name),
         Network::BasicSegnet => None,
     };
     let Some(name) = published else {
@@ -108,12 +110,15 @@ fn values(network: Network, parameter: &Parameter, bands: Option<&[Band]>, found
     };
     let wrong = |what: String| {
         Error::input(format!("these are no weights of the encoder of {}: {what}", network.name()))
-            .help("safetensors with the names of efficientnet_lite_pytorch, or of torchvision's resnet18 or vgg16_bn")
+            .help("safetensors with the names of efficientnet_lite_pytorch, of torchvision's resnet18 or vgg16_bn, or of timm's vit_small_patch14_dinov2")
     };
     let array = found.iter().find(|a| a.name == name).ok_or_else(|| wrong(format!("`{name}` is missing")))?;
     if !array.values.iter().all(|v| v.is_finite()) {
         return Err(wrong(format!("`{name}` holds values that are not finite numbers")));
     }
+    let laid = (network == Network::VitUnet).then(|| vit_unet::laid(&parameter.name, array, found).map_err(wrong));
+    let laid = laid.transpose()?;
+    let array = laid.as_ref().unwrap_or(array);
     match (array.shape.as_slice(), parameter.shape.as_slice(), bands) {
         (&[outputs, 3, height, width], &[to, _, h, w], Some(bands)) if (outputs, height, width) == (to, h, w) => {
             Ok(for_bands(&array.values, height * width, bands))
@@ -148,6 +153,7 @@ mod tests {
         let name = |parameter: &Parameter| match network {
             Network::LiteUnet => lite_unet::published(&parameter.name),
             Network::Unet => unet::published(&parameter.name),
+            Network::VitUnet => vit_unet::published(&parameter.name),
             _ => segnet::published(&parameter.name),
         };
         let array = |(i, p): (usize, &Parameter)| {
@@ -171,6 +177,11 @@ mod tests {
             (Network::Unet, "stem.bn.weight", "bn1.weight"),
             (Network::Unet, "enc0_1.1.conv.weight", "layer1.1.conv2.weight"),
             (Network::Unet, "enc3_0.past.bn.bias", "layer4.0.downsample.1.bias"),
+            (Network::VitUnet, "stem.weight", "patch_embed.proj.weight"),
+            (Network::VitUnet, "enc.position", "pos_embed"),
+            (Network::VitUnet, "enc0.norm1.weight", "blocks.0.norm1.weight"),
+            (Network::VitUnet, "enc10.qkv.bias", "blocks.10.attn.qkv.bias"),
+            (Network::VitUnet, "enc11.scale2.gamma", "blocks.11.ls2.gamma"),
             (Network::LiteUnet, "stem.bn.running_var", "_bn0.running_var"),
             (Network::LiteUnet, "enc0_0.depthwise.conv.weight", "_blocks.0._depthwise_conv.weight"),
             (Network::LiteUnet, "enc2_1.project.bn.bias", "_blocks.4._bn2.bias"),

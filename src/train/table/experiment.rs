@@ -14,7 +14,7 @@ use crate::train::data::margin::MOST;
 use crate::train::data::select::MOST_REPEATS;
 use crate::train::data::{Band, Pick};
 use crate::train::fit::{Plan, Settings};
-use crate::train::net::Network;
+use crate::train::net::{Network, Pretrained};
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
@@ -298,9 +298,14 @@ impl Checker<'_> {
 
     /// Puts hyper-parameters of the file into a plan.
     fn settings(&self, settings: &Settings, at: At<'_>, plan: &mut Plan) -> Result<()> {
-        settings
-            .apply(plan)
-            .map_err(|invalid| self.fault(&[at, &[Step::Field(invalid.field)]].concat(), invalid.message, invalid.help))
+        settings.apply(plan).map_err(|invalid| {
+            self.fault(&[at, &[Step::Field(invalid.field)]].concat(), invalid.message, invalid.help)
+        })?;
+        // Paths count from the folder of the file.
+        if let (Some(text), Pretrained::File(path)) = (&settings.pretrained, &mut plan.hyper.pretrained) {
+            *path = self.page.need_file(text)?;
+        }
+        Ok(())
     }
 
     fn sets(&self, scale: Option<&ScaleDesc>, seen: (u32, u32)) -> Result<Vec<(String, Source)>> {

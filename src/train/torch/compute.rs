@@ -98,6 +98,49 @@ impl Operations for Compute<'_> {
         x.upsample_nearest2d(size(like), None, None)
     }
 
+    fn to_multiple(&mut self, x: &Tensor, pixels: usize) -> Tensor {
+        let pixels = pixels as i64;
+        let to = size(x).map(|side| (side + pixels - 1) / pixels * pixels);
+        if to == size(x) { x.shallow_clone() } else { x.upsample_bilinear2d(to, false, None, None) }
+    }
+
+    fn tokens(&mut self, x: &Tensor, name: &str, channels: usize, _grid: usize) -> Tensor {
+        let [class, position] = ["class", "position"].map(|what| &self.tensors[&format!("{name}.{what}")]);
+        let placed = x + position.upsample_bicubic2d(size(x), false, None, None);
+        let (images, channels) = (x.size()[0], channels as i64);
+        let patches = placed.reshape([images, channels, 1, -1]);
+        Tensor::cat(&[&class.expand([images, channels, 1, 1], false), &patches], 3)
+    }
+
+    fn map(&mut self, tokens: &Tensor, like: &Tensor) -> Tensor {
+        let [height, width] = size(like);
+        tokens.narrow(3, 1, height * width).reshape([tokens.size()[0], -1, height, width])
+    }
+
+    /// In single precision, as `torch.autocast` has it.
+    fn layer_norm(&mut self, x: &Tensor, name: &str, norm: Norm) -> Tensor {
+        let [gain, shift] = ["weight", "bias"].map(|what| Some(&self.tensors[&format!("{name}.{what}")]));
+        let lying = x.to_kind(Kind::Float).permute([0, 2, 3, 1]);
+        lying.layer_norm([norm.channels as i64], gain, shift, norm.epsilon, true).permute([0, 3, 1, 2])
+    }
+
+    fn gelu(&mut self, x: &Tensor) -> Tensor {
+        x.gelu("none")
+    }
+
+    fn attention(&mut self, x: &Tensor, channels: usize, heads: usize) -> Tensor {
+        let (images, count) = (x.size()[0], x.size()[3]);
+        let (channels, heads) = (channels as i64, heads as i64);
+        let split = x.reshape([images, 3, heads, channels / heads, count]).transpose(3, 4);
+        let [query, key, value] = [0, 1, 2].map(|part| split.select(1, part));
+        let y = Tensor::scaled_dot_product_attention(&query, &key, &value, None::<&Tensor>, 0.0, false, None, false);
+        y.transpose(2, 3).reshape([images, channels, 1, count])
+    }
+
+    fn scale(&mut self, x: &Tensor, name: &str, channels: usize) -> Tensor {
+        x * self.tensors[&format!("{name}.gamma")].view([1, channels as i64, 1, 1])
+    }
+
     fn features(&mut self, x: &Tensor, halvings: usize) {
         if let Some(features) = &mut self.features {
             features.insert(halvings, x.shallow_clone());

@@ -199,7 +199,7 @@ mod tests {
     #[test]
     fn every_network_tells_of_its_encoder() {
         let place = Where { device: Device::Cpu, precision: Precision::Single };
-        let (size, channels) = ((96u32, 64u32), [64 + 64, 512 + 512, 40 + 112, 128 + 256]);
+        let (size, channels) = ((96u32, 64u32), [64 + 64, 512 + 512, 40 + 112, 128 + 256, 384 + 384]);
         let pixels: Vec<f32> = (0..96 * 64 * 3).map(|i| (i % 17) as f32 / 17.0).collect();
         for (network, channels) in Network::ALL.iter().zip(channels) {
             let model = Model::new(*network, 3, 3, 1, place);

@@ -45,6 +45,42 @@ impl Recorder {
         name.into()
     }
 
+    /// Whole numbers as a constant, once for each list of them: sizes, shapes, axes.
+    fn wholes(&mut self, values: &[i64]) -> String {
+        let words: Vec<String> = values.iter().map(ToString::to_string).collect();
+        let name = format!("whole_{}", words.join("_"));
+        if self.graph.initializer.iter().all(|tensor| tensor.name != name) {
+            self.graph.initializer.push(Tensor {
+                dims: vec![values.len() as i64],
+                data_type: DataType::Int64.into(),
+                name: name.clone(),
+                raw_data: values.iter().flat_map(|v| v.to_le_bytes()).collect(),
+            });
+        }
+        name
+    }
+
+    /// A number of single precision as a constant, once.
+    fn number(&mut self, value: f32) -> String {
+        let name = format!("number_{value}");
+        if self.graph.initializer.iter().all(|tensor| tensor.name != name) {
+            self.constant(&name, &[], &[value]);
+        }
+        name
+    }
+
+    /// To a height and width, which stand in a value of the graph, between pixels' centres.
+    fn resize(&mut self, x: &str, size: &str, mode: &str) -> String {
+        let channels = self.op("Shape", &[x], vec![whole("end", 2)]);
+        let size = self.op("Concat", &[&channels, size], vec![whole("axis", 0)]);
+        let attributes = vec![
+            word("mode", mode),
+            word("coordinate_transformation_mode", "half_pixel"),
+            number("cubic_coeff_a", -0.75),
+        ];
+        self.op("Resize", &[x, "", "", &size], attributes)
+    }
+
     /// Trained weights as constants under their names.
     pub(super) fn weights<'a>(&mut self, arrays: impl IntoIterator<Item = &'a Array>) {
         for array in arrays {
@@ -171,6 +207,80 @@ impl Operations for Recorder {
             word("coordinate_transformation_mode", "asymmetric"),
         ];
         self.op("Resize", &[x, "", "", &size], attributes)
+    }
+
+    fn to_multiple(&mut self, x: &String, pixels: usize) -> String {
+        let (less, pixels) = (self.wholes(&[pixels as i64 - 1]), self.wholes(&[pixels as i64]));
+        let size = self.op("Shape", &[x], vec![whole("start", 2)]);
+        let more = self.op("Add", &[&size, &less], vec![]);
+        let times = self.op("Div", &[&more, &pixels], vec![]);
+        let size = self.op("Mul", &[&times, &pixels], vec![]);
+        self.resize(x, &size, "linear")
+    }
+
+    fn tokens(&mut self, x: &String, name: &str, channels: usize, _grid: usize) -> String {
+        let size = self.op("Shape", &[x], vec![whole("start", 2)]);
+        let position = self.resize(&format!("{name}.position"), &size, "cubic");
+        let placed = self.op("Add", &[x, &position], vec![]);
+        let row = self.wholes(&[0, channels as i64, 1, -1]);
+        let patches = self.op("Reshape", &[&placed, &row], vec![]);
+        let images = self.op("Shape", &[x], vec![whole("end", 1)]);
+        let one = self.wholes(&[channels as i64, 1, 1]);
+        let shape = self.op("Concat", &[&images, &one], vec![whole("axis", 0)]);
+        let class = self.op("Expand", &[&format!("{name}.class"), &shape], vec![]);
+        self.op("Concat", &[&class, &patches], vec![whole("axis", 3)])
+    }
+
+    fn map(&mut self, tokens: &String, like: &String) -> String {
+        let [from, to, axis] = [[1], [i64::MAX], [3]].map(|n| self.wholes(&n));
+        let patches = self.op("Slice", &[tokens, &from, &to, &axis], vec![]);
+        let size = self.op("Shape", &[like], vec![]);
+        self.op("Reshape", &[&patches, &size], vec![])
+    }
+
+    fn layer_norm(&mut self, x: &String, name: &str, norm: Norm) -> String {
+        let lying = self.op("Transpose", &[x], vec![several("perm", &[0, 2, 3, 1])]);
+        let inputs = [&lying, &format!("{name}.weight"), &format!("{name}.bias")];
+        let y =
+            self.op("LayerNormalization", &inputs.map(String::as_str), vec![number("epsilon", norm.epsilon as f32)]);
+        self.op("Transpose", &[&y], vec![several("perm", &[0, 3, 1, 2])])
+    }
+
+    /// x / 2 · (1 + erf(x / √2)).
+    fn gelu(&mut self, x: &String) -> String {
+        let [root, one, half] = [std::f32::consts::FRAC_1_SQRT_2, 1.0, 0.5].map(|n| self.number(n));
+        let y = self.op("Mul", &[x, &root], vec![]);
+        let y = self.op("Erf", &[&y], vec![]);
+        let y = self.op("Add", &[&y, &one], vec![]);
+        let y = self.op("Mul", &[&y, &half], vec![]);
+        self.op("Mul", &[x, &y], vec![])
+    }
+
+    /// In each head softmax(qᵀ · k / √channels), by which the values are summed.
+    fn attention(&mut self, x: &String, channels: usize, heads: usize) -> String {
+        let (wide, heads) = ((channels / heads) as f32, heads as i64);
+        let shape = self.wholes(&[0, 3 * heads, -1, 0]);
+        let all = self.op("Reshape", &[x, &shape], vec![]);
+        let [query, key, value] = [0, 1, 2].map(|part| {
+            let [from, to, axis] = [part * heads, (part + 1) * heads, 1].map(|n| self.wholes(&[n]));
+            self.op("Slice", &[&all, &from, &to, &axis], vec![])
+        });
+        let turned = || vec![several("perm", &[0, 1, 3, 2])];
+        let query = self.op("Transpose", &[&query], turned());
+        let products = self.op("MatMul", &[&query, &key], vec![]);
+        let root = self.number(wide.sqrt().recip());
+        let products = self.op("Mul", &[&products, &root], vec![]);
+        let shares = self.op("Softmax", &[&products], vec![whole("axis", 3)]);
+        let shares = self.op("Transpose", &[&shares], turned());
+        let sums = self.op("MatMul", &[&value, &shares], vec![]);
+        let shape = self.wholes(&[0, channels as i64, 1, -1]);
+        self.op("Reshape", &[&sums, &shape], vec![])
+    }
+
+    fn scale(&mut self, x: &String, name: &str, channels: usize) -> String {
+        let shape = self.wholes(&[channels as i64, 1, 1]);
+        let gamma = self.op("Reshape", &[&format!("{name}.gamma"), &shape], vec![]);
+        self.op("Mul", &[x, &gamma], vec![])
     }
 }
 
