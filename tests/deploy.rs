@@ -83,11 +83,13 @@ fn record(learnt: &TrainedModel, file: &Path) {
 }
 
 /// Networks of all kinds, normalised in all ways.
-const KINDS: [(Network, &str, NormalizationMode); 4] = [
+const KINDS: [(Network, &str, NormalizationMode); 6] = [
     (Network::BasicSegnet, "rgbn", NormalizationMode::Band),
     (Network::BasicSegnet, "rgb", NormalizationMode::Image),
     (Network::Segnet, "rgb", NormalizationMode::Image),
     (Network::Unet, "rgbn", NormalizationMode::Fixed),
+    (Network::LiteUnet, "rgb", NormalizationMode::Image),
+    (Network::VitUnet, "rgb", NormalizationMode::Fixed),
 ];
 
 #[test]

@@ -498,6 +498,7 @@ fn mistakes_in_a_page_are_shown_where_they_are() {
             "a smaller crop",
         ),
         ("batch: 2", "balance: \"much\"", "\"much\"", "there are no class weights `much`", "annealed"),
+        ("batch: 2", "pretrained: \"none.safetensors\"", "\"none.safetensors\"", "`none.safetensors`", ""),
         ("seeds: [7]", "seeds: []", "[]", "there is no seed", "such as [1]"),
     ];
     for (from, to, underlined, what, help) in faults {

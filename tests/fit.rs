@@ -278,6 +278,8 @@ fn weights_of_other_classes_and_damaged_ones_are_refused() {
     succeed(&mut fit(&set, &three, "--network unet --steps 1"));
     succeed(fit(&set, &two, "--network unet --steps 1").args(["--classes", "soil; plant=crop,weed"]));
     assert_eq!(TrainedModel::open(&two).unwrap().card.classes.names(), ["soil", "plant"]);
+    let kept = folder.join("kept.safetensors");
+    fs::copy(three.join(run::WEIGHTS), &kept).unwrap();
     fs::copy(two.join(run::WEIGHTS), three.join(run::WEIGHTS)).unwrap();
     let eval = |run: &Path| train(&format!("eval {} --set {} --threads 1", run.display(), set.display()));
     let error = refuse(&mut eval(&three), 2);
@@ -285,6 +287,16 @@ fn weights_of_other_classes_and_damaged_ones_are_refused() {
     let error =
         refuse(&mut fit(&set, &folder.join("on"), &format!("--network unet --steps 1 --init {}", two.display())), 2);
     assert!(error.contains("not those of unet with 3 bands and 3 classes") && error.contains("head.conv"), "{error}");
+    // Nothing is left that would be in the way of the right command.
+    assert!(!folder.join("on").exists());
+    for (other, told) in
+        [("--network segnet", "--network unet"), ("--network unet --normalization fixed", "--normalization band")]
+    {
+        let other = format!("{other} --steps 1 --init {}", three.display());
+        fs::copy(&kept, three.join(run::WEIGHTS)).unwrap();
+        let error = refuse(&mut fit(&set, &folder.join("on"), &other), 2);
+        assert!(error.contains("cannot begin with another") && error.contains(told), "{error}");
+    }
     // Cards that would take all memory, divide by nothing or lead elsewhere.
     let card = two.join(run::MODEL);
     let text = fs::read_to_string(&card).unwrap();

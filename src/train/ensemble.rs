@@ -39,7 +39,7 @@ impl Ensemble {
             if !alike(&card, &other.card) {
                 let what = format!("it answers otherwise than {} beside it", first.display());
                 return Err(Error::input(what)
-                    .help("runs of one folder answer together where classes, bands and sizes are the same: name one of them")
+                    .help("runs of one folder answer together where network, classes, bands and sizes are the same: name one of them")
                     .in_file(run));
             }
             hashes.push(other.card.weights_sha256);

@@ -235,8 +235,9 @@ impl TrainedModel {
             };
             return Err(error.in_file(folder));
         }
-        let card: ModelCard = read_json(&path)?;
-        card.check().map_err(|what| {
+        let bytes = crate::input::contents(&path).map_err(Error::reading(&path))?;
+        let card = serde_json::from_slice(&bytes).map_err(|e| format!("this file cannot be read: {e}"));
+        let card = card.and_then(|card: ModelCard| card.check().map(|()| card)).map_err(|what| {
             Error::input(what).help("no `train fit` writes such a card: take one that you trust").in_file(path)
         })?;
         let path = below(folder, &card.weights)?;

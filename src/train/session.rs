@@ -9,7 +9,7 @@ use super::fit::hyper::NormalizationMode;
 use super::fit::logits;
 use super::fit::{self, Callbacks, Data, Plan};
 use super::measure::{Evaluation, Prediction, Report};
-use super::net::{Parameter, parameters};
+use super::net::{Parameter, fitting, parameters};
 use super::run::{self, Identity, ModelCard, Results, TrainedModel};
 use super::torch::{Model, Precision, Where, device, multiscale};
 use super::weights::{self, Array};
@@ -71,7 +71,13 @@ fn begun(plan: &Plan, run: &Path) -> Result<Vec<Array>> {
             let what = format!("a run cannot begin with another of {flag} {is}: its own is {asked}");
             Err(Error::misuse(what).in_file(run).help(format!("--{flag} {is}")))
         }
-        None => Ok(values),
+        None => {
+            let fit = fitting(plan.network, plan.shape.bands.len(), plan.classes.len(), &values);
+            fit.map(drop).map_err(|error| {
+                error.in_file(run).help("--bands and --classes must be as many as those of the run")
+            })?;
+            Ok(values)
+        }
     }
 }
 

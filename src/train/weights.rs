@@ -2,7 +2,7 @@
 
 use crate::output::write_atomically;
 use crate::{Error, Result};
-use half::f16;
+use half::{bf16, f16};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use sha2::{Digest, Sha256};
 use std::collections::HashMap;
@@ -20,12 +20,14 @@ pub struct Array {
 }
 
 impl Array {
-    /// A tensor of a file; none where it is neither of single nor of half precision.
+    /// A tensor of a file; none where it holds no floating-point numbers of 16, 32 or 64 bits.
     fn of(name: String, view: &TensorView<'_>) -> Option<Self> {
         let bytes = view.data();
         let values = match view.dtype() {
             Dtype::F32 => bytes.as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect(),
             Dtype::F16 => bytes.as_chunks().0.iter().map(|b| f16::from_le_bytes(*b).to_f32()).collect(),
+            Dtype::BF16 => bytes.as_chunks().0.iter().map(|b| bf16::from_le_bytes(*b).to_f32()).collect(),
+            Dtype::F64 => bytes.as_chunks().0.iter().map(|b| f64::from_le_bytes(*b) as f32).collect(),
             _ => return None,
         };
         Some(Self { name, shape: view.shape().to_vec(), values })
@@ -101,11 +103,14 @@ pub fn read(path: &Path) -> Result<(Vec<Array>, String)> {
     Ok((arrays, text.to_owned()))
 }
 
-/// Reads arrays that another program wrote, in the order of their names; those that are neither of single nor of half precision are left out.
+/// Reads arrays that another program wrote, in the order of their names; those that hold no floating-point numbers are left out.
 pub fn read_foreign(path: &Path) -> Result<Vec<Array>> {
     let bytes = crate::input::contents(path).map_err(Error::reading(path))?;
     let all = SafeTensors::deserialize(&bytes);
-    let fault = |e: &dyn std::fmt::Display| unusable(path, &format!("this is no safetensors file: {e}"));
+    let fault = |e: &dyn std::fmt::Display| {
+        unusable(path, &format!("this is no safetensors file: {e}"))
+            .help("PyTorch converts its own: safetensors.torch.save_file(torch.load(FILE, weights_only=True), OUT)")
+    };
     let all = all.map_err(|e| fault(&e))?;
     let mut arrays: Vec<Array> = all.tensors().into_iter().filter_map(|(name, view)| Array::of(name, &view)).collect();
     arrays.sort_by(|a, b| a.name.cmp(&b.name));
@@ -116,7 +121,7 @@ pub fn read_foreign(path: &Path) -> Result<Vec<Array>> {
 fn arrays(bytes: &[u8]) -> Result<Vec<Array>, String> {
     let all = SafeTensors::deserialize(bytes).map_err(|e| e.to_string())?;
     let array = |(name, view): (String, TensorView<'_>)| {
-        let words = format!("`{name}` is neither of single nor of half precision");
+        let words = format!("`{name}` holds no floating-point numbers");
         Array::of(name, &view).ok_or(words)
     };
     let mut arrays = all.tensors().into_iter().map(array).collect::<Result<Vec<_>, _>>()?;
@@ -192,6 +197,27 @@ mod tests {
         }
         let far = Array { name: "b".into(), shape: vec![2], values: vec![1e9, -1e9] };
         assert_eq!(far.halved().values, [f32::INFINITY, f32::NEG_INFINITY]);
+    }
+
+    /// Expected: a file of another program in any floating-point type is read; whole numbers are left out. Source: IEEE 754 and bfloat16,
+    /// whose bits are the upper half of single precision.
+    #[test]
+    fn foreign_weights_are_read_in_every_floating_point_type() {
+        let bytes: [(&str, Dtype, Vec<u8>); 5] = [
+            ("a", Dtype::F32, (-1.5_f32).to_le_bytes().into()),
+            ("b", Dtype::F16, f16::from_f32(-1.5).to_le_bytes().into()),
+            ("c", Dtype::BF16, ((-1.5_f32).to_bits() >> 16).to_le_bytes()[..2].into()),
+            ("d", Dtype::F64, (-1.5_f64).to_le_bytes().into()),
+            ("e", Dtype::I64, 3_i64.to_le_bytes().into()),
+        ];
+        let view = |(name, dtype, bytes)| (name, TensorView::new(dtype, vec![1], bytes).unwrap());
+        let views = bytes.iter().map(|(name, dtype, bytes)| view((*name, *dtype, bytes.as_slice())));
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("foreign.safetensors");
+        std::fs::write(&path, safetensors::serialize(views, &None).unwrap()).unwrap();
+        let found = read_foreign(&path).unwrap();
+        let found: Vec<(&str, f32)> = found.iter().map(|a| (a.name.as_str(), a.values[0])).collect();
+        assert_eq!(found, [("a", -1.5), ("b", -1.5), ("c", -1.5), ("d", -1.5)]);
     }
 
     #[test]

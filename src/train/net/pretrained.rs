@@ -108,17 +108,23 @@ fn values(network: Network, parameter: &Parameter, bands: Option<&[Band]>, found
         return Err(Error::misuse(format!("{} has no published weights to begin with", network.name()))
             .help("--pretrained none, or another --network"));
     };
+    let known = match network {
+        Network::LiteUnet => "efficientnet_lite_pytorch's efficientnet-lite0",
+        Network::Unet => "torchvision's resnet18",
+        Network::VitUnet => "timm's vit_small_patch14_dinov2",
+        Network::Segnet | Network::BasicSegnet => "torchvision's vgg16_bn",
+    };
     let wrong = |what: String| {
         Error::input(format!("these are no weights of the encoder of {}: {what}", network.name()))
-            .help("safetensors with the names of efficientnet_lite_pytorch, of torchvision's resnet18 or vgg16_bn, or of timm's vit_small_patch14_dinov2")
+            .help(format!("safetensors with the names of {known}"))
     };
     let array = found.iter().find(|a| a.name == name).ok_or_else(|| wrong(format!("`{name}` is missing")))?;
-    if !array.values.iter().all(|v| v.is_finite()) {
-        return Err(wrong(format!("`{name}` holds values that are not finite numbers")));
-    }
     let laid = (network == Network::VitUnet).then(|| vit_unet::laid(&parameter.name, array, found).map_err(wrong));
     let laid = laid.transpose()?;
     let array = laid.as_ref().unwrap_or(array);
+    if !array.values.iter().all(|v| v.is_finite()) {
+        return Err(wrong(format!("`{name}` holds values that are not finite numbers")));
+    }
     match (array.shape.as_slice(), parameter.shape.as_slice(), bands) {
         (&[outputs, 3, height, width], &[to, _, h, w], Some(bands)) if (outputs, height, width) == (to, h, w) => {
             Ok(for_bands(&array.values, height * width, bands))

@@ -2,8 +2,8 @@
 //! has its weights and a GPU, or patience.
 //!
 //! Sources: Dosovitskiy et al. 2021, "An image is worth 16 × 16 words" (patches as tokens, pre-norm blocks); Oquab et al. 2023, "DINOv2"
-//! (ViT-S/14: 12 blocks of 384 channels and 6 heads, LayerScale, 37 × 37 positions, brought to another size bicubically and not
-//! antialiased, as its own code does). An image is first brought to multiples of a patch's 14 pixels. What a patch is too coarse for comes
+//! (ViT-S/14: 12 blocks of 384 channels and 6 heads, LayerScale, 37 × 37 positions). Positions are brought to another size bicubically and
+//! not antialiased, as Hugging Face's `Dinov2Model` has it; timm antialiases, and DINOv2's own code stretches by a tenth of a patch. An image is first brought to multiples of a patch's 14 pixels. What a patch is too coarse for comes
 //! from three convolutions of the image itself, of 2, 4 and 8 pixels; the decoder has 128, 64, 32 and 16 channels, each two 3 × 3
 //! convolutions behind an enlargement by the nearest pixel.
 
@@ -115,8 +115,14 @@ pub(super) fn laid(name: &str, array: &Array, found: &[Array]) -> Result<Array, 
         let positions = found.iter().find(|a| a.name == "pos_embed" && a.shape == shape);
         positions.ok_or_else(|| format!("`pos_embed` is not {shape:?}, as of 518 × 518 pixels and no registers"))
     };
+    if let Some(registers) = found.iter().find(|a| ["reg_token", "register_tokens"].contains(&a.name.as_str())) {
+        return Err(format!("it has registers, `{}`: take the weights without them", registers.name));
+    }
     let (shape, values) = match name {
-        "enc.class" if array.shape == [1, 1, CHANNELS] => {
+        "enc.class" if array.shape != [1, 1, CHANNELS] => {
+            return Err(format!("`{}` is {:?}, not {:?}", array.name, array.shape, [1, 1, CHANNELS]));
+        }
+        "enc.class" => {
             let sum = array.values.iter().zip(&positions()?.values).map(|(class, position)| class + position);
             (vec![1, CHANNELS, 1, 1], sum.collect())
         }
@@ -131,4 +137,42 @@ pub(super) fn laid(name: &str, array: &Array, found: &[Array]) -> Result<Array, 
         },
     };
     Ok(Array { name: array.name.clone(), shape, values })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn array(name: &str, shape: &[usize]) -> Array {
+        let values = (0..shape.iter().product::<usize>()).map(|i| (i % 8191) as f32).collect();
+        Array { name: name.into(), shape: shape.into(), values }
+    }
+
+    /// Rationale: a token without its position, or features of a network with registers, still learn, only worse. Expected: the class token with
+    /// the first row of positions added, the others as a map of each
+    /// channel; other shapes and registers are refused by their names.
+    #[test]
+    fn published_values_lie_as_the_network_has_them() {
+        let tokens = 1 + GRID * GRID;
+        let (class, positions) = (array("cls_token", &[1, 1, CHANNELS]), array("pos_embed", &[1, tokens, CHANNELS]));
+        let found = [class.clone(), positions.clone()];
+        let token = laid("enc.class", &class, &found).unwrap();
+        assert_eq!((token.shape.as_slice(), token.values[7]), (&[1, CHANNELS, 1, 1][..], 14.0));
+        let map = laid("enc.position", &positions, &found).unwrap();
+        let (channel, row, column) = (5, 3, 30);
+        let place = (channel * GRID + row) * GRID + column;
+        assert_eq!(map.values[place], positions.values[(1 + row * GRID + column) * CHANNELS + channel]);
+        for shape in [&[1, CHANNELS][..], &[1, CHANNELS, 1, 1]] {
+            assert!(
+                laid("enc.class", &array("cls_token", shape), &found).unwrap_err().contains("cls_token"),
+                "{shape:?}"
+            );
+        }
+        let fewer = [class.clone(), array("pos_embed", &[1, tokens - 1, CHANNELS])];
+        assert!(laid("enc.class", &class, &fewer).unwrap_err().contains("pos_embed"));
+        for name in ["reg_token", "register_tokens"] {
+            let with = [class.clone(), positions.clone(), array(name, &[1, 4, CHANNELS])];
+            assert!(laid("enc.class", &class, &with).unwrap_err().contains(name));
+        }
+    }
 }

@@ -100,13 +100,16 @@ pub fn run(order: &Order<'_>, callbacks: &Callbacks<'_>) -> Result<Vec<PathBuf>>
     }
     bound.check()?;
     alone(out, || write_atomically(&out.join("experiment.ron"), order.page.as_bytes()))?;
+    let rows = rows::of_shard(&bound.experiment, order.shard);
+    if order.only.is_none() {
+        check_pretrained(order, &rows)?;
+    }
     for set in bound.used() {
         bound.make(set, callbacks.tell, callbacks.warn, callbacks.stop)?;
     }
     if order.only == Some(Only::Sets) {
         return Ok(bound.used().into_iter().map(|set| bound.folder(set).join(crate::dataset::recipe::FILE)).collect());
     }
-    let rows = rows::of_shard(&bound.experiment, order.shard);
     // Before hours are spent on the first row, the last one is checked.
     let mut todo = Vec::new();
     for (_, row) in &rows {
@@ -130,6 +133,22 @@ pub fn run(order: &Order<'_>, callbacks: &Callbacks<'_>) -> Result<Vec<PathBuf>>
         }
     }
     tables(order, callbacks)
+}
+
+/// Checks the weights that networks begin with, each file once, before anything is rendered.
+fn check_pretrained(order: &Order<'_>, rows: &[(usize, Row)]) -> Result<()> {
+    let experiment = &order.bound.experiment;
+    let mut seen = BTreeSet::new();
+    for (_, row) in rows {
+        let Learner::Network(network, seed) = row.learner else { continue };
+        let plan = &experiment.train[row.train].plan;
+        let pretrained = &plan.hyper.pretrained;
+        if !pretrained.is_none() && seen.insert((network, pretrained.name())) {
+            let begun = pretrained.begin(network, &plan.shape.bands, plan.classes.len(), seed);
+            begun.map_err(|error| error.within(row.in_words(experiment)))?;
+        }
+    }
+    Ok(())
 }
 
 /// Writes the tables of what is there.

@@ -5,6 +5,9 @@ use crate::train::net::{Conv, Norm, Operations, is_encoder};
 use std::collections::BTreeMap;
 use tch::{Kind, Tensor};
 
+/// Tokens whose attention is multiplied out: a picture of 560 × 350 pixels in patches of 14, and its class.
+const MULTIPLIED_OUT: i64 = 1 + 1000;
+
 /// Which statistics batch norms take: those of the batch, which also move the running ones, or the running ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pass {
@@ -106,21 +109,24 @@ impl Operations for Compute<'_> {
 
     fn tokens(&mut self, x: &Tensor, name: &str, channels: usize, _grid: usize) -> Tensor {
         let [class, position] = ["class", "position"].map(|what| &self.tensors[&format!("{name}.{what}")]);
-        let placed = x + position.upsample_bicubic2d(size(x), false, None, None);
-        let (images, channels) = (x.size()[0], channels as i64);
-        let patches = placed.reshape([images, channels, 1, -1]);
-        Tensor::cat(&[&class.expand([images, channels, 1, 1], false), &patches], 3)
+        let [height, width] = size(x);
+        let placed = x + position.upsample_bicubic2d([height, width], false, None, None);
+        // The number of images is nowhere written down: a trace would keep it.
+        let patches = placed.reshape([-1, channels as i64, 1, height * width]);
+        Tensor::cat(&[&class.expand_as(&patches.narrow(3, 0, 1)), &patches], 3)
     }
 
     fn map(&mut self, tokens: &Tensor, like: &Tensor) -> Tensor {
         let [height, width] = size(like);
-        tokens.narrow(3, 1, height * width).reshape([tokens.size()[0], -1, height, width])
+        tokens.narrow(3, 1, height * width).reshape([-1, tokens.size()[1], height, width])
     }
 
     /// In single precision, as `torch.autocast` has it.
     fn layer_norm(&mut self, x: &Tensor, name: &str, norm: Norm) -> Tensor {
         let [gain, shift] = ["weight", "bias"].map(|what| Some(&self.tensors[&format!("{name}.{what}")]));
-        let lying = x.to_kind(Kind::Float).permute([0, 2, 3, 1]);
+        // Asked for where it is there already, it would write the device into a trace.
+        let x = if x.kind() == Kind::Float { x.shallow_clone() } else { x.to_kind(Kind::Float) };
+        let lying = x.permute([0, 2, 3, 1]);
         lying.layer_norm([norm.channels as i64], gain, shift, norm.epsilon, true).permute([0, 3, 1, 2])
     }
 
@@ -128,13 +134,18 @@ impl Operations for Compute<'_> {
         x.gelu("none")
     }
 
+    /// Few tokens are multiplied out, which every PyTorch can trace; the products of many would not fit the memory.
     fn attention(&mut self, x: &Tensor, channels: usize, heads: usize) -> Tensor {
-        let (images, count) = (x.size()[0], x.size()[3]);
-        let (channels, heads) = (channels as i64, heads as i64);
-        let split = x.reshape([images, 3, heads, channels / heads, count]).transpose(3, 4);
+        let (channels, heads, count) = (channels as i64, heads as i64, x.size()[3]);
+        let split = x.reshape([-1, 3, heads, channels / heads, count]).transpose(3, 4);
         let [query, key, value] = [0, 1, 2].map(|part| split.select(1, part));
-        let y = Tensor::scaled_dot_product_attention(&query, &key, &value, None::<&Tensor>, 0.0, false, None, false);
-        y.transpose(2, 3).reshape([images, channels, 1, count])
+        let y = if count > MULTIPLIED_OUT {
+            Tensor::scaled_dot_product_attention(&query, &key, &value, None::<&Tensor>, 0.0, false, None, false)
+        } else {
+            let products = query.matmul(&key.transpose(2, 3)) * (heads as f64 / channels as f64).sqrt();
+            products.softmax(-1, None::<Kind>).matmul(&value)
+        };
+        y.transpose(2, 3).reshape([-1, channels, 1, count])
     }
 
     fn scale(&mut self, x: &Tensor, name: &str, channels: usize) -> Tensor {
