@@ -37,7 +37,8 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         zoo::needs_out(&args.run, "report")?;
     }
     let name = args.set.to_string();
-    let pick = name.strip_prefix(&*args.set.folder.to_string_lossy()).unwrap_or_default().replace('/', "-");
+    let pick = name.strip_prefix(&*args.set.folder.to_string_lossy()).filter(|pick| *pick != "@all");
+    let pick = pick.unwrap_or_default().replace('/', "-");
     let out = args.out.clone().unwrap_or_else(|| {
         let mut name = set.to_owned();
         name.push(pick);
