@@ -66,19 +66,14 @@ fn begun(plan: &Plan, run: &Path) -> Result<Vec<Array>> {
     let normalization = NormalizationMode::of(&card.normalization).name();
     let is = [("network", card.network.name()), ("normalization", normalization)];
     let asked = [plan.network.name(), plan.hyper.normalization.name()];
-    match is.iter().zip(asked).find(|((_, is), asked)| is != asked) {
-        Some(((flag, is), asked)) => {
-            let what = format!("a run cannot begin with another of {flag} {is}: its own is {asked}");
-            Err(Error::misuse(what).in_file(run).help(format!("--{flag} {is}")))
-        }
-        None => {
-            let fit = fitting(plan.network, plan.shape.bands.len(), plan.classes.len(), &values);
-            fit.map(drop).map_err(|error| {
-                error.in_file(run).help("--bands and --classes must be as many as those of the run")
-            })?;
-            Ok(values)
-        }
+    if let Some(((flag, is), asked)) = is.iter().zip(asked).find(|((_, is), asked)| is != asked) {
+        let what = format!("a run cannot begin with another of {flag} {is}: its own is {asked}");
+        return Err(Error::misuse(what).in_file(run).help(format!("--{flag} {is}")));
     }
+    let fit = fitting(plan.network, plan.shape.bands.len(), plan.classes.len(), &values);
+    fit.map(drop)
+        .map_err(|error| error.in_file(run).help("--bands and --classes must be as many as those of the run"))?;
+    Ok(values)
 }
 
 /// The same with photographs without labels, where the plan is a self-training.
