@@ -4,7 +4,7 @@
 //! stderr, exit code 2 with clear words for what the user can mend, and nothing written then.
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 /// A scene that renders in a blink.
 const PAGE: &str = r"Field(
@@ -96,7 +96,8 @@ fn without_arguments_the_help_is_shown() {
 #[test]
 fn the_version_is_told() {
     let done = run(folder().path(), &["--version"]);
-    assert_eq!(text(&done.stdout), format!("trace {}\n", env!("CARGO_PKG_VERSION")));
+    let kernels = furrow::accel::version().unwrap();
+    assert_eq!(text(&done.stdout), format!("trace {} ({kernels})\n", env!("CARGO_PKG_VERSION")));
 }
 
 #[test]
@@ -333,8 +334,6 @@ fn a_catalogue_measures_the_stages_of_its_photographs() {
     assert_eq!(rendered, ["BBCH 11"]);
 }
 
-/// Rationale: logs fill disks, and readers die. Expected: what cannot be said ends no work and changes no exit code; paths that are lost
-/// are a failure, told on stderr, with the files there; a reader that wants no more is none.
 /// Rationale: hours of work want a place to go. Expected: what is no folder and what nothing can be written into is told before anything grows.
 #[test]
 fn a_folder_that_cannot_be_is_told_first() {
@@ -352,6 +351,13 @@ fn a_folder_that_cannot_be_is_told_first() {
         let done = run(at, &["--scene", "page.ron", "--spp", "65536", "--out", out]);
         assert!(done.status.code() == Some(2) && text(&done.stderr).contains(words), "{out}: {}", text(&done.stderr));
     }
+    // Pictures that are made of these are told the same.
+    let long = format!("{}.png", "a".repeat(252));
+    for verb in [&["preview", "page.ron", "--spp", "65536"][..], &["leaf", "page.ron"]] {
+        let done = run(at, &[verb, &["--out", long.as_str()]].concat());
+        let said = text(&done.stderr);
+        assert!(done.status.code() == Some(2) && said.contains("this name is too long"), "{verb:?}: {said}");
+    }
     std::os::unix::fs::symlink("other.ron", at.join("one.ron")).unwrap();
     std::os::unix::fs::symlink("one.ron", at.join("other.ron")).unwrap();
     let done = run(at, &["--scene", "one.ron", "--out", "out"]);
@@ -361,9 +367,27 @@ fn a_folder_that_cannot_be_is_told_first() {
     assert_eq!(done.status.code(), Some(1), "{}", text(&done.stderr));
 }
 
+fn full() -> Stdio {
+    std::fs::File::create("/dev/full").expect("Linux").into()
+}
+
+/// Runs a program that answers on stdout: into a full disk, and for nobody.
+fn its_answer_is_not_lost_unseen(program: &str, folder: &Path, args: &[&str]) {
+    let command = |out: Stdio| Command::new(program).current_dir(folder).args(args).stdout(out).output().unwrap();
+    let lost = command(full());
+    let said = text(&lost.stderr);
+    assert!(lost.status.code() == Some(1) && said.contains("cannot write to stdout"), "{args:?}: {said}");
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let unread = command(writer.into());
+    let said = text(&unread.stderr);
+    assert!(unread.status.code() == Some(0) && !said.contains("stdout"), "{args:?}: {said}");
+}
+
+/// Rationale: logs fill disks, and readers die. Expected: what cannot be said ends no work and changes no exit code; paths and answers that
+/// are lost are a failure, told on stderr, with the files there; a reader that wants no more is none.
 #[test]
 fn full_and_closed_streams_end_no_work() {
-    let full = || std::process::Stdio::from(std::fs::File::create("/dev/full").expect("Linux"));
     let folder = folder();
     let command = |arguments: &[&str]| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_trace"));
@@ -375,9 +399,34 @@ fn full_and_closed_streams_end_no_work() {
     assert_eq!(command(&["--crop", "0,0,99,99"]).stderr(full()).output().unwrap().status.code(), Some(2));
     let lost = command(&["--out", "b"]).stdout(full()).output().unwrap();
     let said = text(&lost.stderr);
-    assert!(lost.status.code() == Some(1) && said.contains("cannot be written to stdout"), "{said}");
+    assert!(lost.status.code() == Some(1) && said.contains("their paths are lost: cannot write to stdout"), "{said}");
     assert_eq!((files("a"), files("b")), (7, 7));
-    let mut closed = command(&["--out", "c"]).stdout(std::process::Stdio::piped()).spawn().unwrap();
+    let mut closed = command(&["--out", "c"]).stdout(Stdio::piped()).spawn().unwrap();
     drop(closed.stdout.take());
     assert_eq!(closed.wait().unwrap().code(), Some(0));
+    let order = ["--scene", "page.ron", "--out", "d", "--count", "1", "--spp", "1"];
+    assert!(run(folder.path(), &[&["dataset", "plan"][..], &order].concat()).status.success());
+    let other = ["--scene", "page.ron", "--out", "e", "--count", "1", "--spp", "1"];
+    for args in [
+        &["--help"][..],
+        &["--version"],
+        &["dataset", "status", "--help"],
+        &["species"],
+        &["cameras"],
+        &["soils"],
+        &["explain"],
+        &["ablate", "--list"],
+        &["--scene", "page.ron", "--spp", "1", "--pixel", "9,9", "--quiet"],
+        &["dataset", "status", "d"],
+        &["dataset", "status", "d", "--json"],
+        &["dataset", "status", "d", "--watch"],
+        &[&["dataset"][..], &other, &["--dry-run"]].concat(),
+        &[&["dataset", "plan"][..], &other, &["--bill"]].concat(),
+    ] {
+        its_answer_is_not_lost_unseen(env!("CARGO_BIN_EXE_trace"), folder.path(), args);
+    }
+    #[cfg(feature = "train")]
+    for verb in ["explain", "zoo", "--help", "--version"] {
+        its_answer_is_not_lost_unseen(env!("CARGO_BIN_EXE_train"), folder.path(), &[verb]);
+    }
 }

@@ -506,6 +506,11 @@ fn feathery_leaves_are_no_fault_and_shifted_maps_are() {
         shifted.coverage[at] = share(((at % width).div_ceil(2) % 2) as u8);
     }
     assert!(told(&shifted));
+    // A scene file that ships, of leaves much finer than so few pixels.
+    let coarse = path(&data).to_owned() + "-coarse";
+    let mut command = trace(&["dataset", "--scene", "scenes/any-field.ron", "--count", "3", "--spp", "1", "--quiet"]);
+    command.args(["--width", "64", "--height", "48", "--out", &coarse]);
+    succeed(command);
 }
 
 /// Expected: a stem and leaf ends lie where the label maps say that their plant is, within a pixel, wherever they are told to be visible.

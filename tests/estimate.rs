@@ -7,7 +7,9 @@
 use crate::common::program::{scratch, small_text, trace};
 use furrow::render;
 use furrow::scene::assemble::{self, Options, Source};
+use furrow::scene::estimate::Estimate;
 use std::collections::BTreeMap;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -126,6 +128,73 @@ fn the_limit_is_raised_by_a_flag_and_changes_no_byte() {
     }
 }
 
+/// Writes a flat picture of so many pixels a side, a few kilobytes.
+fn flat(path: &Path, side: u32, color: png::ColorType) {
+    let file = std::fs::File::create(path).expect("a file");
+    let mut encoder = png::Encoder::new(std::io::BufWriter::new(file), side, side);
+    encoder.set_color(color);
+    let mut rows = encoder.write_header().expect("a header").into_stream_writer().expect("a writer");
+    let row = vec![90; side as usize * color.samples()];
+    for _ in 0..side {
+        rows.write_all(&row).expect("a row");
+    }
+    rows.finish().expect("an end");
+}
+
+/// What a scene file would take, where so many bytes are allowed.
+fn estimate(path: &Path, memory: u64) -> furrow::Result<Estimate> {
+    let options = Options { width: Some(64), memory: Some(memory), ..Options::default() };
+    let pool = render::pool(0).expect("a pool");
+    pool.install(|| Source::open(path).unwrap_or_else(|e| panic!("{e}")).estimate(&options))
+}
+
+/// Rationale: a small file may hold many pixels, and maps of a soil layer without a height map take 40 bytes of each at their peak.
+/// Expected: 1.3 GiB told before anything is decoded, exit code 2, the file and the limit; the same estimate within a larger limit.
+#[test]
+fn a_picture_that_would_take_too_much_is_refused() {
+    let layers = "layers: [(albedo: \"large.png\", size_m: 1, height_mm: (0, 1))]";
+    let (keep, path) = with_soil(&format!("soil: (\n {layers},\n clods: (over_5mm_per_m2: 0),\n)"));
+    flat(&keep.path().join("large.png"), 6000, png::ColorType::Rgb);
+    let out = keep.path().join("out.png");
+    let (scene, out) = (path.to_str().expect("UTF-8"), out.to_str().expect("UTF-8"));
+    for arguments in [
+        vec!["--scene", scene, "--out", out, "--spp", "1", "--width", "64", "--memory", "1"],
+        vec!["preview", scene, "--out", out, "--memory", "1"],
+    ] {
+        let said = refused(trace(&arguments));
+        assert!(said.contains("`large.png` cannot be used: 6000 × 6000 pixels would take about 1.3 GiB"), "{said}");
+        assert!(said.contains("the limit is 1.0 GiB") && said.contains("--memory"), "{said}");
+        assert!(said.contains(layers) && !Path::new(out).exists(), "{said}");
+    }
+    assert_eq!(estimate(&path, 1 << 30).unwrap_err().exit_code(), 2);
+    let estimate = estimate(&path, 4 << 30).unwrap_or_else(|e| panic!("{e}"));
+    assert!(estimate.check(4 << 30).is_ok());
+    let share = estimate.shares.iter().find(|share| share.advice.contains("large.png")).expect("a share of its own");
+    assert!((share.cost.bytes / (40.0 * 36e6) - 1.0).abs() < 0.01, "{share:?}");
+}
+
+/// The same of a model: its first picture fits, the second does not beside it. Expected: its file's name, and what is there already.
+#[test]
+fn pictures_of_a_model_are_counted_together() {
+    let (keep, _) = scratch();
+    let write = |name: &str, text: &str| std::fs::write(keep.path().join(name), text).expect("a file");
+    for name in ["leaf.png", "stem.png"] {
+        flat(&keep.path().join(name), 2000, png::ColorType::Grayscale);
+    }
+    write("m.mtl", "newmtl a\nmap_Kd leaf.png\nnewmtl b\nmap_Kd stem.png\n");
+    write("m.obj", "mtllib m.mtl\nv 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nusemtl a\nf 1 2 3\nusemtl b\nf 3 2 1\n");
+    let light = "lights: [Constant(radiance: (1, 1, 1, 1))]";
+    write("page.ron", &format!("Field(camera: JaiAd130(), {light}, models: [(file: \"m.obj\", class: Weed)])"));
+    let error = estimate(&keep.path().join("page.ron"), 64 << 20).unwrap_err();
+    let said = error.to_string();
+    assert_eq!(error.exit_code(), 2, "{said}");
+    assert!(said.contains("`m.obj` cannot be used: its picture `stem.png`: 2000 × 2000 pixels"), "{said}");
+    assert!(said.contains("about 56 MiB of memory, beside 20 MiB of other pictures; the limit is 64 MiB"), "{said}");
+    let estimate = estimate(&keep.path().join("page.ron"), 1 << 30).unwrap_or_else(|e| panic!("{e}"));
+    let share = estimate.shares.iter().find(|share| share.advice.contains("m.obj")).expect("a share of its own");
+    assert!((share.cost.bytes / (20.0 * 4e6) - 1.0).abs() < 0.01, "{share:?}");
+}
+
 /// A field is refused in each verb that grows it.
 #[test]
 fn every_verb_that_grows_a_field_refuses_it() {
@@ -171,4 +240,28 @@ fn refused(mut command: std::process::Command) -> String {
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{command:?}: {said}");
     said
+}
+
+/// The same of a picture of all directions, of which little is kept but much is read. Expected: refused by its header, in both kinds of files.
+#[test]
+fn an_environment_map_that_would_take_too_much_is_refused() {
+    let (keep, _) = scratch();
+    let (width, height) = (1024, 512);
+    let hdr = std::fs::File::create(keep.path().join("sky.hdr")).expect("a file");
+    let pixels = vec![image::Rgb([1.0_f32; 3]); width * height];
+    image::codecs::hdr::HdrEncoder::new(hdr).encode(&pixels, width, height).expect("a picture");
+    let sky = exr::prelude::SpecificChannels::rgb(|_| (1.0_f32, 1.0_f32, 1.0_f32));
+    let sky = exr::prelude::Image::from_channels((width, height), sky);
+    exr::prelude::WritableImage::write(&sky).to_file(keep.path().join("sky.exr")).expect("a picture");
+    for name in ["sky.hdr", "sky.exr"] {
+        let page = keep.path().join("page.ron");
+        let light = format!("lights: [EnvironmentMap(file: \"{name}\", nir: OfRed(0.8))]");
+        let soil = "soil: (layers: [(albedo: \"soil.png\", size_m: 1, height_mm: (0, 1))])";
+        flat(&keep.path().join("soil.png"), 64, png::ColorType::Rgb);
+        std::fs::write(&page, format!("Field(camera: JaiAd130(), {light}, {soil})")).expect("a page");
+        let error = estimate(&page, 8 << 20).unwrap_err();
+        let said = error.to_string();
+        assert_eq!(error.exit_code(), 2, "{said}");
+        assert!(said.contains(name) && said.contains("1024 × 512 pixels would take about 16 MiB"), "{said}");
+    }
 }

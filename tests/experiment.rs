@@ -126,7 +126,7 @@ impl Players {
         let trained = match predictor {
             Predictor::Network(trained, ..) => trained,
             Predictor::Baseline(baseline, shape) => {
-                return files::evaluate(baseline, on, shape, &AtomicBool::new(false), &mut |_, _| ());
+                return files::evaluate(baseline, on, shape, &AtomicBool::new(false), &mut |_, _| Ok(()));
             }
         };
         let seed = trained.values[0].values[0];

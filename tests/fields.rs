@@ -216,7 +216,8 @@ fn all_that_a_camera_sees_is_planted_or_told() {
     let level =
         "intrinsics: FieldOfView(horizontal_deg: 40), pose: LookAt(position_m: (0, 0, 1.2), target_m: (0, 4, 0.5))";
     let field = under(level).unwrap();
-    let [warning] = field.warnings.as_slice() else { panic!("{:?}", field.warnings) };
+    let [coarser, warning] = field.warnings.as_slice() else { panic!("{:?}", field.warnings) };
+    assert!(coarser.contains("to the horizon") && coarser.contains("detail: ByPixel"), "{coarser}");
     assert!(warning.contains("to the horizon") && warning.contains("turn it down"), "{warning}");
     assert!(field.plants.iter().any(|p| p.position.y > 5.4));
     let refused =

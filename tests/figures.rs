@@ -8,7 +8,8 @@ use crate::common::browser::{browser, probe};
 use crate::common::program::scratch;
 use crate::common::python::python;
 use furrow::report::chart::{Chart, Curve};
-use furrow::train::figure::{Page, Shot, sheet, spread};
+use furrow::train::data::{Band, Example};
+use furrow::train::figure::{Page, Shot, Shots, sheet, spread};
 use furrow::train::measure::{Evaluation, Prediction, Report};
 use std::process::Command;
 
@@ -64,6 +65,40 @@ fn shots_are_made_small_and_spread_over_the_set() {
     assert!(shot.truth.iter().enumerate().all(|(at, class)| *class == u8::from(at % 20 >= 10)));
     assert_eq!(shot.truth, shot.predictions[1]);
     assert_eq!((spread(100, 4), spread(3, 8), spread(0, 4)), (vec![12, 37, 62, 87], vec![0, 1, 2], vec![]));
+}
+
+/// Rationale: who looks at an evaluation looks for what went wrong. Expected: of images in any order those of the lowest mean I/U, the worst
+/// first, then those spread over the set that are not among them; without that, the spread ones alone.
+#[test]
+fn the_worst_images_are_kept_and_some_spread_over_the_set() {
+    let wrong = [3, 40, 7, 0, 90, 12, 55, 1, 30, 8];
+    let seen = |mut shots: Shots| {
+        for (k, wrong) in wrong.iter().enumerate() {
+            let labels = vec![0; 50].into_iter().chain(vec![1; 50]).collect::<Vec<u8>>();
+            let predicted: Vec<u8> =
+                labels.iter().enumerate().map(|(at, class)| if at < *wrong { 1 - class } else { *class }).collect();
+            let planes = vec![vec![9; 100]];
+            let example = Example { name: k.to_string(), planes, labels, plants: Vec::new() };
+            shots.see(&example, (10, 10), &predicted).unwrap();
+        }
+        shots.kept().into_iter().map(|shot| shot.name).collect::<Vec<_>>()
+    };
+    let spread_alone = Shots::new(10, 3, 50, &[Band::Red]);
+    assert_eq!(seen(spread_alone), ["1", "5", "8"]);
+    let shots = Shots::new(10, 3, 50, &[Band::Red]).and_worst(4, 2);
+    // Of 10 × 10 pixels, 90, 55, 40 and 30 are wrong in the worst four; 5 is the only spread one that is not among them.
+    assert_eq!(seen(shots), ["4", "6", "1", "8", "5"]);
+}
+
+/// Rationale: a loss that falls from 1.6 to 1.2 had an axis without a number. Expected: three numbers or more on a logarithmic axis however short.
+#[test]
+fn a_short_logarithmic_axis_has_numbers() {
+    for (from, to) in [(1.2, 1.6), (0.63, 1.82), (0.0301, 0.0309), (1.0, 900.0)] {
+        let curves = vec![Curve { name: "a".into(), points: vec![(0.0, to), (1.0, from)] }];
+        let short = Chart { curves, ..chart(true) };
+        let numbers = short.svg().matches("text-anchor=\"end\"").count();
+        assert!(numbers >= 3, "{from} to {to}: {numbers}");
+    }
 }
 
 fn chart(logarithmic: bool) -> Chart {

@@ -15,6 +15,7 @@ use furrow::train::run::{self, Results, TrainedModel};
 use furrow::train::table::Experiment;
 use std::borrow::Cow;
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::sync::Arc;
@@ -314,7 +315,9 @@ fn weights_of_other_classes_and_damaged_ones_are_refused() {
             "\"normalisation\": {\"fixed\": {\"mean\": [0.5], \"sd\": [0.1]}}",
             "is not one of 3 bands",
         ),
-        ("pixel", "\"weights\":", "\"pixel_mm\": 0.0, \"weights\":", "its pixels have no size"),
+        ("no pixel", "\"weights\":", "\"pixel_mm\": 0.0, \"weights\":", "pixels is not 0.001 to 10000 mm"),
+        ("large pixel", "\"weights\":", "\"pixel_mm\": 1e9, \"weights\":", "pixels is not 0.001 to 10000 mm"),
+        ("vast pixel", "\"weights\":", "\"pixel_mm\": 1e308, \"weights\":", "pixels is not 0.001 to 10000 mm"),
         ("resize", "\"weights\":", "\"resize\": {\"scale\": 0.0}, \"weights\":", "not by 0"),
         ("sides", "\"weights\":", "\"resize\": {\"long_sides\": [1000000000]}, \"weights\":", "long sides are 1 to 8"),
         ("refine", "\"weights\":", "\"refine\": \"all\", \"weights\":", "there is no refinement `all`"),
@@ -335,6 +338,20 @@ fn weights_of_other_classes_and_damaged_ones_are_refused() {
         assert!(error.contains(words), "{what}: {error}");
     }
     fs::write(&card, &text).unwrap();
+    // Weights that no training writes, and checksums that are theirs.
+    let sound = TrainedModel::open(&two).unwrap();
+    for (end, value, words) in [
+        (".weight", f32::NAN, "holds values that are not finite numbers"),
+        (".running_var", -1.0, "holds variances below 0"),
+    ] {
+        let mut model = sound.clone();
+        model.values.iter_mut().find(|array| array.name.ends_with(end)).unwrap().values[0] = value;
+        model.card.weights_sha256 = furrow::train::weights::hash(&model.values);
+        model.write(&two).unwrap();
+        let error = refuse(&mut eval(&two), 2);
+        assert!(error.contains("weights.safetensors") && error.contains(words), "{error}");
+    }
+    sound.write(&two).unwrap();
     let path = two.join(run::WEIGHTS);
     let mut bytes = fs::read(&path).unwrap();
     let last = bytes.len() - 1;
@@ -581,7 +598,7 @@ fn outlines_are_learnt_where_people_draw_them() {
 }
 
 /// Rationale: whoever trains for a night wants to see in its first hour whether anything is learnt. Expected: a row of the log stands there
-/// while the training still runs; stopped and gone on with, both logs hold each step once; TensorBoard's own reader finds the
+/// while the training still runs; stopped, killed and gone on with, both logs hold each step once; TensorBoard's own reader finds the
 /// same numbers, and pictures of validation images. Source: PyPI's tensorboard 2.20.0, `tests/train/check_events.py`.
 #[test]
 fn logs_grow_while_it_trains_and_tensorboard_reads_them() {
@@ -600,8 +617,24 @@ fn logs_grow_while_it_trains_and_tensorboard_reads_them() {
     assert!(!out.join(run::RESULT).exists());
     let _ = Command::new("sh").arg("-c").arg(format!("kill -INT {}", child.id())).status();
     child.wait().unwrap();
+    // A page of what is known so far.
+    let losses = scratch.path().join("losses");
+    let mut report = Command::new(env!("CARGO_BIN_EXE_train"));
+    succeed(report.arg("report").arg(&out).arg("--out").arg(&losses));
+    let page = fs::read_to_string(losses.join("losses.html")).unwrap();
+    assert!(page.contains("not done") && page.contains("cross-entropy + soft Dice loss"), "{page}");
+    // Gone on with and killed half a second later, in the middle of a record as it were; then to the end. The file only grows.
+    let events = out.join("training.tfevents");
+    let before = fs::read(&events).unwrap();
+    let mut child = fit(&set, &out, &more).stderr(Stdio::null()).spawn().unwrap();
+    std::thread::sleep(Duration::from_millis(500));
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let mut torn = fs::OpenOptions::new().append(true).open(&events).unwrap();
+    torn.write_all(&[40, 0, 0]).unwrap();
     succeed(&mut fit(&set, &out, &more));
     assert_eq!(rows(), 1 + 40);
+    assert!(fs::read(&events).unwrap().starts_with(&before), "what was there stays, for whoever reads it");
     if let Some(python) = python("import tensorboard, PIL") {
         ask(&python, "train/check_events.py", &[out.to_str().unwrap()]);
     }

@@ -21,6 +21,8 @@ mod condition;
 mod coverage;
 mod dataset;
 mod dataset_kill;
+#[cfg(unix)]
+mod dataset_links;
 mod denoise;
 mod dependencies;
 #[cfg(feature = "train")]

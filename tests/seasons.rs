@@ -6,6 +6,7 @@
 
 use crate::common::dataset::{fail, path, same, succeed, tree, verb};
 use crate::common::program::{scratch, small_text, trace};
+use crate::common::python::{ask, python};
 use furrow::dataset::{Record, Set, native};
 use furrow::geometry::AlphaMask;
 use furrow::light::LightRecord;
@@ -213,6 +214,7 @@ fn page(folder: &Path) -> PathBuf {
     let more = "cameras: [(name: \"right\", camera: Pinhole(size: (96, 72), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.45, \
                 at_m: (0.04, 0))))], drive: (frames: 2, path: Straight(speed_m_s: 0.2)), days: (on: [9, 21]), lights:";
     let text = small_text().replacen("lights:", more, 1);
+    let text = text.replace("growth:", "condition: (holes: 2, dust: 0.2, wilt: 0.3), growth:");
     let text =
         text.replace("\"textures/", &format!("\"{root}/textures/")).replace("\"scenes/", &format!("\"{root}/scenes/"));
     let path = folder.join("page.ron");
@@ -236,6 +238,9 @@ fn images_of_days_do_not_depend_on_the_others() {
     };
     succeed(make(&whole, &[]));
     let before = tree(&whole);
+    if let Some(python) = python("import pandas, pyarrow") {
+        ask(&python, "formats/check_index.py", &[path(&whole)]);
+    }
     let records: Vec<Record> = (0..8).map(|k| native::read_record(&whole, &Set::name(k)).unwrap()).collect();
     for (record, k) in records.iter().zip(0_u32..) {
         let capture = record.capture.as_ref().expect("a sequence");

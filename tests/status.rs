@@ -34,7 +34,7 @@ fn told(data: &Path, more: &[&str]) -> String {
 
 #[test]
 fn a_dataset_that_is_done_says_so() {
-    let (_keep, data) = scratch();
+    let (keep, data) = scratch();
     succeed(make(&data, 4, &["--at-once", "1"]));
     let before = tree(&data);
     let found = status(&data, &[]);
@@ -67,6 +67,16 @@ fn a_dataset_that_is_done_says_so() {
         words.contains("4 of 4 images") && words.contains("all done") && words.contains("slowest images:"),
         "{words}"
     );
+    assert!(before == tree(&data));
+    // The page tells the same, and loads itself no more.
+    let page = keep.path().join("status.html");
+    told(&data, &["--watch", "--page", path(&page)]);
+    let html = fs::read_to_string(&page).unwrap();
+    assert!(html.contains(r#"data-key="done" data-value="4""#) && html.contains("Slowest images"), "{html}");
+    assert!(html.contains("000000") && !html.contains("location.reload"), "{html}");
+    assert!(fail(verb("status", &data, &["--page", path(&data)]), 2).contains("this is no file"));
+    let own = data.join("dataset.json");
+    assert!(fail(verb("status", &data, &["--page", path(&own)]), 2).contains("lies in the dataset's folder"));
     assert!(before == tree(&data));
 }
 

@@ -287,9 +287,17 @@ fn a_dry_run_tells_the_rows_and_does_nothing() {
     let output = succeed(table(&out, &["--dry-run"]));
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(said.lines().filter(|l| l.contains("missing")).count(), 4 + 8, "{said}");
+    let cells = |line: &str| line.split('|').map(|cell| cell.trim().to_owned()).filter(|c| !c.is_empty()).collect();
+    let set = |said: &str, name: &str| -> Vec<String> {
+        said.lines().map(cells).find(|row: &Vec<String>| row.first().is_some_and(|c| c == name)).expect("a row")
+    };
+    assert_eq!(set(&said, "small")[2..], ["48 × 36", "6", "0"], "{said}");
+    assert!(set(&said, "frames").contains(&"0".to_owned()), "{said}");
     assert!(!out.exists());
     let (_, done, _) = whole();
     let said = succeed(table(done, &["--dry-run"])).stderr;
     let said = String::from_utf8_lossy(&said);
     assert_eq!(said.lines().filter(|l| l.contains("done") && l.contains("1 of 1")).count(), 4 + 8, "{said}");
+    assert_eq!(set(&said, "small")[2..], ["48 × 36", "6", "6"], "{said}");
+    assert_eq!(set(&said, "frames").last().map(String::as_str), Some("5"), "{said}");
 }

@@ -1,5 +1,5 @@
-//! What the command lines share: how a line is told, how a run ends, how a list and an error look, how a crop is written, what a
-//! signal does.
+//! What the command lines share: how they are read, how a line is told, how an answer is printed, how a run ends, how a list and an error
+//! look, how a crop is written, what a signal does.
 
 pub mod signal;
 
@@ -28,21 +28,50 @@ pub fn tell(words: fmt::Arguments<'_>) {
     let _ = io::stderr().write_all(format!("{words}\n").as_bytes());
 }
 
-/// Ends a program: the paths that it wrote go to stdout, one a line, for the next program; an error goes to stderr. Where stdout is
-/// closed, nobody wants them; where it is full, they are lost, and that is a failure.
-pub fn end(done: Result<Vec<PathBuf>>) -> ExitCode {
-    let paths = match done {
-        Ok(paths) => paths,
-        Err(e) => return fail(&e),
-    };
-    let mut out = io::stdout().lock();
-    let written = paths.iter().try_for_each(|path| writeln!(out, "{}", path.display())).and_then(|()| out.flush());
-    match written {
-        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
-            fail(&Error::failed(format!("the files are there, but their paths cannot be written to stdout: {e}")))
+/// Reads the command line. Help and version, with that of the kernels that rays are traced with, go to stdout, as every answer does; what is wrong
+/// goes to stderr. Returns the exit code where that was all.
+pub fn parse<C: clap::Parser>(kernels: fn() -> Result<String>) -> Result<C, ExitCode> {
+    C::try_parse().map_err(|words| {
+        let done = if words.kind() == clap::error::ErrorKind::DisplayVersion {
+            print(&version(&words.to_string(), kernels))
+        } else {
+            written(words.print().and_then(|()| io::stdout().flush()))
+        };
+        match done {
+            Err(lost) if !words.use_stderr() => fail(&lost),
+            _ => ExitCode::from(words.exit_code() as u8),
         }
-        _ => ExitCode::SUCCESS,
+    })
+}
+
+fn version(program: &str, kernels: fn() -> Result<String>) -> String {
+    let kernels = kernels().unwrap_or_else(|error| error.message().to_owned());
+    format!("{} ({kernels})\n", program.trim_end())
+}
+
+/// Prints an answer to stdout. Whether somebody reads on: a closed pipe is no failure, for nobody wants the words then. Where they are lost
+/// otherwise, as on a full disk, that is one.
+pub fn print(words: &str) -> Result<bool> {
+    let mut out = io::stdout().lock();
+    written(out.write_all(words.as_bytes()).and_then(|()| out.flush()))
+}
+
+/// What it means that stdout took words, or did not.
+fn written(done: io::Result<()>) -> Result<bool> {
+    match done {
+        Ok(()) => Ok(true),
+        Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(false),
+        Err(e) => Err(Error::failed(format!("cannot write to stdout: {e}"))),
     }
+}
+
+/// Ends a program: the paths that it wrote go to stdout, one a line, for the next program; an error goes to stderr.
+pub fn end(done: Result<Vec<PathBuf>>) -> ExitCode {
+    let told = done.and_then(|paths| {
+        let lines: String = paths.iter().map(|path| path.display().to_string() + "\n").collect();
+        print(&lines).map_err(|e| e.within("the files are there, but their paths are lost"))
+    });
+    told.map_or_else(|e| fail(&e), |_| ExitCode::SUCCESS)
 }
 
 /// Reads a time of a second to a year, with its unit.
@@ -53,9 +82,9 @@ pub fn time(text: &str) -> Result<Duration, String> {
         .ok_or_else(|| "write a time of a second or more with its unit, such as 30s, 2m or 1h30m".into())
 }
 
-/// Prints rows to stdout with their columns below each other. A closed pipe is no failure.
-pub fn print_rows<const N: usize>(rows: &[[String; N]]) {
-    let _ = io::stdout().lock().write_all(columns(rows).as_bytes());
+/// [Prints](print()) rows with their columns below each other.
+pub fn print_rows<const N: usize>(rows: &[[String; N]]) -> Result<bool> {
+    print(&columns(rows))
 }
 
 /// Rows as lines whose columns stand below each other.
@@ -111,15 +140,21 @@ pub fn check_folder(folder: &Path) -> Result<()> {
         }
     }
     // The names of the files that would lie in it are about as long as this one.
-    if let Err(e) = folder.join("semantics.png").symlink_metadata()
-        && e.kind() == io::ErrorKind::InvalidFilename
-    {
-        return Err(Error::misuse("this name is too long for the file system")
-            .in_file(folder)
-            .help("give --out a shorter one"));
-    }
+    check_length(&folder.join("semantics.png")).map_err(|e| e.in_file(folder))?;
     // Not by its permissions: root may write where they say no, and nobody on a file system that is read-only.
     tempfile::tempfile_in(there).map_err(Error::io(there)).map(drop)
+}
+
+/// Checks that the file system takes names as long as this one.
+fn check_length(file: &Path) -> Result<()> {
+    match file.symlink_metadata() {
+        Err(e) if e.kind() == io::ErrorKind::InvalidFilename => {
+            Err(Error::misuse("this name is too long for the file system")
+                .in_file(file)
+                .help("give --out a shorter one"))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Checks that a PNG can be written at `out` from what `source` holds, before there is work to lose: not over the source itself, nor in the place of
@@ -129,14 +164,22 @@ pub fn check_png(out: &Path, source: &Path) -> Result<()> {
     if !out.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
         return Err(Error::misuse("the picture must be a PNG").in_file(out).help(help));
     }
-    if out.exists() && !out.is_file() {
-        return Err(Error::misuse("this is no file, so no picture can be written there").in_file(out).help(help));
-    }
+    check_file(out)?;
     if let (Ok(a), Ok(b)) = (out.canonicalize(), source.canonicalize())
         && a == b
     {
         return Err(Error::misuse("the picture would be written over what it is made from").in_file(out).help(help));
     }
+    Ok(())
+}
+
+/// Checks that a file can be written, before there is work to lose: not in the place of a folder or a device.
+pub fn check_file(out: &Path) -> Result<()> {
+    if out.exists() && !out.is_file() {
+        let error = Error::misuse("this is no file, so none can be written there").in_file(out);
+        return Err(error.help("give the name of a file"));
+    }
+    check_length(out)?;
     check_folder(out.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new(".")))
 }
 

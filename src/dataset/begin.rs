@@ -5,7 +5,7 @@ use super::checksum_record::write_files;
 use super::keep::Kept;
 use super::photo::Photo;
 use super::recipe::{FILE, Made, Recipe};
-use super::{format, pack};
+use super::{format, links, pack};
 use crate::output::{create_atomically, is_unfinished};
 use crate::{Error, Result};
 use std::path::Path;
@@ -43,6 +43,7 @@ fn go_on(folder: &Path, mut recipe: Recipe, files: &[File]) -> Result<Recipe> {
     // In whatever order they were asked for, it is one dataset.
     recipe.formats.sort();
     recipe.formats.dedup();
+    links::refuse(folder, &recipe)?;
     format::check_maps(&recipe).and_then(|()| pack::check(&recipe)).map_err(|e| e.in_file(folder))?;
     write_changed(folder, files)?;
     write_changed(folder, &[File { path: FILE.into(), bytes: recipe.text()? }])?;

@@ -46,7 +46,12 @@ impl ChecksumRecord {
 
     /// Where the checksums of an image lie.
     pub fn path(folder: &Path, index: u64) -> PathBuf {
-        folder.join("seals").join(format!("{}.json", native::image_name(index)))
+        folder.join(Self::path_below(index))
+    }
+
+    /// The same below the dataset's folder.
+    pub(super) fn path_below(index: u64) -> String {
+        format!("seals/{}.json", native::image_name(index))
     }
 
     /// Reads an image's checksums; `None` where there is none or it is damaged.
@@ -60,7 +65,7 @@ impl ChecksumRecord {
     /// Writes it: after everything that it names.
     pub fn write(&self, folder: &Path) -> Result<()> {
         let written = Written { checksums: self.clone(), seal_sha256: self.hash()? };
-        write_atomically(&Self::path(folder, self.index), &compact(&written)?)
+        write_atomically(&below(folder, &Self::path_below(self.index))?, &compact(&written)?)
     }
 
     /// SHA-256 over everything in it, hex.

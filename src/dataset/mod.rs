@@ -26,6 +26,7 @@
 //! | `sample`, `record`, `annotate`, `rle` | one image and all that is known of it |
 //! | `native`, `format` | as files: ours (`images/`), and those of other tools |
 //! | `checksum`, `checksum_record`, `set` | SHA-256 of a file; those of an image's files; the dataset on disk |
+//! | `links` | symbolic links in a dataset's folder, which are refused |
 //! | `pack`, `archive` | images in archives instead of folders; names in them |
 //! | `push` | sends what is finished elsewhere, by a command of the user's |
 //! | `make` | all of it in one call |
@@ -78,6 +79,7 @@ pub mod keep;
 pub mod labelling;
 #[doc(hidden)]
 pub mod labels;
+mod links;
 mod make;
 #[doc(hidden)]
 pub mod meter;

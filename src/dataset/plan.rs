@@ -10,7 +10,7 @@ use super::photo::Photo;
 use super::recipe::{FILE, Made, Recipe, Rendering};
 use super::set::Set;
 use super::split::Shares;
-use super::{File, checksum_record, format, pack};
+use super::{File, checksum_record, format, links, pack};
 use crate::ablation::{Edit, FULL};
 use crate::job::{Renderer, SceneFile};
 use crate::sensor::Camera;
@@ -264,6 +264,7 @@ pub fn add_formats(set: &mut Set, names: &[String], labelling: &Labelling) -> Re
         ));
     }
     format::check_maps(&recipe).and_then(|()| pack::check(&recipe)).map_err(|e| e.in_file(&set.folder))?;
+    links::refuse(&set.folder, &recipe)?;
     let warnings = warnings(&recipe)?;
     checksum_record::write_files(&set.folder, &[File { path: FILE.into(), bytes: recipe.text()? }])?;
     set.recipe = recipe;

@@ -6,7 +6,7 @@
 //! at the other place:
 //!
 //! ```text
-//! --push 'rclone copy {dir} remote:bucket/set'      --push 'cp -r {dir}/. /mnt/set/'
+//! --push 'rclone copy {dir} remote:bucket/set'      --push 'cp -a {dir}/. /mnt/set/'
 //! --push 'aws s3 cp --recursive {dir} s3://bucket/set'
 //! ```
 //!
@@ -19,7 +19,7 @@ use super::pack::{Id, Packing};
 use super::recipe::{FILE, MANIFEST, compact};
 use super::set::Set;
 use super::{index, native, report};
-use crate::input::below;
+use crate::input::{below, refuse_links};
 use crate::output::{remove_unfinished_in, write_atomically};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -230,6 +230,7 @@ impl Push {
         let Some((files, hash)) = unit.contents(set)? else { return Ok(()) };
         let note = |freed| Note { unit: unit.name(), sha256: hash.clone(), freed };
         let path = unit.note(&set.folder);
+        refuse_links(&set.folder, Path::new("pushed"))?;
         match unit.noted(set, &hash) {
             Some(Note { freed: true, .. }) => return Ok(()),
             Some(_) => {}
@@ -241,6 +242,8 @@ impl Push {
                     }
                     other => other?,
                 }
+                // The command may have taken hours.
+                refuse_links(&set.folder, Path::new("pushed"))?;
                 write_atomically(&path, &compact(&note(false))?)?;
             }
         }
@@ -255,6 +258,7 @@ impl Push {
 
     /// Clears away what killed runs have left of their pushes and archives: further names of files that are to take no room here any longer.
     pub(super) fn clear(&self, set: &Set) -> Result<()> {
+        refuse_links(&set.folder, Path::new("packs"))?;
         for folder in [set.folder.clone(), set.folder.join("packs")].iter().filter(|_| self.free) {
             if folder.is_dir() {
                 remove_unfinished_in(folder)?;

@@ -3,6 +3,7 @@
 use super::archive::entry_name;
 use super::checksum::Checksum;
 use super::checksum_record::ChecksumRecord;
+use super::links;
 use super::native::{self, Files};
 use super::pack::record::Packs;
 use super::pack::{Id, Packing};
@@ -37,9 +38,11 @@ impl Set {
         Self { folder: folder.into(), recipe, packs: Packs::default() }
     }
 
-    /// Opens the dataset in a folder.
+    /// Opens the dataset in a folder; an error where a folder in it is a symbolic link, for it may come from others.
     pub fn open(folder: &Path) -> Result<Self> {
-        Ok(Self::new(folder, Recipe::read(folder)?))
+        let recipe = Recipe::read(folder)?;
+        links::refuse(folder, &recipe)?;
+        Ok(Self::new(folder, recipe))
     }
 
     /// The name of an image: its number in six digits or more.

@@ -5,6 +5,7 @@
 //! made. Runs never share a file, for lines that two machines append to one file over a network get lost.
 
 use super::render::Times;
+use crate::input::refuse_links;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions};
@@ -130,7 +131,7 @@ pub fn now() -> f64 {
 
 /// A run's file, made with its first row.
 pub struct TimingLog {
-    folder: PathBuf,
+    dataset: PathBuf,
     shard: String,
     file: Mutex<Option<(PathBuf, File)>>,
 }
@@ -138,7 +139,7 @@ pub struct TimingLog {
 impl TimingLog {
     /// For a run of a shard, `k-of-n`.
     pub fn new(dataset: &Path, shard: &str) -> Self {
-        Self { folder: dataset.join("ledger"), shard: shard.to_owned(), file: Mutex::new(None) }
+        Self { dataset: dataset.to_path_buf(), shard: shard.to_owned(), file: Mutex::new(None) }
     }
 
     /// Adds a row.
@@ -155,10 +156,12 @@ impl TimingLog {
 
     /// The first name that no other run has taken.
     fn open(&self) -> Result<(PathBuf, File)> {
-        std::fs::create_dir_all(&self.folder).map_err(Error::io(&self.folder))?;
+        refuse_links(&self.dataset, Path::new("ledger"))?;
+        let folder = self.dataset.join("ledger");
+        std::fs::create_dir_all(&folder).map_err(Error::io(&folder))?;
         let mut run = 1;
         loop {
-            let path = self.folder.join(format!("shard-{}-run-{run}.jsonl", self.shard));
+            let path = folder.join(format!("shard-{}-run-{run}.jsonl", self.shard));
             match OpenOptions::new().append(true).create_new(true).open(&path) {
                 Ok(file) => return Ok((path, file)),
                 Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => run += 1,

@@ -96,7 +96,8 @@ pub fn read(path: &Path, most: u64) -> std::result::Result<Vec<u8>, Refusal> {
 }
 
 /// Where a path leads that a file of `folder` names by which files are told apart or written, as datasets and model cards do: below
-/// that folder, whoever wrote the file, and written plainly, without `.` and `..`. [`Scope`] is the rule for what is only read.
+/// that folder, whoever wrote the file, written plainly, without `.` and `..`, and through no [link](refuse_links). [`Scope`] is the
+/// rule for what is only read.
 pub fn below(folder: &Path, path: &str) -> Result<PathBuf> {
     let inner = Path::new(path);
     let is_name = |component: Component<'_>| matches!(component, Component::Normal(_));
@@ -105,7 +106,26 @@ pub fn below(folder: &Path, path: &str) -> Result<PathBuf> {
             .help("such a file may name files in its folder and below; use one that you trust")
             .in_file(folder));
     }
+    // A file that is a link is replaced, and never written through.
+    refuse_links(folder, inner.parent().unwrap_or(Path::new("")))?;
     Ok(folder.join(inner))
+}
+
+/// An error where a folder on the path `inner` below `folder` is a symbolic link: what is written or removed behind it would lie elsewhere.
+/// `folder` itself may be one, and may lie behind others.
+pub fn refuse_links(folder: &Path, inner: &Path) -> Result<()> {
+    let parts = inner.ancestors().filter(|part| !part.as_os_str().is_empty());
+    match parts.map(|part| folder.join(part)).find(|path| path.is_symlink()) {
+        Some(path) => Err(link_error(&path)),
+        None => Ok(()),
+    }
+}
+
+/// The error about a folder that is a symbolic link.
+pub fn link_error(path: &Path) -> Error {
+    Error::input("this is a symbolic link, and nothing is read, written or removed behind one: it may lead elsewhere")
+        .help("replace it by the folder that it leads to")
+        .in_file(path)
 }
 
 #[cfg(test)]
@@ -132,6 +152,30 @@ mod tests {
             let error = below(folder, path).unwrap_err();
             assert_eq!(error.exit_code(), 2, "{path}");
             assert!(error.to_string().contains(&format!("`{path}`")), "{error}");
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_to_folders_are_refused_and_the_folder_itself_may_be_one() {
+        use std::os::unix::fs::symlink;
+        let around = tempfile::tempdir().unwrap();
+        let (data, name) = (around.path().join("data"), around.path().join("name"));
+        std::fs::create_dir_all(data.join("real")).unwrap();
+        symlink("real", data.join("link")).unwrap();
+        symlink("nowhere", data.join("dangling")).unwrap();
+        symlink("../secret", data.join("real/file")).unwrap();
+        symlink(&data, &name).unwrap();
+        for folder in [&data, &name] {
+            for path in ["file", "real/file", "new/folder/file", "link"] {
+                assert_eq!(below(folder, path).unwrap(), folder.join(path));
+            }
+            for path in ["link/file", "link/new/file", "dangling/file"] {
+                let error = below(folder, path).unwrap_err();
+                assert_eq!(error.exit_code(), 2, "{path}");
+                assert!(error.to_string().contains("symbolic link"), "{error}");
+            }
+            assert!(refuse_links(folder, Path::new("link")).is_err() && refuse_links(folder, Path::new("")).is_ok());
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::settle::Wrong;
 use crate::input::{self, Outside, Refusal, Scope};
+use crate::texture::{Allowance, Header, Need};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -17,13 +18,19 @@ pub(super) struct Files<'a> {
     scope: Scope,
     /// What was read so far, with the SHA-256 of the bytes.
     pub(super) read: BTreeMap<PathBuf, [u8; 32]>,
+    /// What its pictures may take.
+    allowance: Allowance,
+    /// What its pictures so far take.
+    pub(super) pictures: Need,
 }
 
 impl<'a> Files<'a> {
-    /// Of the model at `path`: the files that it names lie in its folder and below, or, where that is `lifted`, in this scope.
-    pub(super) fn of(path: &'a Path, lifted: Option<&Scope>) -> Self {
+    /// Of the model at `path`: the files that it names lie in its folder and below, or, where that is `lifted`, in this scope. Its
+    /// pictures may take so much memory.
+    pub(super) fn of(path: &'a Path, lifted: Option<&Scope>, allowance: Allowance) -> Self {
         let own = || Scope::Below { folder: folder(path).into(), help: HELP };
-        Self { path, scope: lifted.cloned().unwrap_or_else(own), read: BTreeMap::new() }
+        let scope = lifted.cloned().unwrap_or_else(own);
+        Self { path, scope, read: BTreeMap::new(), allowance, pictures: Need::default() }
     }
 
     /// The bytes of the model's own file; in words why there are none.
@@ -37,6 +44,17 @@ impl<'a> Files<'a> {
             |outside: Outside| Wrong { what: format!("it names a file elsewhere: {outside}"), help: outside.help };
         let path = self.scope.resolve(folder(self.path), name).map_err(outside)?;
         self.bytes(path)
+    }
+
+    /// Counts the picture of this name that is about to be decoded from these bytes; in words why it may not be.
+    pub(super) fn count(&mut self, name: &str, data: &[u8], need: fn(&Header) -> Need) -> Result<(), Wrong> {
+        // What has no header is told when it is decoded.
+        let Some(header) = Header::of(data) else { return Ok(()) };
+        let need = need(&header);
+        let wrong = |what: String| Wrong { what: format!("its picture {name}: {what}"), help: Allowance::HELP };
+        self.allowance.take(&header, need).map_err(wrong)?;
+        self.pictures = self.pictures + need;
+        Ok(())
     }
 
     fn bytes(&mut self, path: PathBuf) -> Result<Vec<u8>, Wrong> {

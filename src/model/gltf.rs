@@ -14,7 +14,7 @@ use super::settle::{Wrong, faceted, fraction, into_one_tile, settle, too_many_tr
 use super::uri::{Target, follow};
 use crate::geometry::{AlphaMask, Mesh};
 use crate::math::{DMat4, DQuat, DVec3, Vec2, Vec3, vec2};
-use crate::texture::{ColorSpace, NormalMap, Texture, Wrap};
+use crate::texture::{ColorSpace, Header, NormalMap, Texture, Wrap};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -58,6 +58,7 @@ pub(super) fn read(mut files: Files<'_>, up: Up) -> Result<Model, Wrong> {
     // The last is for pieces without a material.
     model.surfaces.push(Surface::default());
     reader.walk(up, &looks, &mut model)?;
+    model.pictures = reader.files.pictures;
     model.files = reader.files.read;
     Ok(model)
 }
@@ -384,6 +385,8 @@ impl Reader<'_> {
         };
         let name = source.uri.as_deref().filter(|u| !u.starts_with("data:")).or(source.name.as_deref());
         let name = name.map_or_else(|| format!("image {image}"), |n| format!("`{n}`"));
+        let need = if space == ColorSpace::Srgb { Header::color } else { Header::normals };
+        self.files.count(&name, &data, need)?;
         let decoded = Texture::decode(&data, space).map_err(|what| format!("its picture {name}: {what}"))?;
         Ok(decoded.wrapped(if repeats { Wrap::Repeat } else { Wrap::Clamp }))
     }

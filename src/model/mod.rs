@@ -20,6 +20,7 @@ mod uri;
 pub use parts::{Label, Model, NormalTexture, Part, Surface, Transmission, Up};
 
 use crate::input::Scope;
+use crate::texture::Allowance;
 use crate::{Error, Result};
 use files::Files;
 use settle::Wrong;
@@ -29,14 +30,15 @@ impl Model {
     /// Reads a model. Formats are told by the name: `.glb`, `.gltf`, `.obj`. An [`Error`] about the file says what is wrong with it.
     /// The files that it names must lie in its folder or below.
     pub fn load(path: &Path, up: Up) -> Result<Self> {
-        Self::load_within(path, up, None)
+        Self::load_within(path, up, None, Allowance::UNLIMITED)
     }
 
-    /// The same of a model whose files may lie in this scope instead of its folder.
-    pub fn load_within(path: &Path, up: Up, lifted: Option<&Scope>) -> Result<Self> {
+    /// The same of a model whose files may lie in this scope instead of its folder, and whose pictures may take so much memory: they are
+    /// refused before they are decoded.
+    pub fn load_within(path: &Path, up: Up, lifted: Option<&Scope>, allowance: Allowance) -> Result<Self> {
         let wrong = |Wrong { what, help }: Wrong| Error::input(what).help(help).in_file(path);
         let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-        let files = Files::of(path, lifted);
+        let files = Files::of(path, lifted, allowance);
         let model = match extension.as_str() {
             "glb" | "gltf" => gltf::read(files, up).map_err(wrong)?,
             "obj" => obj::read(files, up).map_err(wrong)?,

@@ -8,7 +8,7 @@ use super::parts::{MOST_TRIANGLES, Model, Part, Surface, Up};
 use super::settle::{Wrong, faceted, fraction, into_one_tile, settle, too_many_triangles};
 use crate::geometry::{AlphaMask, Mesh};
 use crate::math::{Vec3, vec2};
-use crate::texture::{ColorSpace, Texture, Wrap};
+use crate::texture::{ColorSpace, Header, Texture, Wrap};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -99,6 +99,7 @@ pub(super) fn read(mut files: Files<'_>, up: Up) -> Result<Model, Wrong> {
         settle(&mut mesh, &up.rotation(), &name)?;
         model.parts.push(Part { name, mesh, surface, label: None });
     }
+    model.pictures = pictures.files.pictures;
     model.files = pictures.files.read;
     Ok(model)
 }
@@ -164,6 +165,7 @@ impl Pictures<'_> {
             return Ok(known.clone());
         }
         let data = self.files.named(&slashed(name))?;
+        self.files.count(&format!("`{name}`"), &data, Header::color)?;
         let picture =
             Texture::decode(&data, ColorSpace::Srgb).map_err(|what| format!("its picture `{name}`: {what}"))?;
         let picture = Arc::new(picture.wrapped(Wrap::Repeat));

@@ -2,7 +2,7 @@
 
 use crate::geometry::{AlphaMask, Mesh};
 use crate::math::DMat4;
-use crate::texture::{NormalMap, Texture};
+use crate::texture::{Need, NormalMap, Texture};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -40,6 +40,8 @@ pub struct Model {
     pub surfaces: Vec<Surface>,
     /// Every file that was read, the model's own, its buffers, pictures and materials, with the SHA-256 of what was in it.
     pub files: BTreeMap<PathBuf, [u8; 32]>,
+    /// What its pictures take.
+    pub pictures: Need,
 }
 
 /// A piece of a model.

@@ -4,7 +4,7 @@ use super::node::{Node, Object, Part, Types, parts, tuple};
 use super::ron;
 use super::sample;
 use super::section::{Entry, Section, prose, unit};
-use crate::ron_file::{self, DISTRIBUTION_WORDS, KIND, RANGE};
+use crate::ron_file::{self, DEFAULT, DISTRIBUTION_WORDS, KIND, RANGE};
 use schemars::JsonSchema;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -158,7 +158,8 @@ impl Reference {
     fn entry(&self, part: &Part<'_>, section: Option<String>) -> Entry {
         let inner = self.types.inner(part.schema).map(|(node, _)| node.schema);
         let words = part.words.or_else(|| inner.and_then(description)).map(prose).unwrap_or_default();
-        let given = self.default(part.schema, section.is_some());
+        let told = || part.schema.get(DEFAULT).and_then(Value::as_str).map(str::to_owned);
+        let given = self.default(part.schema, section.is_some()).or_else(told);
         let default = match part.required {
             Some(true) => None,
             None => Some(String::new()),

@@ -31,7 +31,7 @@ pub use num::Num;
 pub use place::{Step, place};
 pub use quantities::{Quantity, Value, quantities};
 pub use renamed::{Keyword, RENAMED, Renamed};
-pub use schema::{DRAWN, FIXED, KIND, PICKED, RANGE};
+pub use schema::{DEFAULT, DRAWN, FIXED, KIND, PICKED, RANGE};
 pub use spliced::Spliced;
 pub use suggest::{choose, nearest};
 pub use vary::{DISTRIBUTION_WORDS, Distribution, Pick, Vary};

@@ -13,6 +13,9 @@ pub const KIND: &str = "x-kind";
 /// Key of a schema that holds a number's bound in words, as [`Bound::WORDS`] has it.
 pub const RANGE: &str = "x-range";
 
+/// Key of a schema that holds a default, RON: what counts in the end for a field that may be left out and has none itself.
+pub const DEFAULT: &str = "x-default";
+
 /// A number that is the same in every field.
 pub const FIXED: &str = "number";
 

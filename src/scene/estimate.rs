@@ -2,7 +2,7 @@
 //! takes most.
 //!
 //! The numbers are those that will be drawn, so an estimate is of one field. On the scene files that ship it is at least half and at
-//! most three times what grows (`tests/estimate.rs`); memory follows from triangles.
+//! most three times what grows (`tests/estimate.rs`); memory follows from triangles, and from the headers of pictures.
 
 use crate::Error;
 use crate::geometry::Cost;

@@ -4,6 +4,7 @@ use super::desc::{ModelDesc, SpeciesDesc};
 use super::drive;
 use super::growing::Growing;
 use super::layer::Layer;
+use super::pictures::{self, Pictures};
 use super::shipped::species as shipped_species;
 use super::species_text::SpeciesFile;
 use crate::error::{Kind, Place};
@@ -17,7 +18,7 @@ use crate::optics::{Pigments, measured};
 use crate::ron_file::{Pick, RENAMED, RonFile, nearest};
 use crate::sensor::Pose;
 use crate::soil::LayerDesc;
-use crate::texture::{ColorSpace, Height, HeightFromBrightness, Maps, Texture, Wrap};
+use crate::texture::{ColorSpace, Header, Height, HeightFromBrightness, Maps, Texture, Wrap};
 use crate::{Error, Result};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -59,6 +60,8 @@ pub(super) struct Species {
     pub(super) desc: SpeciesDesc,
     /// By the material's name.
     pub(super) materials: BTreeMap<String, Vec<Choice>>,
+    /// Those of its leaves.
+    pub(super) pictures: Vec<pictures::Picture>,
 }
 
 /// One is equal to itself alone: its files may have changed.
@@ -80,6 +83,10 @@ pub(super) struct Library {
     /// By file, by whether z points up in it, and by whether it may name files outside its folder.
     models: BTreeMap<(PathBuf, bool, bool), Arc<Model>>,
     layers: BTreeMap<(PathBuf, PathBuf), Arc<Layer>>,
+    /// The files of soil layers.
+    layer_files: BTreeMap<(PathBuf, PathBuf), pictures::Picture>,
+    /// What all these pictures take.
+    pub(super) counted: Pictures,
     environment_maps: BTreeMap<(PathBuf, Infrared), Arc<Table>>,
     /// What to tell of species files, by file: keywords that were renamed, pictures that look wrong.
     told: BTreeMap<PathBuf, Vec<String>>,
@@ -182,6 +189,7 @@ impl Library {
     pub(super) fn species(&mut self, page: &RonFile, path: &str) -> Result<Arc<Species>> {
         let full = self.need_or_shipped(page, path, shipped_species, shipped::species_files)?;
         if let Some(known) = self.species.get(&full) {
+            self.counted.again(&known.pictures);
             return Ok(known.clone());
         }
         let file = self.species_file(&full)?;
@@ -196,13 +204,14 @@ impl Library {
         let mut desc: SpeciesDesc = own.parse_all()?;
         self.told.insert(full.into(), file.sources().iter().flat_map(|source| source.renamed(RENAMED)).collect());
         file.check_materials(&desc)?;
-        let mut cuts: Vec<Vec<Cut>> = Vec::new();
+        let (mut cuts, mut pictures): (Vec<Vec<Cut>>, Vec<pictures::Picture>) = (Vec::new(), Vec::new());
         for leaf in desc.materials.values() {
             let paths = leaf.texture.as_ref().map_or(&[][..], Pick::all);
             let range = leaf.relief_range.f32();
             let mut all = Vec::new();
             for path in paths {
-                let cut = self.picture(own, path, range)?;
+                let (cut, picture) = self.picture(own, path, range)?;
+                pictures.push(picture);
                 // Pictures that the program drew are sound.
                 if !leaf.calibrated {
                     self.told.entry(full.into()).or_default().extend(unlikely(path, cut.mask.as_deref()));
@@ -235,25 +244,28 @@ impl Library {
         if let Some(change) = self.growing.species {
             change(&mut desc);
         }
-        Ok(Arc::new(Species { desc, materials }))
+        Ok(Arc::new(Species { desc, materials, pictures }))
     }
 
-    fn picture(&mut self, page: &RonFile, path: &str, relief_range: f32) -> Result<Cut> {
+    /// A leaf's picture, and what it is counted as.
+    fn picture(&mut self, page: &RonFile, path: &str, relief_range: f32) -> Result<(Cut, pictures::Picture)> {
         let full = self.need(page, path)?;
-        let key = (full.clone(), relief_range.to_bits());
-        if let Some(known) = self.pictures.get(&key) {
-            return Ok(known.clone());
-        }
-        self.note(&full)?;
         // A height map drawn or measured for the picture lies beside it; without one the relief is read off the colours.
         let beside = self.scope.check(full.with_extension("height.png")).map_err(outside(page, path))?;
         let relief = beside.is_file();
+        let counted = (full.clone(), if relief { beside.clone() } else { PathBuf::new() }, relief_range.to_bits());
+        self.counted.count(&counted, Header::leaf).map_err(|e| at_its_place(page, path, IMAGE_HELP, e))?;
+        let key = (full.clone(), relief_range.to_bits());
+        if let Some(known) = self.pictures.get(&key) {
+            return Ok((known.clone(), counted));
+        }
+        self.note(&full)?;
         if relief {
             self.note(&beside)?;
         }
         if let Some(known) = self.kept(&[&full, &beside], |before| before.pictures.get(&key).cloned()) {
             self.pictures.insert(key, known.clone());
-            return Ok(known);
+            return Ok((known, counted));
         }
         let color = Texture::load(&full, ColorSpace::Srgb).map_err(|e| at_its_place(page, path, IMAGE_HELP, e))?;
         let maps = if relief {
@@ -265,7 +277,7 @@ impl Library {
         let margin = mask.as_deref().map(|m| Arc::new(Margin::of(m)));
         let cut = Cut { picture: Arc::new(Picture { color, maps }), mask, margin };
         self.pictures.insert(key, cut.clone());
-        Ok(cut)
+        Ok((cut, counted))
     }
 
     /// The model that `page` names, with the files that it needs.
@@ -274,19 +286,28 @@ impl Library {
         let full = self.need(page, path)?;
         let key = (full.clone(), desc.up == Up::Z, desc.allow_outside);
         if let Some(known) = self.models.get(&key) {
+            self.counted.note(counted_model(&key), known.pictures);
             return Ok(known.clone());
         }
         let lifted = desc.allow_outside.then_some(&self.scope);
         let model = if let Some(known) = self.model_before(&key) {
             known
         } else {
-            let model = Model::load_within(&full, desc.up, lifted);
+            let model = Model::load_within(&full, desc.up, lifted, self.counted.allowance());
             Arc::new(model.map_err(|e| at_its_place(page, path, MODEL_HELP, e))?)
         };
         // Of the bytes that it was made of: the files may have been written since.
         self.files.extend(model.files.iter().map(|(file, digest)| (file.clone(), *digest)));
+        self.counted.note(counted_model(&key), model.pictures);
         self.models.insert(key, model.clone());
         Ok(model)
+    }
+
+    /// What the pictures of a model are counted as that `page` names.
+    pub(super) fn model_pictures(&mut self, page: &RonFile, desc: &ModelDesc) -> Result<pictures::Picture> {
+        self.model(page, desc)?;
+        let full = self.need(page, &desc.file)?;
+        Ok(counted_model(&(full, desc.up == Up::Z, desc.allow_outside)))
     }
 
     /// A model that was read before and whose files hold what they held.
@@ -315,6 +336,7 @@ impl Library {
             self.environment_maps.insert(key, known.clone());
             return Ok(known);
         }
+        self.counted.check_panorama(&full).map_err(|error| at_its_place(page, path, IMAGE_HELP, error))?;
         let table = Arc::new(Table::load(&full, infrared).map_err(|error| {
             let help = "name an equirectangular .exr or .hdr; `nir` says where near infrared comes from: Channel, Sky or OfRed(0.8)";
             at_its_place(page, path, help, error)
@@ -341,32 +363,51 @@ impl Library {
         measured::reflectance(&text).map_err(|e| at_its_place(page, path, "", e.in_file(full)))
     }
 
+    /// The files of a soil layer's textures, counted.
+    pub(super) fn layer_pictures(&mut self, page: &RonFile, desc: &LayerDesc) -> Result<pictures::Picture> {
+        let key = (desc.albedo.clone(), desc.height.clone());
+        if let Some(known) = self.layer_files.get(&key) {
+            self.counted.again(std::slice::from_ref(known));
+            return Ok(known.clone());
+        }
+        let mut need = |path: &Path| {
+            let text = path.to_string_lossy();
+            self.need_or_shipped(page, &text, shipped::soil_texture, shipped::soil_textures)
+        };
+        let albedo = need(&desc.albedo)?;
+        let height = if desc.height.as_os_str().is_empty() { PathBuf::new() } else { need(&desc.height)? };
+        let files = (albedo, height, 0);
+        self.counted.count(&files, Header::layer).map_err(|e| {
+            let of_height = e.place().is_some_and(|place| place.file == files.1);
+            let named = if of_height { &desc.height } else { &desc.albedo };
+            at_its_place(page, &named.to_string_lossy(), IMAGE_HELP, e)
+        })?;
+        self.layer_files.insert(key, files.clone());
+        Ok(files)
+    }
+
     /// A soil layer's textures.
     pub(super) fn layer(&mut self, page: &RonFile, desc: &LayerDesc) -> Result<Arc<Layer>> {
         let key = (desc.albedo.clone(), desc.height.clone());
+        let (albedo, height, _) = self.layer_pictures(page, desc)?;
         if let Some(known) = self.layers.get(&key) {
             return Ok(known.clone());
         }
-        let mut need = |path: &Path| -> Result<(PathBuf, String)> {
-            let text = path.to_string_lossy().into_owned();
-            let full = self.need_or_shipped(page, &text, shipped::soil_texture, shipped::soil_textures)?;
-            self.note(&full)?;
-            Ok((full, text))
-        };
-        let (albedo, albedo_text) = need(&desc.albedo)?;
-        let height = if desc.height.as_os_str().is_empty() { None } else { Some(need(&desc.height)?) };
-        let files = [Some(albedo.as_path()), height.as_ref().map(|(height, _)| height.as_path())];
-        let files: Vec<&Path> = files.into_iter().flatten().collect();
+        let height = (!height.as_os_str().is_empty()).then_some(height);
+        let files: Vec<&Path> = std::iter::once(&albedo).chain(&height).map(PathBuf::as_path).collect();
+        for file in &files {
+            self.note(file)?;
+        }
         if let Some(known) = self.kept(&files, |before| before.layers.get(&key).cloned()) {
             self.layers.insert(key, known.clone());
             return Ok(known);
         }
-        let albedo =
-            Texture::load(&albedo, ColorSpace::Srgb).map_err(|e| at_its_place(page, &albedo_text, IMAGE_HELP, e))?;
+        let wrong = |named: &Path, error| at_its_place(page, &named.to_string_lossy(), IMAGE_HELP, error);
+        let albedo = Texture::load(&albedo, ColorSpace::Srgb).map_err(|e| wrong(&desc.albedo, e))?;
         let albedo = albedo.wrapped(Wrap::Repeat);
         let height = match height {
             None => read_off(&albedo),
-            Some((height, text)) => Height::load(&height, 1.0).map_err(|e| at_its_place(page, &text, IMAGE_HELP, e))?,
+            Some(height) => Height::load(&height, 1.0).map_err(|e| wrong(&desc.height, e))?,
         };
         let layer = Arc::new(Layer::new(albedo, height.wrapped(Wrap::Repeat)));
         self.layers.insert(key, layer.clone());
@@ -377,6 +418,11 @@ impl Library {
         self.files.insert(path.into(), digest(path)?);
         Ok(())
     }
+}
+
+/// What the pictures of a model are counted as.
+fn counted_model((file, z_up, outside): &(PathBuf, bool, bool)) -> pictures::Picture {
+    (file.clone(), PathBuf::new(), u32::from(*z_up) + 2 * u32::from(*outside))
 }
 
 /// SHA-256 of a file's contents.
@@ -461,7 +507,7 @@ mod tests {
         let page = RonFile::of("Species()");
         let mut library = Library::default();
         let mut highest = |range: f32| {
-            let cut = library.picture(&page, "textures/leaf/sugar_beet.png", range).unwrap();
+            let (cut, _) = library.picture(&page, "textures/leaf/sugar_beet.png", range).unwrap();
             cut.picture.maps.height.values().iter().fold(0.0_f32, |most, h| most.max(h.abs()))
         };
         let (low, high, again) = (highest(0.01), highest(0.04), highest(0.01));
@@ -479,7 +525,7 @@ mod tests {
         let copy = |name: &str| std::fs::copy(format!("textures/leaf/{name}.png"), &path).unwrap();
         copy("sugar_beet");
         let page = RonFile { path: folder.path().join("page.ron"), text: "Species()".to_owned() };
-        let read = |library: &mut Library| library.picture(&page, "leaf.png", 0.02).unwrap().picture;
+        let read = |library: &mut Library| library.picture(&page, "leaf.png", 0.02).unwrap().0.picture;
         let mut first = Library::default();
         let picture = read(&mut first);
         let mut second = first.clone().renewed();

@@ -10,6 +10,7 @@ mod layer;
 mod library;
 mod part;
 mod part_kind;
+mod pictures;
 pub mod record;
 pub mod shipped;
 pub mod species_file;

@@ -2,7 +2,7 @@
 
 use exr::compression::Compression;
 use exr::meta::MetaData;
-use std::io::Cursor;
+use std::io::{Cursor, Read, Seek};
 
 /// Bytes of decoded pixels at most.
 const LARGEST: u64 = 4 << 30;
@@ -10,6 +10,12 @@ const LARGEST: u64 = 4 << 30;
 /// this is far above what pictures come to.
 const DEFLATED: u64 = 1100;
 const OTHERWISE: u64 = 16384;
+
+/// Pixels across and down of a file's first layer; `None` where it is no OpenEXR file.
+pub(super) fn size(source: impl Read + Seek) -> Option<(usize, usize)> {
+    let meta = MetaData::read_from_buffered(source, false).ok()?;
+    meta.headers.first().map(|header| (header.layer_size.0, header.layer_size.1))
+}
 
 /// An error in words where the file tells of more pixels than its bytes can hold, or than are taken.
 pub(crate) fn check(bytes: &[u8]) -> Result<(), String> {

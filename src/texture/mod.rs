@@ -10,6 +10,7 @@ pub mod draw;
 pub(crate) mod exr_size;
 mod height;
 pub mod maps;
+mod need;
 pub mod noise;
 pub mod panorama;
 mod pyramid;
@@ -20,6 +21,7 @@ mod texels;
 pub use cutout::{Cutting, cut_out, doubts};
 pub use height::Height;
 pub use maps::{AmbientOcclusion, HeightFromBrightness, Maps, NormalMap};
+pub use need::{Allowance, Header, Need};
 pub use pyramid::Wrap;
 pub use srgb::ColorSpace;
 
@@ -223,19 +225,24 @@ fn decode(path: &Path) -> Result<image::DynamicImage> {
     })
 }
 
-/// Decodes an image within the limits.
-fn read(source: impl BufRead + Seek) -> Result<image::DynamicImage, Fault> {
-    let wrong = |what: &str| Fault::Image(what.to_owned());
+/// A reader of an image that keeps to the limits.
+fn reader<R: BufRead + Seek>(source: R) -> Result<image::ImageReader<R>, Fault> {
     let mut reader = image::ImageReader::new(source).with_guessed_format().map_err(Fault::Io)?;
     if reader.format().is_none() {
-        return Err(wrong("this is not an image; PNG and JPEG can be read"));
+        return Err(Fault::Image("this is not an image; PNG and JPEG can be read".to_owned()));
     }
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(MAX_SIZE);
     limits.max_image_height = Some(MAX_SIZE);
     limits.max_alloc = Some(MAX_BYTES);
     reader.limits(limits);
-    reader.decode().map_err(|e| match e {
+    Ok(reader)
+}
+
+/// Decodes an image within the limits.
+fn read(source: impl BufRead + Seek) -> Result<image::DynamicImage, Fault> {
+    let wrong = |what: &str| Fault::Image(what.to_owned());
+    reader(source)?.decode().map_err(|e| match e {
         image::ImageError::Limits(_) => {
             let mib = MAX_BYTES >> 20;
             Fault::Image(format!(

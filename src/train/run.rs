@@ -22,6 +22,7 @@ use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 /// File of the plan.
@@ -32,6 +33,8 @@ pub const WEIGHTS: &str = "weights.safetensors";
 pub const MODEL: &str = "model.json";
 /// File of the results.
 pub const RESULT: &str = "result.json";
+/// Sides of pixels on the ground, millimetres, that a model card may tell.
+pub const PIXEL_MM: RangeInclusive<f64> = 0.001..=10_000.0;
 
 /// A plan with checksums of its images: two trainings with equal identities result in the same weights.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -153,8 +156,8 @@ impl ModelCard {
             let words = "parameters: this network with these bands and classes has";
             return Err(format!("it tells of {} {words} {trainable}", self.parameters));
         }
-        if self.pixel_mm.is_some_and(|mm| !(mm.is_finite() && mm > 0.0)) {
-            return Err("its pixels have no size".into());
+        if self.pixel_mm.is_some_and(|mm| !PIXEL_MM.contains(&mm)) {
+            return Err(format!("the side of its pixels is not {} to {} mm", PIXEL_MM.start(), PIXEL_MM.end()));
         }
         if let Normalization::Fixed { mean, sd } = &self.normalization
             && (mean.len() != bands.len()

@@ -121,7 +121,8 @@ pub(super) fn train(
     if !val.is_empty() {
         val.get(0)?;
     }
-    let pixel_mm = train.pixel_mm()?;
+    // Records that other programs wrote may tell sizes that no card takes.
+    let pixel_mm = train.pixel_mm()?.filter(|mm| run::PIXEL_MM.contains(mm));
     identity.claim(folder)?;
     remove_unfinished(folder)?;
     if let Some(results) = run::results(folder)? {

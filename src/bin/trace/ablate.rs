@@ -11,7 +11,6 @@ use furrow::output::write_atomically;
 use furrow::settings::{RenderOptions, Techniques};
 use furrow::train::table::variants;
 use furrow::{Error, Result, cli};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Makes a dataset in DIR/full and one for each edit in DIR/NAME: the same fields, plants, light and noise with one thing changed.
@@ -66,7 +65,7 @@ three seeds of 600 steps each, about three and a half more.";
 /// Makes what is missing; returns the paths of the files that belong to all images of a dataset.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     if args.list {
-        list();
+        cli::print(&list())?;
         return Ok(Vec::new());
     }
     let edits = chosen(args)?;
@@ -101,14 +100,13 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// Prints the edits.
-fn list() {
-    let mut out = std::io::stdout().lock();
-    for edit in [&FULL].into_iter().chain(EDITS) {
+/// The edits, one a line.
+fn list() -> String {
+    let line = |edit: &Edit| {
         let labels = if edit.keeps_labels { "" } else { " (other labels)" };
-        // A closed pipe is no failure.
-        let _ = writeln!(out, "{:<20} {}{labels}", edit.name, edit.about);
-    }
+        format!("{:<20} {}{labels}\n", edit.name, edit.about)
+    };
+    [&FULL].into_iter().chain(EDITS).map(line).collect()
 }
 
 /// The full dataset and the edits that were asked for, in the order of the table. Where all are, those that would change nothing here

@@ -1,8 +1,7 @@
 //! `trace explain`: what may stand in scene files, species files and texture recipes.
 
-use furrow::Result;
 use furrow::reference::{answer, distribution, scene, species, texture};
-use std::io::Write;
+use furrow::{Result, cli};
 use std::path::PathBuf;
 
 /// What to explain.
@@ -18,7 +17,6 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     let words =
         answer(args.path.as_deref().unwrap_or_default(), &[scene(), species(), texture(), distribution()], "trace")?;
-    // The words are the result; a closed pipe is no failure.
-    let _ = std::io::stdout().write_all(words.as_bytes());
+    cli::print(&words)?;
     Ok(Vec::new())
 }

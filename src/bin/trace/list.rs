@@ -24,7 +24,7 @@ pub(crate) fn species() -> Result<Vec<PathBuf>> {
         let stages = format!("BBCH {} to {}", codes().min().unwrap_or(0), codes().max().unwrap_or(0));
         rows.push([species.stem(), desc.scientific.clone(), desc.name.clone(), desc.eppo.clone(), role.into(), stages]);
     }
-    cli::print_rows(&rows);
+    cli::print_rows(&rows)?;
     Ok(Vec::new())
 }
 
@@ -48,7 +48,7 @@ pub(crate) fn cameras() -> Result<Vec<PathBuf>> {
     }
     let any = "the scene file says size, intrinsics, pose and sensor";
     rows.push(["Pinhole", "any size", "any field of view", "any sensor", any].map(str::to_owned));
-    cli::print_rows(&rows);
+    cli::print_rows(&rows)?;
     Ok(Vec::new())
 }
 
@@ -77,6 +77,6 @@ pub(crate) fn soils() -> Result<Vec<PathBuf>> {
         let layer = format!("layers: [(albedo: \"{name}.png\", height: \"{name}.height.png\", …)]");
         rows.push([name.to_string(), layer, albedo.display().to_string()]);
     }
-    cli::print_rows(&rows);
+    cli::print_rows(&rows)?;
     Ok(Vec::new())
 }

@@ -129,7 +129,10 @@ fn main() -> ExitCode {
     #[cfg(feature = "raster")]
     display::need_none();
     let signals = signal::Signals::watch();
-    let cli = Cli::parse();
+    let cli = match cli::parse::<Cli>(furrow::accel::version) {
+        Ok(cli) => cli,
+        Err(code) => return code,
+    };
     let done = match cli.verb {
         Some(Verb::Catalogue(args)) => catalogue::run(&args, &signals),
         Some(Verb::Compare(args)) => compare::run(&args),

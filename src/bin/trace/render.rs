@@ -12,7 +12,7 @@ use furrow::render::Watch;
 use furrow::settings::{Engine, Quality};
 use furrow::{Error, Result, cli};
 use indicatif::{ProgressBar, ProgressStyle};
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -85,8 +85,8 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     cli::check_crop(window, width, height)?;
     if let Some(pixel) = args.pixel {
         cli::check_pixel(pixel, width, height)?;
-        // The words are the result; a closed pipe is no failure.
-        let _ = writeln!(std::io::stdout(), "{}", renderer.explain(&field, args.integrator, pixel)?);
+        let words = renderer.explain(&field, args.integrator, pixel)?;
+        cli::print(&format!("{words}\n"))?;
         return Ok(Vec::new());
     }
     if options.engine == Engine::Trace {

@@ -44,15 +44,15 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let stop = signals.heed();
     let (_, images) = args.set.open(Pick::All, 0)?;
     let rule = files::fit(args.kind, &args.from, 0, &shape, stop)?;
-    let mut shots = report::shots(images.len(), &Band::RGB);
+    let mut shots = report::shots(images.len(), &Band::RGB, Classes::default().len());
     let report = files::evaluate(&rule, &args.set, &shape, stop, &mut |example, predicted| {
-        shots.see(example, args.size, predicted);
+        shots.see(example, args.size, predicted)
     })?;
     let json = args.out.join("baseline.json");
     run::write_json(&json, &rule)?;
     let title = format!("{} on {}", args.kind.name(), args.set.folder.display());
     let lead = "The score of an ExG threshold; a network that scores lower has learned nothing about shape.";
-    let mut paths = report::write(&args.out, &title, lead, &report, &shots.kept, &Classes::default().colors())?;
+    let mut paths = report::write(&args.out, &title, lead, &report, &shots.kept(), &Classes::default().colors())?;
     paths.push(json);
     furrow::tell!("{}", report.summary().markdown().trim_end());
     Ok(paths)

@@ -5,9 +5,11 @@ use furrow::report::Table;
 use furrow::report::chart::{Chart, Curve};
 use furrow::report::{Cell, number};
 use furrow::train::figure::Page;
-use furrow::train::run::{self, Results};
+use furrow::train::fit::checkpoint::History;
+use furrow::train::fit::log;
+use furrow::train::run::{self, Identity, Results};
 use furrow::{Error, Result, cli};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Name of the page.
 const FILE: &str = "losses.html";
@@ -15,7 +17,7 @@ const FILE: &str = "losses.html";
 /// Which runs.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folders of runs that are done.
+    /// Folders of runs; of one that is not done, what its log tells so far.
     #[arg(required = true, value_name = "RUN")]
     runs: Vec<PathBuf>,
     /// Folder for losses.html.
@@ -23,18 +25,39 @@ pub(crate) struct Args {
     out: PathBuf,
 }
 
-/// Reads the runs and writes the page; returns its path.
-pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
-    cli::check_folder(&args.out)?;
-    let mut runs = Vec::new();
-    for folder in &args.runs {
-        let results = run::results(folder)?.ok_or_else(|| {
-            Error::input("there is no finished training in this folder")
+/// A run as far as it is.
+struct Run {
+    name: String,
+    /// Name of its loss, where its plan tells.
+    loss: Option<&'static str>,
+    history: History,
+    /// How it ended; none where it is not done.
+    results: Option<Results>,
+}
+
+impl Run {
+    fn read(folder: &Path) -> Result<Self> {
+        let results = run::results(folder)?;
+        let history = match &results {
+            Some(results) => Some(results.history.clone()),
+            None => log::read(folder)?,
+        };
+        let history = history.ok_or_else(|| {
+            Error::input("there is no training in this folder")
                 .in_file(folder)
                 .help("give folders of `train fit`, or those below runs/ of `train table`")
         })?;
-        runs.push((folder.display().to_string(), results));
+        let plan = folder.join(run::PLAN);
+        let loss = plan.exists().then(|| run::read_json::<Identity>(&plan)).transpose()?;
+        let loss = loss.map(|identity| identity.plan.hyper.loss.in_words());
+        Ok(Self { name: folder.display().to_string(), loss, history, results })
     }
+}
+
+/// Reads the runs and writes the page; returns its path.
+pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
+    cli::check_folder(&args.out)?;
+    let runs = args.runs.iter().map(|folder| Run::read(folder)).collect::<Result<Vec<_>>>()?;
     let charts = charts(&runs);
     let page = Page {
         kind: "Training",
@@ -48,43 +71,49 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
 }
 
 /// Training loss, validation loss and mean I/U; those that no run has are left out.
-fn charts(runs: &[(String, Results)]) -> Vec<Chart> {
-    let chart = |title: &str, upwards: &str, logarithmic, points: &dyn Fn(&Results) -> Vec<(f64, f64)>| Chart {
+fn charts(runs: &[Run]) -> Vec<Chart> {
+    let chart = |title: &str, upwards: &str, logarithmic, points: &dyn Fn(&History) -> Vec<(f64, f64)>| Chart {
         title: title.into(),
         across: "steps".into(),
         upwards: upwards.into(),
         curves: runs
             .iter()
-            .map(|(name, results)| Curve { name: name.clone(), points: points(results) })
+            .map(|run| Curve { name: run.name.clone(), points: points(&run.history) })
             .filter(|curve| !curve.points.is_empty())
             .collect(),
         logarithmic,
     };
-    let losses = |of: &Results| of.history.losses.iter().map(|l| (l.step as f64, l.loss)).collect();
+    let losses = |of: &History| of.losses.iter().map(|l| (l.step as f64, l.loss)).collect();
+    let rates = |of: &History| of.losses.iter().map(|l| (l.step as f64, l.rate)).collect();
     let validation =
-        |of: &Results| of.history.validation.iter().filter_map(|pass| Some((pass.step as f64, pass.loss?))).collect();
-    let scores =
-        |of: &Results| of.history.validation.iter().map(|pass| (pass.step as f64, 100.0 * pass.miou)).collect();
+        |of: &History| of.validation.iter().filter_map(|pass| Some((pass.step as f64, pass.loss?))).collect();
+    let scores = |of: &History| of.validation.iter().map(|pass| (pass.step as f64, 100.0 * pass.miou)).collect();
+    // One name where all have the same loss.
+    let one = runs.first().and_then(|first| first.loss).filter(|loss| runs.iter().all(|run| run.loss == Some(loss)));
+    let loss = one.unwrap_or("loss");
     let all = [
-        chart("Training loss", "loss", true, &losses),
-        chart("Validation loss", "loss", true, &validation),
+        chart("Training loss", loss, true, &losses),
+        chart("Validation loss", loss, true, &validation),
+        chart("Learning rate", "rate", true, &rates),
         chart("Validation set", "mean I/U, %", false, &scores),
     ];
     all.into_iter().filter(|chart| !chart.curves.is_empty()).collect()
 }
 
-/// How each run ended.
-fn table(runs: &[(String, Results)]) -> Table {
-    let mut table = Table::new("Runs", ["run", "steps", "best step", "best mean I/U, %", "last loss", "minutes"]);
-    for (name, results) in runs {
-        let best = results.history.best();
+/// How each run ended, or how far it is.
+fn table(runs: &[Run]) -> Table {
+    let mut table =
+        Table::new("Runs", ["run", "state", "steps", "best step", "best mean I/U, %", "last loss", "minutes"]);
+    for Run { name, history, results, .. } in runs {
+        let best = history.best();
         table.push([
             Cell::text(name),
-            Cell::Count(results.steps),
-            Cell::number(results.best_step.map(|step| step as f64), 0),
+            Cell::text(if results.is_some() { "done" } else { "not done" }),
+            Cell::Count(results.as_ref().map_or_else(|| history.last(), |results| results.steps)),
+            Cell::number(best.map(|pass| pass.step as f64), 0),
             Cell::percent(best.map(|pass| pass.miou), 1),
-            Cell::Shown(results.history.losses.last().map_or_else(|| "–".into(), |last| number(last.loss))),
-            Cell::number(Some(results.seconds / 60.0), 1),
+            Cell::Shown(history.losses.last().map_or_else(|| "–".into(), |last| number(last.loss))),
+            Cell::number(results.as_ref().map(|results| results.seconds / 60.0), 1),
         ]);
     }
     table

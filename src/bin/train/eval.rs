@@ -48,11 +48,8 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let (machine, threads) = (args.machine.machine(), args.machine.threads());
     let card = &trained.card;
     let (_, images) = args.set.open(Pick::All, 0)?;
-    let mut shots = report::shots(images.len(), &card.input.bands);
-    let mut see = |seen: &session::Predicted<'_>| {
-        shots.see(seen.example, seen.size, seen.predicted);
-        Ok(())
-    };
+    let mut shots = report::shots(images.len(), &card.input.bands, card.classes.len());
+    let mut see = |seen: &session::Predicted<'_>| shots.see(seen.example, seen.size, seen.predicted);
     let report =
         session::evaluate(&trained, &args.set, &args.machine.precision, threads, &machine, signals.heed(), &mut see)?;
     let title = format!("{} on {}", args.run.display(), args.set);
@@ -68,7 +65,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         if card.refine.is_none() { ", not refined".into() } else { format!(", refined by {}", card.refine.name()) },
         if trained.size() > 1 { format!("; the mean of {} runs", trained.size()) } else { String::new() }
     );
-    let paths = report::write(&out, &title, &lead, &report, &shots.kept, &card.classes.colors())?;
+    let paths = report::write(&out, &title, &lead, &report, &shots.kept(), &card.classes.colors())?;
     furrow::tell!("{}", report.summary().markdown().trim_end());
     Ok(paths)
 }

@@ -1,8 +1,7 @@
 //! `train explain`: what may stand in experiment files.
 
-use furrow::Result;
 use furrow::reference::{answer, experiment};
-use std::io::Write;
+use furrow::{Result, cli};
 use std::path::PathBuf;
 
 /// What to explain.
@@ -16,7 +15,6 @@ pub(crate) struct Args {
 /// Prints the explanation.
 pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     let words = answer(args.path.as_deref().unwrap_or_default(), &[experiment()], "train")?;
-    // The words are the result; a closed pipe is no failure.
-    let _ = std::io::stdout().write_all(words.as_bytes());
+    cli::print(&words)?;
     Ok(Vec::new())
 }

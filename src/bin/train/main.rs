@@ -85,7 +85,10 @@ enum Verb {
 }
 
 fn main() -> ExitCode {
-    let verb = Cli::parse().verb;
+    let verb = match cli::parse::<Cli>(furrow::accel::version) {
+        Ok(cli) => cli.verb,
+        Err(code) => return code,
+    };
     furrow::train::memory::keep();
     // After that: a process that has replaced itself would warn twice.
     renamed::warn(std::env::args_os());

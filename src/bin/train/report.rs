@@ -11,14 +11,16 @@ use furrow::train::measure::Report;
 use furrow::train::run;
 use std::path::{Path, PathBuf};
 
-/// Images that the figure and the page show.
-const SHOWN: usize = 8;
+/// Images of the lowest mean I/U that the figure and the page of an evaluation show.
+const WORST: usize = 8;
+/// Images beside them, spread over the set.
+const SPREAD: usize = 4;
 /// Pixels that they are wide and high at most.
 const LARGEST: u32 = 360;
 
-/// Images to look at, spread over a set of so many.
-pub(crate) fn shots(images: usize, bands: &[Band]) -> Shots {
-    Shots::new(images, SHOWN, LARGEST, bands)
+/// Images to look at of a set of so many: the worst by the mean I/U of so many classes, and some spread over the set.
+pub(crate) fn shots(images: usize, bands: &[Band], classes: usize) -> Shots {
+    Shots::new(images, SPREAD, LARGEST, bands).and_worst(WORST, classes)
 }
 
 /// Writes `report.json`, `report.md`, `figure.png` and `report.html`; returns their paths.
@@ -68,6 +70,8 @@ pub(crate) fn curves(history: &History, loss: &str, classes: &[String]) -> Vec<C
         losses.push(Curve { name: "validation".into(), points: validation });
     }
     let mut charts = vec![chart("Loss", loss, losses, true)];
+    let rates = history.losses.iter().map(|l| (l.step as f64, l.rate)).collect();
+    charts.push(chart("Learning rate", "rate", vec![Curve { name: "decoder".into(), points: rates }], true));
     if !history.validation.is_empty() {
         let of = |name: &str, value: &dyn Fn(usize) -> Option<f64>| Curve {
             name: name.into(),

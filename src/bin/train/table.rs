@@ -46,7 +46,7 @@ pub(crate) struct Args {
     /// Only a part of the work.
     #[arg(long, value_enum)]
     only: Option<Part>,
-    /// Print the rows and how far they are, and do nothing.
+    /// Print the sets and rows and how far they are, and do nothing. What is wrong with weights or missing of real sets is told.
     #[arg(long)]
     dry_run: bool,
     /// Most time of a training, such as 30m; its end is then where the clock says, and the tables are not the same twice.
@@ -91,9 +91,10 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         furrow::tell!("warning: `{name}` is left out: --without {}", args.without.join(" --without "));
     }
     if args.dry_run {
-        if let Err(error) = bound.check() {
+        for error in [bound.check(), table::check_weights(&bound)].into_iter().filter_map(Result::err) {
             furrow::tell!("warning: {error}");
         }
+        furrow::tell!("{}\n", bound.listing()?.markdown().trim_end());
         furrow::tell!("{}", table::listing(&bound, &out)?.markdown().trim_end());
         return Ok(Vec::new());
     }
@@ -159,24 +160,21 @@ fn evaluate(
     let (_, images) = on.open(Pick::All, 0)?;
     let (report, shots, palette) = match predictor {
         Predictor::Network(trained, precision, threads) => {
-            let mut shots = report::shots(images.len(), &trained.card.input.bands);
-            let mut see = |seen: &session::Predicted<'_>| {
-                shots.see(seen.example, seen.size, seen.predicted);
-                Ok(())
-            };
+            let mut shots = report::shots(images.len(), &trained.card.input.bands, trained.card.classes.len());
+            let mut see = |seen: &session::Predicted<'_>| shots.see(seen.example, seen.size, seen.predicted);
             let report =
                 session::evaluate(&(*trained).clone().into(), on, precision, *threads, machine, stop, &mut see)?;
             (report, shots, trained.card.classes.colors())
         }
         Predictor::Baseline(baseline, shape) => {
-            let mut shots = report::shots(images.len(), &Band::RGB);
+            let mut shots = report::shots(images.len(), &Band::RGB, Classes::default().len());
             let size = (shape.width, shape.height);
             let mut see = |example: &_, predicted: &[u8]| shots.see(example, size, predicted);
             let report = files::evaluate(baseline, on, shape, stop, &mut see)?;
             (report, shots, Classes::default().colors())
         }
     };
-    write_atomically(picture, &sheet(&shots.kept, &palette, true).png()?)?;
+    write_atomically(picture, &sheet(&shots.kept(), &palette, true).png()?)?;
     Ok(report)
 }
 

@@ -22,7 +22,7 @@ pub(crate) fn run() -> Result<Vec<PathBuf>> {
     };
     let (whole, damaged): (Vec<_>, Vec<_>) = zoo::all()?.into_iter().partition(Result::is_ok);
     let rows: Vec<[String; 6]> = whole.iter().flatten().map(row).collect();
-    cli::print_rows(&rows);
+    cli::print_rows(&rows)?;
     let mut damaged: Vec<_> = damaged.into_iter().filter_map(Result::err).collect();
     let Some(last) = damaged.pop() else { return Ok(Vec::new()) };
     for error in &damaged {

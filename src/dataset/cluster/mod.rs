@@ -16,6 +16,7 @@ mod slurm;
 pub use request::{Job, Pod, Scheduler};
 
 use super::Set;
+use crate::input::{refuse_links, tidy};
 use crate::output::write_together;
 use crate::{Error, Result};
 use script::plain;
@@ -35,6 +36,10 @@ pub fn emit(set: &Set, job: &Job, folder: &Path) -> Result<(Vec<PathBuf>, Vec<St
         Scheduler::Kubernetes(pod) => kubernetes::files(&dir, job, pod),
         Scheduler::Parallel => parallel::files(&dir, job),
     }?;
+    let asked = tidy(&std::path::absolute(folder).map_err(Error::io(folder))?);
+    if let Ok(within) = asked.strip_prefix(tidy(Path::new(&dir))) {
+        refuse_links(&set.folder, within)?;
+    }
     for file in &files {
         let path = folder.join(&file.path);
         if crate::input::contents(&path).is_ok_and(|there| there != file.bytes) {

@@ -13,6 +13,7 @@ use crate::Result;
 use crate::light::LightRecord;
 use crate::math::Spectrum;
 use crate::scene::tag::Class;
+use crate::settings::Engine;
 use table::{Row, Table};
 
 /// The table of images, below the dataset's folder.
@@ -68,6 +69,13 @@ fn joined<'a>(values: impl IntoIterator<Item = &'a str>) -> String {
     values.into_iter().collect::<Vec<_>>().join("; ")
 }
 
+/// Samples of the mean pixel of a traced photograph: as the film tells, or as they were asked for where it tells nothing, such as of one sample.
+fn spp(set: &Set, record: &Record) -> Option<f64> {
+    let told = record.sampling.as_ref().map(|sampling| sampling.spp);
+    let traced = || set.recipe.rendering().ok().filter(|rendering| rendering.engine == Engine::Trace);
+    told.or_else(|| record.exposure.and_then(|_| Some(f64::from(traced()?.spp))))
+}
+
 fn of_image(set: &Set, record: &Record) -> Row {
     let capture = record.capture.as_ref();
     let conditions = record.conditions.as_ref();
@@ -98,6 +106,7 @@ fn of_image(set: &Set, record: &Record) -> Row {
         ("source", record.source.as_deref().into()),
         ("field", count(set.recipe.field_of(record.index).0).into()),
         ("camera", capture.map(|capture| capture.camera.as_str()).into()),
+        ("day", capture.and_then(|capture| capture.day).into()),
         ("frame", capture.map(|capture| capture.frame).into()),
         ("time_s", capture.map(|capture| capture.time_s).into()),
         ("width", record.width.into()),
@@ -135,7 +144,7 @@ fn of_image(set: &Set, record: &Record) -> Row {
         ("pixel_m", camera.and_then(crate::sensor::CameraRecord::pixel_m).into()),
         ("gain", record.exposure.map(|exposure| exposure.gain).into()),
         ("nir_gain", record.exposure.map(|exposure| exposure.nir_gain).into()),
-        ("spp", record.sampling.as_ref().map(|sampling| sampling.spp).into()),
+        ("spp", spp(set, record).into()),
         ("relative_error", record.sampling.as_ref().map(|sampling| sampling.relative_error).into()),
         ("warnings", joined(record.warnings.iter().map(String::as_str)).into()),
     ]
@@ -189,7 +198,19 @@ fn of_plant(name: &str, split: Split, index: u64, plant: &Plant) -> Row {
         ("cover_m2", traits.map(|traits| traits.cover_m2).into()),
         ("top_m", traits.map(|traits| traits.top_m).into()),
         ("holes", condition.map(|condition| condition.holes).into()),
+        ("shot_holes", condition.map(|condition| condition.shot_holes).into()),
+        ("bites", condition.map(|condition| condition.bites).into()),
+        ("tears", condition.map(|condition| condition.tears).into()),
         ("chlorosis", condition.map(|condition| condition.chlorosis).into()),
+        ("blotches", condition.map(|condition| condition.blotches).into()),
         ("spots", condition.map(|condition| condition.spots).into()),
+        ("scorched", condition.map(|condition| condition.scorched).into()),
+        ("scorch", condition.map(|condition| condition.scorch).into()),
+        ("reddening", condition.map(|condition| condition.reddening).into()),
+        ("dust", condition.map(|condition| condition.dust).into()),
+        ("splash", condition.map(|condition| condition.splash).into()),
+        ("wilt", condition.map(|condition| condition.wilt).into()),
+        ("pale_young", condition.map(|condition| condition.pale_young).into()),
+        ("greenness", condition.map(|condition| condition.greenness).into()),
     ]
 }

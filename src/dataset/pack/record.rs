@@ -55,7 +55,7 @@ impl PackRecord {
     /// Writes it: after its archive.
     pub(in crate::dataset) fn write(&self, folder: &Path, id: Id) -> Result<()> {
         let written = Written { seal_sha256: self.hash()?, record: self.clone() };
-        write_atomically(&folder.join(id.seal()), &compact(&written)?)
+        write_atomically(&input::below(folder, &id.seal())?, &compact(&written)?)
     }
 
     /// SHA-256 over everything in it, hex.

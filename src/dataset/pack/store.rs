@@ -9,6 +9,7 @@ use crate::dataset::push::Unit;
 use crate::dataset::set::{Set, Whole};
 use crate::dataset::task::{Task, remaining};
 use crate::dataset::{File, native};
+use crate::input::below;
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -125,7 +126,7 @@ fn written(set: &Set, id: Id) -> Result<()> {
         let mut archive = tar::Builder::new(out);
         for image in &images {
             for path in native::in_order(image.files.keys().filter(|path| native::is_native(path))) {
-                let file = folder.join(path);
+                let file = below(folder, path)?;
                 let bytes = crate::input::contents(&file).map_err(Error::io(&file))?;
                 members.insert(entry_name(path), (archive.get_ref().written() + BLOCK, bytes.len() as u64));
                 append(&mut archive, path, &bytes).map_err(Error::io(&file))?;
@@ -144,8 +145,8 @@ fn written(set: &Set, id: Id) -> Result<()> {
 fn clear(folder: &Path, record: &PackRecord) -> Result<()> {
     for index in record.images.iter().map(|image| image.index) {
         // First what says that it is whole.
-        remove(&ChecksumRecord::path(folder, index), |path| std::fs::remove_file(path))?;
-        remove_folder(&folder.join(native::folder(&Set::name(index))))?;
+        remove(&below(folder, &ChecksumRecord::path_below(index))?, |path| std::fs::remove_file(path))?;
+        remove_folder(&below(folder, &native::folder(&Set::name(index)))?)?;
     }
     Ok(())
 }
@@ -195,7 +196,7 @@ fn take_apart(set: &Set, id: Id, record: &PackRecord) -> Result<()> {
     packs.forget(id);
     // First what says that it is whole.
     for path in [id.seal(), id.path()] {
-        remove(&folder.join(path), |path| std::fs::remove_file(path))?;
+        remove(&below(folder, &path)?, |path| std::fs::remove_file(path))?;
     }
     Ok(())
 }

@@ -20,6 +20,8 @@ const SMALL_LEFT: f64 = 30.0;
 const SMALL_BOTTOM: f64 = 18.0;
 /// About how wide a character of the legend is.
 const CHARACTER: f64 = 6.6;
+/// Fewest numbers of a logarithmic axis that tell how far it reaches.
+const LEAST: usize = 3;
 /// Most points of a curve that are drawn.
 const POINTS: usize = 600;
 /// Colours of curves, told apart by colour-blind eyes and on light and dark. Source: Okabe & Ito 2008.
@@ -235,13 +237,14 @@ impl Frame {
         let decades = from.floor() as i32..=to.ceil() as i32;
         let steps: &[f64] = if to - from < 2.5 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         let every = ((to - from) / 8.0).ceil().max(1.0) as i32;
-        decades
-            .filter(|k| k % every == 0)
-            .flat_map(|k| steps.iter().map(move |s| s * 10.0_f64.powi(k)))
-            .map(|v| (v.log10(), v))
-            .filter(|(place, _)| (from..=to).contains(place))
-            .map(|(place, v)| (place, if v < 1e-4 { format!("{v:e}") } else { number(v) }))
-            .collect()
+        let round = decades.filter(|k| k % every == 0).flat_map(|k| steps.iter().map(move |s| s * 10.0_f64.powi(k)));
+        let mut values: Vec<f64> = round.filter(|v| (from..=to).contains(&v.log10())).collect();
+        if values.len() < LEAST {
+            // Less than a decade holds hardly any of them: multiples of a round step.
+            let some = [1, 2, 4].map(|times| ticks(10.0_f64.powf(from), 10.0_f64.powf(to), times * about));
+            values = some.into_iter().find(|values| values.len() >= LEAST).unwrap_or(values);
+        }
+        values.into_iter().map(|v| (v.log10(), if v < 1e-4 { format!("{v:e}") } else { number(v) })).collect()
     }
 
     /// A curve; a point on its own is a dot.

@@ -14,6 +14,7 @@ use crate::math::Vec3;
 use crate::optics::soil::LOESS;
 use crate::plant::most_triangles;
 use crate::ron_file::Step;
+use crate::scene::desc::Detail;
 use crate::scene::estimate::{Estimate, Share};
 use crate::soil::Expected;
 use rayon::prelude::*;
@@ -49,6 +50,11 @@ impl Builder<'_> {
         let camera = &self.scene.camera;
         let pixels = f64::from(camera.width()) * f64::from(camera.height());
         let film = Cost::work(pixels * (size_of::<Pixel>() as f64 + BYTES_BESIDE), pixels * SECONDS_PER_PIXEL);
+        let coarser = if self.desc.detail == Detail::Full {
+            ", or lower the camera, or set detail: ByPixel"
+        } else {
+            ", or lower the camera"
+        };
         let mut shares = Vec::new();
         let fewer = match (self.desc.drive.is_some(), self.scanners.is_empty()) {
             (false, true) => "",
@@ -74,7 +80,7 @@ impl Builder<'_> {
                 "lower the camera, narrow its angle of view, or make the image smaller",
             );
             for Expected { at, cost, advice } in all {
-                add(&[&[Step::Field("soil")], &at[..]].concat(), cost, &format!("{advice}, or lower the camera"));
+                add(&[&[Step::Field("soil")], &at[..]].concat(), cost, &format!("{advice}{coarser}"));
             }
         }
         let (seedlings, populations) = self.seedlings(view.area.grown(PLANT_MARGIN), &[])?;
@@ -84,7 +90,7 @@ impl Builder<'_> {
             let number = range.len();
             let some = self.count(&seedlings, population, range.clone());
             let shared = seedlings[range].iter().filter_map(|s| s.member).collect::<Vec<_>>();
-            add(&at, expected(&some, number, &shared), &format!("{advice}, or lower the camera"));
+            add(&at, expected(&some, number, &shared), &format!("{advice}{coarser}"));
             counted.extend(some);
         }
         if let Some(preview) = &self.options.preview {
@@ -96,7 +102,30 @@ impl Builder<'_> {
             let cost = Cost::of(triangles as f64, model.parts.len() as f64);
             add(&[Step::Field("models"), Step::Item(k)], cost, "place fewer models, or coarser ones");
         }
+        shares.extend(self.pictured()?);
         Ok(Estimate { shares })
+    }
+
+    /// What pictures take: of soil, of leaves, of models.
+    fn pictured(&mut self) -> Result<Vec<Share>> {
+        let (page, desc) = (self.page, self.desc);
+        let at = |list, k, field| vec![Step::Field(list), Step::Item(k), Step::Field(field)];
+        let mut places = Vec::new();
+        let layers = desc.soil.iter().flat_map(|soil| &soil.layers);
+        for (k, layer) in layers.enumerate() {
+            let place = [vec![Step::Field("soil")], at("layers", k, "albedo")].concat();
+            places.push((place, vec![self.library.layer_pictures(page, layer)?]));
+        }
+        let crops = self.sown.clone().map(|k| ("crops", k, &desc.crops[k].species));
+        let weeds = desc.weeds.iter().enumerate().map(|(k, weed)| ("weeds", k, &weed.species));
+        let plants = desc.plants.iter().enumerate().map(|(k, plant)| ("plants", k, &plant.species));
+        for (list, k, species) in crops.chain(weeds).chain(plants) {
+            places.push((at(list, k, "species"), self.library.species(page, species)?.pictures.clone()));
+        }
+        for (k, model) in desc.models.iter().enumerate() {
+            places.push((at("models", k, "file"), vec![self.library.model_pictures(page, model)?]));
+        }
+        Ok(self.library.counted.shares(places))
     }
 
     /// The sizes of some plants of a population, which are grown for it. Not grown is what might itself be too large.

@@ -170,6 +170,7 @@ impl Source {
 
 impl<'a> Builder<'a> {
     fn new(page: &'a RonFile, desc: &'a FieldDesc, options: &'a Options, mut library: Library) -> Result<Self> {
+        library.counted.begin(options.memory);
         let (seed, index) = (options.seed.unwrap_or(desc.seed), options.index);
         let mut stream = Stream::of(seed, index, Purpose::Page, 0);
         let camera = rig::first(page, desc, (options.width, options.height), &mut stream)?;

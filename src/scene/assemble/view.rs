@@ -177,6 +177,13 @@ impl Builder<'_> {
             (100.0 * bare).ceil()
         );
         let help = "lower the camera, turn it down, narrow its angle of view, or raise reach_m";
+        if self.desc.detail == Detail::Full && !told {
+            self.warnings.push(format!(
+                "{} sees ground {far}, and detail is Full: all of it is made as fine as the nearest; detail: ByPixel makes each place as \
+                 fine as its pixels, in a fraction of the time and memory",
+                self.which(capture)
+            ));
+        }
         if bare > TOO_BARE {
             return Err(self.blame_capture(capture, Error::input(words).help(help)));
         }

@@ -42,7 +42,7 @@ pub fn evaluate(
     on: &Selection,
     like: &Shape,
     stop: &AtomicBool,
-    seen: &mut dyn FnMut(&data::Example, &[u8]),
+    seen: &mut dyn FnMut(&data::Example, &[u8]) -> Result<()>,
 ) -> Result<Report> {
     let store = open(std::slice::from_ref(on), Pick::All, 0, like, true)?;
     let (width, height) = (like.width, like.height);
@@ -59,7 +59,7 @@ pub fn evaluate(
         let plants = example.plants.iter().any(|p| *p > 0).then_some(example.plants.as_slice());
         let (name, truth) = (example.name.as_str(), example.labels.as_slice());
         evaluation.add(&Prediction { name, width, height, truth, predicted: &predicted, plants, seconds })?;
-        seen(&example, &predicted);
+        seen(&example, &predicted)?;
     }
     Ok(evaluation.finish())
 }

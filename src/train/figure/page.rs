@@ -114,7 +114,7 @@ impl Page<'_> {
         Ok(html! {
             (self.colors(known))
             p.reading {
-                @if self.report.is_some() { "The worst first. " }
+                @if self.report.is_some() { "Those of the lowest mean I/U and some spread over the set, the worst first. " }
                 "A click, or the space bar, enlarges a picture and puts it back."
             }
             div.heads { @for head in heads { span { (head) } } }

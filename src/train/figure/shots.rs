@@ -1,17 +1,22 @@
-//! Some images of a set with their predictions, evenly spread over it, for people to look at.
+//! Some images of a set with their predictions, for people to look at: evenly spread over it and, where that is asked for, those that were
+//! predicted worst.
 
 use super::shot::{Shot, spread};
+use crate::Result;
 use crate::train::data::{Band, Example};
+use crate::train::measure::{Confusion, Scores};
 
-/// Images to look at, spread over a set.
+/// Images to look at.
 pub struct Shots {
     places: Vec<usize>,
     next: usize,
+    classes: usize,
+    worst: usize,
     /// Red, green and blue among the bands; the first band for each where they are not all there.
     planes: [usize; 3],
     most: u32,
-    /// Those that were kept.
-    pub kept: Vec<Shot>,
+    /// Those that were kept: place, mean intersection over union where it counts, and the image; the worst first, then the spread ones.
+    kept: Vec<(usize, Option<f64>, Shot)>,
 }
 
 impl Shots {
@@ -23,16 +28,53 @@ impl Shots {
             (Some(red), Some(green), Some(blue)) => [red, green, blue],
             _ => [0; 3],
         };
-        Self { places: spread(images, shown), next: 0, planes, most, kept: Vec::new() }
+        Self { places: spread(images, shown), next: 0, classes: 0, worst: 0, planes, most, kept: Vec::new() }
+    }
+
+    /// So many images beside them: those of the lowest mean intersection over union of so many classes.
+    #[must_use]
+    pub fn and_worst(self, worst: usize, classes: usize) -> Self {
+        Self { classes, worst, ..self }
     }
 
     /// Sees the next image, which has this width and height; keeps it if it is one of the chosen.
-    pub fn see(&mut self, example: &Example, size: (u32, u32), predicted: &[u8]) {
-        if self.places.contains(&self.next) {
-            let planes = self.planes.map(|band| &example.planes[band]);
-            let rgb: Vec<[u8; 3]> = (0..example.labels.len()).map(|i| planes.map(|plane| plane[i])).collect();
-            self.kept.push(Shot::new(&example.name, size, &rgb, &example.labels, &[predicted], self.most));
-        }
+    pub fn see(&mut self, example: &Example, size: (u32, u32), predicted: &[u8]) -> Result<()> {
+        let place = self.next;
         self.next += 1;
+        let iou = if self.worst > 0 { self.mean_iou(example, predicted)? } else { None };
+        // Of equal ones the first; images without a score are no worse than others.
+        let at = iou.map(|iou| self.kept.iter().take_while(|(_, there, _)| there.is_some_and(|t| t <= iou)).count());
+        let at = at.filter(|at| *at < self.worst);
+        if at.is_none() && !self.places.contains(&place) {
+            return Ok(());
+        }
+        let planes = self.planes.map(|band| &example.planes[band]);
+        let rgb: Vec<[u8; 3]> = (0..example.labels.len()).map(|i| planes.map(|plane| plane[i])).collect();
+        let shot = Shot::new(&example.name, size, &rgb, &example.labels, &[predicted], self.most);
+        match at {
+            Some(at) => self.kept.insert(at, (place, iou, shot)),
+            None => self.kept.push((place, None, shot)),
+        }
+        let scored = self.kept.iter().take_while(|(_, iou, _)| iou.is_some()).count();
+        if scored > self.worst {
+            let (place, _, shot) = self.kept.remove(self.worst);
+            if self.places.contains(&place) {
+                self.kept.push((place, None, shot));
+            }
+        }
+        Ok(())
+    }
+
+    /// Those that were kept: the worst, the worst of all first, then the spread ones that are not among them in their order.
+    pub fn kept(mut self) -> Vec<Shot> {
+        self.kept.sort_by_key(|(place, iou, _)| if iou.is_some() { (false, 0) } else { (true, *place) });
+        self.kept.into_iter().map(|(_, _, shot)| shot).collect()
+    }
+
+    fn mean_iou(&self, example: &Example, predicted: &[u8]) -> Result<Option<f64>> {
+        let mut confusion = Confusion::new(self.classes);
+        confusion.add(&example.labels, predicted)?;
+        let plants: Vec<bool> = (0..self.classes).map(|class| class > 0).collect();
+        Ok(Scores::of(&confusion, &plants).mean_iou)
     }
 }

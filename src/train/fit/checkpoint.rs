@@ -53,6 +53,12 @@ impl History {
         self.validation.iter().reduce(|best, pass| if pass.miou > best.miou { pass } else { best })
     }
 
+    /// The last step of which something is known.
+    pub fn last(&self) -> u64 {
+        let loss = self.losses.last().map_or(0, |point| point.step);
+        self.validation.last().map_or(0, |pass| pass.step).max(loss)
+    }
+
     /// Validation passes since the best one.
     pub fn since_best(&self) -> u64 {
         let best = self.best().map_or(0, |b| b.step);

@@ -8,6 +8,7 @@ use super::hyper::{Invalid, LossFunction, NormalizationMode, OptimiserKind, SIDE
 use super::plan::Plan;
 use super::schedule::Schedule;
 use crate::dataset::classes::Classes;
+use crate::ron_file;
 use crate::train::data::{Augment, Band, Resize};
 use crate::train::net::Pretrained;
 use crate::train::refine::Refine;
@@ -15,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
-/// Hyper-parameters of a training; what is left out keeps its default.
+/// Hyper-parameters of a training; what is left out keeps the value that it had, at first the default.
 ///
 /// ```
 /// use furrow::train::fit::{Plan, Settings};
@@ -27,6 +28,7 @@ use std::sync::LazyLock;
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, clap::Args, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default, rename = "Hyperparameters")]
+#[schemars(transform = tell_defaults)]
 pub struct Settings {
     /// Classes to tell apart, with a semicolon between, each with its labels, as for datasets: "soil; beet=BEAVX; other=crop,weed; ignore=stone".
     #[arg(long, value_name = "CLASSES", default_value = default_of("classes"))]
@@ -212,6 +214,21 @@ pub fn defaults() -> Vec<(&'static str, String)> {
         ("validate_every", hyper.validate_every.to_string()),
         ("patience", hyper.patience.to_string()),
     ]
+}
+
+/// Writes the defaults into the schema, as an experiment file has them.
+fn tell_defaults(schema: &mut schemars::Schema) {
+    let Some(fields) = schema.get_mut("properties").and_then(serde_json::Value::as_object_mut) else { return };
+    for (name, default) in defaults() {
+        let written = match (name, default.parse::<f64>()) {
+            ("size", _) => format!("({})", default.replace('x', ", ")),
+            (_, Ok(_)) => default,
+            _ => format!("{default:?}"),
+        };
+        if let Some(field) = fields.get_mut(name).and_then(serde_json::Value::as_object_mut) {
+            field.insert(ron_file::DEFAULT.into(), written.into());
+        }
+    }
 }
 
 fn rate_help() -> String {

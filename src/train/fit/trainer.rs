@@ -113,7 +113,7 @@ pub fn train(
         augment: hyper.augment,
         normalization: normalization.clone(),
     };
-    let mut log = TrainingLog::begin(folder, &plan.classes.names(), &at.history)?;
+    let mut log = TrainingLog::begin(folder, &plan.classes.names(), &at.history, at.step)?;
     let (first, last) = (at.step * hyper.accumulate, hyper.steps * hyper.accumulate);
     let mut loader = Loader::start(&data.train, &order, first, last, data.loaders)?;
     let photos = data.photos.as_ref();
@@ -156,8 +156,7 @@ pub fn train(
         let encoder = if at.step < hyper.freeze { 0.0 } else { hyper.encoder_rate };
         let loss = step(&model, &mut optimiser, &batches, &photographs, plan, &weights, [rate, encoder])?;
         if loss.is_some_and(|loss| !loss.is_finite()) {
-            let help = format!("a smaller --rate than {} (this training lies in {})", hyper.rate, folder.display());
-            return Err(Error::input(format!("the loss of step {} is no number any more", at.step + 1)).help(help));
+            return Err(diverged(plan, at.step, !begin.is_empty(), folder));
         }
         at.step += 1;
         if let Some(ema) = &mut ema {
@@ -194,6 +193,17 @@ pub fn train(
     let kept = ema.as_ref().map_or(&model, Ema::model);
     let values = if at.best.is_empty() { kept.arrays()? } else { at.best };
     Ok(Outcome { values, normalization, history: at.history, steps: at.step, ended, seconds: at.seconds })
+}
+
+/// The error of a loss that is no finite number after so many steps. Before the first, no rate had a part in it.
+fn diverged(plan: &Plan, steps: u64, begun_with_weights: bool, folder: &Path) -> Error {
+    let lies = format!("this training lies in {}", folder.display());
+    if steps == 0 && begun_with_weights {
+        return Error::input("with the weights that this training begins with, the first loss is no finite number")
+            .help(format!("their values are too large: other weights, or --pretrained none ({lies})"));
+    }
+    Error::input(format!("the loss of step {} is no finite number", steps + 1))
+        .help(format!("a smaller --rate than {} ({lies})", plan.hyper.rate))
 }
 
 fn next<T>(loader: &mut Loader<T>) -> Result<T>
@@ -287,7 +297,7 @@ fn validate(
         }
         let predicted = classes(&scores)?;
         confusion.add(&example.labels, &predicted)?;
-        shots.see(&example, size, &predicted);
+        shots.see(&example, size, &predicted)?;
     }
     let plants: Vec<bool> = (0..model.classes).map(|c| c > 0).collect();
     let scores = Scores::of(&confusion, &plants);
@@ -295,5 +305,5 @@ fn validate(
     let (ga, miou) = (number(scores.global_accuracy), number(scores.mean_iou));
     let iou = scores.classes.iter().map(|c| c.iou).collect();
     let loss = (!losses.is_empty()).then(|| losses.iter().sum::<f64>() / losses.len() as f64);
-    Ok((ValidationPass { step, ga, miou, iou, loss }, sheet(&shots.kept, &plan.classes.colors(), false)))
+    Ok((ValidationPass { step, ga, miou, iou, loss }, sheet(&shots.kept(), &plan.classes.colors(), false)))
 }

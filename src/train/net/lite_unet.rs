@@ -6,7 +6,7 @@
 //! batch norms have its ε, so that published weights compute what they were trained to. Decoder of 128, 64, 48, 32 and 16 channels,
 //! each two 3 × 3 convolutions behind an enlargement by the nearest pixel.
 
-use super::{Conv, Norm, Operations, unit};
+use super::{Conv, Norm, Operations, decode};
 
 /// Blocks, kernel, stride, expansion and channels out of each stage.
 const STAGES: [(usize, usize, usize, usize, usize); 7] = [
@@ -41,19 +41,7 @@ pub(super) fn walk<O: Operations>(o: &mut O, x: &O::Value, bands: usize, classes
             channels = outputs;
         }
     }
-    for (level, outputs) in DECODER.into_iter().enumerate() {
-        let (joined, inputs) = match skips.pop() {
-            Some((skip, more)) => {
-                let larger = o.enlarge(&now, &skip);
-                (o.concat(&larger, &skip), channels + more)
-            }
-            None => (o.enlarge(&now, x), channels),
-        };
-        let first = unit(o, &joined, &format!("dec{level}_0"), Conv::new(inputs, outputs, 3), true);
-        now = unit(o, &first, &format!("dec{level}_1"), Conv::new(outputs, outputs, 3), true);
-        channels = outputs;
-    }
-    o.conv(&now, "head.conv", Conv::new(channels, classes, 3).bias())
+    decode(o, x, (now, channels), skips, &DECODER, classes)
 }
 
 /// Convolution, batch norm and, where asked for, ReLU6, named as [`unit`] names them.

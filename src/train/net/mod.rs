@@ -198,3 +198,28 @@ fn unit<O: Operations>(o: &mut O, x: &O::Value, name: &str, conv: Conv, relu: bo
     let y = o.norm(&y, &format!("{name}.bn"), Norm { channels: conv.outputs, epsilon: 1e-5 });
     if relu { o.relu(&y) } else { y }
 }
+
+/// The decoder of a U-Net: from the deepest value and its channels through levels of `widths` channels, each behind an enlargement by the nearest
+/// pixel and two 3 × 3 convolutions, beside the last of `skips`, or at the size of `x` where none is left; then the classes.
+fn decode<O: Operations>(
+    o: &mut O,
+    x: &O::Value,
+    (mut now, mut channels): (O::Value, usize),
+    mut skips: Vec<(O::Value, usize)>,
+    widths: &[usize],
+    classes: usize,
+) -> O::Value {
+    for (level, outputs) in widths.iter().copied().enumerate() {
+        let (joined, inputs) = match skips.pop() {
+            Some((skip, more)) => {
+                let larger = o.enlarge(&now, &skip);
+                (o.concat(&larger, &skip), channels + more)
+            }
+            None => (o.enlarge(&now, x), channels),
+        };
+        let first = unit(o, &joined, &format!("dec{level}_0"), Conv::new(inputs, outputs, 3), true);
+        now = unit(o, &first, &format!("dec{level}_1"), Conv::new(outputs, outputs, 3), true);
+        channels = outputs;
+    }
+    o.conv(&now, "head.conv", Conv::new(channels, classes, 3).bias())
+}

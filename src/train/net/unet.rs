@@ -4,7 +4,7 @@
 //! then four stages of two blocks). Decoder of 256, 128, 64, 32 and 16 channels, each two 3 × 3 convolutions behind an
 //! enlargement by the nearest pixel. Weights begin at random unless a file is given.
 
-use super::{Conv, Operations, unit};
+use super::{Conv, Operations, decode, unit};
 
 /// Channels of the encoder's stages.
 const STAGES: [usize; 4] = [64, 128, 256, 512];
@@ -28,21 +28,7 @@ pub(super) fn walk<O: Operations>(o: &mut O, x: &O::Value, bands: usize, classes
         }
         channels = outputs;
     }
-    let mut now = deepest;
-    for (level, outputs) in DECODER.into_iter().enumerate() {
-        let conv = |inputs| Conv::new(inputs, outputs, 3);
-        let (joined, inputs) = match skips.pop() {
-            Some((skip, more)) => {
-                let larger = o.enlarge(&now, &skip);
-                (o.concat(&larger, &skip), channels + more)
-            }
-            None => (o.enlarge(&now, x), channels),
-        };
-        let first = unit(o, &joined, &format!("dec{level}_0"), conv(inputs), true);
-        now = unit(o, &first, &format!("dec{level}_1"), conv(outputs), true);
-        channels = outputs;
-    }
-    o.conv(&now, "head.conv", Conv::new(channels, classes, 3).bias())
+    decode(o, x, (deepest, channels), skips, &DECODER, classes)
 }
 
 /// A residual block: two convolutions and the way past them, which has a convolution of its own where sizes differ.

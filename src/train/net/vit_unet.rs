@@ -7,7 +7,7 @@
 //! from three convolutions of the image itself, of 2, 4 and 8 pixels; the decoder has 128, 64, 32 and 16 channels, each two 3 × 3
 //! convolutions behind an enlargement by the nearest pixel.
 
-use super::{Conv, Norm, Operations, unit};
+use super::{Conv, Norm, Operations, decode, unit};
 use crate::train::weights::Array;
 
 /// Pixels across a patch.
@@ -53,20 +53,8 @@ pub(super) fn walk<O: Operations>(o: &mut O, x: &O::Value, bands: usize, classes
         let cells = o.enlarge(features, &skips[FINE.len() - 1].0);
         o.features(&cells, halvings);
     }
-    let (mut now, mut channels) = (o.concat(&seen[0], &seen[1]), 2 * CHANNELS);
-    for (level, outputs) in DECODER.into_iter().enumerate() {
-        let (joined, inputs) = match skips.pop() {
-            Some((skip, more)) => {
-                let larger = o.enlarge(&now, &skip);
-                (o.concat(&larger, &skip), channels + more)
-            }
-            None => (o.enlarge(&now, x), channels),
-        };
-        let first = unit(o, &joined, &format!("dec{level}_0"), Conv::new(inputs, outputs, 3), true);
-        now = unit(o, &first, &format!("dec{level}_1"), Conv::new(outputs, outputs, 3), true);
-        channels = outputs;
-    }
-    o.conv(&now, "head.conv", Conv::new(channels, classes, 3).bias())
+    let tokens = o.concat(&seen[0], &seen[1]);
+    decode(o, x, (tokens, 2 * CHANNELS), skips, &DECODER, classes)
 }
 
 /// A block: attention between tokens, then a layer of four times the channels in each, both behind a norm and beside a way past them.
@@ -149,8 +137,7 @@ mod tests {
     }
 
     /// Rationale: a token without its position, or features of a network with registers, still learn, only worse. Expected: the class token with
-    /// the first row of positions added, the others as a map of each
-    /// channel; other shapes and registers are refused by their names.
+    /// the first row of positions added, the others as a map of each channel; other shapes and registers are refused by their names.
     #[test]
     fn published_values_lie_as_the_network_has_them() {
         let tokens = 1 + GRID * GRID;

@@ -70,4 +70,4 @@ pub use rows::{Learner, Row, rows};
 pub use sets::{Bound, Real};
 #[doc(hidden)]
 pub use variants::variants;
-pub use work::{Callbacks, Only, Order, PAGE, Predictor, State, run};
+pub use work::{Callbacks, Only, Order, PAGE, Predictor, State, check_weights, run};

@@ -6,10 +6,13 @@ use crate::ablation::{Edit, FULL};
 use crate::dataset::generate::{Callbacks, Work};
 use crate::dataset::import::masks::{Folders, Masks};
 use crate::dataset::import::{self, Source as _};
+use crate::dataset::set::Set;
 use crate::dataset::split::Shares;
+use crate::dataset::status::Status;
 use crate::dataset::{self, recipe};
 use crate::error::Kind;
 use crate::job::Threads;
+use crate::report::{Cell, Table};
 use crate::settings::{Quality, RenderOptions};
 use crate::train::data::Selection;
 use crate::{Error, Result};
@@ -142,6 +145,34 @@ impl Bound {
             missing.iter().map(told).collect::<Vec<_>>().join(" and of ")
         ))
         .help(format!("--real {name}=DIR leads to them, --without {name} leaves out what needs them")))
+    }
+
+    /// The sets that are used and how far they are.
+    pub fn listing(&self) -> Result<Table> {
+        let mut table = Table::new("Sets", ["set", "comes from", "size", "images", "there"]);
+        for set in self.used() {
+            let (folder, origin) = &self.sets[set];
+            let (name, source) = &self.experiment.sets[set];
+            let begun = folder.join(recipe::FILE).is_file();
+            let status = begun.then(|| Status::of(&Set::open(folder)?, None, &AtomicBool::new(false))).transpose()?;
+            let images = match source {
+                Source::Scene { count, .. } | Source::Dataset { count, .. } => Some(*count),
+                Source::Real { .. } => status.as_ref().map(|status| status.images),
+            };
+            let (from, size) = match (source, origin) {
+                (Source::Scene { file, size, spp, edit, .. }, _) => {
+                    let edit = edit.map(|name| format!(", {name}")).unwrap_or_default();
+                    (format!("{}, {spp} spp{edit}", file.display()), format!("{} × {}", size.0, size.1))
+                }
+                (_, Origin::Imported(from)) => (from.display().to_string(), String::new()),
+                (_, Origin::Unknown) => (format!("--real {name}=DIR"), String::new()),
+                _ => (folder.display().to_string(), String::new()),
+            };
+            let done = status.map_or(0, |status| status.done);
+            let [name, from, size] = [name.clone(), from, size].map(Cell::text);
+            table.push([name, from, size, Cell::number(images.map(|n| n as f64), 0), Cell::Count(done)]);
+        }
+        Ok(table)
     }
 
     /// Makes what is missing of a set: renders or imports it. Waits where another process is at it.

@@ -2,7 +2,7 @@
 
 use super::against;
 use super::evaluation::{self, BASELINE, Evaluated, Known, StoredEvaluation};
-use super::experiment::{Part, TrainSet};
+use super::experiment::{Experiment, Part, TrainSet};
 use super::print;
 use super::rows::{self, Learner, Row};
 use super::sets::Bound;
@@ -102,7 +102,7 @@ pub fn run(order: &Order<'_>, callbacks: &Callbacks<'_>) -> Result<Vec<PathBuf>>
     alone(out, || write_atomically(&out.join("experiment.ron"), order.page.as_bytes()))?;
     let rows = rows::of_shard(&bound.experiment, order.shard);
     if order.only.is_none() {
-        check_pretrained(order, &rows)?;
+        check_pretrained(&bound.experiment, &rows)?;
     }
     for set in bound.used() {
         bound.make(set, callbacks.tell, callbacks.warn, callbacks.stop)?;
@@ -136,8 +136,7 @@ pub fn run(order: &Order<'_>, callbacks: &Callbacks<'_>) -> Result<Vec<PathBuf>>
 }
 
 /// Checks the weights that networks begin with, each file once, before anything is rendered.
-fn check_pretrained(order: &Order<'_>, rows: &[(usize, Row)]) -> Result<()> {
-    let experiment = &order.bound.experiment;
+fn check_pretrained(experiment: &Experiment, rows: &[(usize, Row)]) -> Result<()> {
     let mut seen = BTreeSet::new();
     for (_, row) in rows {
         let Learner::Network(network, seed) = row.learner else { continue };
@@ -151,9 +150,20 @@ fn check_pretrained(order: &Order<'_>, rows: &[(usize, Row)]) -> Result<()> {
     Ok(())
 }
 
+/// Checks the weights that networks begin with.
+///
+/// # Errors
+/// The first that are missing or wrong.
+pub fn check_weights(bound: &Bound) -> Result<()> {
+    check_pretrained(&bound.experiment, &rows::of_shard(&bound.experiment, Shard::ALL))
+}
+
 /// Writes the tables of what is there.
 fn tables(order: &Order<'_>, callbacks: &Callbacks<'_>) -> Result<Vec<PathBuf>> {
-    against::measure(order.bound, order.out)?;
+    // Shards would all measure the same, each after each of its rows; whoever writes the tables of all does it once.
+    if order.shard == Shard::ALL {
+        against::measure(order.bound, order.out)?;
+    }
     let (tables, told) = print::tables(order.bound, order.out)?;
     for words in told {
         (callbacks.warn)(&words);

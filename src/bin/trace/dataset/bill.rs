@@ -24,7 +24,7 @@ pub(crate) fn run(folder: &Path, order: &Order, threads: usize, signals: &Signal
     for warning in warnings {
         furrow::tell!("warning: {warning}");
     }
-    cli::print_rows(&rows(folder, &bill, threads.count()));
+    cli::print_rows(&rows(folder, &bill, threads.count()))?;
     Ok(Vec::new())
 }
 

@@ -31,7 +31,7 @@ pub(crate) struct Args {
 #[derive(clap::Args)]
 pub(crate) struct PushArgs {
     /// Run this shell command for each finished image or pack: {dir} is a folder with its files by their paths in the dataset, such as
-    /// 'rclone copy {dir} remote:set' or 'cp -r {dir}/. /mnt/set/'. What was pushed is noted, and not pushed again.
+    /// 'rclone copy {dir} remote:set' or 'cp -a {dir}/. /mnt/set/'. What was pushed is noted, and not pushed again.
     #[arg(long, value_name = "COMMAND")]
     push: Option<String>,
     /// Run this after it; where it fails, the push counts as failed. Such as 'rclone check --one-way {dir} remote:set'.

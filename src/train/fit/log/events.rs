@@ -13,7 +13,7 @@ pub(super) struct Event {
     pub(super) wall_time: f64,
     #[prost(int64, tag = "2")]
     pub(super) step: i64,
-    #[prost(oneof = "What", tags = "3, 5")]
+    #[prost(oneof = "What", tags = "3, 5, 7")]
     pub(super) what: Option<What>,
 }
 
@@ -24,7 +24,19 @@ pub(super) enum What {
     FileVersion(String),
     #[prost(message, tag = "5")]
     Summary(Summary),
+    #[prost(message, tag = "7")]
+    SessionLog(SessionLog),
 }
+
+/// `SessionLog`.
+#[derive(Clone, PartialEq, Message)]
+pub(super) struct SessionLog {
+    #[prost(int32, tag = "1")]
+    pub(super) status: i32,
+}
+
+/// `SessionLog.START`: what the file told of this step and later ones counts no more.
+pub(super) const STARTED: i32 = 1;
 
 /// `Summary`.
 #[derive(Clone, PartialEq, Message)]
@@ -71,6 +83,29 @@ pub(super) fn record(event: &Event) -> Vec<u8> {
     let message = event.encode_to_vec();
     let length = (message.len() as u64).to_le_bytes();
     [&length[..], &masked(&length), &message, &masked(&message)].concat()
+}
+
+/// How many bytes of a file are whole records, and the last step that they tell of.
+pub(super) fn whole(bytes: &[u8]) -> (usize, u64) {
+    let (mut at, mut last) = (0, 0);
+    while let Some((message, length)) = first(&bytes[at..]) {
+        let Ok(event) = Event::decode(message) else { break };
+        at += length;
+        last = last.max(event.step.cast_unsigned());
+    }
+    (at, last)
+}
+
+/// The message of the first record and the record's length, where it is whole and its sums are right.
+fn first(bytes: &[u8]) -> Option<(&[u8], usize)> {
+    let (length, rest) = bytes.split_first_chunk::<8>()?;
+    let (sum, rest) = rest.split_first_chunk::<4>()?;
+    if *sum != masked(length) {
+        return None;
+    }
+    let size = usize::try_from(u64::from_le_bytes(*length)).ok()?;
+    let (message, rest) = rest.split_at_checked(size)?;
+    (rest.first_chunk::<4>()? == &masked(message)).then_some((message, 16 + size))
 }
 
 fn masked(bytes: &[u8]) -> [u8; 4] {

@@ -1,19 +1,21 @@
 //! The log of a training, which grows while it trains: `log.csv`, and `training.tfevents` for TensorBoard.
 //!
-//! A training that goes on writes both anew from its checkpoint: what came after that is done again. A log that cannot be written
-//! ends it, as a checkpoint does. Times in the event file are of the clock; nothing else depends on it.
+//! A training that goes on writes the first anew from its checkpoint and appends to the second, so that whoever has it open sees more of it: what
+//! came after the checkpoint is done again, and an event says from which step on. A log that cannot be written ends it, as a
+//! checkpoint does. Times in the event file are of the clock; nothing else depends on it.
 
 mod events;
 
 use super::checkpoint::{History, LossPoint, ValidationPass};
+use crate::input;
 use crate::output::write_atomically;
 use crate::report::{Lines, csv};
 use crate::train::figure::Sheet;
 use crate::{Error, Result};
-use events::{Event, Image, Of, Summary, Value, What};
+use events::{Event, Image, Of, STARTED, SessionLog, Summary, Value, What};
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::Write;
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -30,10 +32,18 @@ pub struct TrainingLog {
 }
 
 impl TrainingLog {
-    /// Begins both files with what is known.
-    pub fn begin(folder: &Path, classes: &[String], history: &History) -> Result<Self> {
+    /// Begins both files with what is known after so many steps, or goes on with them.
+    pub fn begin(folder: &Path, classes: &[String], history: &History, step: u64) -> Result<Self> {
         std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
         let path = folder.join(EVENTS);
+        if let Some((events, last)) = go_on(&path, history.last()).map_err(Error::io(&path))? {
+            let mut log = Self { folder: folder.into(), classes: classes.to_vec(), events };
+            if last > step {
+                log.event(step + 1, What::SessionLog(SessionLog { status: STARTED }))?;
+            }
+            log.csv(history)?;
+            return Ok(log);
+        }
         let events = File::create(&path).map_err(Error::io(&path))?;
         let mut log = Self { folder: folder.into(), classes: classes.to_vec(), events };
         log.event(0, What::FileVersion("brain.Event:2".into()))?;
@@ -80,8 +90,52 @@ impl TrainingLog {
     }
 }
 
+/// An event file that holds what is known up to a step, open at the end of its last whole record, and the last step that it tells of. None
+/// where there is no such file, or where less is in it: a training that was begun elsewhere.
+fn go_on(path: &Path, known: u64) -> io::Result<Option<(File, u64)>> {
+    if known == 0 || !path.is_file() {
+        return Ok(None);
+    }
+    let mut file = File::options().read(true).write(true).open(path)?;
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes)?;
+    let (length, last) = events::whole(&bytes);
+    if last < known {
+        return Ok(None);
+    }
+    file.set_len(length as u64)?;
+    file.seek(SeekFrom::End(0))?;
+    Ok(Some((file, last)))
+}
+
 fn number(tag: &str, value: f64) -> Value {
     Value { tag: tag.into(), of: Some(Of::Number(value as f32)) }
+}
+
+/// What the log of a training tells so far, I/U of single classes apart; none where there is no log.
+pub fn read(folder: &Path) -> Result<Option<History>> {
+    let path = folder.join(CSV);
+    if !path.exists() {
+        return Ok(None);
+    }
+    let bytes = input::contents(&path).map_err(Error::reading(&path))?;
+    let text = String::from_utf8_lossy(&bytes);
+    let mut history = History::default();
+    for line in text.lines().skip(1) {
+        let cells: Vec<Option<f64>> = line.split(',').take(5).map(|cell| cell.parse().ok()).collect();
+        let &[Some(step), loss, rate, miou, validation] = &cells[..] else {
+            let error = Error::damaged("this is no log of a training").in_file(path);
+            return Err(error.help("a row has step, loss, rate, validation_mean_iou, validation_loss and more"));
+        };
+        let step = step as u64;
+        if let (Some(loss), Some(rate)) = (loss, rate) {
+            history.losses.push(LossPoint { step, loss, rate });
+        }
+        if let Some(miou) = miou {
+            history.validation.push(ValidationPass { step, ga: f64::NAN, miou, iou: Vec::new(), loss: validation });
+        }
+    }
+    Ok(Some(history))
 }
 
 /// Loss, learning rate and validation passes as CSV: a row for each step of which something is known.

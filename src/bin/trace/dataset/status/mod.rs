@@ -1,14 +1,17 @@
 //! How far a dataset is: `trace dataset status`.
 
+mod page;
+
 use furrow::cli;
 use furrow::cli::signal::Signals;
 use furrow::dataset::Set;
 use furrow::dataset::status::{FailedImage, ShardStatus, State, Status};
+use furrow::output::write_atomically;
 use furrow::report::{count, number};
 use furrow::{Error, Result};
 use humantime::format_duration;
-use std::io::{self, IsTerminal, Write};
-use std::path::PathBuf;
+use std::io::{self, IsTerminal};
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -30,6 +33,9 @@ pub(crate) struct Args {
     /// Print one JSON object, on one line.
     #[arg(long)]
     json: bool,
+    /// Write an HTML page as well, which shows all shards and all failures; with --watch it is written again at every look, and loads itself again.
+    #[arg(long, value_name = "FILE")]
+    page: Option<PathBuf>,
     /// How many shards it is made in; as many as its last run had, unless given.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
     shards: Option<u64>,
@@ -37,17 +43,41 @@ pub(crate) struct Args {
 
 /// Looks once, or until all images are there.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
+    args.page.as_deref().map_or(Ok(()), |page| check_page(page, &args.dir))?;
     let stop = signals.heed();
     loop {
         // It may have got longer meanwhile.
         let set = Set::open(&args.dir)?;
         let status = Status::of(&set, args.shards, stop)?;
         let text = if args.json { status.json()? + "\n" } else { told(&set, &status) };
-        let written = print(&text, args.watch && !args.json);
-        if status.is_done() || !args.watch || written.is_err() {
+        if let Some(path) = &args.page {
+            let again = (args.watch && !status.is_done()).then_some(EVERY.as_secs());
+            write_atomically(path, page::html(&set, &status, again).as_bytes())?;
+        }
+        let is_read = print(&text, args.watch && !args.json)?;
+        if status.is_done() || !args.watch || !is_read {
             return Ok(Vec::new());
         }
-        wait(stop)?;
+        if let Err(stopped) = wait(stop) {
+            // Nobody writes it again.
+            if let Some(path) = &args.page {
+                write_atomically(path, page::html(&set, &status, None).as_bytes())?;
+            }
+            return Err(stopped);
+        }
+    }
+}
+
+/// Refuses a page in the place of a folder, or among the dataset's own files.
+fn check_page(page: &Path, dataset: &Path) -> Result<()> {
+    cli::check_file(page)?;
+    let folder = page.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    match (folder.canonicalize(), dataset.canonicalize()) {
+        (Ok(folder), Ok(dataset)) if folder.starts_with(&dataset) => {
+            let error = Error::misuse("this lies in the dataset's folder, whose files are the dataset's").in_file(page);
+            Err(error.help("give --page a file elsewhere"))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -63,41 +93,53 @@ fn wait(stop: &AtomicBool) -> Result<()> {
     Ok(())
 }
 
-/// Prints to stdout; in the place of what stood there where a person watches. A closed pipe ends the watching, and is no failure.
-fn print(text: &str, in_place: bool) -> io::Result<()> {
-    let mut out = io::stdout().lock();
-    if in_place && out.is_terminal() {
-        out.write_all(b"\x1b[2J\x1b[H")?;
-    }
-    out.write_all(text.as_bytes())?;
-    out.flush()
+/// Prints; in the place of what stood there where a person watches. Whether somebody reads on.
+fn print(text: &str, in_place: bool) -> Result<bool> {
+    let begin = if in_place && io::stdout().is_terminal() { "\x1b[2J\x1b[H" } else { "" };
+    cli::print(&format!("{begin}{text}"))
 }
 
 /// A status in words.
 fn told(set: &Set, status: &Status) -> String {
     let mut text = format!("{}: {}\n", set.folder.display(), summary(status));
     if status.shards.len() > 1 {
-        let head = ["shard", "images", "done", "failed", "images/h", "left", "state"].map(String::from);
-        text += &cli::columns(&[&[head][..], &status.shards.iter().map(row).collect::<Vec<_>>()].concat());
+        text += &cli::columns(&shards(status));
     }
     if !status.slowest.is_empty() {
         text += "slowest images:\n";
-        let head = ["image", "seconds", "growing", "drawing", "labels", "plants"].map(String::from);
-        let rows = status.slowest.iter().map(|image| {
-            let [all, grow, draw, label] = [image.seconds, image.grow_s, image.draw_s, image.label_s].map(number);
-            [Set::name(image.index), all, grow, draw, label, image.plants.map_or("-".into(), |n| n.to_string())]
-        });
-        text += &cli::columns(&[head].into_iter().chain(rows).collect::<Vec<_>>());
+        text += &cli::columns(&slowest(status));
     }
     if !status.failures.is_empty() {
         text += "failed images:\n";
-        let line = |failure: &FailedImage| format!("{}: {}\n", Set::name(failure.index), failure.error);
-        text.extend(status.failures.iter().take(MOST_TOLD).map(line));
+        text.extend(failed(status).iter().skip(1).take(MOST_TOLD).map(|row| format!("{}\n", row.join(": "))));
         if let Some(more) = status.failures.len().checked_sub(MOST_TOLD).filter(|more| *more > 0) {
-            text.extend([format!("and {more} more; --json tells all\n")]);
+            text.extend([format!("and {more} more; --json and --page tell all\n")]);
         }
     }
     text
+}
+
+/// Shard by shard below the heads of columns.
+fn shards(status: &Status) -> Vec<[String; 7]> {
+    let heads = ["shard", "images", "done", "failed", "images/h", "left", "state"].map(String::from);
+    [heads].into_iter().chain(status.shards.iter().map(row)).collect()
+}
+
+/// The images that took longest below the heads of columns.
+fn slowest(status: &Status) -> Vec<[String; 6]> {
+    let heads = ["image", "seconds", "growing", "drawing", "labels", "plants"].map(String::from);
+    let rows = status.slowest.iter().map(|image| {
+        let [all, grow, draw, label] = [image.seconds, image.grow_s, image.draw_s, image.label_s].map(number);
+        [Set::name(image.index), all, grow, draw, label, image.plants.map_or("-".into(), |n| n.to_string())]
+    });
+    [heads].into_iter().chain(rows).collect()
+}
+
+/// The images that could not be made below the heads of columns.
+fn failed(status: &Status) -> Vec<[String; 2]> {
+    let row = |failure: &FailedImage| [Set::name(failure.index), failure.error.clone()];
+    let heads = ["image", "why"].map(String::from);
+    [heads].into_iter().chain(status.failures.iter().map(row)).collect()
 }
 
 /// The most important in a line.
