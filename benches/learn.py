@@ -3,8 +3,8 @@
     cargo bench --features train --bench learn --no-run
     VENV/bin/python benches/learn.py --set DIR          # a venv with torch==2.11.0
 
-Both compute the same networks (SegNet and Basic SegNet; the U-Net's encoder needs torchvision's blocks, written out here), Adam, the same
-batch, precision and threads. Torch gets random numbers that lie ready in memory; ours reads, varies and normalises images as well.
+Both compute the same networks (SegNet and Basic SegNet; the U-Nets' encoders need torchvision's and EfficientNet-Lite0's blocks, written out
+here), Adam, the same batch, precision and threads. Torch gets random numbers that lie ready in memory; ours reads, varies and normalises images as well.
 """
 import argparse
 import os
@@ -53,15 +53,72 @@ class Residual(nn.Module):
         return F.relu(self.second(self.first(x)) + self.past(x))
 
 
+class Light(nn.Sequential):
+    """Convolution, batch norm and ReLU6 as EfficientNet-Lite has them: with stride 2 one zero fewer before the first pixel than behind the last."""
+
+    def __init__(self, a, b, k=1, stride=1, groups=1, relu=True):
+        before, after = (k - stride) // 2, (k - stride + 1) // 2
+        layers = [] if before == after else [nn.ZeroPad2d((before, after, before, after))]
+        layers += [nn.Conv2d(a, b, k, stride, before if before == after else 0, groups=groups, bias=False), nn.BatchNorm2d(b, eps=1e-3)]
+        super().__init__(*layers, *([nn.ReLU6()] if relu else []))
+
+
+class Inverted(nn.Module):
+    def __init__(self, a, b, k, stride, expansion):
+        super().__init__()
+        wide = a * expansion
+        self.halves, self.past = stride == 2, stride == 1 and a == b
+        layers = [Light(a, wide)] if expansion > 1 else []
+        self.layers = nn.Sequential(*layers, Light(wide, wide, k, stride, groups=wide), Light(wide, b, relu=False))
+
+    def forward(self, x):
+        y = self.layers(x)
+        return x + y if self.past else y
+
+
+def decoder(inputs, widths):
+    blocks = [nn.Sequential(Unit(a, b, 3, bias=False), Unit(b, b, 3, bias=False)) for a, b in zip(inputs, widths)]
+    return nn.ModuleList(blocks), nn.Conv2d(widths[-1], 3, 3, padding=1)
+
+
+def decode(blocks, head, y, skips, size):
+    for block in blocks:
+        like = skips.pop() if skips else None
+        y = F.interpolate(y, size=size if like is None else like.shape[-2:])
+        y = block(y if like is None else torch.cat([y, like], 1))
+    return head(y)
+
+
+class LiteUNet(nn.Module):
+    # Blocks, kernel, stride, expansion and channels out of each stage of EfficientNet-Lite0.
+    STAGES = [(1, 3, 1, 1, 16), (2, 3, 2, 6, 24), (2, 5, 2, 6, 40), (3, 3, 2, 6, 80), (3, 5, 1, 6, 112), (4, 5, 2, 6, 192), (1, 3, 1, 6, 320)]
+
+    def __init__(self):
+        super().__init__()
+        self.stem, blocks, channels = Light(3, 32, 3, 2), [], 32
+        for count, kernel, stride, expansion, outputs in self.STAGES:
+            for k in range(count):
+                blocks.append(Inverted(channels, outputs, kernel, stride if k == 0 else 1, expansion))
+                channels = outputs
+        self.blocks = nn.ModuleList(blocks)
+        self.decoder, self.head = decoder([320 + 112, 128 + 40, 64 + 24, 48 + 16, 32], [128, 64, 48, 32, 16])
+
+    def forward(self, x):
+        y, skips = self.stem(x), []
+        for block in self.blocks:
+            if block.halves:
+                skips.append(y)
+            y = block(y)
+        return decode(self.decoder, self.head, y, skips, x.shape[-2:])
+
+
 class UNet(nn.Module):
     def __init__(self):
         super().__init__()
         self.stem = Unit(3, 64, 7, 2, bias=False)
         stages = [(64, 64, 1), (64, 128, 2), (128, 256, 2), (256, 512, 2)]
         self.stages = nn.ModuleList(nn.Sequential(Residual(a, b, s), Residual(b, b, 1)) for a, b, s in stages)
-        inputs = [(512 + 256, 256), (256 + 128, 128), (128 + 64, 64), (64 + 64, 32), (32, 16)]
-        self.decoder = nn.ModuleList(nn.Sequential(Unit(a, b, 3, bias=False), Unit(b, b, 3, bias=False)) for a, b in inputs)
-        self.head = nn.Conv2d(16, 3, 3, padding=1)
+        self.decoder, self.head = decoder([512 + 256, 256 + 128, 128 + 64, 64 + 64, 32], [256, 128, 64, 32, 16])
 
     def forward(self, x):
         size, stem = x.shape[-2:], self.stem(x)
@@ -70,16 +127,14 @@ class UNet(nn.Module):
             y = stage(y)
             skips.append(y)
         skips.pop()
-        for block in self.decoder:
-            like = skips.pop() if skips else None
-            y = F.interpolate(y, size=size if like is None else like.shape[-2:])
-            y = block(y if like is None else torch.cat([y, like], 1))
-        return self.head(y)
+        return decode(self.decoder, self.head, y, skips, size)
 
 
 def network(name):
     if name == "unet":
         return UNet()
+    if name == "lite-unet":
+        return LiteUNet()
     if name == "basic-segnet":
         return SegNet([[(3, 64)]] + [[(64, 64)]] * 3, [[(64, 64)]] * 4, 7, 1, False)
     encoder = [[(3, 64), (64, 64)], [(64, 128), (128, 128)], [(128, 256), (256, 256), (256, 256)], [(256, 512), (512, 512), (512, 512)], [(512, 512)] * 3]
@@ -117,7 +172,7 @@ def ours(name, a):
 if __name__ == "__main__":
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("--set", required=True)
-    p.add_argument("--networks", default="basic-segnet,segnet,unet")
+    p.add_argument("--networks", default="basic-segnet,segnet,unet,lite-unet")
     p.add_argument("--width", type=int, default=480)
     p.add_argument("--height", type=int, default=360)
     p.add_argument("--batch", type=int, default=4)

@@ -76,7 +76,7 @@ fn main() {
         let times = RefCell::new(vec![Instant::now()]);
         let step = |_, _| times.borrow_mut().push(Instant::now());
         let stop = AtomicBool::new(false);
-        let callbacks = Callbacks { step: &step, validation: &|_, _| (), stop: &stop };
+        let callbacks = Callbacks { step: &step, validation: &|_, _| (), warn: &|_| (), stop: &stop };
         session::fit(&plan, None, &machine, folder.path(), &callbacks).expect("a training");
         let times = times.into_inner();
         let learning = asked.batch as f64 / median(times.windows(2).map(|t| (t[1] - t[0]).as_secs_f64()).collect());

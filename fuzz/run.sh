@@ -1,20 +1,51 @@
 #!/bin/sh
 # Fuzzes targets one after the other, so many seconds each: sh fuzz/run.sh 180 scene png …; all of them without names.
-# What libFuzzer finds lies in fuzz/finds/TARGET-*; what it has learnt in fuzz/learnt/TARGET, which is not kept.
+# What libFuzzer finds lies in fuzz/finds/TARGET-*; then the script ends with 1. What it has learnt lies in fuzz/learnt/TARGET, the fewest and
+# shortest files that reach as far: the next run begins with them. Git keeps neither; what was mended is copied to fuzz/corpus/TARGET by hand.
 set -eu
 cd "$(dirname "$0")"
+known=$(sed -n 's/^    ("\([a-z]*\)", [a-z]*),$/\1/p' src/targets.rs)
+usage() {
+    echo "$1: sh fuzz/run.sh SECONDS [TARGET…], targets:" $known >&2
+    exit 2
+}
+[ $# -gt 0 ] || usage "no seconds"
 seconds=$1
 shift
+case $seconds in '' | *[!0-9]*) usage "no number of seconds: $seconds" ;; esac
+for target; do
+    echo "$known" | grep -qx -e "$target" || usage "no target: $target"
+done
+[ $# -gt 0 ] || set -- $known
 # Coverage on a stable compiler: the pass is LLVM's, and its flags are asked for by name.
 export RUSTC_BOOTSTRAP=1
 export RUSTFLAGS="-Ctarget-cpu=x86-64-v3 --cfg fuzzing -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
 -Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table -Cllvm-args=-sanitizer-coverage-trace-compares"
 cargo build --release --target x86_64-unknown-linux-gnu
-[ $# -gt 0 ] || set -- scene species experiment png hdr exr glb obj coco rle phenobench record dataset model safetensors
 mkdir -p finds
+# A target's fuzzer, with the limits of all.
+fuzz() {
+    FUZZ=$target target/x86_64-unknown-linux-gnu/release/furrow-fuzz -timeout=20 -rss_limit_mb=4096 -max_len=65536 \
+        -artifact_prefix="finds/$target-" "$@" 2>&1
+}
+# Replaces what was learnt by the part of it that is needed to reach as far as all of it and the corpus; as it was where that fails.
+minimise() {
+    rm -rf "learnt/$target.least"
+    mkdir "learnt/$target.least"
+    if fuzz -merge=1 "learnt/$target.least" "learnt/$target" "corpus/$target" >"learnt/$target.merge.log"; then
+        rm -rf "learnt/$target"
+        mv "learnt/$target.least" "learnt/$target"
+    else
+        rm -rf "learnt/$target.least"
+        echo "$target: not minimised, see fuzz/learnt/$target.merge.log"
+    fi
+}
 for target; do
     mkdir -p "learnt/$target"
-    FUZZ=$target target/x86_64-unknown-linux-gnu/release/furrow-fuzz -max_total_time="$seconds" -timeout=20 -rss_limit_mb=4096 \
-        -max_len=65536 -print_final_stats=1 -artifact_prefix="finds/$target-" "learnt/$target" "corpus/$target" 2>&1 |
+    echo "$target"
+    fuzz -max_total_time="$seconds" -print_final_stats=1 "learnt/$target" "corpus/$target" |
         tee "learnt/$target.log" | grep -E '^(stat::|SUMMARY|Done|#.*(INITED|DONE))' || true
+    minimise
 done
+found=$(for target; do find finds -name "$target-*"; done)
+[ -z "$found" ] || { echo "found:" $found; exit 1; }

@@ -8,7 +8,7 @@
 use furrow::output::{Picture, write_png};
 use furrow::sampling::{Purpose, Stream};
 use furrow::train::measure::Report;
-use furrow::train::run;
+use furrow::train::run::{self, Results};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -170,4 +170,43 @@ fn what_cannot_be_adapted_is_told() {
     let set = folder.join("day/set");
     let (alone, set, out) = (alone.display(), set.display(), out.display());
     succeed(&format!("adapt {alone} --images {images} --set {set}@all --out {out} --steps 2"));
+}
+
+/// Rationale: who has labels of some photographs wants to see whether self-training helps while it goes on. Expected: with a validation set the log
+/// has its loss and I/U and the event file its pictures; its images decide which weights are kept and nothing of how they are learnt.
+#[test]
+fn a_validation_set_is_logged_and_not_learnt_from() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path();
+    let run = trained(folder);
+    let (photos, val) = (set(&folder.join("photos"), LAMP, 100, false), set(&folder.join("val"), LAMP, 200, true));
+    let adapt = |name: &str, more: &str| -> Results {
+        let out = folder.join(name);
+        let (images, from) = (photos.display(), run.display());
+        succeed(&format!("adapt {from} --images {images} --out {} --steps 5 {more}", out.display()));
+        run::results(&out).unwrap().unwrap()
+    };
+    let without = adapt("without", "");
+    let with = adapt("with", &format!("--val {}@all", val.display()));
+    assert!(without.history.validation.is_empty() && without.best_step.is_none());
+    let [pass] = with.history.validation.as_slice() else { panic!("{:?}", with.history.validation) };
+    assert!(pass.step == 5 && pass.iou.len() == 3 && pass.miou > 0.0 && pass.loss.is_some(), "{pass:?}");
+    assert_eq!(with.best_step, Some(5));
+    assert_eq!(with.history.losses, without.history.losses);
+    // Behind the head, which names the plan: eight bytes of its length, and it.
+    let arrays = |name: &str| {
+        let bytes = weights(&folder.join(name));
+        let head = usize::try_from(u64::from_le_bytes(bytes[..8].try_into().unwrap())).unwrap();
+        bytes[8 + head..].to_vec()
+    };
+    assert!(arrays("with") == arrays("without"), "a validation set moves weights");
+    let log = fs::read_to_string(folder.join("with/log.csv")).unwrap();
+    let cells: Vec<&str> = log.lines().last().unwrap().split(',').collect();
+    assert!(cells.len() == 8 && cells[0] == "5" && cells.iter().all(|cell| !cell.is_empty()), "{log}");
+    let picture = b"photograph, truth, prediction";
+    let has_picture = |name: &str| {
+        let events = fs::read(folder.join(name).join("training.tfevents")).unwrap();
+        events.windows(picture.len()).any(|bytes| bytes == picture)
+    };
+    assert!(has_picture("with") && !has_picture("without"));
 }

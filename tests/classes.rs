@@ -5,7 +5,7 @@
 //! and byte by byte between datasets that got their classes early and late. Source: the native files; EPPO codes from the species files.
 
 use crate::common::dataset::{fail, path, same, succeed, tree, verb};
-use crate::common::program::{SMALL, scratch, trace};
+use crate::common::program::{SMALL, scratch, small_text, trace};
 use furrow::dataset::record::{Plant, Record};
 use furrow::dataset::sample::IGNORE;
 use furrow::dataset::{Sample, Set, native};
@@ -80,7 +80,7 @@ fn expected(set: &Set, samples: &[Sample], category: impl Fn(&str) -> Option<u64
 fn learnt_alike(set: &Set, samples: &[Sample]) {
     use furrow::train::data::bands::Band;
     use furrow::train::data::example::Example;
-    let map = furrow::dataset::classes::Classes::parse(CLASSES).unwrap().of(&set.recipe.species).unwrap();
+    let map = furrow::dataset::classes::Classes::parse(CLASSES).unwrap().of(&set.recipe.species, &[]).unwrap();
     for sample in samples {
         let (split, name) = (sample.record.split.name(), &sample.record.name);
         let written = output::read_gray(&set.folder.join(format!("imagefolder/{split}/masks/{name}.png"))).unwrap().2;
@@ -294,4 +294,70 @@ fn maps_are_kept_as_asked() {
     assert!(!fs::read_to_string(oldest.join("dataset.json")).unwrap().contains("keep"));
     let words = fail(make(&oldest, "3", &["--keep", "depth"]), 2);
     assert!(words.contains("another dataset lies in this folder: keep "), "{words}");
+}
+
+/// Rationale: a robot in view is no soil to learn from. Expected: pixels of the model that the scene file names have no label, those of the others
+/// have the class of all models, by `parts.png`, whose numbers `parts/names.json` tells; a plant's name is its species; a name that no model has
+/// is refused with those that there are.
+#[test]
+fn a_robot_in_view_is_ignored() {
+    const ROBOT: u8 = 101;
+    const MODEL: u8 = 6;
+    const DUMMY: u8 = 102;
+    let (_keep, folder) = scratch();
+    fs::create_dir_all(&folder).unwrap();
+    fs::write(folder.join("plate.obj"), "o plate\nv -2 -2 0\nv 2 -2 0\nv 2 2 0\nv -2 2 0\nf 1 2 3 4\n").unwrap();
+    let plate = |more: &str| format!("(file: \"plate.obj\", up: Z, scale: 0.01, lift_m: 0.2, {more})");
+    let models = [
+        plate("name: \"robot\", class: Soil, position_m: (-0.03, 0)"),
+        plate("class: Soil, position_m: (0.03, 0)"),
+        plate("name: \"dummy\", class: Weed, position_m: (0, 0.06)"),
+    ];
+    let root = env!("CARGO_MANIFEST_DIR");
+    let text = small_text().replacen("lights:", &format!("models: [{}], lights:", models.join(", ")), 1);
+    let text =
+        text.replace("\"textures/", &format!("\"{root}/textures/")).replace("\"scenes/", &format!("\"{root}/scenes/"));
+    let (page, data) = (folder.join("page.ron"), folder.join("data"));
+    fs::write(&page, text).unwrap();
+    let make = |classes: &str| {
+        let mut command = trace(&["dataset", "--scene", path(&page), "--quiet", "--out", path(&data), "--count", "1"]);
+        command.args(["--width", "96", "--spp", "2", "--format", "imagefolder,parts", "--classes", classes]);
+        command
+    };
+    let words = fail(make("soil; crop; weed; ignore=model:tractor"), 2);
+    assert!(words.contains("`model:tractor`") && words.contains("model:robot, model:dummy"), "{words}");
+    let good = fs::read_to_string(&page).unwrap();
+    for taken in ["crop", "BEAVX"] {
+        fs::write(&page, good.replacen("\"robot\"", &format!("\"{taken}\""), 1)).unwrap();
+        let words = fail(make("soil; crop; weed"), 2);
+        assert!(words.contains(&format!("`{taken}` is a role or a species")), "{words}");
+    }
+    fs::write(&page, good).unwrap();
+
+    succeed(make("soil; crop; weed; thing=model; ignore=model:robot"));
+    let (set, samples) = samples(&data);
+    assert_eq!(set.recipe.models(), ["robot", "dummy"]);
+    assert!(set.recipe.species.iter().any(|species| species.name == "dummy" && species.eppo.is_empty()));
+    let names = json(&data.join("parts/names.json"));
+    for (number, expected) in [("101", "model:robot"), ("102", "model:dummy"), ("6", "model")] {
+        assert_eq!(names[number].as_str(), Some(expected));
+    }
+    let sample = &samples[0];
+    let (split, name) = (sample.record.split.name(), &sample.record.name);
+    let class = |(part, semantic): (&u8, &u8)| match *part {
+        ROBOT => IGNORE,
+        MODEL | DUMMY => 3,
+        _ => *semantic,
+    };
+    let expected: Vec<u8> = sample.parts.iter().zip(&sample.semantics).map(class).collect();
+    assert_eq!(output::read_gray(&data.join(format!("imagefolder/{split}/masks/{name}.png"))).unwrap().2, expected);
+    let of_format = output::read_indexed(&data.join(format!("parts/{split}/{name}.png"))).map(|(.., map)| map);
+    assert!(of_format.is_ok_and(|map| map == sample.parts), "parts.png is the format's map");
+    for number in [ROBOT, MODEL] {
+        let places: Vec<usize> = (0..sample.parts.len()).filter(|i| sample.parts[*i] == number).collect();
+        assert!(places.len() > 50, "{} pixels of {number}: nothing is tested", places.len());
+        assert!(places.iter().all(|i| (sample.semantics[*i], sample.plants[*i]) == (0, 0)), "{number} is no plant");
+    }
+    let said = succeed(verb("verify", &data, &["--rerender", "1"])).stderr;
+    assert!(String::from_utf8_lossy(&said).contains("; 0 faults"), "{}", String::from_utf8_lossy(&said));
 }

@@ -430,3 +430,25 @@ fn full_and_closed_streams_end_no_work() {
         its_answer_is_not_lost_unseen(env!("CARGO_BIN_EXE_train"), folder.path(), &[verb]);
     }
 }
+
+/// Rationale: the driver's library prints an error that is none where there is no window system, as on servers and in containers. Expected: without
+/// that variable the program says no more than with it, whatever renders.
+#[cfg(target_os = "linux")]
+#[test]
+fn no_window_system_is_no_error() {
+    let folder = folder();
+    let engines: &[&str] = if cfg!(feature = "raster") { &["trace", "raster"] } else { &["trace"] };
+    for &engine in engines {
+        let said = [None, Some("/tmp")].map(|place| {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_trace"));
+            command.current_dir(folder.path()).env_remove("XDG_RUNTIME_DIR");
+            command.envs(place.map(|place| ("XDG_RUNTIME_DIR", place)));
+            let arguments = ["--scene", "page.ron", "--spp", "1", "--quiet", "--engine", engine, "--out", engine];
+            let done = command.args(arguments).output().unwrap();
+            assert_eq!(done.status.code(), Some(0), "{engine}: {}", text(&done.stderr));
+            text(&done.stderr)
+        });
+        assert_eq!(said[0], said[1], "{engine}");
+        assert!(!said[0].contains("error") && !said[0].contains("XDG_RUNTIME_DIR"), "{engine}: {}", said[0]);
+    }
+}

@@ -13,6 +13,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Output, Stdio};
 use std::time::{Duration, Instant};
 
+mod scratch;
+
 /// Begins a dataset of `count` images, each of which takes about a second.
 fn plan(folder: &Path, count: u64) {
     plan_with(folder, count, &[]);

@@ -5,8 +5,9 @@
 //! command ends with the bytes of an undisturbed run. Source: none needed, equality is exact.
 
 use crate::common::dataset::{path, same, succeed, tree};
-use crate::common::faults::{self, Ended, moments};
+use crate::common::faults::{self, Tree, as_nobody, each_is_gone_on_from, failed_well, misdate, open_to_all};
 use crate::common::program::{FILES, SMALL, names, scratch, trace};
+use furrow::output::{Picture, write_png};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
@@ -14,20 +15,6 @@ use std::process::Command;
 /// One small image.
 fn image(out: &Path, seed: &str) -> Command {
     trace(&["--scene", SMALL, "--spp", "1", "--width", "24", "--quiet", "--seed", seed, "--out", path(out)])
-}
-
-/// What must hold of a program that could not write.
-fn failed_well(ended: &Ended, folder: &Path, at: u64) {
-    // A scene file with old words is warned about first.
-    let said: Vec<String> = ended.said().lines().filter(|l| !l.starts_with("warning: ")).map(str::to_owned).collect();
-    let said = said.join("\n");
-    let what = format!("change {at}, {}: {said}", ended.failed);
-    assert_eq!(ended.output.status.code(), Some(1), "{what}");
-    assert!(said.starts_with("error: ") && said.matches("error: ").count() == 1, "{what}");
-    assert!(said.contains("\n help: "), "{what}");
-    if folder.exists() {
-        assert!(tree(folder).keys().all(|name| !name.contains(".furrow-")), "{what}");
-    }
 }
 
 /// Expected: whatever fails, the old image stays as it is, renamed files put back; where the disk fails for good after the first of them has its
@@ -89,71 +76,98 @@ fn restore(folder: &Path, files: &BTreeMap<String, Vec<u8>>) {
     }
 }
 
-#[test]
-fn a_dataset_that_meets_a_fault_goes_on_to_the_same_bytes() {
-    let make = |data: &Path| {
-        let mut command =
-            trace(&["dataset", "--scene", "tests/data/dataset/scene/field.ron", "--quiet", "--out", path(data)]);
-        command.args(["--count", "2", "--width", "32", "--spp", "1", "--threads", "1", "--format", "imagefolder"]);
-        command
-    };
-    let (_keep, whole) = scratch();
-    let undisturbed = faults::run(make(&whole), &whole, 0, false);
-    assert!(undisturbed.output.status.success(), "{}", undisturbed.said());
-    let whole = tree(&whole);
-    for at in moments(undisturbed.changes, 16) {
-        let (_keep, data) = scratch();
-        let ended = faults::run(make(&data), &data, at, at % 2 == 0);
-        failed_well(&ended, &data, at);
-        // Whatever has its final name is whole; lists of formats grow with the images.
-        let there = if data.exists() { tree(&data) } else { BTreeMap::new() };
-        for (name, bytes) in there {
-            if name.starts_with("images/") || name.starts_with("seals/") || name.starts_with("scene/") {
-                assert_eq!(Some(&bytes), whole.get(&name), "change {at}: {name}");
-            }
-        }
-        succeed(make(&data));
-        same(&tree(&data), &whole);
+/// A dataset of tiny images on one thread.
+fn dataset(data: &Path, count: &str) -> Command {
+    let mut command =
+        trace(&["dataset", "--scene", "tests/data/dataset/scene/field.ron", "--quiet", "--out", path(data)]);
+    command.args(["--count", count, "--width", "32", "--spp", "1", "--threads", "1"]);
+    command
+}
+
+/// Whatever has its final name is whole, the lists of all images left out: those grow with the images. What goes into archives lies `beside` them
+/// before.
+fn is_whole(there: &Tree, whole: &Tree, beside: &Tree, what: &str) {
+    let folders = ["images/", "packs/", "seals/", "scene/"];
+    for (name, bytes) in there.iter().filter(|(name, _)| folders.iter().any(|f| name.starts_with(f))) {
+        let expected = whole.get(name).or_else(|| beside.get(name));
+        assert!(expected == Some(bytes), "{what}: {name} is not that of an undisturbed run");
     }
 }
 
+#[test]
+fn a_dataset_that_meets_a_fault_goes_on_to_the_same_bytes() {
+    let make = |data: &Path| {
+        let mut command = dataset(data, "2");
+        command.args(["--format", "imagefolder"]);
+        command
+    };
+    each_is_gone_on_from(&make, None, 16, &|there, whole, what| is_whole(there, whole, &Tree::new(), what));
+}
+
+/// Expected: no archive is half under its name, whatever change fails; images wait in folders of their own until theirs is whole.
+#[test]
+fn a_packed_dataset_that_meets_a_fault_goes_on_to_the_same_bytes() {
+    let (_keep, folders) = scratch();
+    let make = |data: &Path| {
+        let mut command = dataset(data, "3");
+        command.args(["--split", "1,0,0"]);
+        command
+    };
+    succeed(make(&folders));
+    let beside = tree(&folders);
+    let packed = |data: &Path| {
+        let mut command = make(data);
+        command.args(["--pack", "2"]);
+        command
+    };
+    for (within, between) in [(None, 6), (Some("packs"), 5)] {
+        each_is_gone_on_from(&packed, within, between, &|there, whole, what| is_whole(there, whole, &beside, what));
+    }
+}
+
+/// Three photographs with masks in folders for training and validation.
+fn photographs(root: &Path) {
+    let (w, h) = (13, 9);
+    let masks: Vec<u8> = (0..w * h).map(|i| u8::from(i % w > 4) + u8::from(i % w > 9)).collect();
+    for (k, name) in ["train/a.png", "train/b.png", "val/c.png"].into_iter().enumerate() {
+        let rgb: Vec<[u8; 3]> = (0..w * h).map(|i| [i as u8, (3 * i) as u8, 40 * k as u8]).collect();
+        write_png(&root.join("photos").join(name), w, h, &Picture::Rgb(&rgb), "").expect("a photograph");
+        write_png(&root.join("masks").join(name), w, h, &Picture::Gray(&masks), "").expect("a mask");
+    }
+}
+
+#[test]
+fn an_import_that_meets_a_fault_goes_on_to_the_same_bytes() {
+    let (_keep, source) = scratch();
+    photographs(&source);
+    let (photos, masks) = (source.join("photos"), source.join("masks"));
+    let make = |data: &Path| {
+        let from = ["--format", "masks", "--images", path(&photos), "--masks", path(&masks)];
+        let mut command = trace(&["dataset", "import", "--quiet", "--threads", "1", "--out", path(data)]);
+        command.args(from);
+        command
+    };
+    each_is_gone_on_from(&make, None, 12, &|there, whole, what| is_whole(there, whole, &Tree::new(), what));
+}
+
 /// Rationale: shared folders hold other people's files, and clocks jump. Expected: what cannot be read or written is one error; a clock set
-/// back by years changes nothing, for no file holds a time and none is trusted by its age.
+/// back or ahead by years changes nothing, for no file holds a time and none is trusted by its age.
 #[test]
 fn files_of_another_user_and_old_clocks_are_an_error_or_the_same_result() {
     let (_keep, data) = scratch();
-    let make = || {
-        let mut command =
-            trace(&["dataset", "--scene", "tests/data/dataset/scene/field.ron", "--quiet", "--out", path(&data)]);
-        command.args(["--count", "2", "--width", "32", "--spp", "1"]);
-        command
-    };
+    let make = || dataset(&data, "2");
     succeed(make());
     let whole = tree(&data);
-    let long_ago = std::time::SystemTime::UNIX_EPOCH + std::time::Duration::from_secs(86400);
-    for name in whole.keys() {
-        let file = std::fs::File::options().write(true).open(data.join(name)).expect("a file");
-        file.set_modified(long_ago).expect("a time");
-    }
+    misdate(&data);
     std::fs::remove_file(data.join("seals/000001.json")).expect("a seal");
     succeed(make());
     same(&tree(&data), &whole);
     // Root reads and writes what belongs to others: nobody cannot.
-    let as_nobody = |mut inner: Command| {
-        let mut command = Command::new("setpriv");
-        command.args(["--reuid", "65534", "--clear-groups"]).arg(inner.get_program()).args(inner.get_args());
-        command.current_dir(env!("CARGO_MANIFEST_DIR"));
-        inner.env_clear();
-        command.output()
-    };
-    let Ok(output) = as_nobody(trace(&["--version"])) else { return };
-    if !output.status.success() {
-        // A right that a machine may withhold.
-        return;
-    }
+    let Some(mut command) = as_nobody(&make()) else { return };
+    open_to_all(&data, 0o755);
     std::fs::remove_file(data.join("seals/000001.json")).expect("a seal");
     let before = tree(&data);
-    let output = as_nobody(make()).expect("the program");
+    let output = command.output().expect("the program");
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.starts_with("error: ") && said.contains("Permission denied") && said.contains(" help: "), "{said}");

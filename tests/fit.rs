@@ -372,8 +372,8 @@ fn batches_do_not_depend_on_threads_or_on_where_a_training_goes_on() {
         Arc::new(Store::open(&[all], Pick::All, 1, &Classes::default(), &shape, false, memory).unwrap())
     };
     let (seed, batch, crop_size) = (3, 3, (32, 24));
-    let order =
-        Order { seed, batch, crop_size, rare: 0.5, augment: Augment::default(), normalization: Normalization::Image };
+    let (augment, normalization) = (Augment::default(), Normalization::Image);
+    let order = Order { seed, batch, crop_size, rare: 0.5, augment, pixels: None, normalization };
     let batches = |memory, from, threads| -> Vec<_> {
         Loader::start(&store(memory), &order, from, 12, threads).unwrap().map(|b| b.unwrap()).collect()
     };

@@ -62,7 +62,7 @@ fn stand() -> (Vec<Part>, Vec<Part>) {
     let plants = plants();
     for k in 0..7 {
         let rotation = Mat3::from_axis_angle(unit(&mut s), s.range32(0.0, 6.0));
-        let at = Arc::new(Placement { rotation, offset: point(&mut s, 0.8) });
+        let at = Arc::new(Placement { rotation, scale: 0.7 + 0.1 * k as f32, offset: point(&mut s, 0.8) });
         all.extend(plants[k % 2].iter().map(|(mesh, mask)| part(mesh.clone(), mask.clone(), Some(at.clone()))));
     }
     all.push(own(-0.8));
@@ -262,7 +262,41 @@ fn instances_do_not_depend_on_threads_or_the_view() {
         let turned = heading.distance(heading_there);
         assert!(organs == organs_there && turned < 0.1, "plant {id}: {organs}, {organs_there} organs, {turned} apart");
         assert!(at.offset.truncate().distance(at_there.offset.truncate()) < 1e-5, "plant {id}");
+        assert_eq!(at.scale, at_there.scale, "plant {id}");
     }
+}
+
+/// Expected: instances of one plant have sizes of their own; heights, radii and lengths of leaves go with them, leaf areas with their squares.
+#[test]
+fn instances_have_sizes_of_their_own() {
+    let field = meadow("Instanced", 0.0);
+    let traits = Traits::of(&field);
+    let plants: BTreeMap<u32, &PlantRecord> = field.plants.iter().map(|p| (p.number, p)).collect();
+    // Who has the same first mesh is an instance of the same plant.
+    let (mut worn, mut known) = (BTreeMap::<*const Mesh, Vec<(f32, u32)>>::new(), BTreeSet::new());
+    for part in &field.scene.parts {
+        if let Some(at) = part.instance.as_ref().filter(|_| known.insert(part.tag.plant)) {
+            worn.entry(Arc::as_ptr(&part.mesh)).or_default().push((at.scale, part.tag.plant));
+        }
+    }
+    let leaves = |plant: u32| -> Vec<_> {
+        traits.leaves.range((plant, 0)..=(plant, u16::MAX)).map(|(_, leaf)| (leaf.length_m, leaf.width_m)).collect()
+    };
+    let mut compared = 0;
+    for pair in worn.values().flat_map(|wearers| wearers.windows(2)) {
+        let [(one, a), (other, b)] = [pair[0], pair[1]];
+        assert!(one != other && (one / other).ln().abs() < 0.22, "plants {a} and {b}: {one} and {other}");
+        let near = |x: f32, y: f32, power: i32| (y / x / (other / one).powi(power) - 1.0).abs() < 2e-3;
+        let (p, q) = (plants[&a], plants[&b]);
+        assert!(near(p.height, q.height, 1) && near(p.radius, q.radius, 1), "plants {a} and {b}");
+        let areas = [a, b].map(|plant| traits.plants[&plant].leaf_area_m2);
+        assert!(near(areas[0], areas[1], 2), "plants {a} and {b}: {areas:?}");
+        let (small, large) = (leaves(a), leaves(b));
+        assert!(!small.is_empty() && small.len() == large.len(), "plants {a} and {b}");
+        assert!(small.iter().zip(&large).all(|(x, y)| near(x.0, y.0, 1) && near(x.1, y.1, 1)), "plants {a} and {b}");
+        compared += 1;
+    }
+    assert!(compared > 100, "{compared}");
 }
 
 /// Expected: leaf area, height and cover of a field of instances are those of its copies in the world.

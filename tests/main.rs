@@ -27,6 +27,7 @@ mod denoise;
 mod dependencies;
 #[cfg(feature = "train")]
 mod deploy;
+mod detail;
 mod determinism;
 mod documents;
 mod drive;
@@ -39,6 +40,8 @@ mod explain;
 mod extents;
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 mod faults;
+#[cfg(all(feature = "train", target_os = "linux", target_arch = "x86_64"))]
+mod faults_train;
 mod fields;
 mod figures;
 #[cfg(feature = "train")]
@@ -62,6 +65,8 @@ mod output;
 mod packs;
 mod pages;
 mod photo;
+#[cfg(feature = "train")]
+mod pixel_size;
 mod python;
 #[cfg(feature = "raster")]
 mod raster;

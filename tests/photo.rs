@@ -135,7 +135,7 @@ fn all_readers_have_the_pixels_of_the_file() {
 fn learnt_alike(set: &Set, sample: &Sample) {
     use furrow::dataset::classes::Classes;
     use furrow::train::data::{Band, Example};
-    let map = Classes::default().of(&set.recipe.species).unwrap();
+    let map = Classes::default().of(&set.recipe.species, &[]).unwrap();
     let bands = [Band::Blue, Band::Gray("nir".into())];
     let (_, learnt) = Example::read_whole(set, sample.record.index, &map, 0.0, &bands, false).unwrap();
     let blue: Vec<u8> = sample.rgb.iter().map(|pixel| pixel[2]).collect();

@@ -172,6 +172,36 @@ fn a_disk_that_fails_is_told_and_the_table_goes_on() {
     same(&files(&out), &expected);
 }
 
+/// Expected: files from the past and from the future change nothing; a folder of another user is one error, and stays as it is.
+#[cfg(all(target_os = "linux", target_arch = "x86_64"))]
+#[test]
+fn files_of_another_user_and_jumping_clocks_are_an_error_or_the_same_tables() {
+    use crate::common::faults::{as_nobody, misdate, open_to_all};
+    let (_, expected, _) = whole();
+    let (_keep, out) = scratch();
+    let mut copy = Command::new("cp");
+    copy.arg("-r").args([expected, &out]);
+    succeed(copy);
+    std::fs::remove_dir_all(out.join("runs/unet/synthetic/seed-1")).expect("a run");
+    for lost in ["sets/small/seals/000001.json", "table-1.md"] {
+        std::fs::remove_file(out.join(lost)).expect("a file");
+    }
+    misdate(&out);
+    if let Some(mut command) = as_nobody(&table(&out, &[])) {
+        open_to_all(desk(), 0o755);
+        open_to_all(&out, 0o755);
+        let before = tree(&out);
+        let output = command.output().expect("the program");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(said.starts_with("error: ") && said.contains("Permission denied"), "{said}");
+        assert!(said.contains("\n help: "), "{said}");
+        same(&tree(&out), &before);
+    }
+    succeed(table(&out, &[]));
+    same(&files(&out), &files(expected));
+}
+
 #[test]
 fn two_shards_at_the_same_time_make_the_whole() {
     let (_, expected, _) = whole();

@@ -1,19 +1,28 @@
 //! What is fuzzed: each target takes bytes as a file from elsewhere and reads them as the program does. A refusal is a good answer; a panic, a
 //! hang and memory without bound are finds.
 
+use furrow::dataset::checksum::Checksum;
+use furrow::dataset::checksum_record::ChecksumRecord;
 use furrow::dataset::import::{Source, coco::Coco, phenobench::PhenoBench};
-use furrow::dataset::{Recipe, native, rle::Rle};
+use furrow::dataset::{Callbacks, Recipe, Set, Work, generate, native, rle::Rle};
 use furrow::model::{Model, Up};
 use furrow::output;
 use furrow::plant::{self, Stage};
 use furrow::ron_file::RonFile;
 use furrow::sampling::{Purpose, Stream};
+use furrow::scene::assemble::{self, Options};
 use furrow::scene::desc::{FieldDesc, SpeciesDesc};
 use furrow::texture::panorama::Panorama;
-use furrow::texture::{ColorSpace, Texture};
-use furrow::train::run::TrainedModel;
+use furrow::texture::{ColorSpace, Texture, draw};
+use furrow::train::fit::checkpoint::{self, Checkpoint};
+use furrow::train::run::{self, Identity, TrainedModel};
 use furrow::train::table::{Experiment, ExperimentDesc};
+use furrow::train::weights::{self, Array};
+use serde_json::Value;
+use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use tempfile::TempDir;
 
 /// A target: its name, which is that of its folder in the corpus, and what it does.
@@ -36,6 +45,15 @@ pub(crate) const TARGETS: &[Target] = &[
     ("dataset", dataset),
     ("model", model),
     ("safetensors", safetensors),
+    ("jpeg", jpeg),
+    ("gltf", gltf),
+    ("mtl", mtl),
+    ("texture", texture),
+    ("poses", poses),
+    ("pack", pack),
+    ("archive", archive),
+    ("plan", plan),
+    ("checkpoint", checkpoint),
 ];
 
 /// Most triangles of a plant that is grown.
@@ -169,6 +187,140 @@ fn model(bytes: &[u8]) {
 fn safetensors(bytes: &[u8]) {
     let folder = folder(&[("a.safetensors", bytes)]);
     let path = folder.path().join("a.safetensors");
-    let _ = furrow::train::weights::read(&path);
-    let _ = furrow::train::weights::read_foreign(&path);
+    let _ = weights::read(&path);
+    let _ = weights::read_foreign(&path);
+}
+
+fn jpeg(bytes: &[u8]) {
+    let _ = Texture::decode(bytes, ColorSpace::Srgb);
+    let folder = folder(&[("a.jpg", bytes)]);
+    let path = folder.path().join("a.jpg");
+    let _ = output::photo_size(&path);
+    let _ = output::read_color_photo(&path);
+    let _ = output::read_gray_photo(&path);
+}
+
+/// Places and texture coordinates of a triangle, as glTF has them: nine numbers and six.
+fn triangle() -> Vec<u8> {
+    let numbers = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0];
+    numbers.iter().flat_map(|number: &f32| number.to_le_bytes()).collect()
+}
+
+fn gltf(bytes: &[u8]) {
+    let folder = folder(&[("a.gltf", bytes), ("a.bin", &triangle()), ("a.png", &picture())]);
+    let _ = Model::load(&folder.path().join("a.gltf"), Up::Y);
+}
+
+fn mtl(bytes: &[u8]) {
+    let square = b"mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nusemtl m\nf 1/1 2/2 3/3\n";
+    let folder = folder(&[("a.obj", square), ("a.mtl", bytes), ("a.png", &picture())]);
+    let _ = Model::load(&folder.path().join("a.obj"), Up::Z);
+}
+
+/// Most pixels across and down of a texture that is drawn.
+const MOST_PIXELS: f64 = 32.0;
+
+fn texture(bytes: &[u8]) {
+    let Some(page) = text(bytes) else { return };
+    let Ok(recipe) = page.parse_all::<draw::Recipe>() else { return };
+    let side = match &recipe {
+        draw::Recipe::Leaf(leaf) => leaf.size.get() * leaf.aspect.get().max(1.0),
+        draw::Recipe::Soil(soil) => soil.size.get(),
+    };
+    if side <= MOST_PIXELS {
+        let _ = draw::draw(&recipe);
+    }
+}
+
+fn poses(bytes: &[u8]) {
+    let scene = r#"Field(
+        camera: Pinhole(size: (8, 6), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.5)),
+        lights: [Constant(radiance: (1, 1, 1, 1))],
+        drive: (frames: 2, path: Poses("a.tum")),
+        models: [(file: "a.obj", class: Soil, up: Z)],
+    )"#;
+    let plane = b"v -2 -2 0\nv 2 -2 0\nv 2 2 0\nf 1 2 3\n";
+    let folder = folder(&[("a.ron", scene.as_bytes()), ("a.obj", plane), ("a.tum", bytes)]);
+    if let Ok(source) = assemble::Source::open(&folder.path().join("a.ron")) {
+        let _ = source.estimate(&Options::default());
+    }
+}
+
+/// A dataset of two images in one pack.
+const PACKED: &str = r#"{
+    "furrow": "0.1.0", "made": {"imported": {"from": "masks", "source_sha256": ""}}, "count": 2,
+    "split": [1, 0, 0], "formats": [], "pack": 2, "licence": "", "species": []
+}"#;
+
+/// A pack's record with these contents and the hash that belongs to them, for without it nothing of it is read; `None` where it would be none.
+fn record_of_pack(bytes: &[u8]) -> Option<(String, Vec<ChecksumRecord>)> {
+    let value: Value = serde_json::from_slice(bytes).ok()?;
+    let tar: Checksum = serde_json::from_value(value["tar"].clone()).ok()?;
+    let members: BTreeMap<String, (u64, u64)> = serde_json::from_value(value["members"].clone()).ok()?;
+    let images: Vec<ChecksumRecord> = serde_json::from_value(value["images"].clone()).ok()?;
+    let tar = serde_json::to_string(&tar).ok()?;
+    let members = serde_json::to_string(&members).ok()?;
+    let listed = serde_json::to_string(&images).ok()?;
+    let open = format!("{{\"pack\":\"train-000000\",\"tar\":{tar},\"members\":{members},\"images\":{listed}");
+    let hash = Checksum::of(format!("{open}}}\n").as_bytes()).sha256;
+    Some((format!("{open},\"seal_sha256\":\"{hash}\"}}"), images))
+}
+
+fn pack(bytes: &[u8]) {
+    let Some((record, images)) = record_of_pack(bytes) else { return };
+    let files = [
+        ("dataset.json", PACKED.as_bytes()),
+        ("seals/train-000000.json", record.as_bytes()),
+        ("packs/train-000000.tar", &[0x20_u8; 4096][..]),
+    ];
+    let folder = folder(&files);
+    let set = Set::open(folder.path()).expect("a dataset");
+    if images.len() == 1 && images[0].index == 0 {
+        assert!(set.checksums(0).is_some(), "a record with its own hash is read");
+    }
+    for index in 0..2 {
+        if let Some(image) = set.checksums(index) {
+            let _ = set.faults(&image);
+        }
+        let _ = set.sample(index);
+    }
+}
+
+/// An archive whose record is lost is taken apart where the manifest lists it: nothing of it may land beside the dataset.
+fn archive(bytes: &[u8]) {
+    let sum = serde_json::to_string(&Checksum::of(bytes)).expect("JSON");
+    let manifest = format!("{{\"recipe\":{PACKED},\"files\":{{\"packs/train-000000.tar\":{sum}}}}}");
+    let files = [
+        ("set/dataset.json", PACKED.as_bytes()),
+        ("set/manifest.json", manifest.as_bytes()),
+        ("set/packs/train-000000.tar", bytes),
+    ];
+    let folder = folder(&files);
+    let set = Set::open(&folder.path().join("set")).expect("a dataset");
+    let work = Work { threads: 1, at_once: 1, ..Work::default() };
+    // Stopped before the first image is made: archives are taken apart before.
+    let (soon, now) = (AtomicBool::new(true), Arc::new(AtomicBool::new(false)));
+    let callbacks = Callbacks { begin: &|_| (), warn: &|_| (), done: &|_| (), soon: &soon, now: &now };
+    let _ = generate::generate(&set, &work, &callbacks);
+    assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1, "something lies beside the dataset");
+}
+
+fn plan(bytes: &[u8]) {
+    let folder = folder(&[("plan.json", bytes)]);
+    if let Ok(identity) = run::read_json::<Identity>(&folder.path().join(run::PLAN)) {
+        let _ = identity.hash();
+        let _ = identity.claim(folder.path());
+    }
+}
+
+/// The words of a checkpoint beside arrays that are whole: a checksum over both would keep all others out.
+fn checkpoint(bytes: &[u8]) {
+    let Ok(words) = std::str::from_utf8(bytes) else { return };
+    let array = |name: &str| Array { name: name.into(), shape: vec![2], values: vec![0.5, -1.0] };
+    let folder = folder(&[]);
+    let arrays = ["values/a", "memory/a", "best/a"].map(array);
+    weights::write(&folder.path().join(checkpoint::FILE), &arrays, words).expect("a file");
+    if let Ok(Some(read)) = Checkpoint::read(folder.path(), "plan") {
+        let _ = (read.history.best(), read.history.last(), read.history.since_best());
+    }
 }

@@ -204,7 +204,7 @@ fn instances(device: &Arc<rtc::Device>, surfaces: &[Surface<'_>], quick: bool) -
     let shared: Vec<Shared> = distinct.par_iter().map(share).collect::<Result<_>>()?;
     let place = |(first, group, at): &Group<'_>| {
         let (scene, slots) = &shared[numbers[&key(group)]];
-        let (turned, offset) = (at.rotation, at.offset);
+        let (turned, offset) = (at.matrix(), at.offset);
         let geometry = rtc::Geometry::instance(scene, [turned.x_axis, turned.y_axis, turned.z_axis, offset])?;
         Ok((Instance { first: *first, slots: slots.clone() }, Arc::new(geometry)))
     };

@@ -2,11 +2,10 @@
 
 use super::sample::{BsdfSample, Scatter, cosine, facing};
 use crate::math::{Spectrum, Vec3};
+use crate::optics::soil::facets;
 use std::f32::consts::FRAC_1_PI;
 
-/// Oren & Nayar 1994, the qualitative model: `f = ρ/π (A + B max(0, cos Δφ) sin α tan β)`.
-/// Never returns more than a Lambert surface of the same albedo, which it is for σ = 0: the model as printed returns
-/// ρ (A + B/2) at grazing angles, up to 1.5 % too much for small σ, so A and B are divided by that where it exceeds one.
+/// Oren & Nayar 1994, the qualitative model: `f = ρ/π (A + B max(0, cos Δφ) sin α tan β)`, with A and B of [`facets`].
 #[derive(Clone, Copy, Debug)]
 pub struct OrenNayar {
     albedo: Spectrum,
@@ -17,10 +16,8 @@ pub struct OrenNayar {
 impl OrenNayar {
     /// `albedo` 0–1 per band; `sigma`: standard deviation of the facets' slope angle, radians, 0–1.
     pub fn new(albedo: Spectrum, sigma: f32) -> Self {
-        let s = sigma * sigma;
-        let (a, b) = (1.0 - 0.5 * s / (s + 0.33), 0.45 * s / (s + 0.09));
-        let most = (a + 0.5 * b).max(1.0);
-        Self { albedo, a: a / most, b: b / most }
+        let [a, b] = facets(sigma);
+        Self { albedo, a, b }
     }
 
     /// The albedo it was made with.

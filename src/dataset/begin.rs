@@ -51,7 +51,7 @@ fn go_on(folder: &Path, mut recipe: Recipe, files: &[File]) -> Result<Recipe> {
 }
 
 /// Writes the files that are not there as they are to be: others may be reading them.
-fn write_changed(folder: &Path, files: &[File]) -> Result<()> {
+pub(super) fn write_changed(folder: &Path, files: &[File]) -> Result<()> {
     let changed =
         |file: &&File| !crate::input::contents(&folder.join(&file.path)).is_ok_and(|there| there == file.bytes);
     let changed: Vec<File> = files.iter().filter(changed).cloned().collect();

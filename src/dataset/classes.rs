@@ -7,6 +7,7 @@
 //! | soil, crop, weed | a class of `semantics.png` |
 //! | a species | of the set's table, by its name or EPPO code; wins over the class that it belongs to |
 //! | an organ, or what lies on the ground | of `parts.png`, such as petiole or stone; wins over both |
+//! | `model:NAME` | a model from disk that the scene file names, of `parts.png` too; wins over `model`, which is all of them |
 //!
 //! A pixel that no class claims has no label, nor has one that the class named `ignore` claims.
 
@@ -20,6 +21,10 @@ use std::fmt;
 
 /// The labels of `semantics.png` by their number.
 const SEMANTICS: [&str; 3] = ["soil", "crop", "weed"];
+
+/// The label of all models from disk, and what that of a named one begins with.
+const MODEL: &str = "model";
+const OF_NAME: &str = "model:";
 
 /// The class whose labels are none.
 const IGNORED: &str = "ignore";
@@ -157,26 +162,27 @@ impl Classes {
 
     /// Whether an organ or a thing on the ground is a class of its own, which only `parts.png` tells.
     pub fn needs_parts(&self) -> bool {
-        self.0.iter().flat_map(|class| &class.labels).any(|label| part(label).is_some())
+        self.0.iter().flat_map(|class| &class.labels).any(|label| is_part(label))
     }
 
     /// Those that plants may have: all but those of soil, organs and things on the ground alone.
     pub fn of_plants(&self) -> Vec<u8> {
-        let plant = |label: &String| label != SEMANTICS[0] && part(label).is_none();
+        let plant = |label: &String| label != SEMANTICS[0] && !is_part(label);
         let places = (0..).zip(self.counted()).filter(|(_, class)| class.labels.iter().any(plant));
         places.map(|(place, _)| place).collect()
     }
 
-    /// Which class every label is, in a set that numbers these species. An error for labels that it does not have.
-    pub fn of(&self, species: &[SpeciesRecord]) -> Result<Map> {
+    /// Which class every label is, in a set that numbers these species and names these models. An error for labels that it does not have.
+    pub fn of(&self, species: &[SpeciesRecord], models: &[String]) -> Result<Map> {
         let records = species;
         let species: Vec<[&str; 2]> = species.iter().map(|s| [s.name.as_str(), s.eppo.as_str()]).collect();
         let known = |label: &str| {
             let is = |other: &&str| other.eq_ignore_ascii_case(label);
-            SEMANTICS.contains(&label) || part(label).is_some() || species.iter().flatten().any(is)
+            let named = label.strip_prefix(OF_NAME).is_some_and(|name| models.iter().any(|model| model == name));
+            SEMANTICS.contains(&label) || part(label).is_some() || named || species.iter().flatten().any(is)
         };
         if let Some(label) = self.0.iter().flat_map(|class| &class.labels).find(|label| !known(label)) {
-            return Err(unknown(label, records));
+            return Err(unknown(label, records, models));
         }
         for names in &species {
             let is = |label: &&String| names.iter().any(|name| name.eq_ignore_ascii_case(label));
@@ -197,6 +203,12 @@ impl Classes {
             parts.resize(parts.len().max(usize::from(*number) + 1), None);
             parts[usize::from(*number)] = place(&|label| label == *name);
         }
+        for (k, name) in (0..=u8::MAX).zip(models) {
+            let number = usize::from(PartKind::Named(k).number());
+            parts.resize(parts.len().max(number + 1), None);
+            let own = place(&|label| label.strip_prefix(OF_NAME) == Some(name.as_str()));
+            parts[number] = own.or_else(|| place(&|label| label == MODEL));
+        }
         Ok(Map {
             semantics: SEMANTICS.map(|name| place(&|label| label == name)),
             species: species.iter().map(of_species).collect(),
@@ -211,10 +223,16 @@ fn part(label: &str) -> Option<u8> {
     known.map(|(number, ..)| *number)
 }
 
+/// Whether only `parts.png` tells where a label is.
+fn is_part(label: &str) -> bool {
+    part(label).is_some() || label.starts_with(OF_NAME)
+}
+
 /// A label that the set does not have.
-fn unknown(label: &str, species: &[SpeciesRecord]) -> Error {
+fn unknown(label: &str, species: &[SpeciesRecord], models: &[String]) -> Error {
     let parts = PartKind::NUMBERED.iter().map(|(_, name, ..)| *name).filter(|name| part(name).is_some());
-    let others: Vec<&str> = SEMANTICS.into_iter().chain(parts).collect();
+    let others = SEMANTICS.into_iter().chain(parts).map(str::to_owned);
+    let others: Vec<String> = others.chain(models.iter().map(|name| format!("{OF_NAME}{name}"))).collect();
     let told = |s: &SpeciesRecord| {
         if s.eppo.is_empty() { s.name.clone() } else { format!("{} ({})", s.name, s.eppo) }
     };
@@ -299,13 +317,13 @@ mod tests {
         };
         let table = [species("fat hen", "CHEAL"), species("thistle", "CIRAR")];
         for twice in ["soil; a=CHEAL; b=fat hen; weed", "soil; a=cheal; b=CHEAL; weed"] {
-            let said = Classes::parse(twice).unwrap().of(&table).unwrap_err().to_string();
+            let said = Classes::parse(twice).unwrap().of(&table, &[]).unwrap_err().to_string();
             assert!(said.contains("fat hen (CHEAL) belongs to `a` and to `b`"), "{said}");
         }
         let classes = Classes::parse("soil; ignore=thistle,stick; hen=cheal; weed; stone").unwrap();
         assert_eq!(classes.names(), ["soil", "hen", "weed", "stone"]);
         assert_eq!((classes.of_plants(), classes.needs_parts()), (vec![1, 2], true));
-        let map = classes.of(&table).unwrap();
+        let map = classes.of(&table, &[]).unwrap();
         let number = |name: &str| part(name).unwrap();
         let (semantics, species, parts) = (
             [0, 0, 0, 2, 2, 2, 1],
@@ -314,7 +332,25 @@ mod tests {
         );
         assert_eq!(map.labels(&semantics, &species, &parts), [0, 3, IGNORE, 1, IGNORE, 2, IGNORE]);
         assert_eq!([(2, 1), (2, 2), (2, 0), (1, 0)].map(|(c, s)| map.of_plant(c, s)), [Some(1), None, Some(2), None]);
-        assert!(Classes::parse("soil; a=HORSE; weed").unwrap().of(&table).is_err());
+        assert!(Classes::parse("soil; a=HORSE; weed").unwrap().of(&table, &[]).is_err());
+    }
+
+    /// Expected: a named model has the class of its name, another one that of all models; without either it is the soil that it is drawn as. A
+    /// name that the set does not have is told with those that it has.
+    #[test]
+    fn models_are_told_apart_by_their_names() {
+        let names = ["robot".to_owned(), "box".to_owned()];
+        let pixels = |text: &str| {
+            let classes = Classes::parse(text).unwrap();
+            assert!(classes.needs_parts() && classes.of_plants() == [1]);
+            let parts = [1, 6, 101, 102];
+            classes.of(&[], &names).unwrap().labels(&[0; 4], &[], &parts)
+        };
+        assert_eq!(pixels("soil; crop; ignore=model:robot"), [0, 0, IGNORE, 0]);
+        assert_eq!(pixels("soil; crop; machine=model:robot; ignore=model"), [0, IGNORE, 2, IGNORE]);
+        let missing = Classes::parse("soil; crop; ignore=model:tractor").unwrap().of(&[], &names).unwrap_err();
+        let said = missing.to_string();
+        assert!(said.contains("`model:tractor`") && said.contains("model:robot, model:box"), "{said}");
     }
 
     #[test]

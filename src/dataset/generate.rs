@@ -87,6 +87,16 @@ pub struct Callbacks<'a> {
     pub now: &'a Arc<AtomicBool>,
 }
 
+/// Where the images of a run go when they are finished.
+pub(super) struct Delivery<'a> {
+    /// Whether an image is where it is to be already, wherever the run works.
+    pub(super) has: &'a (dyn Fn(u64) -> bool + Sync),
+    /// Told of each unit that is finished, also of those that earlier runs finished.
+    pub(super) deliver: &'a (dyn Fn(Unit) -> Result<()> + Sync),
+    /// The dataset in whose timing log the run tells of itself.
+    pub(super) log: &'a Path,
+}
+
 /// Images under way at once unless said otherwise: more would take more memory than they save time.
 pub(super) const MOST_AT_ONCE: usize = 16;
 
@@ -106,9 +116,19 @@ pub(super) fn share(threads: usize, workers: usize, worker: usize) -> usize {
 /// call goes on later. A fault of one field ([`Error::is_of_one_field`]) is told when all others are made; a cause that lasts ends the
 /// run at once. What is made is kept in any case.
 pub fn generate(set: &Set, work: &Work<'_>, callbacks: &Callbacks<'_>) -> Result<()> {
-    let sent = |unit: Unit| work.push.map_or(Ok(()), |push| push.unit(set, unit, callbacks.now));
     work.push.map_or(Ok(()), |push| push.clear(set))?;
-    sent(Unit::Recipe)?;
+    let deliver = |unit: Unit| work.push.map_or(Ok(()), |push| push.unit(set, unit, callbacks.now));
+    deliver(Unit::Recipe)?;
+    generate_for(set, work, callbacks, &Delivery { has: &|_| false, deliver: &deliver, log: &set.folder })
+}
+
+/// The same where what is finished goes elsewhere.
+pub(super) fn generate_for(
+    set: &Set,
+    work: &Work<'_>,
+    callbacks: &Callbacks<'_>,
+    delivery: &Delivery<'_>,
+) -> Result<()> {
     let renderer = renderer(set)?;
     let all = Threads::new(work.threads)?;
     let threads = all.count();
@@ -117,21 +137,19 @@ pub fn generate(set: &Set, work: &Work<'_>, callbacks: &Callbacks<'_>) -> Result
     let wanted: Vec<u64> = (0..set.recipe.count).filter(held).collect();
     let open = all.install(|| OpenPacks::of(set, shard))?;
     let is_freed = |k: u64| set.recipe.pack.is_none() && Unit::Image(k).is_freed(set);
-    let look = |k: u64| Ok((k, if open.is_settled(set, k) || is_freed(k) { Task::Done } else { task(set, k)? }));
+    let is_there = |k: u64| (delivery.has)(k) || open.is_settled(set, k) || is_freed(k);
+    let look = |k: u64| Ok((k, if is_there(k) { Task::Done } else { task(set, k)? }));
     let tasks: Vec<(u64, Task)> = all.install(|| wanted.into_par_iter().map(look).collect::<Result<Vec<_>>>())?;
     let wanted = tasks.len();
     let tasks: Vec<(u64, Task)> = tasks.into_iter().filter(|(_, t)| *t != Task::Done).collect();
     (callbacks.begin)(tasks.len());
     open.expect(set, &tasks)?;
-    if work.push.is_some() {
-        // What is there and was not pushed: units that lack nothing.
-        let lacking: BTreeSet<String> = tasks.iter().map(|(index, _)| Unit::of(set, *index).name()).collect();
-        let mut units: Vec<Unit> = held_units(set, shard);
-        units.retain(|unit| !lacking.contains(&unit.name()));
-        units
-            .into_iter()
-            .try_for_each(|unit| if callbacks.soon.load(Ordering::Relaxed) { Ok(()) } else { sent(unit) })?;
-    }
+    // What is there and was not delivered: units that lack nothing.
+    let lacking: BTreeSet<String> = tasks.iter().map(|(index, _)| Unit::of(set, *index).name()).collect();
+    let mut units: Vec<Unit> = held_units(set, shard);
+    units.retain(|unit| !lacking.contains(&unit.name()));
+    let sent = delivery.deliver;
+    units.into_iter().try_for_each(|unit| if callbacks.soon.load(Ordering::Relaxed) { Ok(()) } else { sent(unit) })?;
     // Images of one field and day follow each other on one worker, which grows it once.
     let fields: Vec<&[(u64, Task)]> =
         tasks.chunk_by(|a, b| set.recipe.growing_of(a.0) == set.recipe.growing_of(b.0)).collect();
@@ -154,7 +172,7 @@ pub fn generate(set: &Set, work: &Work<'_>, callbacks: &Callbacks<'_>) -> Result
         callbacks,
         threads,
         at_once,
-        timing_log: TimingLog::new(&set.folder, &format!("{}-of-{}", shard.number, shard.of)),
+        timing_log: TimingLog::new(delivery.log, &format!("{}-of-{}", shard.number, shard.of)),
     };
     let cpu_before = meter::cpu();
     if !tasks.is_empty() {
@@ -264,11 +282,11 @@ fn held_units(set: &Set, shard: Shard) -> Vec<Unit> {
 }
 
 /// The packs of a shard that are not whole yet.
-struct OpenPacks(BTreeMap<Id, AtomicUsize>);
+pub(super) struct OpenPacks(BTreeMap<Id, AtomicUsize>);
 
 impl OpenPacks {
     /// Those of a shard, none where images lie in folders.
-    fn of(set: &Set, shard: Shard) -> Result<Self> {
+    pub(super) fn of(set: &Set, shard: Shard) -> Result<Self> {
         let Some(packing) = Packing::of(&set.recipe) else { return Ok(Self(BTreeMap::new())) };
         let held: Vec<Id> = packing.all().filter(|id| shard.holds(packing.place(*id))).collect();
         let open = held.into_par_iter().map(|id| Ok((id, store::settle(set, id)?))).collect::<Result<Vec<_>>>()?;
@@ -276,7 +294,7 @@ impl OpenPacks {
     }
 
     /// Whether an image lies in a pack that is whole.
-    fn is_settled(&self, set: &Set, index: u64) -> bool {
+    pub(super) fn is_settled(&self, set: &Set, index: u64) -> bool {
         Packing::of(&set.recipe).is_some_and(|packing| !self.0.contains_key(&packing.id(index)))
     }
 

@@ -23,7 +23,7 @@ impl<'a> Labels<'a> {
         let labelling = &recipe.labelling;
         let classes = labelling.classes.as_ref().map_or_else(|| Cow::Owned(Classes::default()), Cow::Borrowed);
         classes.check().map_err(|what| Error::damaged(format!("the classes of this dataset are none: {what}")))?;
-        Ok(Self { labelling, map: classes.of(&recipe.species)?, classes })
+        Ok(Self { labelling, map: classes.of(&recipe.species, recipe.models())?, classes })
     }
 
     /// The classes by number.

@@ -34,6 +34,7 @@
 //! | `bill`, `meter` | what a dataset will cost, from three of its images; what this process has taken |
 //! | `status` | how far a dataset is, from what lies in its folder |
 //! | `stream` | the images of a dataset without its folder, as an archive for a program that reads them as they are made |
+//! | `scratch` | the images of a shard on a node's own disk, brought home as they are finished |
 //! | `cluster` | the same on many machines: job files for schedulers |
 //! | `invariants`, `difference`, `verify` | what must hold of every image; how far two of them lie apart; whether all is so |
 //! | `import` | other people's images and labels |
@@ -104,6 +105,8 @@ pub mod report;
 pub mod rle;
 #[doc(hidden)]
 pub mod sample;
+#[doc(hidden)]
+pub mod scratch;
 #[doc(hidden)]
 pub mod set;
 #[doc(hidden)]

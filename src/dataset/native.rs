@@ -69,7 +69,7 @@ pub fn files(recipe: &Recipe, sample: &Sample, text: &str) -> Result<Vec<File>> 
         add("species.png", png(&Picture::Gray(&sample.species))?);
     }
     if !sample.parts.is_empty() {
-        add("parts.png", png(&Picture::Indexed(&sample.parts, &PartKind::palette()))?);
+        add("parts.png", png(&Picture::Indexed(&sample.parts, &PartKind::palette(recipe.models().len())))?);
     }
     add("plants.png", png(&Picture::Numbers(&sample.plants))?);
     add("leaves.png", png(&Picture::Gray16(&sample.leaves))?);

@@ -156,6 +156,7 @@ pub(super) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
             max_depth: options.techniques.max_depth,
             clamp: options.techniques.clamp,
             parts: order.labelling.classes.as_ref().is_some_and(Classes::needs_parts),
+            models: field.models.clone(),
             keep,
             labels_only: order.labels_only,
             photo: Some(order.photo),

@@ -88,7 +88,7 @@ impl Unit {
     }
 
     /// Its files by their paths below the dataset's folder, and a hash of what they are; `None` where it is not finished.
-    fn contents(self, set: &Set) -> Result<Option<(Vec<String>, String)>> {
+    pub(super) fn contents(self, set: &Set) -> Result<Option<(Vec<String>, String)>> {
         let folder = &set.folder;
         Ok(match self {
             Self::Recipe => {
@@ -415,7 +415,7 @@ fn end(child: &mut Child) {
 }
 
 /// Removes the files of a unit here; what tells of them stays.
-fn free(set: &Set, files: &[String]) -> Result<()> {
+pub(super) fn free(set: &Set, files: &[String]) -> Result<()> {
     for file in files.iter().filter(|file| !file.starts_with("seals/")) {
         let path = below(&set.folder, file)?;
         match std::fs::remove_file(&path) {

@@ -91,6 +91,9 @@ pub struct Rendering {
     /// Whether images have a `parts.png`.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub parts: bool,
+    /// Names of its models from disk, in the order of their numbers in `parts.png`; left out where the scene file gives none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub models: Vec<String>,
     /// Maps that images keep beside photograph, labels and record; [`Kept::OLDEST`] where a recipe of before does not say.
     #[serde(default = "oldest", skip_serializing_if = "is_oldest")]
     pub keep: Vec<Kept>,
@@ -235,6 +238,11 @@ impl Recipe {
     /// The days on which images are taken; none where fields are seen as they are written.
     pub fn days(&self) -> &[u32] {
         self.rendering().map_or(&[], |rendering| &rendering.days)
+    }
+
+    /// Names that the scene file gives to models from disk; none for images from elsewhere.
+    pub fn models(&self) -> &[String] {
+        self.rendering().map_or(&[], |rendering| &rendering.models)
     }
 
     /// Number of the growing, among all, of the field that an image shows: fields grow anew for each of their days.

@@ -52,7 +52,7 @@ impl Interaction {
     #[inline]
     #[must_use]
     pub fn placed(self, placement: &Placement) -> Self {
-        let edges = self.edges.map(|(edge, uv)| (placement.direction(edge), uv));
+        let edges = self.edges.map(|(edge, uv)| (placement.direction(edge) * placement.scale, uv));
         let [ng, ns] = [self.ng, self.ns].map(|normal| placement.direction(normal));
         Self { p: placement.point(self.p), ng, ns, edges, ..self }
     }

@@ -8,12 +8,10 @@ use crate::bsdf::{Bsdf, OrenNayar, Wet};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec2, Vec3, vec2};
 use crate::optics::soil::{at as four_bands, wet};
-use crate::soil::GroundMaps;
+use crate::soil::{FACETS, GroundMaps};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Slope angle of the facets below a millimetre, radians. With explicit relief down to 1 mm Irons et al. 1992 leave 0.26–0.52.
-const SIGMA: f32 = 0.35;
 /// Roughness α of a water film that lies over grains; an estimate between a puddle (0.1) and damp grains (0.4).
 const FILM_ROUGHNESS: f32 = 0.3;
 /// Below this share of film the gloss is not worth its cost: it would add less than 0.1 % of reflectance.
@@ -47,6 +45,7 @@ impl BakedGround {
             let open = f32::from(maps.ao[i]) / 255.0;
             let dry = four_bands(GroundMaps::decode(maps.albedo[i]), maps.like) * open;
             let (moist, film) = wet(dry, f32::from(maps.moisture[i]) / 255.0);
+            let moist = moist.map(|r| r * (1.0 - maps.hidden) / (1.0 - r * maps.hidden));
             Texel {
                 reflectance: moist.to_array().map(|r| (r.max(0.0).sqrt() * 255.0 + 0.5) as u8),
                 slope: maps.slope[i],
@@ -98,12 +97,12 @@ pub struct Ground {
 impl Ground {
     /// The ground: its fine relief tilts the shading normal.
     pub fn new(baked: Arc<BakedGround>) -> Self {
-        Self { baked, tint: Spectrum::ONE, relief: true, facets: Some(SIGMA) }
+        Self { baked, tint: Spectrum::ONE, relief: true, facets: Some(FACETS) }
     }
 
     /// Clods of it, of a reflectance `tint` times as high: they have relief of their own.
     pub fn clods(baked: Arc<BakedGround>, tint: Spectrum) -> Self {
-        Self { baked, tint, relief: false, facets: Some(SIGMA) }
+        Self { baked, tint, relief: false, facets: Some(FACETS) }
     }
 
     pub(super) fn leave_out(&mut self, feature: Feature) {

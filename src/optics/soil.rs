@@ -13,6 +13,18 @@ use crate::math::Spectrum;
 use std::f64::consts::FRAC_PI_2;
 use std::sync::LazyLock;
 
+/// A and B of Oren & Nayar 1994, the qualitative model: `f = ρ/π (A + B max(0, cos Δφ) sin α tan β)`, for facets whose slope angles have the standard
+/// deviation `sigma`, radians, 0–1.
+///
+/// Never returns more than a Lambert surface of the same albedo, which it is for σ = 0: the model as printed returns
+/// ρ (A + B/2) at grazing angles, up to 1.5 % too much for small σ, so A and B are divided by that where it exceeds one.
+pub fn facets(sigma: f32) -> [f32; 2] {
+    let s = sigma * sigma;
+    let (a, b) = (1.0 - 0.5 * s / (s + 0.33), 0.45 * s / (s + 0.09));
+    let most = (a + 0.5 * b).max(1.0);
+    [a / most, b / most]
+}
+
 /// Common loam: brightness 0.5, shape angles 25° and 45°.
 pub const LOAM: Spectrum = Spectrum::new(0.2041, 0.1436, 0.0914, 0.2514);
 /// Loess silt loam, the soil of many beet fields: 0.52, 26°, 50°.

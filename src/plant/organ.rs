@@ -128,7 +128,7 @@ pub struct Carried {
 }
 
 impl LeafAxis {
-    /// The same with all its points moved by a rigid motion.
+    /// The same with all its points moved by a rigid motion, or by one that changes all lengths alike; its size is what it was.
     #[must_use]
     pub fn moved(mut self, motion: impl Fn(Vec3) -> Vec3) -> Self {
         (self.base, self.tip) = (motion(self.base), motion(self.tip));

@@ -109,7 +109,7 @@ pub enum Detail {
     /// As the pixels need it, for cameras high above: 144 m² in seconds.
     ByPixel,
     /// The same, and plants of which a pixel shows more than 2.5 mm share their meshes: each is an instance of one of 64 plants of its
-    /// population, turned by an angle of its own. For fields of thousands of plants, to a hectare. With images of another size,
+    /// population, turned by an angle and larger or smaller by a factor of its own. For fields of thousands of plants, to a hectare. With images of another size,
     /// other plants are instances.
     Instanced,
 }
@@ -318,6 +318,11 @@ pub struct ModelDesc {
     /// glTF (`.glb`, `.gltf`) or Wavefront OBJ with its materials; lengths in metres.
     #[schemars(extend("x-example" = "\"thistle.glb\""))]
     pub file: String,
+    /// What it is called: classes of datasets tell it by `model:NAME`, tables of species by the name alone. Without one
+    /// it is of the class `model`, and tables tell the file's name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "\"robot\""))]
+    pub name: Option<String>,
     /// Whether the file may name pictures and other parts outside its own folder, by absolute paths or by `..`: for a model of your own.
     /// In a dataset they stay within the dataset's folder in any case.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]

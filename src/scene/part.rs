@@ -34,7 +34,7 @@ impl Part {
             None => Cow::Borrowed(&self.mesh),
             Some(placement) => {
                 let mut mesh = Mesh::clone(&self.mesh);
-                mesh.transform(placement.rotation, placement.offset);
+                mesh.transform(placement.matrix(), placement.offset);
                 Cow::Owned(mesh)
             }
         }

@@ -12,12 +12,20 @@ pub enum PartKind {
     Debris(DebrisKind),
     /// A model from disk, of whose organs nothing is known.
     Model,
+    /// One that the scene file names, by its place among the names: below [`Self::MOST_NAMED`].
+    Named(u8),
     /// An organ of a plant.
     Organ(OrganKind),
 }
 
+/// Number of the first named model in label maps.
+const FIRST_NAMED: u8 = 101;
+
 impl PartKind {
-    /// All of them with their numbers in label maps, their names, and their colours there: soils brown, organs green, others apart. 0 is nothing at
+    /// Most names of models in a scene file: their numbers go up to 200.
+    pub const MOST_NAMED: usize = 100;
+
+    /// All but named models with their numbers in label maps, their names, and their colours there: soils brown, organs green, others apart. 0 is nothing at
     /// all, such as the sky.
     pub const NUMBERED: [(u8, &'static str, [u8; 3], Self); 19] = [
         (1, "soil", [94, 72, 52], Self::Soil),
@@ -41,19 +49,24 @@ impl PartKind {
         (23, "berry", [230, 30, 60], Self::Organ(OrganKind::Berry)),
     ];
 
-    /// Colours of the numbers in label maps, from 0; black where there is none.
-    pub fn palette() -> Vec<[u8; 3]> {
-        let last = Self::NUMBERED.iter().map(|(number, ..)| usize::from(*number)).max().unwrap_or(0);
-        let mut all = vec![[0; 3]; last + 1];
-        for (number, _, color, _) in Self::NUMBERED {
-            all[usize::from(number)] = color;
+    /// Colours of the numbers in label maps, from 0, where so many models are named; black where there is none.
+    pub fn palette(named: usize) -> Vec<[u8; 3]> {
+        let named = (0..=u8::MAX).take(named).map(|k| (Self::Named(k).number(), of_name(k)));
+        let mut all = Vec::new();
+        for (number, color) in Self::NUMBERED.map(|(number, _, color, _)| (number, color)).into_iter().chain(named) {
+            let place = usize::from(number);
+            all.resize(all.len().max(place + 1), [0; 3]);
+            all[place] = color;
         }
         all
     }
 
     /// Its number in label maps.
     pub fn number(self) -> u8 {
-        Self::NUMBERED.iter().find(|(.., kind)| *kind == self).map_or(0, |(number, ..)| *number)
+        match self {
+            Self::Named(place) => FIRST_NAMED.saturating_add(place),
+            kind => Self::NUMBERED.iter().find(|(.., known)| *known == kind).map_or(0, |(number, ..)| *number),
+        }
     }
 
     /// The organ, if it is one.
@@ -63,6 +76,12 @@ impl PartKind {
             _ => None,
         }
     }
+}
+
+/// Colour of a named model: blues and purples that differ from one to the next.
+fn of_name(place: u8) -> [u8; 3] {
+    let channel = |step: usize| (40 + (usize::from(place) * step) % 180) as u8;
+    [channel(53), channel(97), 230]
 }
 
 #[cfg(test)]
@@ -95,6 +114,10 @@ mod tests {
         numbers.dedup();
         assert_eq!(numbers.len(), all.len());
         assert!(!numbers.contains(&0));
+        // Named models follow them, and alone need a longer palette.
+        assert!(numbers.iter().all(|number| *number < PartKind::Named(0).number()));
+        assert_eq!(PartKind::Named(PartKind::MOST_NAMED as u8 - 1).number(), 200);
+        assert_eq!([0, 2].map(|named| PartKind::palette(named).len()), [24, 103]);
         for (_, name, _, kind) in PartKind::NUMBERED {
             assert!(kind.organ().is_none_or(|organ| organ.name() == name), "{name}");
         }

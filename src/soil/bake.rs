@@ -31,6 +31,9 @@ pub struct GroundMaps {
     pub ao: Vec<u8>,
     /// Mean reflectance of the dry soil, whose NIR over red is that of every texel.
     pub like: Spectrum,
+    /// Share of the light that relief hides which neither the mesh nor the maps show, 0..1: 0 on ground of full detail. Bright soil gets
+    /// more of it back from around.
+    pub hidden: f32,
 }
 
 impl GroundMaps {
@@ -47,8 +50,8 @@ impl GroundMaps {
     }
 }
 
-/// Depth of a pit between crumbs that hides half of the sky, metres.
-const HALF_SKY_M: f32 = 0.0005;
+/// Depth of a pit between crumbs that hides half of the sky, metres; on coarse ground [`Ground::shade`] tells.
+pub(super) const HALF_SKY_M: f32 = 0.0005;
 
 /// Side of the square of matter that clods show, metres ([`Ground::fabric`] says it too): more than the longest clod that a scene file asks for as a rule.
 const FABRIC_M: f32 = 0.12;
@@ -56,9 +59,72 @@ const FABRIC_M: f32 = 0.12;
 /// How much wetter such a pit is.
 const PIT_WETTING: f32 = 0.2;
 
+/// The ground's maps while openness and moisture are still to be told from its pits.
+pub(super) struct Painted {
+    pub(super) maps: GroundMaps,
+    /// How far each texel lies below its surroundings, metres; 0 where it does not.
+    pub(super) pits: Vec<f32>,
+    /// Share of the ground's moisture that its crumb has lost, times 255.
+    dry: Vec<u8>,
+    /// Texels along each step of the grid.
+    split: usize,
+}
+
+/// How pits and lost relief darken a ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Shade {
+    /// Depth of a pit that hides half of the sky, metres.
+    pub(super) sky: f32,
+    /// Depth of a pit that keeps all of its wetness, metres.
+    pub(super) wet: f32,
+    /// Share of the light that relief hides which neither the mesh nor the pits show.
+    pub(super) hidden: f32,
+}
+
+impl Shade {
+    /// That of a ground of full detail.
+    pub(super) const FULL: Self = Self { sky: HALF_SKY_M, wet: HALF_SKY_M, hidden: 0.0 };
+}
+
+impl Painted {
+    /// The texel at a place, and the slope there, mixed between the middles of four as readers do.
+    pub(super) fn at(&self, p: Vec2) -> (usize, Vec2) {
+        let GroundMaps { slope, width, height, origin, texel_m, .. } = &self.maps;
+        let index = |x: f32, count: usize| (x.max(0.0) as usize).min(count - 1);
+        let q = (p - *origin) / *texel_m;
+        let nearest = index(q.y, *height) * width + index(q.x, *width);
+        let (floor, t) = ((q - 0.5).floor(), (q - 0.5).fract());
+        let at = |i: f32, j: f32| Vec2::from(slope[index(j, *height) * width + index(i, *width)].map(f32::from));
+        let row = |j: f32| at(floor.x, j).lerp(at(floor.x + 1.0, j), t.x);
+        (nearest, row(floor.y).lerp(row(floor.y + 1.0), t.y) / GroundMaps::SLOPE_STEPS)
+    }
+
+    /// Share of the moisture that the crumb of a texel has left.
+    pub(super) fn left(&self, k: usize) -> f32 {
+        1.0 - f32::from(self.dry[k]) / 255.0
+    }
+}
+
+/// One over the share of the sky that a pit leaves open.
+pub(super) fn closing(pit: f32, half: f32) -> f32 {
+    1.0 + pit / half
+}
+
+/// How much of the wetness of pits one keeps.
+pub(super) fn wet(pit: f32, full: f32) -> f32 {
+    (pit / full).min(1.0)
+}
+
 impl Ground {
     /// Bakes the texture with texels of at most `texel_m`; `maps` are those the ground was made with.
     pub fn bake<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32) -> GroundMaps {
+        let painted = self.paint(maps, texel_m);
+        let shade = self.shade(maps, &painted);
+        self.finish(painted, shade)
+    }
+
+    /// Everything of the texture but openness and moisture.
+    pub(super) fn paint<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32) -> Painted {
         let area = self.area();
         // Texels that split the grid's steps evenly: the area then holds whole texels, and each knows its cell.
         let split = ((self.step / texel_m.max(2e-5) - 1e-3).ceil() as usize).max(1);
@@ -77,6 +143,7 @@ impl Ground {
             slope: Vec::new(),
             ao: Vec::new(),
             like: self.color.like,
+            hidden: 0.0,
         };
         let look = self.look();
         let crumbs = self.crumbs(raster);
@@ -108,8 +175,7 @@ impl Ground {
             }
         });
         self.bake_slopes(raster, split, &detail, &mut baked);
-        self.bake_pits(raster, split, detail, &crumbs.dry, &mut baked);
-        baked
+        Painted { maps: baked, pits: self.pits(raster, split, detail), dry: crumbs.dry, split }
     }
 
     /// What clods are made of: a square of 12 cm of the ground's own matter without crumbs or relief, all of it as wet as
@@ -142,6 +208,7 @@ impl Ground {
             slope: vec![[0; 2]; n],
             ao: vec![255; n],
             like: self.color.like,
+            hidden: 0.0,
         }
     }
 
@@ -175,20 +242,27 @@ impl Ground {
         baked.slope = differences(detail, raster).into_par_iter().enumerate().map(slope).collect();
     }
 
-    /// What lies in pits of the detail sees less of the sky and dries later; crumbs dry first, by the shares in `dry`.
-    fn bake_pits(&self, raster: Raster, split: usize, mut detail: Vec<f32>, dry: &[u8], baked: &mut GroundMaps) {
-        let moistures = &self.look().moisture;
+    /// How far texels lie below the mean of what is around them, metres.
+    fn pits(&self, raster: Raster, split: usize, mut detail: Vec<f32>) -> Vec<f32> {
         let cell = |k: usize| self.texel_cell(k % raster.width, k / raster.width, split);
         detail.par_iter_mut().enumerate().for_each(|(k, d)| *d -= cell(k).mix(|v| self.fine.detail[v]));
         let around = blur(&detail, raster.width, (0.0008 / raster.step).ceil() as usize);
-        let pit = |k: usize| (around[k] - detail[k]).max(0.0) / HALF_SKY_M;
-        let open = |k: usize| (255.0 / (1.0 + pit(k)) + 0.5) as u8;
+        detail.par_iter_mut().zip(around).for_each(|(d, around)| *d = (around - *d).max(0.0));
+        detail
+    }
+
+    /// What lies in pits of the detail sees less of the sky and dries later; crumbs dry first.
+    fn finish(&self, painted: Painted, Shade { sky, wet: full, hidden }: Shade) -> GroundMaps {
+        let moistures = &self.look().moisture;
+        let width = painted.maps.width;
+        let shade = |k: usize| (255.0 / closing(painted.pits[k], sky) + 0.5) as u8;
         let moisture = |k: usize| {
-            let left = 1.0 - f32::from(dry[k]) / 255.0;
-            let wet = (cell(k).mix(|v| moistures[v]) + PIT_WETTING * pit(k).min(1.0)) * left;
-            (wet.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
+            let cell = self.texel_cell(k % width, k / width, painted.split);
+            let wet = cell.mix(|v| moistures[v]) + PIT_WETTING * wet(painted.pits[k], full);
+            ((wet * painted.left(k)).clamp(0.0, 1.0) * 255.0 + 0.5) as u8
         };
-        (baked.ao, baked.moisture) = (0..detail.len()).into_par_iter().map(|k| (open(k), moisture(k))).unzip();
+        let (ao, moisture) = (0..painted.pits.len()).into_par_iter().map(|k| (shade(k), moisture(k))).unzip();
+        GroundMaps { moisture, ao, hidden, ..painted.maps }
     }
 }
 

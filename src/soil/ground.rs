@@ -67,6 +67,8 @@ pub struct Ground {
     moisture: MoistureRecord,
     /// How much drier is what stands out.
     drying: f32,
+    /// Whether it is rendered without any height.
+    pub(super) flat: bool,
     /// Worked out when it is first asked for: a field that nobody lights does without.
     look: OnceLock<Look>,
 }
@@ -121,13 +123,45 @@ impl Ground {
                 patch_m: desc.moisture.patch_m.draw(&mut stream.child(Purpose::Soil, 32)),
             },
             drying: desc.moisture.drying.f32(),
+            flat: desc.flat,
             look: OnceLock::new(),
             grid,
         };
-        ground.raise(maps);
-        ground.strew();
-        ground.slopes = ground.differences();
+        ground.complete(maps);
         Ok(ground)
+    }
+
+    /// A piece of this ground again, with other cells and aggregates.
+    pub(super) fn piece<L: LayerMaps + Sync>(&self, maps: &[L], area: Rect, grid_m: f32, sizes: Sizes) -> Self {
+        let site =
+            Site { area, grid_m, margin_m: 0.0, growth: 2.0, level_m: f32::INFINITY, smallest_mm: 0.0, rows: None };
+        let mut piece = Self {
+            heights: Vec::new(),
+            slopes: Vec::new(),
+            shape: self.shape.clone(),
+            fine: Fine::default(),
+            blend: self.blend.clone(),
+            law: self.law.clone(),
+            color: self.color,
+            sizes,
+            crumbs_amount: self.crumbs_amount,
+            stream: self.stream.clone(),
+            step: grid_m,
+            moisture: self.moisture.clone(),
+            drying: self.drying,
+            flat: self.flat,
+            look: OnceLock::new(),
+            grid: Grid::new(&site),
+        };
+        piece.complete(maps);
+        piece
+    }
+
+    /// Heights and slopes of a ground whose law is known.
+    fn complete<L: LayerMaps + Sync>(&mut self, maps: &[L]) {
+        self.raise(maps);
+        self.strew();
+        self.slopes = self.differences();
     }
 
     /// Relief and layers.

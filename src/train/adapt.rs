@@ -1,6 +1,6 @@
 //! Self-training of a trained network on photographs without labels, from files to files.
 
-use super::data::{Augment, Photos, Selection};
+use super::data::{Augment, AugmentScale, Photos, Selection};
 use super::deploy::pictures::Picture;
 use super::fit::class_weights::ClassWeights;
 use super::fit::hyper::NormalizationMode;
@@ -22,6 +22,8 @@ pub struct Asked<'a> {
     pub run: &'a Path,
     /// Images with labels; the training set of the run unless given.
     pub sets: &'a [Selection],
+    /// Validation images with labels; none to keep the last weights.
+    pub val: &'a [Selection],
     /// Steps.
     pub steps: u64,
     /// Learning rate; a fifth of the run's unless given.
@@ -70,6 +72,8 @@ impl Asked<'_> {
             resize: card.resize.clone(),
             refine: card.refine,
             normalization: NormalizationMode::of(&card.normalization),
+            // Other images may not tell the size of their pixels.
+            augment_scale: if self.sets.is_empty() { hyper.augment_scale } else { AugmentScale::Relative },
             ..hyper
         };
         // Before any photograph is read.
@@ -79,7 +83,7 @@ impl Asked<'_> {
             classes: card.classes.clone(),
             shape: card.input.clone(),
             train,
-            val: Vec::new(),
+            val: self.val.to_vec(),
             seed: self.seed,
             hyper,
             precision: self.precision.into(),

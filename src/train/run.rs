@@ -8,7 +8,7 @@
 //! result.json              loss curve, validation passes, time; written last
 //! ```
 
-use super::data::{Band, Normalization, Resize, Shape, Store};
+use super::data::{Band, Normalization, Resize, Shape, Store, ground};
 use super::fit::Plan;
 use super::fit::checkpoint::History;
 use super::fit::hyper::SIDES;
@@ -34,7 +34,7 @@ pub const MODEL: &str = "model.json";
 /// File of the results.
 pub const RESULT: &str = "result.json";
 /// Sides of pixels on the ground, millimetres, that a model card may tell.
-pub const PIXEL_MM: RangeInclusive<f64> = 0.001..=10_000.0;
+pub const PIXEL_MM: RangeInclusive<f64> = ground::PIXEL_MM;
 
 /// A plan with checksums of its images: two trainings with equal identities result in the same weights.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

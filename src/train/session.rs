@@ -1,12 +1,13 @@
 //! Training, calibration and evaluation, from files to files.
 
-use super::data::{Photos, Pick, Resize, Selection, Store, resize};
+use super::data::{AugmentScale, Photos, Pick, Resize, Selection, Store, resize};
 use super::deploy::enlarge::classes_at;
 use super::ensemble::Ensemble;
 use super::fit::calibrate::calibrate;
 use super::fit::checkpoint::Checkpoint;
 use super::fit::hyper::NormalizationMode;
 use super::fit::logits;
+use super::fit::warnings::warnings;
 use super::fit::{self, Callbacks, Data, Plan};
 use super::measure::{Evaluation, Prediction, Report};
 use super::net::{Parameter, fitting, parameters};
@@ -97,6 +98,11 @@ pub(super) fn train(
         return Err(Error::misuse("there is no training image")
             .help("name sets with --set DIR, or other images of them with DIR@all"));
     }
+    // Sets to train from need not have validation images; one that was named for them must.
+    if val.is_empty() && plan.val.iter().any(|selection| !plan.train.contains(selection)) {
+        return Err(Error::misuse("there is no validation image in the sets of --val")
+            .help("name other images of them with --val DIR@all, or leave --val out"));
+    }
     if plan.hyper.logit_adjustment > 0.0 && !plan.classes.begins_with_soil() {
         return Err(Error::misuse("logit adjustment takes out how frequent soil is, and the first class is not soil")
             .help("name soil first in --classes, or leave --logit-adjustment out"));
@@ -122,14 +128,22 @@ pub(super) fn train(
         val.get(0)?;
     }
     // Records that other programs wrote may tell sizes that no card takes.
-    let pixel_mm = train.pixel_mm()?.filter(|mm| run::PIXEL_MM.contains(mm));
+    let pixel_mm = match plan.hyper.augment_scale {
+        AugmentScale::PixelMm(lo, hi) => Some((lo * hi).sqrt()),
+        AugmentScale::Relative | AugmentScale::Auto => train.pixel_mm()?,
+    };
+    let pixel_mm = pixel_mm.filter(|mm| run::PIXEL_MM.contains(mm));
+    let pixels = plan.hyper.augment_scale.of(|| train.pixel_sizes_mm())?;
     identity.claim(folder)?;
     remove_unfinished(folder)?;
     if let Some(results) = run::results(folder)? {
         return Ok(results);
     }
     let hash = identity.hash()?;
-    let data = Data { train: Arc::new(train), val, photos: photos.map(Arc::new), loaders: machine.loaders };
+    for words in warnings(&plan, train.distinct(), pixels.as_ref()) {
+        (callbacks.warn)(&words);
+    }
+    let data = Data { train: Arc::new(train), val, photos: photos.map(Arc::new), pixels, loaders: machine.loaders };
     let mut outcome = fit::train(&plan, &hash, &data, &begin, place, folder, callbacks)?;
     if plan.hyper.calibrate > 0 {
         let model = Model::with(plan.network, plan.shape.bands.len(), plan.classes.len(), &outcome.values, place)?;

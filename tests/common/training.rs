@@ -48,7 +48,8 @@ pub fn learn_with(set: &Path, out: &Path, plan: Plan, hyper: Hyperparameters) ->
     let shape = Shape { width: SIZE.0, height: SIZE.1, ..plan.shape };
     let hyper = Hyperparameters { steps: 6, batch: 2, ..hyper };
     let plan = Plan { shape, classes: Classes::default(), train: vec![selection], hyper, ..plan };
-    let callbacks = Callbacks { step: &|_, _| (), validation: &|_, _| (), stop: &AtomicBool::new(false) };
+    let callbacks =
+        Callbacks { step: &|_, _| (), validation: &|_, _| (), warn: &|_| (), stop: &AtomicBool::new(false) };
     session::fit(&plan, None, &machine(), out, &callbacks).expect("a training");
     TrainedModel::open(out).expect("what was learnt")
 }

@@ -1,4 +1,4 @@
-"""Do `images.parquet` and `plants.parquet` hold what the records do, of days, samples and the condition of plants?
+"""Do the tables of images, plants and leaves hold what the records do, of days, cameras, samples and the condition of plants?
 
 check_index.py DATASET
 """
@@ -18,6 +18,15 @@ for record, row in zip(records, images.to_dict("records"), strict=True):
     assert (row["day"], row["frame"], row["camera"]) == (capture["day"], capture["frame"], capture["camera"])
     assert row["spp"] == (sampling["spp"] if sampling else asked), row["spp"]
 plants = [plant for record in records for plant in record["plants"]]
+# Each row tells its image as the table of images does, also as CSV.
+ORIGIN = ["image", "number", "split", "field", "camera", "day", "frame"]
+told = {row["image"]: row for row in images[ORIGIN].to_dict("records")}
+read = lambda name: pandas.read_csv(root / "traits" / name, dtype={"image": str})
+leaves = pandas.read_parquet(root / "traits/leaves.parquet")
+for rows in (table, leaves, read("plants.csv"), read("leaves.csv"), read("images.csv")):
+    assert list(rows.columns[: len(ORIGIN)]) == ORIGIN, list(rows.columns)
+    assert len(rows) > 0 and all(row == told[row["image"]] for row in rows[ORIGIN].to_dict("records"))
+assert list(read("images.csv")["image"]) == list(images["image"])
 NAMES = "holes shot_holes bites tears chlorosis blotches spots scorched scorch reddening dust splash wilt pale_young"
 marked = 0
 for plant, row in zip(plants, table.to_dict("records"), strict=True):
@@ -26,4 +35,15 @@ for plant, row in zip(plants, table.to_dict("records"), strict=True):
         assert pandas.isna(row[name]) if condition is None else abs(row[name] - condition[name]) < 1e-6, name
     marked += condition is not None and row["wilt"] > 0
 assert set(images["day"]) == {9, 21} and marked > 0, (set(images["day"]), marked)
+# Curves of growth, as the guide draws them from the table alone.
+curves = table[table["camera"] == images["camera"][0]].pivot_table("leaf_area_m2", "day", "id")
+expected = {}
+for record in records:
+    for plant in record["plants"]:
+        if record["capture"]["camera"] == images["camera"][0]:
+            areas = expected.setdefault((record["capture"]["day"], plant["id"]), [])
+            areas.append(plant["grown"]["traits"]["leaf_area_m2"])
+assert expected and curves.count().max() == 2, "a plant is to be seen on both days"
+for (day, plant), areas in expected.items():
+    assert abs(curves.loc[day, plant] - sum(areas) / len(areas)) < 1e-7
 print(f"{len(images)} images, {len(plants)} plants, {marked} of them wilted")

@@ -17,11 +17,17 @@ plants, leaves, views = read("plants.csv"), read("leaves.csv"), read("images.csv
 assert list(views["image"]) == list(images)
 assert len(plants) == sum(len(i.record["plants"]) for i in images.values())
 assert len(leaves) == sum(len(p["leaves"]) for i in images.values() for p in i.record["plants"])
-assert list(plants.columns[:6]) == ["image", "split", "plant", "id", "class", "species"]
-assert list(leaves.columns[:5]) == ["image", "split", "plant", "leaf", "id"]
+ORIGIN = ["image", "number", "split", "field", "camera", "day", "frame"]
+assert list(plants.columns[:11]) == [*ORIGIN, "plant", "id", "class", "species"]
+assert list(leaves.columns[:10]) == [*ORIGIN, "plant", "leaf", "id"]
+assert list(views.columns[:7]) == ORIGIN
+for rows in (plants, leaves, views):
+    # One image a field: no camera, no day, no frame.
+    assert (rows["field"] == rows["number"]).all() and rows[["camera", "day", "frame"]].isna().all(axis=None)
+    assert all(images[name].record["index"] == number for name, number in zip(rows["image"], rows["number"]))
 
 table = pd.read_parquet(dataset / "traits" / "leaves.parquet")
-same = {"image": "image", "split": "split", "plant": "plant", "leaf": "leaf", "id": "id", "pixels": "visible_px"}
+same = {"image": "image", "number": "number", "split": "split", "field": "field", "plant": "plant", "leaf": "leaf", "id": "id", "pixels": "visible_px"}
 traits = ("area_m2", "visible_area_m2", "length_m", "width_m", "petiole_m", "inclination_deg", "azimuth_deg", "top_m")
 assert len(table) == len(leaves)
 for ours, theirs in (same | {name: name for name in traits}).items():

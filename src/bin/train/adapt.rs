@@ -23,6 +23,10 @@ pub(crate) struct Args {
     /// Labelled images that it goes on learning beside them: the training set of the run unless given. May be given several times.
     #[arg(long = "set", value_name = "DIR[@PICK]", value_parser = Selection::parse)]
     sets: Vec<Selection>,
+    /// Validation set: images with labels, whose loss, I/U and predictions are logged while it trains; the best pass is kept, and a training
+    /// ends early as that of the run does. Without one the last weights are kept. May be given several times.
+    #[arg(long, value_name = "DIR[@PICK]", value_parser = Selection::parse)]
+    val: Vec<Selection>,
     /// Folder of the adapted network.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -57,6 +61,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let asked = Asked {
         run: &args.run,
         sets: &args.sets,
+        val: &args.val,
         steps: args.steps,
         rate: args.rate,
         keep: args.keep,

@@ -151,7 +151,12 @@ pub(crate) fn shown(
             bar.suspend(|| furrow::tell!("{line}"));
         }
     };
-    let callbacks = Callbacks { step: &step, validation: &validation, stop: signals.heed() };
+    let warn = |words: &str| {
+        if !quiet {
+            bar.suspend(|| furrow::tell!("warning: {words}"));
+        }
+    };
+    let callbacks = Callbacks { step: &step, validation: &validation, warn: &warn, stop: signals.heed() };
     let results = work(&callbacks);
     bar.finish_and_clear();
     results
@@ -197,6 +202,9 @@ fn facts(plan: &Plan, results: &Results) -> Vec<(String, String)> {
         fact("seed", plan.seed.to_string()),
         fact("result", in_words(results)),
     ];
+    if !plan.hyper.augment_scale.is_relative() {
+        facts.push(fact("scale of the augmentation", format!("{}, mm a pixel", plan.hyper.augment_scale.name())));
+    }
     if let Some(Adaptation { photos, keep, .. }) = plan.adaptation {
         let words = format!(
             "{photos} photographs without labels, the surest {keep} of the pixels of each class taken for labels"

@@ -24,6 +24,11 @@ pub(crate) struct InferenceArgs {
 }
 
 impl InferenceArgs {
+    /// Side of the pictures' pixels on the ground, millimetres, where it is given.
+    pub(crate) fn pixel_mm(&self) -> Option<f64> {
+        self.pixel_mm
+    }
+
     /// Puts what is given into a model card.
     pub(crate) fn apply(&self, card: &mut ModelCard) -> Result<()> {
         if let Some(resize) = &self.resize {

@@ -61,6 +61,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         precision: &args.machine.precision,
         threads: args.machine.threads(),
         batch: args.batch.into(),
+        pixel_mm: args.inference.pixel_mm(),
         done: &|done| bar.set_position(done as u64),
         stop: signals.heed(),
     };

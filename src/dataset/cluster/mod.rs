@@ -83,6 +83,15 @@ fn check(set: &Set, job: &Job) -> Result<()> {
             return fault("--push is for slurm and parallel".into(), help);
         }
     }
+    if let Some(scratch) = &job.scratch {
+        if scratch.is_empty() || scratch.contains(char::is_control) {
+            return fault(format!("--scratch {scratch:?} is no folder"), "name one, as --scratch '$TMPDIR/furrow'");
+        }
+        if matches!(job.scheduler, Scheduler::Kubernetes(_)) {
+            let help = "write --scratch into the command of render.yaml by hand, with a folder of the container";
+            return fault("--scratch is for slurm and parallel".into(), help);
+        }
+    }
     // Job files are in whole seconds.
     let (grace, time) = (job.grace.as_secs(), job.time.as_secs());
     if grace >= time {

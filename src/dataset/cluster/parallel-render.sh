@@ -47,7 +47,7 @@ run() {
 if parallel --version 2>/dev/null | grep -q "GNU parallel"; then
     # The first shard that fails lets those under way go on and starts no other.
     run parallel --will-cite --quote --tag --line-buffer --jobs "$jobs" --halt soon,fail=1 ${HOSTS:+--sshlogin "$HOSTS"} \
-        "$trace" dataset render "$dir" --threads "$threads" --shard "{}/$shards"@PUSH@ ::: $(seq 0 $((shards - 1)))
+        "$trace" dataset render "$dir" --threads "$threads" --shard "{}/$shards"@RENDERING@ ::: $(seq 0 $((shards - 1)))
 elif [ -n "${HOSTS:-}" ]; then
     echo "HOSTS needs GNU parallel: install it, or run this script without HOSTS" >&2
     exit 2
@@ -56,7 +56,7 @@ else
     # them although they are ignored here.
     run env --ignore-signal=USR1,TERM xargs -a <(seq 0 $((shards - 1))) -P "$jobs" -I{} \
         bash -c '"$@" || { code=$?; echo "shard ended with $code" >&2; exit 255; }' \
-        bash "$trace" dataset render "$dir" --threads "$threads" --shard "{}/$shards"@PUSH@
+        bash "$trace" dataset render "$dir" --threads "$threads" --shard "{}/$shards"@RENDERING@
 fi
 code=$?
 if [ -n "$asked" ]; then

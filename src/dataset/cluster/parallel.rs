@@ -12,6 +12,7 @@ pub(super) fn files(dir: &str, job: &Job) -> Result<Vec<File>> {
         ("DIR_QUOTED", quoted(dir)),
         ("TRACE", quoted(&plain(&job.program)?)),
         ("SHARDS", job.shards.to_string()),
+        ("RENDERING", job.rendering()),
         ("PUSH", job.pushing()),
         ("CPUS", job.cpus.to_string()),
         ("AGAIN", job.again.to_string()),

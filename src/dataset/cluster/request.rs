@@ -1,6 +1,6 @@
 //! What is asked of a scheduler.
 
-use super::script::quoted;
+use super::script::{expanded, quoted};
 use crate::dataset::push::Push;
 use crate::{Error, Result};
 use std::path::PathBuf;
@@ -68,12 +68,20 @@ pub struct Job {
     pub again: u64,
     /// The program, as the machines see it.
     pub program: PathBuf,
+    /// Folder of a node's own disk in which shards work; the dataset's unless given. `$NAME` and `${NAME}` are the node's variables.
+    pub scratch: Option<String>,
     /// How what is finished is sent elsewhere.
     pub push: Option<Push>,
 }
 
 impl Job {
-    /// What scripts write behind `render` and `finish`: nothing where nothing is pushed.
+    /// What scripts write behind `render`: where it works, and how it pushes.
+    pub(super) fn rendering(&self) -> String {
+        let scratch = self.scratch.as_ref().map(|scratch| format!(" --scratch {}", expanded(scratch)));
+        scratch.unwrap_or_default() + &self.pushing()
+    }
+
+    /// What scripts write behind `finish`: nothing where nothing is pushed.
     pub(super) fn pushing(&self) -> String {
         let Some(Push { command, check, free, tries, timeout }) = &self.push else { return String::new() };
         let mut words = format!(" --push {} --push-tries {tries}", quoted(command));

@@ -32,6 +32,41 @@ pub(super) fn quoted(word: &str) -> String {
     format!("'{}'", word.replace('\'', r"'\''"))
 }
 
+/// A word of a shell script in which `$NAME` and `${NAME}` are what these variables hold, and all else stands for itself. The script ends
+/// where one of them is empty or not set.
+pub(super) fn expanded(word: &str) -> String {
+    let mut out = String::from("\"");
+    let mut rest = word;
+    while let Some(c) = rest.chars().next() {
+        rest = &rest[c.len_utf8()..];
+        if c == '$'
+            && let Some((name, after)) = variable(rest)
+        {
+            out.extend(["${", name, ":?}"]);
+            rest = after;
+            continue;
+        }
+        if matches!(c, '"' | '\\' | '$' | '`') {
+            out.push('\\');
+        }
+        out.push(c);
+    }
+    out + "\""
+}
+
+/// The variable whose name stands at the beginning, with or without braces, and what follows it.
+fn variable(text: &str) -> Option<(&str, &str)> {
+    let is_name = |name: &str| {
+        let plain = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+        plain && !name.is_empty() && !name.starts_with(|c: char| c.is_ascii_digit())
+    };
+    let parts = match text.strip_prefix('{') {
+        Some(braced) => braced.split_once('}')?,
+        None => text.split_at(text.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(text.len())),
+    };
+    is_name(parts.0).then_some(parts)
+}
+
 /// A template with its names filled in, in one pass: what is filled in may hold names between @ signs itself.
 pub(super) fn fill(path: &str, template: &str, names: &[(&str, String)]) -> File {
     let mut text = String::with_capacity(2 * template.len());
@@ -64,6 +99,26 @@ mod tests {
             let said = std::process::Command::new("sh").arg("-c").arg(format!("printf %s {}", quoted(word))).output();
             assert_eq!(String::from_utf8(said.unwrap().stdout).unwrap(), word);
         }
+    }
+
+    /// Expected: variables are filled in, with spaces in them and whatever stands beside; nothing else of the shell's language is read.
+    #[test]
+    fn variables_are_the_shells_and_nothing_else() {
+        let said = |word: &str| {
+            let words = format!("printf %s {}", expanded(word));
+            let mut shell = std::process::Command::new("sh");
+            let said = shell.arg("-c").arg(words).env("A_1", "x y").env_remove("NONE").output().unwrap();
+            (said.status.success(), String::from_utf8(said.stdout).unwrap())
+        };
+        for (word, expected) in [
+            ("$A_1/furrow", "x y/furrow"),
+            ("/s/${A_1}b", "/s/x yb"),
+            ("$(rm) `y` \"z\" \\ it's * $", "$(rm) `y` \"z\" \\ it's * $"),
+            ("${A_1%x} $1 ${} @A@", "${A_1%x} $1 ${} @A@"),
+        ] {
+            assert_eq!(said(word), (true, expected.to_owned()), "{word}");
+        }
+        assert_eq!(said("$NONE/furrow"), (false, String::new()));
     }
 
     #[test]

@@ -15,6 +15,7 @@ pub(super) fn files(dir: &str, job: &Job) -> Result<Vec<File>> {
         ("DIR_QUOTED", quoted(dir)),
         ("TRACE", quoted(&plain(&job.program)?)),
         ("SHARDS", job.shards.to_string()),
+        ("RENDERING", job.rendering()),
         ("PUSH", job.pushing()),
         ("ARRAY", array),
         ("CPUS", job.cpus.to_string()),

@@ -1,6 +1,7 @@
 //! Organs and ground: `parts/SPLIT/NAME.png`, what each pixel's centre shows: soil, stone, straw, blade, petiole, stem and so on.
 //!
-//! 8 bits of index with a palette; `parts/names.json` names the numbers. 0 is where nothing is: the sky.
+//! 8 bits of index with a palette; `parts/names.json` names the numbers. 0 is where nothing is: the sky. Models that the scene file names have
+//! numbers from 101 on, in the order of their names there.
 
 use super::{Format, Whole, picture};
 use crate::dataset::recipe::Recipe;
@@ -18,14 +19,17 @@ pub(super) struct Writer;
 const FOLDER: &str = "parts";
 
 impl Format for Writer {
-    fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
+    fn image(&self, recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
         let record = &sample.record;
         let path = format!("{FOLDER}/{}/{}.png", record.split.name(), record.name);
-        Ok(vec![picture::file(sample, path, &Picture::Indexed(&numbers(FOLDER, sample)?, &PartKind::palette()))?])
+        let palette = PartKind::palette(recipe.models().len());
+        Ok(vec![picture::file(sample, path, &Picture::Indexed(&numbers(FOLDER, sample)?, &palette))?])
     }
 
-    fn whole(&self, _set: &Set, out: &mut Whole<'_>) -> Result<()> {
-        let names: BTreeMap<u8, &str> = PartKind::NUMBERED.iter().map(|(number, name, ..)| (*number, *name)).collect();
+    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+        let known = PartKind::NUMBERED.map(|(number, name, ..)| (number, name.to_owned())).into_iter();
+        let named = |(place, name): (u8, &String)| (PartKind::Named(place).number(), format!("model:{name}"));
+        let names: BTreeMap<u8, String> = known.chain((0..=u8::MAX).zip(set.recipe.models()).map(named)).collect();
         out.file(&format!("{FOLDER}/names.json"), |w| {
             w.json(&names)?;
             w.put("\n")

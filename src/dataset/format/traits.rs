@@ -3,10 +3,12 @@
 //!
 //! Areas, lengths and angles are those of [`crate::scene::traits`], of what grew, whether it is seen or not; plants and leaves that an image
 //! neither shows nor hides have no row. `visible_area_m2` is a leaf's area times the share of its pixels that the image shows: right
-//! for a leaf that is held alike all over. Cells of what is not known (models, imported images) are empty. The first row names the columns.
+//! for a leaf that is held alike all over. Cells of what is not known (models, imported images) are empty. The first row names the columns; the
+//! first columns tell the image that a row is of ([`Origin`]).
 
 use super::{Format, Whole};
 use crate::dataset::index::leaves;
+use crate::dataset::index::origin::Origin;
 use crate::dataset::record::{Grown, Leaf, Plant, Record};
 use crate::dataset::set::{Set, Stream};
 use crate::scene::tag::Class;
@@ -19,8 +21,6 @@ const FOLDER: &str = "traits";
 
 #[derive(Default, Serialize)]
 struct PlantRow<'a> {
-    image: &'a str,
-    split: &'static str,
     plant: u32,
     id: Option<u32>,
     class: &'static str,
@@ -44,8 +44,6 @@ struct PlantRow<'a> {
 
 #[derive(Default, Serialize)]
 struct LeafRow<'a> {
-    image: &'a str,
-    split: &'static str,
     plant: u32,
     leaf: u16,
     id: Option<u32>,
@@ -64,9 +62,7 @@ struct LeafRow<'a> {
 }
 
 #[derive(Default, Serialize)]
-struct ImageRow<'a> {
-    image: &'a str,
-    split: &'static str,
+struct ImageRow {
     ground_m2: Option<f32>,
     leaf_area_m2: Option<f32>,
     lai: Option<f32>,
@@ -85,14 +81,14 @@ impl Format for Writer {
     }
 
     fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
-        table::<PlantRow<'_>>(set, out, "plants.csv", |record, table| {
-            record.plants.iter().try_for_each(|plant| table.row(PlantRow::of(record, plant)))
+        table::<PlantRow<'_>>(set, out, "plants.csv", |record, origin, table| {
+            record.plants.iter().try_for_each(|plant| table.row(origin, PlantRow::of(plant)))
         })?;
-        table::<LeafRow<'_>>(set, out, "leaves.csv", |record, table| {
-            let leaves = record.plants.iter().flat_map(|plant| plant.leaves.iter().map(move |leaf| (plant, leaf)));
-            leaves.into_iter().try_for_each(|(plant, leaf)| table.row(LeafRow::of(record, plant, leaf)))
+        table::<LeafRow<'_>>(set, out, "leaves.csv", |record, origin, table| {
+            let mut leaves = record.plants.iter().flat_map(|plant| plant.leaves.iter().map(move |leaf| (plant, leaf)));
+            leaves.try_for_each(|(plant, leaf)| table.row(origin, LeafRow::of(plant, leaf)))
         })?;
-        table::<ImageRow<'_>>(set, out, "images.csv", |record, table| table.row(ImageRow::of(record)))?;
+        table::<ImageRow>(set, out, "images.csv", |record, origin, table| table.row(origin, ImageRow::of(record)))?;
         leaves::write(set, out, &format!("{FOLDER}/leaves.parquet"))
     }
 }
@@ -101,8 +97,9 @@ impl Format for Writer {
 struct Table<'s, 'f>(csv::Writer<&'s mut Stream<'f>>);
 
 impl Table<'_, '_> {
-    fn row(&mut self, row: impl Serialize) -> Result<()> {
-        self.0.serialize(row).map_err(failed)
+    /// Adds a row that is about an image.
+    fn row(&mut self, origin: &Origin<'_>, row: impl Serialize) -> Result<()> {
+        self.0.serialize((origin, row)).map_err(failed)
     }
 }
 
@@ -111,38 +108,44 @@ fn failed(error: csv::Error) -> Error {
     Error::failed(format!("a table of {FOLDER} cannot be written: {error}"))
 }
 
+/// The names of the columns that a `T` fills, with commas between.
+fn columns<T: Serialize + Default>() -> Result<Vec<u8>> {
+    let mut names = csv::Writer::from_writer(Vec::new());
+    names.serialize(T::default()).map_err(failed)?;
+    let mut names = names.into_inner().map_err(|e| failed(e.into_error().into()))?;
+    names.truncate(names.iter().position(|byte| *byte == b'\n').unwrap_or(names.len()));
+    Ok(names)
+}
+
 /// Writes a table of rows `T`: the names of its columns, then the rows of all records.
 fn table<T: Serialize + Default>(
     set: &Set,
     out: &mut Whole<'_>,
     name: &str,
-    rows: impl Fn(&Record, &mut Table<'_, '_>) -> Result<()>,
+    rows: impl Fn(&Record, &Origin<'_>, &mut Table<'_, '_>) -> Result<()>,
 ) -> Result<()> {
     // Names are written with the first row; a table without rows has them too.
-    let mut names = csv::Writer::from_writer(Vec::new());
-    names.serialize(T::default()).map_err(failed)?;
-    let mut names = names.into_inner().map_err(|e| failed(e.into_error().into()))?;
-    names.truncate(names.iter().position(|byte| *byte == b'\n').map_or(0, |end| end + 1));
+    let names = [columns::<Origin<'_>>()?, columns::<T>()?].join(&b',');
     out.file(&format!("{FOLDER}/{name}"), |stream| {
         stream.put(names)?;
+        stream.put("\n")?;
         let mut table = Table(csv::WriterBuilder::new().has_headers(false).from_writer(stream));
         for record in set.all() {
-            rows(&record?, &mut table)?;
+            let record = record?;
+            rows(&record, &Origin::of(&set.recipe, &record), &mut table)?;
         }
         table.0.flush().map_err(|e| failed(e.into()))
     })
 }
 
 impl<'a> PlantRow<'a> {
-    fn of(record: &'a Record, plant: &'a Plant) -> Self {
+    fn of(plant: &'a Plant) -> Self {
         let grown = plant.grown.as_ref();
         let place = |axis: usize| grown.map(|grown| grown.position_m[axis]);
         // A model has neither a code nor an age.
         let aged = grown.filter(|grown| !grown.eppo.is_empty());
         let traits = grown.and_then(|grown| grown.traits);
         Self {
-            image: &record.name,
-            split: record.split.name(),
             plant: plant.number,
             id: plant.id,
             class: plant.class.name(),
@@ -167,12 +170,10 @@ impl<'a> PlantRow<'a> {
 }
 
 impl<'a> LeafRow<'a> {
-    fn of(record: &'a Record, plant: &'a Plant, leaf: &Leaf) -> Self {
+    fn of(plant: &'a Plant, leaf: &Leaf) -> Self {
         let traits = leaf.traits;
         let species = plant.grown.as_ref().map(|Grown { species, .. }| species.as_str());
         Self {
-            image: &record.name,
-            split: record.split.name(),
             plant: plant.number,
             leaf: leaf.number,
             id: leaf.id,
@@ -192,13 +193,11 @@ impl<'a> LeafRow<'a> {
     }
 }
 
-impl<'a> ImageRow<'a> {
-    fn of(record: &'a Record) -> Self {
+impl ImageRow {
+    fn of(record: &Record) -> Self {
         let canopy = record.canopy;
         let pixels = |class: Class| record.classes.iter().filter(|share| share.class == class).map(|share| share.pixels).sum();
         Self {
-            image: &record.name,
-            split: record.split.name(),
             ground_m2: canopy.map(|canopy| canopy.ground_m2),
             leaf_area_m2: canopy.and_then(|canopy| canopy.leaf_area_m2),
             lai: canopy.and_then(|canopy| canopy.lai),

@@ -1,11 +1,10 @@
 //! A table with a row a leaf that an image shows or hides: what phenotyping measures of it.
 
-use super::count;
+use super::origin::Origin;
 use super::table::{Row, Table};
 use crate::Result;
 use crate::dataset::record::{Leaf, Plant, Record, Seen};
 use crate::dataset::set::{Set, Whole};
-use crate::dataset::split::Split;
 use crate::scene::tag::Class;
 
 /// Writes the table of a dataset whose images are all there to `path`.
@@ -23,12 +22,13 @@ pub(in crate::dataset) fn write(set: &Set, out: &mut Whole<'_>, path: &str) -> R
             grown: None,
             leaves: Vec::new(),
         };
-        let mut table = Table::begin(out, &row(("", Split::Train, 0), &plant, &leaf))?;
+        let mut table = Table::begin(out, &row(&Origin::default(), &plant, &leaf))?;
         for record in set.all() {
             let record: Record = record?;
+            let origin = Origin::of(&set.recipe, &record);
             for plant in &record.plants {
                 for leaf in &plant.leaves {
-                    table.add(row((&record.name, record.split, record.index), plant, leaf))?;
+                    table.add(row(&origin, plant, leaf))?;
                 }
             }
         }
@@ -36,14 +36,12 @@ pub(in crate::dataset) fn write(set: &Set, out: &mut Whole<'_>, path: &str) -> R
     })
 }
 
-fn row((name, split, index): (&str, Split, u64), plant: &Plant, leaf: &Leaf) -> Row {
+fn row(origin: &Origin<'_>, plant: &Plant, leaf: &Leaf) -> Row {
     let grown = plant.grown.as_ref();
     let aged = grown.filter(|grown| !grown.eppo.is_empty());
     let (seen, traits) = (&leaf.seen, leaf.traits);
-    vec![
-        ("image", name.into()),
-        ("number", count(index).into()),
-        ("split", split.name().into()),
+    let mut row = origin.cells();
+    row.extend([
         ("plant", plant.number.cast_signed().into()),
         ("leaf", leaf.number.into()),
         ("id", leaf.id.into()),
@@ -61,5 +59,6 @@ fn row((name, split, index): (&str, Split, u64), plant: &Plant, leaf: &Leaf) -> 
         ("visible_px", seen.pixels.into()),
         ("unoccluded_px", seen.unoccluded.into()),
         ("whole_px", seen.whole.into()),
-    ]
+    ]);
+    row
 }

@@ -2,19 +2,20 @@
 //! a plant that an image shows or hides. The format `traits` adds a table of leaves (`leaves.parquet`). A cell is empty where its value is not known: of models from disk, of imported images.
 
 pub(super) mod leaves;
+pub(super) mod origin;
 mod table;
 
 use super::native;
 use super::pack::Packing;
 use super::record::{Plant, PointState, Record, Seen};
 use super::set::{Set, Whole};
-use super::split::Split;
 use crate::Result;
 use crate::light::LightRecord;
 use crate::math::Spectrum;
 use crate::scene::tag::Class;
 use crate::settings::Engine;
-use table::{Row, Table};
+use origin::Origin;
+use table::{Row, Table, count};
 
 /// The table of images, below the dataset's folder.
 pub const IMAGES: &str = "images.parquet";
@@ -43,20 +44,16 @@ pub(super) fn write(set: &Set, out: &mut Whole<'_>) -> Result<()> {
             grown: None,
             leaves: Vec::new(),
         };
-        let mut table = Table::begin(out, &of_plant("", Split::Train, 0, &none))?;
+        let mut table = Table::begin(out, &of_plant(&Origin::default(), &none))?;
         for record in set.all() {
             let record = record?;
+            let origin = Origin::of(&set.recipe, &record);
             for plant in &record.plants {
-                table.add(of_plant(&record.name, record.split, record.index, plant))?;
+                table.add(of_plant(&origin, plant))?;
             }
         }
         table.end()
     })
-}
-
-/// A count as a column holds it.
-fn count(n: impl TryInto<i64>) -> i64 {
-    n.try_into().unwrap_or(i64::MAX)
 }
 
 /// Degrees between straight down and the camera's axis.
@@ -150,7 +147,7 @@ fn of_image(set: &Set, record: &Record) -> Row {
     ]
 }
 
-fn of_plant(name: &str, split: Split, index: u64, plant: &Plant) -> Row {
+fn of_plant(origin: &Origin<'_>, plant: &Plant) -> Row {
     let grown = plant.grown.as_ref();
     let place = |axis: usize| grown.map(|grown| grown.position_m[axis]);
     // A model has neither a code nor an age.
@@ -164,10 +161,8 @@ fn of_plant(name: &str, split: Split, index: u64, plant: &Plant) -> Row {
         PointState::Hidden => "hidden",
         PointState::Visible => "visible",
     });
-    vec![
-        ("image", name.into()),
-        ("number", count(index).into()),
-        ("split", split.name().into()),
+    let mut row = origin.cells();
+    row.extend([
         ("plant", plant.number.cast_signed().into()),
         ("id", plant.id.into()),
         ("class", plant.class.name().into()),
@@ -212,5 +207,6 @@ fn of_plant(name: &str, split: Split, index: u64, plant: &Plant) -> Row {
         ("wilt", condition.map(|condition| condition.wilt).into()),
         ("pale_young", condition.map(|condition| condition.pale_young).into()),
         ("greenness", condition.map(|condition| condition.greenness).into()),
-    ]
+    ]);
+    row
 }

@@ -193,3 +193,8 @@ impl<'s, 'f> Table<'s, 'f> {
         self.writer.close().map(drop).map_err(failed)
     }
 }
+
+/// A count as a column holds it.
+pub(super) fn count(n: impl TryInto<i64>) -> i64 {
+    n.try_into().unwrap_or(i64::MAX)
+}

@@ -29,6 +29,10 @@ pub(super) fn adopt(set: &Set, id: Id) -> Result<()> {
     let mut images: BTreeMap<u64, Vec<File>> = BTreeMap::new();
     for entry in archive.entries().map_err(Error::io(&path))? {
         let mut entry = entry.map_err(Error::io(&path))?;
+        // Packs hold plain files alone. One with holes tells its own length, which may be beyond all memory.
+        if !entry.header().entry_type().is_file() {
+            continue;
+        }
         let name = String::from_utf8_lossy(&entry.path_bytes()).into_owned();
         let Some((index, file)) = name.split_once('.').and_then(|(key, file)| Some((key.parse().ok()?, file))) else {
             continue;

@@ -142,7 +142,7 @@ fn written(set: &Set, id: Id) -> Result<()> {
 }
 
 /// Removes the folders of images that a pack holds.
-fn clear(folder: &Path, record: &PackRecord) -> Result<()> {
+pub(in crate::dataset) fn clear(folder: &Path, record: &PackRecord) -> Result<()> {
     for index in record.images.iter().map(|image| image.index) {
         // First what says that it is whole.
         remove(&below(folder, &ChecksumRecord::path_below(index))?, |path| std::fs::remove_file(path))?;

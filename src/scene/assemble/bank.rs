@@ -2,8 +2,9 @@
 //!
 //! Where `detail` is `Instanced`, what stands so far away that a pixel shows more than [`COARSE`] of it is no plant of its own shape: each
 //! population has a bank of plants, grown as all of its plants are, and each plant stands in the field as an instance of one of them,
-//! turned by an angle of its own and leant as its ground. Which one that is, and how it is turned, follows from the plant's own stream
-//! alone, so it does not depend on what else is in view.
+//! turned by an angle and larger or smaller by a factor of its own, and leant as its ground. Which one that is, how it is turned and how large it is
+//! follows from the plant's own stream alone, so it does not depend on what else is in view. Wear and tint are those of the bank's plant, for
+//! materials are as many as plants in the bank.
 
 use super::builder::Builder;
 use super::grown::Grown;
@@ -12,7 +13,7 @@ use super::seedling::{Place, Seedling, grow};
 use crate::Result;
 use crate::geometry::Placement;
 use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3};
-use crate::plant::LeafAxis;
+use crate::plant::{LeafAxis, LeafSize};
 use crate::sampling::{Purpose, Stream};
 use crate::scene::PlantRecord;
 use crate::scene::desc::Detail;
@@ -38,12 +39,27 @@ impl Model {
         let turn = Member::turn(&seedling.stream);
         let ahead = Vec3::new(turn.sin(), turn.cos(), 0.0);
         let frame = Frame::with_tangent(normal, ahead.cross(normal));
-        let at = Placement { rotation: Mat3::from_cols(frame.x, frame.y, frame.z), offset: foot };
-        let axes: Vec<LeafAxis> = self.record.leaf_axes.iter().map(|a| a.clone().moved(|p| at.point(p))).collect();
-        let axis = at.direction(self.record.axis);
-        let record = PlantRecord { id: seedling.id, position: foot, axis, leaf_axes: axes, ..self.record.clone() };
+        // Plants that are all alike are of one size.
+        let scale = if seedling.individual.is_some() { 1.0 } else { Member::size(&seedling.stream) };
+        let at = Placement { rotation: Mat3::from_cols(frame.x, frame.y, frame.z), scale, offset: foot };
+        let record = PlantRecord {
+            id: seedling.id,
+            position: foot,
+            axis: at.direction(self.record.axis),
+            height: self.record.height * scale,
+            radius: self.record.radius * scale,
+            leaf_axes: self.record.leaf_axes.iter().map(|axis| placed(axis, &at)).collect(),
+            ..self.record.clone()
+        };
         (record, at)
     }
+}
+
+/// The axis of a bank's leaf where an instance has it, as large as it is there.
+fn placed(axis: &LeafAxis, at: &Placement) -> LeafAxis {
+    let LeafSize { length, width, petiole } = axis.size;
+    let size = LeafSize { length: length * at.scale, width: width * at.scale, petiole: petiole * at.scale };
+    LeafAxis { size, ..axis.clone().moved(|p| at.point(p)) }
 }
 
 impl Builder<'_> {

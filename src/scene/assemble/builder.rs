@@ -51,6 +51,8 @@ pub(super) struct Builder<'a> {
     pub(super) ground: Vec<PartKind>,
     /// What the plants' parts are, in the order of the parts.
     pub(super) organs: Vec<OrganKind>,
+    /// What the parts of models from disk are, in the order of the parts.
+    pub(super) things: Vec<PartKind>,
     pub(super) warnings: Vec<String>,
 }
 

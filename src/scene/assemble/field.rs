@@ -37,6 +37,8 @@ pub struct Field {
     pub index: u64,
     /// Every species that its scene file can draw, in the scene file's order: the same for all indices.
     pub species: Vec<SpeciesRecord>,
+    /// Names that its scene file gives to models from disk, by their numbers among the [`PartKind::Named`]: the same for all indices.
+    pub models: Vec<String>,
     /// What was drawn for it.
     pub conditions: Conditions,
     /// Every file that was read for it, in order.

@@ -1,12 +1,13 @@
 //! What a builder tells of the field that it built.
 
 use super::builder::Builder;
-use super::models::{self, model_name};
-use crate::Result;
+use super::models::{self, called};
+use crate::ron_file::Step;
 use crate::sampling::Purpose;
 use crate::scatter::{Rows, WeedsRecord};
-use crate::scene::PlantRecord;
 use crate::scene::record::{CropRecord, SpeciesRecord, WeedRecord};
+use crate::scene::{PartKind, PlantRecord};
+use crate::{Error, Result};
 
 impl Builder<'_> {
     /// Every species that the scene file can draw: crops, weeds, plants, models, in the scene file's order and each once. The same for
@@ -29,8 +30,39 @@ impl Builder<'_> {
         for desc in &desc.models {
             let model = self.library.model(page, desc)?;
             for class in models::classes(desc, &model) {
-                add(SpeciesRecord { name: model_name(&desc.file), eppo: String::new(), class });
+                add(SpeciesRecord { name: called(desc), eppo: String::new(), class });
             }
+        }
+        self.tell_apart(&all)?;
+        Ok(all)
+    }
+
+    /// Refuses names of models that classes of datasets would take for a role or a species.
+    fn tell_apart(&self, species: &[SpeciesRecord]) -> Result<()> {
+        let grown =
+            |name: &str| species.iter().any(|s| !s.eppo.is_empty() && [&s.name, &s.eppo].contains(&&name.to_owned()));
+        let taken = |name: &str| ["soil", "crop", "weed"].contains(&name) || grown(name);
+        for (k, desc) in self.desc.models.iter().enumerate() {
+            if let Some(name) = desc.name.as_ref().filter(|name| taken(name)) {
+                let at = [Step::Field("models"), Step::Item(k), Step::Field("name")];
+                let fault = Error::input(format!("`{name}` is a role or a species, so no class could tell the model"));
+                return Err(self.page.blame(&at, fault.help("give a name of its own such as \"robot\"")));
+            }
+        }
+        Ok(())
+    }
+
+    /// The names that the scene file gives to models from disk, in its order and each once. The same for every index.
+    pub(super) fn model_names(&self) -> Result<Vec<String>> {
+        let mut all: Vec<String> = Vec::new();
+        for (k, desc) in self.desc.models.iter().enumerate() {
+            let Some(name) = desc.name.as_ref().filter(|name| !all.contains(name)) else { continue };
+            if let Some(fault) = fault_of_name(name, all.len()) {
+                let at = [Step::Field("models"), Step::Item(k), Step::Field("name")];
+                let help = "give a short name such as \"robot\"; models that are one class may share it";
+                return Err(self.page.blame(&at, Error::input(fault).help(help)));
+            }
+            all.push(name.clone());
         }
         Ok(all)
     }
@@ -57,6 +89,17 @@ impl Builder<'_> {
         }
         Ok(all)
     }
+}
+
+/// What is wrong with a new name of a model where so many others are known.
+fn fault_of_name(name: &str, known: usize) -> Option<&'static str> {
+    if name.is_empty() || name.trim() != name || name.contains([',', ';', '=']) {
+        return Some("no class can tell a model of such a name: it is empty, ends in spaces or holds `,`, `;` or `=`");
+    }
+    if name.contains(char::is_control) {
+        return Some("the name of this model holds a character that ends lines or is not seen");
+    }
+    (known >= PartKind::MOST_NAMED).then_some("label maps have numbers for 100 names of models, and this is one more")
 }
 
 /// Gives every plant the number of its species in the table, from 1.

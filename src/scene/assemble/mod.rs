@@ -228,6 +228,7 @@ impl<'a> Builder<'a> {
             seen: Vec::new(),
             ground: Vec::new(),
             organs: Vec::new(),
+            things: Vec::new(),
             warnings,
         })
     }
@@ -317,7 +318,7 @@ impl<'a> Builder<'a> {
                 (plants, Some(record))
             }
         };
-        let species = self.species()?;
+        let (species, models) = (self.species()?, self.model_names()?);
         known::number_kinds(&mut plants, &species);
         self.warn_of_view(&plants, shown);
         let conditions = Conditions {
@@ -333,7 +334,7 @@ impl<'a> Builder<'a> {
         // Plants come behind the ground, and models behind them.
         let mut kinds = self.ground;
         kinds.extend(self.organs.into_iter().map(PartKind::Organ));
-        kinds.resize(self.scene.parts.len(), PartKind::Model);
+        kinds.extend(self.things);
         self.warnings.extend(self.library.warnings());
         let field = Field {
             scene: self.scene,
@@ -344,6 +345,7 @@ impl<'a> Builder<'a> {
             kinds,
             plants,
             species,
+            models,
             conditions,
             files: self.library.files(),
             shipped: self.library.shipped(),

@@ -11,7 +11,7 @@ use crate::ron_file::{Num, Step};
 use crate::sampling::Purpose;
 use crate::scene::desc::ModelDesc;
 use crate::scene::tag::{Class, MOST_PLANTS, Tag};
-use crate::scene::{Part, PlantRecord};
+use crate::scene::{Part, PartKind, PlantRecord};
 use crate::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -20,10 +20,15 @@ use std::sync::Arc;
 impl Builder<'_> {
     /// Places every model; `numbered` plants have their numbers already. Returns the plants among the models.
     pub(super) fn models(&mut self, numbered: usize, floor: Option<Floor<'_>>) -> Result<Vec<PlantRecord>> {
+        let names = self.model_names()?;
         let mut records: Vec<PlantRecord> = Vec::new();
         let mut last = numbered;
         for (k, desc) in self.desc.models.iter().enumerate() {
+            let parts = self.scene.parts.len();
             let found = self.place(k, desc, last, floor)?;
+            let named = names.iter().position(|name| desc.name.as_ref() == Some(name));
+            let kind = named.map_or(PartKind::Model, |place| PartKind::Named(place as u8));
+            self.things.extend(self.scene.parts[parts..].iter().map(|_| kind));
             last = found.iter().map(|r| r.number as usize).max().unwrap_or(last);
             records.extend(found);
         }
@@ -81,7 +86,7 @@ impl Builder<'_> {
             // What of the model it is, whatever the number of plants before it.
             let own = u64::from(number) - numbered as u64;
             let id = identity::of(self.seed, self.index, identity::MODELS + k as u64, own);
-            self.record((number, id), &parts, &desc.file, foot, &model)
+            self.record((number, id), &parts, called(desc), foot, &model)
         });
         Ok(plants.collect())
     }
@@ -109,7 +114,14 @@ impl Builder<'_> {
     }
 
     /// What is known of a plant that is a model, or a part of one.
-    fn record(&self, (number, id): (u32, u32), parts: &[usize], file: &str, foot: Vec3, model: &Model) -> PlantRecord {
+    fn record(
+        &self,
+        (number, id): (u32, u32),
+        parts: &[usize],
+        name: String,
+        foot: Vec3,
+        model: &Model,
+    ) -> PlantRecord {
         let parts: Vec<&Part> = parts.iter().map(|i| &self.scene.parts[*i]).collect();
         let mut all = Mesh::default();
         for part in &parts {
@@ -123,7 +135,7 @@ impl Builder<'_> {
             number,
             id,
             leaf_ids: Vec::new(),
-            species: model_name(file),
+            species: name,
             eppo: String::new(),
             kind: 0,
             class: parts[0].tag.class,
@@ -164,7 +176,8 @@ fn tag(class: Option<Class>, label: Option<&Label>, numbered: usize) -> Option<T
     }
 }
 
-/// What a model is called: its file, without folder and ending.
-pub(super) fn model_name(file: &str) -> String {
-    Path::new(file).file_stem().unwrap_or_default().to_string_lossy().into_owned()
+/// What a model is called: by its name, else by its file without folder and ending.
+pub(super) fn called(desc: &ModelDesc) -> String {
+    let of_file = || Path::new(&desc.file).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    desc.name.clone().unwrap_or_else(of_file)
 }

@@ -22,7 +22,7 @@ pub struct Augment {
     pub flip: bool,
     /// Turned by any angle: a camera above a field has no up.
     pub rotate: bool,
-    /// Enlarged by 1/1.5 to 1.5.
+    /// Enlarged by 1/1.5 to 1.5, or to pixels on the ground that are asked for; see the module `ground`.
     pub scale: bool,
     /// Another part of the picture: shifted by up to a tenth, and by what an enlargement leaves over.
     pub crop: bool,
@@ -136,7 +136,7 @@ impl Augment {
         normalization: &Normalization,
         stream: &mut Stream,
     ) -> (Vec<f32>, Vec<u8>) {
-        let &Crop { image, size, rare } = crop;
+        let &Crop { image, size, rare, .. } = crop;
         let anywhere = size == image || rare == 0.0 || !stream.chance(rare);
         let about = if anywhere { None } else { crop::rare_pixel(&example.labels, image, stream) };
         let placement = Placement::draw(self.moves(), crop, about, stream);
@@ -316,7 +316,7 @@ mod tests {
     }
 
     fn crop(image: (u32, u32), size: (u32, u32)) -> Crop {
-        Crop { image, size, rare: 0.0 }
+        Crop { image, size, rare: 0.0, ground: None }
     }
 
     fn example(w: u32, h: u32) -> Example {

@@ -121,17 +121,19 @@ impl Epochs {
 fn make(store: &Store, order: &Order, step: u64, epochs: &mut Epochs) -> Result<Batch> {
     let shape = store.shape();
     let colour: Vec<bool> = shape.bands.iter().map(Band::is_color).collect();
-    let crop = Crop { image: (shape.width, shape.height), size: order.crop_size, rare: order.rare };
+    let crop = Crop { image: (shape.width, shape.height), size: order.crop_size, rare: order.rare, ground: None };
     let mut batch = Batch { images: order.batch, pixels: Vec::new(), labels: Vec::new() };
     for slot in 0..order.batch as u64 {
         let place = step * order.batch as u64 + slot;
-        let mut example = store.get(epochs.at(place, store.len()))?;
+        let image = epochs.at(place, store.len());
+        let mut example = store.get(image)?;
         if order.augment.fourier {
             let mut stream = Stream::of(order.seed, place, Purpose::Training, 5);
             let other = store.get(stream.index(store.len()))?;
             let restyled = fourier::restyled(&example, &other, crop.image, &mut stream);
             example = restyled.map_or(example, Cow::Owned);
         }
+        let crop = Crop { ground: order.pixels.as_ref().map(|pixels| pixels.at(image)), ..crop };
         let mut stream = Stream::of(order.seed, place, Purpose::Training, 2);
         let (pixels, labels) = order.augment.apply(&example, &crop, &colour, &order.normalization, &mut stream);
         batch.pixels.extend(pixels);

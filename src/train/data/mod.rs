@@ -11,6 +11,7 @@
 //! | `erase` | random erasing |
 //! | `fourier` | the style of another image |
 //! | `crop` | random crops, some centred on rare-class pixels |
+//! | `ground` | scale by the size of pixels on the ground |
 //! | `normalise` | input normalization |
 //! | `order` | how batches are drawn |
 //! | `photos` | photographs without labels, for self-training |
@@ -24,6 +25,7 @@ pub mod crop;
 mod erase;
 pub mod example;
 mod fourier;
+pub mod ground;
 pub mod loader;
 pub mod margin;
 pub mod normalise;
@@ -38,6 +40,7 @@ pub use augment::Augment;
 pub use bands::Band;
 pub use crop::Crop;
 pub use example::{Example, Shape};
+pub use ground::{AugmentScale, Ground, PixelSizes};
 pub use loader::{Batch, Loader};
 pub use normalise::Normalization;
 pub use order::Order;

@@ -1,6 +1,7 @@
 //! How batches are drawn from images.
 
 use super::augment::Augment;
+use super::ground::PixelSizes;
 use super::normalise::Normalization;
 
 /// How batches are drawn.
@@ -16,6 +17,8 @@ pub struct Order {
     pub rare: f64,
     /// Data augmentation.
     pub augment: Augment,
+    /// Pixels on the ground of the images, where crops are scaled by them.
+    pub pixels: Option<PixelSizes>,
     /// Input normalization, after that.
     pub normalization: Normalization,
 }

@@ -86,7 +86,7 @@ impl Photos {
             let mut stream = Stream::of(order.seed, step * order.batch as u64 + slot, Purpose::Training, 3);
             let photo = &self.all[stream.index(self.all.len())];
             let (image, example) = photo.at(stream.index(photo.sizes.len()), order.crop_size);
-            let crop = Crop { image, size: order.crop_size, rare: 0.0 };
+            let crop = Crop { image, size: order.crop_size, rare: 0.0, ground: None };
             // Both begin with the same random numbers, so they lie at the same place of the photograph.
             let mut again = stream.clone();
             views.plain.extend(moved.apply(&example, &crop, &color, &order.normalization, &mut stream).0);
@@ -124,6 +124,7 @@ mod tests {
             crop_size: (32, 24),
             rare: 0.0,
             augment: Augment::default(),
+            pixels: None,
             normalization: Normalization::Fixed { mean: vec![0.0; 3], sd: vec![1.0; 3] },
         }
     }

@@ -1,10 +1,11 @@
 //! The selected images: decoded once, and kept as far as memory goes.
 
 use super::example::{Example, Shape};
+use super::ground::PIXEL_MM;
 use super::select::{Pick, Selection};
-use crate::Result;
 use crate::dataset::Set;
 use crate::dataset::classes::{Classes, Map};
+use crate::{Error, Result};
 use std::borrow::Cow;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -40,7 +41,7 @@ impl Store {
         let (mut sets, mut images) = (Vec::new(), Vec::new());
         for selection in selections {
             let (set, numbers) = selection.open(otherwise, seed)?;
-            let map = classes.of(&set.recipe.species).map_err(|e| e.in_file(&set.folder))?;
+            let map = classes.of(&set.recipe.species, set.recipe.models()).map_err(|e| e.in_file(&set.folder))?;
             set.recipe.check_parts(classes).map_err(|e| e.in_file(&set.folder))?;
             images.extend(numbers.into_iter().map(|n| (sets.len(), n)));
             sets.push((set, map, selection.margin));
@@ -54,6 +55,11 @@ impl Store {
     /// How many images there are, repeated ones counted as often as they stand there.
     pub fn len(&self) -> usize {
         self.images.len()
+    }
+
+    /// How many different ones.
+    pub fn distinct(&self) -> usize {
+        self.same.iter().enumerate().filter(|(place, first)| place == *first).count()
     }
 
     /// Whether there is none.
@@ -88,13 +94,45 @@ impl Store {
     /// Side of a pixel on the ground at the network's size, millimetres: the median of some images whose records tell their cameras.
     pub fn pixel_mm(&self) -> Result<Option<f64>> {
         let mut sizes = Vec::new();
-        for (set, number) in self.images.iter().step_by(self.images.len().div_ceil(ASKED).max(1)) {
-            let record = self.sets[*set].0.record(*number)?;
-            let across = record.conditions.as_ref().and_then(|conditions| conditions.camera.pixel_m());
-            sizes.extend(across.map(|m| 1e3 * m * f64::from(record.width) / f64::from(self.shape.width)));
+        for place in (0..self.images.len()).step_by(self.images.len().div_ceil(ASKED).max(1)) {
+            sizes.extend(self.pixel_mm_of(place)?);
         }
         sizes.sort_by(f64::total_cmp);
         Ok(sizes.get(sizes.len() / 2).copied())
+    }
+
+    /// The same of each image, in their order; all records are read.
+    ///
+    /// # Errors
+    /// An image whose record does not tell it, or one outside [`PIXEL_MM`].
+    pub fn pixel_sizes_mm(&self) -> Result<Vec<f64>> {
+        let mut sizes: Vec<f64> = Vec::with_capacity(self.images.len());
+        for (place, first) in self.same.iter().enumerate() {
+            if *first < place {
+                sizes.push(sizes[*first]);
+                continue;
+            }
+            let told = self.pixel_mm_of(place)?.filter(|mm| PIXEL_MM.contains(mm));
+            sizes.push(told.ok_or_else(|| self.untold(place))?);
+        }
+        Ok(sizes)
+    }
+
+    /// That an image does not tell the size of its pixels.
+    fn untold(&self, place: usize) -> Error {
+        let (set, number) = self.images[place];
+        let name = Set::name(number);
+        Error::misuse(format!("--augment-scale: image {name} does not tell the size of its pixels on the ground"))
+            .help("imported images do not, nor cameras that do not look down: leave this option out for them")
+            .in_file(&self.sets[set].0.folder)
+    }
+
+    /// Of the image at a place, where its record tells its camera.
+    fn pixel_mm_of(&self, place: usize) -> Result<Option<f64>> {
+        let (set, number) = self.images[place];
+        let record = self.sets[set].0.record(number)?;
+        let across = record.conditions.as_ref().and_then(|conditions| conditions.camera.pixel_m());
+        Ok(across.map(|m| 1e3 * m * f64::from(record.width) / f64::from(self.shape.width)))
     }
 
     /// Keeps an image that was read, where the budget allows it.

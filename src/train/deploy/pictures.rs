@@ -291,7 +291,7 @@ fn one_name_each(pictures: &[Picture]) -> Result<()> {
 }
 
 /// What the predictions in a folder are: `prediction.json`.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Prediction {
     /// The program's version.
     pub furrow: String,
@@ -299,9 +299,12 @@ pub struct Prediction {
     pub network: String,
     /// SHA-256 of its weights.
     pub weights_sha256: String,
-    /// The sizes that pictures were brought to, as `--resize` writes them.
+    /// The sizes that pictures were brought to, as `--resize` writes them; the factor on their own where their pixels on the ground were given.
     #[serde(default = "stretch")]
     pub resize: String,
+    /// Side of the pictures' pixels on the ground, millimetres, where it was given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pixel_mm: Option<f64>,
     /// How they were refined, as `--refine` writes it.
     #[serde(default, skip_serializing_if = "Refine::is_none")]
     pub refine: Refine,
@@ -322,14 +325,15 @@ pub const PREDICTION: &str = "prediction.json";
 impl Prediction {
     /// Takes a folder for the predictions of these pictures. An error where another network's lie there, or files that are not
     /// predictions of these pictures and would be written over.
-    pub fn claim(folder: &Path, card: &ModelCard, pictures: &[Picture]) -> Result<Self> {
+    pub fn claim(folder: &Path, card: &ModelCard, pixel_mm: Option<f64>, pictures: &[Picture]) -> Result<Self> {
         let path = folder.join(PREDICTION);
         let refuse = |path: &Path, what: String| Err(Error::misuse(what).help("give another --out").in_file(path));
         let there: Option<Self> = path.exists().then(|| run::read_json(&path)).transpose()?;
         if there.as_ref().is_some_and(|t| t.weights_sha256 != card.weights_sha256) {
             return refuse(&path, "predictions of another network lie in this folder".into());
         }
-        if there.as_ref().is_some_and(|t| t.resize != card.resize.name()) {
+        let other_pixels = |there: &Self| there.pixel_mm.zip(pixel_mm).is_some_and(|(a, b)| a != b);
+        if there.as_ref().is_some_and(|t| t.resize != card.resize.name() || other_pixels(t)) {
             return refuse(&path, "predictions at other sizes lie in this folder".into());
         }
         if there.as_ref().is_some_and(|t| t.refine != card.refine) {
@@ -365,6 +369,7 @@ impl Prediction {
             network: card.network.name().into(),
             weights_sha256: card.weights_sha256.clone(),
             resize: card.resize.name(),
+            pixel_mm,
             refine: card.refine,
             classes,
             pictures: all,

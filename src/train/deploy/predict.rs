@@ -28,6 +28,8 @@ pub struct Options<'a> {
     pub threads: usize,
     /// Batch size; ≥ 1.
     pub batch: usize,
+    /// Side of the pictures' pixels on the ground, millimetres, where they are brought to the network's by it; it is recorded.
+    pub pixel_mm: Option<f64>,
     /// Called with the number of pictures that are done with, of as many as [`passes`] tells.
     pub done: &'a (dyn Fn(usize) + Sync),
     /// Raised by whoever wants it to stop.
@@ -78,7 +80,7 @@ pub fn predict(
     let place = machine.place(options.precision)?;
     device::set_threads(options.threads);
     let models = trained.models(place)?;
-    let prediction = Prediction::claim(out, card, pictures)?;
+    let prediction = Prediction::claim(out, card, options.pixel_mm, pictures)?;
     let workers = machine.loaders.max(1);
     let failed = AtomicBool::new(false);
     let mut made = Predictions::default();

@@ -9,7 +9,7 @@
 use super::class_weights::ClassWeights;
 use super::schedule::Schedule;
 use crate::Error;
-use crate::train::data::{Augment, Normalization, Resize, Shape};
+use crate::train::data::{Augment, AugmentScale, Normalization, Resize, Shape};
 use crate::train::net::Pretrained;
 use crate::train::refine::Refine;
 use serde::{Deserialize, Serialize};
@@ -190,6 +190,9 @@ pub struct Hyperparameters {
     pub refine: Refine,
     /// Data augmentation.
     pub augment: Augment,
+    /// By what the augmentation `scale` enlarges crops.
+    #[serde(default, skip_serializing_if = "AugmentScale::is_relative")]
+    pub augment_scale: AugmentScale,
     /// Input normalization.
     #[serde(rename = "exposure")]
     pub normalization: NormalizationMode,
@@ -252,6 +255,7 @@ impl Default for Hyperparameters {
             resize: Resize::Stretch,
             refine: Refine::default(),
             augment: Augment::default(),
+            augment_scale: AugmentScale::Relative,
             normalization: NormalizationMode::Band,
             validate_every: 100,
             patience: 10,
@@ -315,6 +319,13 @@ impl Hyperparameters {
                 field: "logit_adjustment",
                 message: "calibration sets the same biases".into(),
                 help: "leave one of the two out".into(),
+            });
+        }
+        if !self.augment_scale.is_relative() && !self.augment.scale {
+            return Err(Invalid {
+                field: "augment_scale",
+                message: format!("`scale` is not among the augmentations, which are {}", self.augment),
+                help: "name scale among them, or leave this out".into(),
             });
         }
         range("validate_every", self.validate_every > 0, &self.validate_every, whole)?;

@@ -17,6 +17,7 @@
 //! | `trainer` | the training loop, with validation passes |
 //! | `calibrate` | class-bias calibration of a trained network |
 //! | `logits` | post-hoc logit adjustment of a trained network |
+//! | `warnings` | what is odd about a training |
 //!
 //! Only `adapt`, `loss`, `gradients`, `optimiser`, `ema`, `trainer`, `calibrate` and `logits` need libtorch. On a CPU the same plan on the same number of threads gives
 //! the same bits, stopped and gone on with or not.
@@ -44,6 +45,7 @@ pub mod schedule;
 pub mod settings;
 #[cfg(feature = "train")]
 pub mod trainer;
+pub mod warnings;
 
 pub use hyper::Hyperparameters;
 pub use plan::{Adaptation, Plan};

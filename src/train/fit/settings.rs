@@ -9,7 +9,7 @@ use super::plan::Plan;
 use super::schedule::Schedule;
 use crate::dataset::classes::Classes;
 use crate::ron_file;
-use crate::train::data::{Augment, Band, Resize};
+use crate::train::data::{Augment, AugmentScale, Band, Resize};
 use crate::train::net::Pretrained;
 use crate::train::refine::Refine;
 use serde::{Deserialize, Serialize};
@@ -159,6 +159,13 @@ pub struct Settings {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-example" = "\"all,erase\""))]
     pub augment: Option<String>,
+    /// What the augmentation `scale` enlarges crops by: relative (by 1/1.5 to 1.5), or, where all training images tell their cameras, so that
+    /// their pixels on the ground are log-uniform: auto (between the 5th and the 95th percentile of the training images' pixels), or a range of
+    /// millimetres a pixel at the size that images are resized to, such as 0.3..2.
+    #[arg(long, value_name = "RANGE", default_value = default_of("augment_scale"))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "\"0.3..2\""))]
+    pub augment_scale: Option<String>,
     /// Input normalization: band (each band of an image by its mean and standard deviation, which removes exposure and white balance),
     /// image (all bands of an image alike, which removes exposure), or fixed (by those of the training set).
     #[arg(long, alias = "normalise", value_name = "NAME", default_value = default_of("normalization"))]
@@ -210,6 +217,7 @@ pub fn defaults() -> Vec<(&'static str, String)> {
         ("resize", hyper.resize.name()),
         ("refine", hyper.refine.name()),
         ("augment", hyper.augment.to_string()),
+        ("augment_scale", hyper.augment_scale.name()),
         ("normalization", hyper.normalization.name().into()),
         ("validate_every", hyper.validate_every.to_string()),
         ("patience", hyper.patience.to_string()),
@@ -287,6 +295,7 @@ impl Settings {
         word("loss", self.loss.as_ref(), &mut hyper.loss, LossFunction::parse)?;
         word("class_weights", self.class_weights.as_ref(), &mut hyper.class_weights, ClassWeights::parse)?;
         word("augment", self.augment.as_ref(), &mut hyper.augment, Augment::parse)?;
+        word("augment_scale", self.augment_scale.as_ref(), &mut hyper.augment_scale, AugmentScale::parse)?;
         word("normalization", self.normalization.as_ref(), &mut hyper.normalization, NormalizationMode::parse)?;
         word("pretrained", self.pretrained.as_ref(), &mut hyper.pretrained, Pretrained::parse)?;
         word("resize", self.resize.as_ref(), &mut hyper.resize, Resize::parse)?;

@@ -11,7 +11,7 @@ use super::loss;
 use super::optimiser::Optimiser;
 use super::plan::Plan;
 use crate::dataset::sample::IGNORE;
-use crate::train::data::{Batch, Loader, Normalization, Order, Photos, Store, Views, augment};
+use crate::train::data::{Batch, Loader, Normalization, Order, Photos, PixelSizes, Store, Views, augment};
 use crate::train::figure::{Sheet, Shots, sheet};
 use crate::train::measure::{Confusion, Scores};
 use crate::train::torch::{Model, Pass, Where, classes, failed};
@@ -31,6 +31,8 @@ pub struct Data {
     pub val: Store,
     /// Photographs without labels; none unless the plan is a self-training.
     pub photos: Option<Arc<Photos>>,
+    /// Pixels on the ground of the training images, where crops are scaled by them.
+    pub pixels: Option<PixelSizes>,
     /// Threads that load.
     pub loaders: usize,
 }
@@ -41,6 +43,8 @@ pub struct Callbacks<'a> {
     pub step: &'a dyn Fn(u64, Option<f64>),
     /// After every validation pass, and whether it is the best so far.
     pub validation: &'a dyn Fn(&ValidationPass, bool),
+    /// With what is odd about it, before the first step.
+    pub warn: &'a dyn Fn(&str),
     /// Raised by whoever wants it to stop.
     pub stop: &'a AtomicBool,
 }
@@ -49,7 +53,7 @@ impl Default for Callbacks<'_> {
     /// None, and never stopped.
     fn default() -> Self {
         static NEVER: AtomicBool = AtomicBool::new(false);
-        Self { step: &|_, _| {}, validation: &|_, _| {}, stop: &NEVER }
+        Self { step: &|_, _| {}, validation: &|_, _| {}, warn: &|_| {}, stop: &NEVER }
     }
 }
 
@@ -111,6 +115,7 @@ pub fn train(
         crop_size: plan.crop_size(),
         rare: hyper.rare_crops,
         augment: hyper.augment,
+        pixels: data.pixels.clone(),
         normalization: normalization.clone(),
     };
     let mut log = TrainingLog::begin(folder, &plan.classes.names(), &at.history, at.step)?;

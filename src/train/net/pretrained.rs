@@ -154,6 +154,7 @@ fn for_bands(values: &[f32], kernel: usize, bands: &[Band]) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::BTreeMap;
 
     fn published(network: Network) -> Vec<Array> {
         let name = |parameter: &Parameter| match network {
@@ -248,5 +249,97 @@ mod tests {
         assert!(told(&arrays, Network::LiteUnet).contains(", not ["));
         std::fs::write(&path, b"\x80\x02}q\x00.").unwrap();
         assert!(from.begin(Network::LiteUnet, &Band::RGB, 3, 1).unwrap_err().to_string().contains("safetensors"));
+    }
+
+    /// Encoder units: ours, torchvision's convolution and batch norm, and the convolution's outputs, inputs and kernel.
+    type Known = (&'static str, &'static str, &'static str, [usize; 3]);
+
+    /// All of `torchvision.models.resnet18().state_dict()` but `fc` and counters of batches.
+    const RESNET18: [Known; 20] = [
+        ("stem", "conv1", "bn1", [64, 3, 7]),
+        ("enc0_0.0", "layer1.0.conv1", "layer1.0.bn1", [64, 64, 3]),
+        ("enc0_0.1", "layer1.0.conv2", "layer1.0.bn2", [64, 64, 3]),
+        ("enc0_1.0", "layer1.1.conv1", "layer1.1.bn1", [64, 64, 3]),
+        ("enc0_1.1", "layer1.1.conv2", "layer1.1.bn2", [64, 64, 3]),
+        ("enc1_0.0", "layer2.0.conv1", "layer2.0.bn1", [128, 64, 3]),
+        ("enc1_0.1", "layer2.0.conv2", "layer2.0.bn2", [128, 128, 3]),
+        ("enc1_0.past", "layer2.0.downsample.0", "layer2.0.downsample.1", [128, 64, 1]),
+        ("enc1_1.0", "layer2.1.conv1", "layer2.1.bn1", [128, 128, 3]),
+        ("enc1_1.1", "layer2.1.conv2", "layer2.1.bn2", [128, 128, 3]),
+        ("enc2_0.0", "layer3.0.conv1", "layer3.0.bn1", [256, 128, 3]),
+        ("enc2_0.1", "layer3.0.conv2", "layer3.0.bn2", [256, 256, 3]),
+        ("enc2_0.past", "layer3.0.downsample.0", "layer3.0.downsample.1", [256, 128, 1]),
+        ("enc2_1.0", "layer3.1.conv1", "layer3.1.bn1", [256, 256, 3]),
+        ("enc2_1.1", "layer3.1.conv2", "layer3.1.bn2", [256, 256, 3]),
+        ("enc3_0.0", "layer4.0.conv1", "layer4.0.bn1", [512, 256, 3]),
+        ("enc3_0.1", "layer4.0.conv2", "layer4.0.bn2", [512, 512, 3]),
+        ("enc3_0.past", "layer4.0.downsample.0", "layer4.0.downsample.1", [512, 256, 1]),
+        ("enc3_1.0", "layer4.1.conv1", "layer4.1.bn1", [512, 512, 3]),
+        ("enc3_1.1", "layer4.1.conv2", "layer4.1.bn2", [512, 512, 3]),
+    ];
+
+    /// All of `torchvision.models.vgg16_bn().features.state_dict()` but counters of batches.
+    const VGG16_BN: [Known; 13] = [
+        ("enc0_0", "features.0", "features.1", [64, 3, 3]),
+        ("enc0_1", "features.3", "features.4", [64, 64, 3]),
+        ("enc1_0", "features.7", "features.8", [128, 64, 3]),
+        ("enc1_1", "features.10", "features.11", [128, 128, 3]),
+        ("enc2_0", "features.14", "features.15", [256, 128, 3]),
+        ("enc2_1", "features.17", "features.18", [256, 256, 3]),
+        ("enc2_2", "features.20", "features.21", [256, 256, 3]),
+        ("enc3_0", "features.24", "features.25", [512, 256, 3]),
+        ("enc3_1", "features.27", "features.28", [512, 512, 3]),
+        ("enc3_2", "features.30", "features.31", [512, 512, 3]),
+        ("enc4_0", "features.34", "features.35", [512, 512, 3]),
+        ("enc4_1", "features.37", "features.38", [512, 512, 3]),
+        ("enc4_2", "features.40", "features.41", [512, 512, 3]),
+    ];
+
+    /// Name there, name here and shape of every array of these units; VGG's convolutions have biases.
+    fn arrays_of(known: &[Known], biases: bool) -> BTreeMap<String, (String, Vec<usize>)> {
+        let mut all = BTreeMap::new();
+        for (ours, conv, norm, [outputs, inputs, kernel]) in known {
+            let shape = vec![*outputs, *inputs, *kernel, *kernel];
+            all.insert(format!("{conv}.weight"), (format!("{ours}.conv.weight"), shape));
+            if biases {
+                all.insert(format!("{conv}.bias"), (format!("{ours}.conv.bias"), vec![*outputs]));
+            }
+            for part in ["weight", "bias", "running_mean", "running_var"] {
+                all.insert(format!("{norm}.{part}"), (format!("{ours}.bn.{part}"), vec![*outputs]));
+            }
+        }
+        all
+    }
+
+    /// Rationale: a user brings torchvision's own file. Expected: every array of its encoder, by the names and shapes written above by hand and
+    /// not by our map, is found, each at its place, and no other is asked for; the encoder begins with what lies under these names in a file.
+    /// Source: torchvision 0.26, `models/resnet.py` and `models/vgg.py`, configuration D.
+    #[test]
+    fn files_of_torchvision_have_every_array_where_it_is_looked_for() {
+        for (network, known) in
+            [(Network::Unet, arrays_of(&RESNET18, false)), (Network::Segnet, arrays_of(&VGG16_BN, true))]
+        {
+            let list = parameters(network, 3, 3);
+            let encoder = list.iter().filter(|p| p.is_encoder());
+            let found: BTreeMap<_, _> = encoder
+                .zip(published(network))
+                .map(|(ours, theirs)| (theirs.name, (ours.name.clone(), ours.shape.clone())))
+                .collect();
+            assert_eq!(found, known);
+        }
+        let known = arrays_of(&RESNET18, false);
+        let array = |(k, (name, (_, shape))): (usize, (&String, &(String, Vec<usize>)))| Array {
+            name: name.clone(),
+            shape: shape.clone(),
+            values: vec![k as f32; shape.iter().product()],
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("resnet18.safetensors");
+        weights::write(&path, &known.iter().enumerate().map(array).collect::<Vec<_>>(), "").unwrap();
+        let begun = Pretrained::File(path).begin(Network::Unet, &Band::RGB, 3, 1).unwrap();
+        for (k, (name, (ours, _))) in known.iter().enumerate() {
+            let array = begun.iter().find(|array| array.name == *ours).unwrap();
+            assert!(array.values.iter().all(|v| *v == k as f32), "{ours} does not begin with {name}");
+        }
     }
 }

@@ -43,6 +43,10 @@ pub(crate) struct Args {
     /// Claim of the volume in which the dataset's folder lies; for kubernetes.
     #[arg(long, value_name = "NAME", default_value = "furrow-data")]
     claim: String,
+    /// Folder on a disk of the node's own in which shards make their images, such as '$TMPDIR/furrow'; variables are the node's, in a script
+    /// for parallel those of the shell that starts it. Images come to DIR as they are finished; for slurm and parallel.
+    #[arg(long, value_name = "DIR")]
+    scratch: Option<String>,
     #[command(flatten)]
     push: PushArgs,
     /// Folder for the job files; `jobs` in the dataset's unless given.
@@ -85,6 +89,7 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
         grace: args.grace,
         again: args.rerender,
         program,
+        scratch: args.scratch.clone(),
         push: args.push.push()?,
     };
     let (paths, warnings) = cluster::emit(&set, &job, &out)?;

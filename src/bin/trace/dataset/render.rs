@@ -3,12 +3,12 @@
 use super::progress::Progress;
 use crate::field::MemoryArgs;
 use crate::quality::threads;
-use furrow::Result;
 use furrow::cli::signal::Signals;
-use furrow::dataset::Set;
 use furrow::dataset::generate::{self, Callbacks, Shard, Work};
 use furrow::dataset::push::Push;
-use std::path::PathBuf;
+use furrow::dataset::{Set, scratch};
+use furrow::{Error, Result, cli};
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// Which images.
@@ -19,6 +19,10 @@ pub(crate) struct Args {
     /// Render the images whose number leaves k when divided by N.
     #[arg(long, value_name = "k/N", default_value = "0/1", value_parser = Shard::parse)]
     shard: Shard,
+    /// Make images in a folder of their own below this one, on a disk of this machine, and bring them to the dataset's folder as they are
+    /// finished; with packs whole archives. Stopped, it brings what there is of a pack.
+    #[arg(long, value_name = "DIR")]
+    scratch: Option<PathBuf>,
     #[command(flatten)]
     memory: MemoryArgs,
     #[command(flatten)]
@@ -91,7 +95,13 @@ impl WorkArgs {
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let set = Set::open(&args.dir)?;
     let push = args.push.push()?;
-    generate_and_push(&set, &args.work, args.shard, args.memory.bytes, push.as_ref(), signals)?;
+    if let Some(scratch) = &args.scratch {
+        check_scratch(scratch, &args.dir)?;
+        let help = "give --scratch a folder on a disk of this machine; it is made where it is missing";
+        cli::check_folder(scratch).map_err(|e| e.help(help))?;
+    }
+    let work = Work { push: push.as_ref(), ..args.work.of(args.shard, args.memory.bytes) };
+    generate_in(&set, args.scratch.as_deref(), &work, args.work.quiet, signals)?;
     Ok(Vec::new())
 }
 
@@ -109,16 +119,39 @@ pub(super) fn generate_and_push(
     push: Option<&Push>,
     signals: &Signals,
 ) -> Result<()> {
+    generate_in(set, None, &Work { push, ..args.of(shard, memory) }, args.quiet, signals)
+}
+
+/// Refuses a folder that is meant for a shell, or that lies in the dataset.
+fn check_scratch(scratch: &Path, dir: &Path) -> Result<()> {
+    let words = scratch.to_string_lossy();
+    if words.contains('$') || words.starts_with('~') {
+        return Err(Error::misuse(format!("--scratch {words}: no shell has filled in this name"))
+            .help("leave single quotes out here; `emit` takes variables of the node"));
+    }
+    let full = |path: &Path| std::path::absolute(path).map_err(Error::io(path));
+    if full(scratch)?.starts_with(full(dir)?) {
+        return Err(Error::misuse(format!("--scratch {words} lies in the dataset itself"))
+            .help("give --scratch a folder on a disk of this machine"));
+    }
+    Ok(())
+}
+
+/// Makes images in the dataset's folder, or elsewhere and brings them there.
+fn generate_in(set: &Set, scratch: Option<&Path>, work: &Work<'_>, quiet: bool, signals: &Signals) -> Result<()> {
     let begin = Instant::now();
     let (soon, now) = signals.heed_patiently();
-    let progress = Progress::new(begin, args.quiet);
+    let progress = Progress::new(begin, quiet);
     let total = |n: usize| progress.expect(n as u64);
     let done = |_| progress.add();
     let warn = |words: &str| furrow::tell!("warning: {words}");
     let callbacks = Callbacks { begin: &total, warn: &warn, done: &done, soon, now };
-    let made = generate::generate(set, &Work { push, ..args.of(shard, memory) }, &callbacks);
+    let made = match scratch {
+        Some(scratch) => scratch::generate(set, scratch, work, &callbacks),
+        None => generate::generate(set, work, &callbacks),
+    };
     let (images, rate) = progress.finish();
-    if !args.quiet {
+    if !quiet {
         let rate = if images > 0 { format!(": {rate:.0} images an hour") } else { String::new() };
         furrow::tell!("{}: {images} images in {:.1} s{rate}", set.folder.display(), begin.elapsed().as_secs_f64());
     }

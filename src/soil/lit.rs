@@ -1,0 +1,176 @@
+//! The light of one place of a ground: what of sky and sun it sends up, past the relief around it.
+//!
+//! Half of the light comes from an even sky, half from suns all round at 45°. Horizons are searched along [`AZIMUTHS`] directions up to [`REACH_M`], as in
+//! Dozier and Frew 1990, "Rapid calculation of terrain parameters for radiation modeling from digital elevation data". Facets reflect as
+//! Oren and Nayar 1994 say, seen from above: sides that turn away from the light are brighter for it than Lambert's.
+
+use super::Rect;
+use crate::geometry::Mesh;
+use crate::math::{Vec2, Vec3};
+use crate::optics::soil::facets;
+use std::f32::consts::TAU;
+
+/// Directions of the search for the horizon, and angles of the sky in each.
+const AZIMUTHS: usize = 12;
+const HEIGHTS: usize = 12;
+
+/// Distances at which the horizon is searched, metres: from one to the next by this factor.
+pub(super) const NEAREST_M: f32 = 1.5e-3;
+const REACH_M: f32 = 0.06;
+const FARTHER: f32 = 1.3;
+
+/// Light of one place, of which level ground has 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Lit {
+    /// What it sends up, over what level ground of its reflectance sends up.
+    pub(super) up: f32,
+    /// Share of the light that does not reach it.
+    pub(super) missed: f32,
+}
+
+impl Lit {
+    /// Of a surface that faces `normal` and whose facets' slope angles have the standard deviation `sigma`, radians. `rise` tells how far what
+    /// stands at a distance, from `nearest` on, rises above it, all in metres.
+    pub(super) fn of(normal: Vec3, sigma: f32, nearest: f32, rise: impl Fn(Vec2) -> f32) -> Self {
+        let [a, b] = facets(sigma);
+        let reflected = |light: Vec3| {
+            let incident = normal.dot(light);
+            let same_side = (light.z - normal.z * incident).max(0.0);
+            (a + b * same_side / normal.z.max(incident).max(1e-3)) * incident
+        };
+        let (mut up, mut reaching) = (0.0, 0.0);
+        let mut add = |light: Vec3, share: f32| {
+            let incident = normal.dot(light).max(0.0) * share;
+            reaching += incident;
+            if incident > 0.0 {
+                up += reflected(light) * share;
+            }
+        };
+        for k in 0..AZIMUTHS {
+            let way = Vec2::from_angle(k as f32 / AZIMUTHS as f32 * TAU);
+            let distances = std::iter::successors(Some(nearest), |d| Some(d * FARTHER)).take_while(|d| *d <= REACH_M);
+            let horizon = distances.map(|d| rise(way * d) / d).fold(0.0, f32::max);
+            // Of a whole sky 2 (n·ω) sin θ dθ, averaged over directions around, is 1 on level ground.
+            let step = (1.0 / horizon.max(1e-6)).atan() / HEIGHTS as f32;
+            for i in 0..HEIGHTS {
+                let (sin, cos) = ((i as f32 + 0.5) * step).sin_cos();
+                add((way * sin).extend(cos), 0.5 * 2.0 * sin * step);
+            }
+            if horizon < 1.0 {
+                add((way.extend(1.0)).normalize(), 0.5 * std::f32::consts::SQRT_2);
+            }
+        }
+        let n = AZIMUTHS as f32;
+        Self { up: up / (n * a), missed: (1.0 - reaching / n).max(0.0) }
+    }
+}
+
+/// Heights above level ground on a square raster.
+pub(super) struct Heights {
+    values: Vec<f32>,
+    side: usize,
+    step: f32,
+}
+
+impl Heights {
+    /// The highest of the meshes above each of `side` × `side` samples of a square, 0 where there is none.
+    pub(super) fn over<'a>(area: Rect, side: usize, meshes: impl Iterator<Item = &'a Mesh>) -> Self {
+        let step = area.size().x / side as f32;
+        let mut heights = Self { values: vec![0.0; side * side], side, step };
+        let place = |p: Vec3| ((p.truncate() - area.corners()[0]) / step).extend(p.z);
+        for mesh in meshes {
+            for triangle in &mesh.triangles {
+                heights.raise(triangle.map(|v| place(mesh.positions[v as usize])));
+            }
+        }
+        heights
+    }
+
+    /// Up to a triangle, whose x and y are in samples.
+    fn raise(&mut self, [a, b, c]: [Vec3; 3]) {
+        let area = (b - a).truncate().perp_dot((c - a).truncate());
+        let (lo, hi) = (a.min(b).min(c), a.max(b).max(c));
+        let last = self.side as f32 - 1.0;
+        for y in lo.y.ceil().max(0.0) as i32..=hi.y.floor().min(last) as i32 {
+            for x in lo.x.ceil().max(0.0) as i32..=hi.x.floor().min(last) as i32 {
+                let d = Vec2::new(x as f32, y as f32) - a.truncate();
+                let u = d.perp_dot((c - a).truncate()) / area;
+                let v = (b - a).truncate().perp_dot(d) / area;
+                if u >= 0.0 && v >= 0.0 && u + v <= 1.0 {
+                    let z = a.z + u * (b.z - a.z) + v * (c.z - a.z);
+                    let height = &mut self.values[y as usize * self.side + x as usize];
+                    *height = height.max(z);
+                }
+            }
+        }
+    }
+
+    /// Share of the square on which something stands.
+    pub(super) fn cover(&self) -> f32 {
+        self.values.iter().filter(|height| **height > 0.0).count() as f32 / self.values.len() as f32
+    }
+
+    fn sample(&self, i: usize, j: usize) -> f32 {
+        self.values[j.min(self.side - 1) * self.side + i.min(self.side - 1)]
+    }
+
+    /// Bilinear, at a place in metres from the first sample; ends are held.
+    fn at(&self, p: Vec2) -> f32 {
+        let q = (p / self.step).max(Vec2::ZERO);
+        let (i, j) = (q.x as usize, q.y as usize);
+        let t = q - Vec2::new(i as f32, j as f32);
+        let row = |j: usize| self.sample(i, j) + t.x * (self.sample(i + 1, j) - self.sample(i, j));
+        row(j) + t.y * (row(j + 1) - row(j))
+    }
+
+    /// Light at a sample, whose normal follows from its neighbours.
+    pub(super) fn lit(&self, i: usize, j: usize, sigma: f32) -> Lit {
+        let x = self.sample(i + 1, j) - self.sample(i.saturating_sub(1), j);
+        let y = self.sample(i, j + 1) - self.sample(i, j.saturating_sub(1));
+        let p = Vec2::new(i as f32, j as f32) * self.step;
+        let own = self.sample(i, j);
+        Lit::of(Vec3::new(-x, -y, 2.0 * self.step).normalize(), sigma, self.step, |d| self.at(p + d) - own)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Expected: level ground has all light; under a horizon of 30° all round it misses sin² 30° of the sky and none of suns at 45°, under one of
+    /// 60° sin² 60° and all suns; a wall-less slope of 20° has (1 + cos 20°) / 2 of the sky and cos 20° of the suns. Source: view factors of a
+    /// cone and of a plane, means over azimuths; Lambert's facets.
+    #[test]
+    fn surfaces_have_the_light_that_their_closed_forms_say() {
+        let lit = |normal: Vec3, horizon: f32| Lit::of(normal, 0.0, NEAREST_M, |d| d.length() * horizon);
+        let level = lit(Vec3::Z, 0.0);
+        assert!((level.up - 1.0).abs() < 2e-3 && level.missed < 2e-3, "{level:?}");
+        for (degrees, missed) in [(30.0f32, 0.5 * 0.25), (60.0, 0.5 * 0.75 + 0.5)] {
+            let found = lit(Vec3::Z, degrees.to_radians().tan());
+            assert!(
+                (found.missed - missed).abs() < 2e-3 && (found.up - 1.0 + missed).abs() < 2e-3,
+                "{degrees}: {found:?}"
+            );
+        }
+        let (sin, cos) = 20f32.to_radians().sin_cos();
+        let tilted = Lit::of(Vec3::new(sin, 0.0, cos), 0.0, NEAREST_M, |_| 0.0).up;
+        let expected = 0.5 * (0.5 * (1.0 + cos) + cos);
+        assert!((tilted - expected).abs() < 0.01, "{tilted} and {expected}");
+        assert!(Lit::of(Vec3::new(sin, 0.0, cos), 0.35, NEAREST_M, |_| 0.0).up > tilted + 0.005);
+    }
+
+    /// Expected: a block of 4 mm on a square of 10 mm stands as high as its lid where that is, its ground is 0; half-way between both the mean.
+    #[test]
+    fn heights_are_those_of_what_stands_there() {
+        let corners =
+            [[3.0, 3.0], [7.0, 3.0], [7.0, 7.0], [3.0, 7.0]].map(|[x, y]: [f32; 2]| Vec3::new(x, y, 4.0) * 1e-3);
+        let lid = Mesh { positions: corners.to_vec(), triangles: vec![[0, 1, 2], [0, 2, 3]], ..Mesh::default() };
+        let heights = Heights::over(Rect::new(0.0, 0.0, 0.01, 0.01), 100, std::iter::once(&lid));
+        let at = |x: f32, y: f32| heights.at(Vec2::new(x, y) * 1e-3);
+        assert!((at(5.0, 5.0) - 0.004).abs() < 1e-6 && at(1.0, 5.0) == 0.0 && at(-1.0, 99.0) == 0.0);
+        assert!((at(7.05, 5.0) - 0.002).abs() < 1e-4, "{}", at(7.05, 5.0));
+        assert!((heights.cover() - 0.16).abs() < 0.01, "{}", heights.cover());
+        let shaded = heights.lit(20, 50, 0.0);
+        assert!(heights.lit(50, 50, 0.0).missed < 1e-3 && shaded.missed > 0.05, "{shaded:?}");
+    }
+}

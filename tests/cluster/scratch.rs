@@ -1,0 +1,153 @@
+//! Shards that work on a node's own disk.
+//!
+//! Rationale: `--scratch` is for folders over a network, so nothing but what is finished may come there, and nothing of it may be lost or
+//! made twice. Expected: bytes of one run on one machine, whatever becomes of nodes; each image drawn once. Source: none, equality is exact.
+
+use super::{PACKS, end, files, plan, plan_with, send, task, until, whole, whole_with};
+use crate::common::dataset::{fail, made, path, same, succeed, tree, verb};
+use crate::common::program::{names, scratch};
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::process::{Child, Stdio};
+
+/// Job files for two shards that work below `$NODE_DISK`.
+fn emit(folder: &Path, engine: &str, more: &[&str]) -> std::path::PathBuf {
+    super::emit(folder, engine, 2, &[&["--scratch", "$NODE_DISK/it's furrow"][..], more].concat())
+}
+
+/// Fails where an image was drawn twice.
+fn drawn_once(folder: &Path, count: u64) {
+    let made = made(folder);
+    let different: BTreeSet<u64> = made.iter().copied().collect();
+    assert_eq!((made.len() as u64, different.len() as u64), (count, count), "{made:?}");
+}
+
+/// Starts shard 0 of 2 in `disk`.
+fn start(folder: &Path, disk: &Path, more: &[&str]) -> Child {
+    let order = ["--shard", "0/2", "--at-once", "1", "--quiet", "--scratch", path(disk)];
+    let mut command = verb("render", folder, &[&order[..], more].concat());
+    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+}
+
+/// A shard is out of time within its first pack and goes on on another node. Expected: what there was of the pack came to the shared folder;
+/// nothing is left on the nodes.
+#[test]
+fn a_shard_goes_on_on_another_node() {
+    const COUNT: u64 = 16;
+    let (keep, folder) = scratch();
+    let folder = folder.join("a set");
+    plan_with(&folder, COUNT, &PACKS);
+    let jobs = emit(&folder, "slurm", &["--rerender", "1"]);
+    let disk = |node: &str| keep.path().join(node);
+    let shard = |number, node: &str| {
+        let mut command = task(&jobs, number);
+        command.env("NODE_DISK", disk(node));
+        command
+    };
+    let mut child = shard(0, "node 1").spawn().unwrap();
+    until("drawn", || !made(&folder).is_empty());
+    send("USR1", &child);
+    assert_eq!(end(&mut child).code(), Some(75));
+    let so_far = made(&folder).len();
+    assert!(so_far < COUNT as usize / 2, "{so_far}");
+    // The node is gone, with all that is on its disk.
+    std::fs::remove_dir_all(disk("node 1")).unwrap();
+    for number in [0, 1] {
+        assert_eq!(shard(number, "node 2").status().unwrap().code(), Some(0));
+    }
+    drawn_once(&folder, COUNT);
+    assert_eq!(names(&disk("node 2").join("it's furrow")), Vec::<String>::new());
+    let told = succeed(verb("status", &folder, &["--json"]));
+    assert!(String::from_utf8_lossy(&told.stdout).contains(r#""images":16,"done":16,"#));
+    let mut finish = std::process::Command::new("bash");
+    finish.arg(jobs.join("finish.sbatch")).env("SLURM_CPUS_PER_TASK", "1");
+    let said = succeed(finish);
+    let said = String::from_utf8_lossy(&said.stderr);
+    assert!(said.contains("16 of 16 images checked, 1 rendered again and the same; 0 faults"), "{said}");
+    same(&files(&folder), &whole_with(COUNT, &PACKS));
+}
+
+/// A run is killed and started again in the same folder, with a push and formats. Expected: the same bytes at home and where it pushes; a unit
+/// is pushed once, but for the one that the kill may have hit; an image is drawn once, but for the one under way.
+#[test]
+fn a_killed_run_goes_on_and_pushes_what_came_home() {
+    const COUNT: u64 = 12;
+    const FORMATS: [&str; 2] = ["--format", "imagefolder"];
+    let (keep, folder) = scratch();
+    plan_with(&folder, COUNT, &FORMATS);
+    let [disk, elsewhere, log] = ["disk", "it's elsewhere", "log"].map(|name| keep.path().join(name));
+    std::fs::create_dir_all(&elsewhere).unwrap();
+    let push = format!("cp -a {{dir}}/. \"{}/\" && basename {{dir}} >> \"{}\"", path(&elsewhere), path(&log));
+    let mut child = start(&folder, &disk, &["--push", &push]);
+    until("at home", || super::sealed(&folder) > 1);
+    child.kill().unwrap();
+    end(&mut child);
+    assert!(super::sealed(&folder) < 6, "all was done before it was killed");
+    assert_eq!(end(&mut start(&folder, &disk, &["--push", &push])).code(), Some(0));
+    let drawn = made(&folder);
+    assert_eq!(drawn.iter().copied().collect::<BTreeSet<u64>>(), (0..6).map(|k| 2 * k).collect());
+    assert_eq!(drawn.len(), 6, "{drawn:?}");
+    assert_eq!(names(&disk), Vec::<String>::new());
+    // All at home: nothing is drawn or pushed.
+    let before = (tree(&folder), std::fs::read_to_string(&log).unwrap());
+    assert_eq!(end(&mut start(&folder, &disk, &["--push", &push])).code(), Some(0));
+    assert!(before == (tree(&folder), std::fs::read_to_string(&log).unwrap()));
+    assert!((7..=8).contains(&before.1.lines().count()), "{}", before.1);
+    // An image of which a byte was changed at home is made again.
+    let photograph = folder.join("images/000004/rgb.png");
+    let bytes = std::fs::read(&photograph).unwrap();
+    std::fs::remove_file(&photograph).unwrap();
+    std::fs::write(&photograph, &bytes[1..]).unwrap();
+    assert_eq!(end(&mut start(&folder, &disk, &["--push", &push])).code(), Some(0));
+    assert!(std::fs::read(&photograph).unwrap() == bytes);
+    succeed(verb("render", &folder, &["--shard", "1/2", "--quiet", "--scratch", path(&disk), "--push", &push]));
+    succeed(verb("finish", &folder, &["--quiet", "--push", &push]));
+    succeed(verb("verify", &elsewhere, &["--quiet"]));
+    let expected = whole_with(COUNT, &FORMATS);
+    same(&files(&folder), &expected);
+    same(&files(&elsewhere), &expected);
+}
+
+/// Expected: a format that is added later is made of the images that are at home, without drawing them again.
+#[test]
+fn formats_that_are_added_are_made_of_what_is_at_home() {
+    let (keep, folder) = scratch();
+    let disk = keep.path().join("disk");
+    plan(&folder, 4);
+    succeed(verb("render", &folder, &["--quiet", "--scratch", path(&disk)]));
+    plan_with(&folder, 4, &["--format", "imagefolder"]);
+    succeed(verb("render", &folder, &["--quiet", "--scratch", path(&disk)]));
+    succeed(verb("finish", &folder, &["--quiet"]));
+    same(&files(&folder), &whole_with(4, &["--format", "imagefolder"]));
+    let drawn = furrow::dataset::timing_log::rows(&folder).unwrap().into_iter().filter(|row| row.draw_s > 0.0).count();
+    assert_eq!(drawn, 4);
+}
+
+/// Expected: GNU parallel's script (or that of xargs) takes the folder of each machine; without it, and for Kubernetes, it is refused.
+#[test]
+fn scripts_name_the_nodes_own_folder() {
+    let (keep, folder) = scratch();
+    plan(&folder, 4);
+    let disk = keep.path().join("disk");
+    let script = emit(&folder, "parallel", &["--rerender", "0"]).join("render.sh");
+    let run = || {
+        let mut command = std::process::Command::new("bash");
+        command.arg(&script).env("JOBS", "2").env_remove("NODE_DISK").stdin(Stdio::null());
+        command
+    };
+    let unset = run().output().unwrap();
+    assert!(!unset.status.success() && String::from_utf8_lossy(&unset.stderr).contains("NODE_DISK"));
+    assert!(made(&folder).is_empty());
+    let mut set = run();
+    set.env("NODE_DISK", &disk);
+    succeed(set);
+    assert_eq!(names(&disk.join("it's furrow")), Vec::<String>::new());
+    same(&files(&folder), &whole(4));
+    for (order, words) in [
+        (["--scheduler", "kubernetes", "--scratch", "/tmp/furrow"], "--scratch is for slurm and parallel"),
+        (["--scheduler", "slurm", "--scratch", "a\nb"], "is no folder"),
+    ] {
+        let said = fail(verb("emit", &folder, &[&order[..], &["--shards", "2"]].concat()), 2);
+        assert!(said.contains(words), "{said}");
+    }
+}

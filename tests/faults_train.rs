@@ -1,0 +1,198 @@
+//! Trainings and what follows them where the disk fails, files belong to somebody else, clocks jump and nobody reads what is said.
+//!
+//! Rationale: networks learn overnight on shared disks, and their programs run under schedulers that close streams. Expected: exit code 1 and one
+//! error with a help, no file that is half under its final name, and the same command ends with the bytes of an undisturbed run; what cannot be
+//! said changes neither files nor exit codes. Source: none needed, equality is exact.
+
+use crate::common::dataset::{fail, path, same, succeed, tree};
+use crate::common::faults::{self, Tree, as_nobody, each_is_gone_on_from, misdate, open_to_all};
+use crate::common::program::scratch;
+use crate::common::training;
+use furrow::train::fit::checkpoint;
+use furrow::train::fit::hyper::NormalizationMode;
+use furrow::train::net::Network;
+use furrow::train::run;
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::LazyLock;
+
+static SET: LazyLock<PathBuf> = LazyLock::new(|| training::set("faults-set"));
+
+/// A trained network.
+static RUN: LazyLock<PathBuf> = LazyLock::new(|| {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("faults-run");
+    if folder.exists() {
+        fs::remove_dir_all(&folder).expect("an old folder");
+    }
+    training::learn(Network::BasicSegnet, "rgb", NormalizationMode::Image, &SET, &folder);
+    folder
+});
+
+/// `train` with these arguments, in single precision on one thread.
+fn train(verb: &str, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_train"));
+    command.current_dir(env!("CARGO_MANIFEST_DIR")).arg(verb).args(arguments);
+    command.args(["--precision", "f32", "--threads", "1"]).stdin(Stdio::null());
+    command
+}
+
+/// Images of the set, as the program's words.
+fn images(pick: &str) -> String {
+    format!("{}@{pick}", SET.display())
+}
+
+fn fit(out: &Path, more: &[&str]) -> Command {
+    let (all, some) = (images("all"), images("0..1"));
+    let mut command = train("fit", &["--set", &all, "--val", &some, "--out", path(out)]);
+    command.args(["--network", "unet", "--size", "64x48", "--batch", "2", "--steps", "6"]);
+    command.args(["--validate-every", "2"]).args(more);
+    command
+}
+
+fn predict(out: &Path, more: &[&str]) -> Command {
+    let mut command = train("predict", &[path(&RUN), &images("0..2"), "--out", path(out)]);
+    command.args(more);
+    command
+}
+
+fn calibrate(out: &Path) -> Command {
+    train("calibrate", &[path(&RUN), "--set", &images("all"), "--images", "2", "--out", path(out)])
+}
+
+/// Expected: each file is whole or absent.
+#[test]
+fn a_prediction_that_meets_a_fault_goes_on_to_the_same_bytes() {
+    let make = |out: &Path| predict(out, &["--quiet"]);
+    each_is_gone_on_from(&make, None, 4, &|there, whole, what| {
+        for (name, bytes) in there {
+            assert!(whole.get(name) == Some(bytes), "{what}: {name} is not that of an undisturbed run");
+        }
+    });
+}
+
+/// Expected: weights and the card that tells of them are there together or not at all.
+#[test]
+fn a_calibration_that_meets_a_fault_leaves_nothing() {
+    each_is_gone_on_from(&calibrate, None, 2, &|there: &Tree, _, what| {
+        assert!(there.is_empty(), "{what}: {:?} are there", there.keys());
+    });
+}
+
+/// A training of which the second checkpoint could not be written, with the first one there.
+fn half_trained(out: &Path) {
+    let checkpoint = out.join(checkpoint::FILE);
+    let ended = faults::run(fit(out, &["--quiet"]), &checkpoint, 2, true);
+    assert_eq!(ended.output.status.code(), Some(1), "{}", ended.said());
+    assert_eq!(ended.failed, "rename");
+    assert!(checkpoint.is_file() && !out.join(run::RESULT).exists());
+}
+
+/// Expected: times of files in the past and in the future change no weight.
+#[test]
+fn a_training_goes_on_whatever_the_times_of_its_files() {
+    let (_keep, whole) = scratch();
+    succeed(fit(&whole, &["--quiet"]));
+    let (_keep, out) = scratch();
+    half_trained(&out);
+    misdate(&out);
+    misdate(&SET);
+    succeed(fit(&out, &["--quiet"]));
+    let weights = |run: &Path| fs::read(run.join(run::WEIGHTS)).expect("weights");
+    assert!(weights(&out) == weights(&whole));
+    let history = |run: &Path| run::results(run).expect("results").expect("they are there").history;
+    assert_eq!(history(&out), history(&whole));
+}
+
+/// Expected: a folder that another user may not write to, and a checkpoint that he may not read, are one error, and nothing is changed.
+#[test]
+fn a_training_of_another_user_is_told() {
+    let (_keep, out) = scratch();
+    half_trained(&out);
+    let Some(mut barred) = as_nobody(&fit(&out, &["--quiet"])) else { return };
+    let before = tree(&out);
+    let refused = |command: &mut Command| {
+        let output = command.output().expect("the program");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(said.starts_with("error: ") && said.matches("error: ").count() == 1, "{said}");
+        assert!(said.contains("Permission denied") && said.contains("\n help: "), "{said}");
+        same(&tree(&out), &before);
+        said
+    };
+    open_to_all(&out, 0o755);
+    refused(&mut barred);
+    open_to_all(&out, 0o777);
+    let checkpoint = out.join(checkpoint::FILE);
+    fs::set_permissions(&checkpoint, fs::Permissions::from_mode(0o600)).expect("permissions");
+    let said = refused(&mut barred);
+    assert!(said.contains(checkpoint::FILE), "{said}");
+}
+
+fn full() -> Stdio {
+    fs::File::create("/dev/full").expect("Linux").into()
+}
+
+/// The same command with stderr closed, by a shell.
+fn mute(inner: &Command) -> Command {
+    let mut command = Command::new("sh");
+    command.args(["-c", "exec \"$0\" \"$@\" 2>&-"]).arg(inner.get_program()).args(inner.get_args());
+    command.current_dir(env!("CARGO_MANIFEST_DIR")).stdin(Stdio::null());
+    command
+}
+
+/// What a command makes in a folder, whatever becomes of what it says: a full disk, a reader that is gone, no stream at all.
+fn makes_the_same(make: &dyn Fn(&Path) -> Command, files: &[&str]) {
+    let made = |begin: &dyn Fn(Command) -> Command| {
+        let (_keep, out) = scratch();
+        let ended = begin(make(&out)).output().expect("the program");
+        assert_eq!(ended.status.code(), Some(0), "{}", String::from_utf8_lossy(&ended.stderr));
+        let mut made = tree(&out);
+        made.retain(|name, _| files.contains(&name.as_str()));
+        assert_eq!(made.len(), files.len(), "{:?}", made.keys());
+        made
+    };
+    let heard = made(&|command| command);
+    let lost = made(&|mut command| {
+        command.stderr(full());
+        command
+    });
+    let unread = made(&|mut command| {
+        let (reader, writer) = std::io::pipe().expect("a pipe");
+        drop(reader);
+        command.stderr(writer);
+        command
+    });
+    for other in [lost, unread, made(&|command| mute(&command))] {
+        same(&other, &heard);
+    }
+}
+
+/// Expected: files and exit code 0 as where somebody reads; exit code 2 where the command is wrong; paths that are lost on stdout are exit code 1, with
+/// the files there.
+#[test]
+fn full_and_closed_streams_end_no_training_and_no_prediction() {
+    makes_the_same(&|out| fit(out, &[]), &[run::WEIGHTS, run::MODEL]);
+    makes_the_same(&|out| predict(out, &[]), &["000000.png", "000001.png", "prediction.json"]);
+    let (_keep, out) = scratch();
+    let mut wrong = predict(&out, &["--band", "nir=nowhere"]);
+    assert_eq!(wrong.stderr(full()).output().expect("the program").status.code(), Some(2));
+    let lost = predict(&out, &["--quiet"]).stdout(full()).output().expect("the program");
+    let said = String::from_utf8_lossy(&lost.stderr);
+    assert!(lost.status.code() == Some(1) && said.contains("cannot write to stdout"), "{said}");
+    assert!(out.join("000001.png").is_file());
+}
+
+/// Rationale: the loader complains of a library that it is to load and does not find. Expected: where there is no CUDA, exit code 2 and words of
+/// ours alone.
+#[test]
+fn a_missing_cuda_is_told_in_words_of_ours() {
+    let (_keep, out) = scratch();
+    let mut command = predict(&out, &["--device", "cuda"]);
+    command.env_remove("LD_LIBRARY_PATH").env_remove("LD_PRELOAD");
+    let said = fail(command, 2);
+    assert!(said.starts_with("error: cuda: there is no libtorch_cuda.so on LD_LIBRARY_PATH"), "{said}");
+    assert!(said.contains("\n help: ") && !said.contains("ld.so") && !said.contains("LD_PRELOAD"), "{said}");
+    assert!(!out.exists());
+}

@@ -1,0 +1,217 @@
+//! The size of pixels on the ground: pictures are brought to the pixels that a network was trained on, and crops to pixels that are asked for.
+//!
+//! Rationale: a plant that is twice as large in pixels is another plant to a network, and a factor that is wrong shows in no error message.
+//! Expected: a run tells the pixels that its camera has by geometry; with pictures of pixels twice as large, `predict` and `eval` answer as
+//! at twice the size; crops are scaled by the pixels of their own image; images that do not tell them are refused where they are needed.
+//! Source: `tests/ref/small.ron`, and what `train fit --help` and `train predict --help` say.
+
+use crate::common::dataset::{fail, path, succeed};
+use crate::common::program::{names, trace};
+use crate::common::training::{self, SIZE, learn, pictures, stirred};
+use furrow::dataset::classes::Classes;
+use furrow::output::{self, Picture};
+use furrow::ron_file::RonFile;
+use furrow::sampling::{Purpose, Stream};
+use furrow::train::data::{
+    Augment, AugmentScale, Band, Batch, Crop, Ground, Loader, Normalization, Order, Pick, Selection, Shape, Store,
+};
+use furrow::train::deploy::pictures::Prediction;
+use furrow::train::fit::hyper::NormalizationMode;
+use furrow::train::measure::Report;
+use furrow::train::net::Network;
+use furrow::train::run::{self, TrainedModel};
+use furrow::train::table::Experiment;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::{Arc, LazyLock};
+
+static SET: LazyLock<PathBuf> = LazyLock::new(|| training::set("pixel-size-set"));
+
+fn train(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_train"));
+    command.args(arguments).args(["--precision", "f32", "--threads", "1"]);
+    command
+}
+
+/// A network whose answers are of all classes, in a folder.
+fn network(folder: &Path) -> TrainedModel {
+    let learnt = learn(Network::BasicSegnet, "rgb", NormalizationMode::Image, &SET, &folder.join("learnt"));
+    let network = stirred(&learnt, 5);
+    network.write(&folder.join("run")).unwrap();
+    network
+}
+
+#[test]
+fn pictures_are_brought_to_the_pixels_that_a_network_was_trained_on() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path();
+    let trained = network(folder);
+    let mm = trained.card.pixel_mm.unwrap();
+    // 0.45 m above the ground, 6° off the vertical, 40° across 64 pixels.
+    let expected = 450.0 / 6f64.to_radians().cos() * 2.0 * 20f64.to_radians().tan() / 64.0;
+    assert!((mm / expected - 1.0).abs() < 0.005, "{mm} mm, by geometry {expected}");
+
+    let (run, some) = (folder.join("run"), format!("{}@0..3", path(&SET)));
+    let twice = (2.0 * mm).to_string();
+    let predict =
+        |out: &Path, more: &[&str]| train(&[&["predict", path(&run), &some, "--out", path(out)][..], more].concat());
+    let masks = |out: &Path| -> Vec<Vec<u8>> {
+        let is_png = |name: &str| Path::new(name).extension().is_some_and(|ending| ending == "png");
+        let is_mask = |name: &&String| is_png(name) && !name.contains("overlay");
+        names(out).iter().filter(is_mask).map(|name| output::read_indexed(&out.join(name)).unwrap().2).collect()
+    };
+    let out = |name: &str| folder.join(name);
+    succeed(predict(&out("twice"), &["--pixel-mm", &twice]));
+    // 64 × 48 pixels become 128 × 96.
+    succeed(predict(&out("long"), &["--resize", "128"]));
+    succeed(predict(&out("same"), &[]));
+    assert_eq!(masks(&out("twice")).len(), 3);
+    assert!(masks(&out("twice")) == masks(&out("long")), "pixels of twice the size are not seen at twice the size");
+    assert!(masks(&out("twice")) != masks(&out("same")), "the size of pixels says nothing");
+
+    let told = |name: &str| -> Prediction { run::read_json(&out(name).join("prediction.json")).unwrap() };
+    assert_eq!((told("twice").pixel_mm, told("twice").resize.as_str()), (Some(2.0 * mm), "× 2.000"));
+    assert_eq!((told("same").pixel_mm, told("same").resize.as_str()), (None, "stretch"));
+    let said = fail(predict(&out("twice"), &["--pixel-mm", &(2.000001 * mm).to_string()]), 2);
+    assert!(said.contains("predictions at other sizes lie in this folder"), "{said}");
+
+    let eval = |name: &str, more: &[&str]| -> (Report, String) {
+        let out = out(name);
+        succeed(train(&[&["eval", path(&run), "--set", &some, "--out", path(&out)][..], more].concat()));
+        let page = std::fs::read_to_string(out.join("report.html")).unwrap();
+        (run::read_json(&out.join("report.json")).unwrap(), page)
+    };
+    let (by_pixels, page) = eval("eval-twice", &["--pixel-mm", &twice]);
+    assert_eq!(by_pixels.scores, eval("eval-long", &["--resize", "128"]).0.scores);
+    assert_ne!(by_pixels.scores, eval("eval-same", &[]).0.scores);
+    assert!(page.contains("size × 2.000"), "the report does not tell the factor");
+
+    for (value, words) in [
+        ("0", "a picture is scaled by 0.02 to 50"),
+        ("-1", "a picture is scaled by"),
+        ("nan", "a picture is scaled by"),
+        ("9000", "the network was trained on pixels of 5.1"),
+    ] {
+        let said = fail(predict(&out("none"), &[&format!("--pixel-mm={value}")]), 2);
+        assert!(said.contains(words), "{value}: {said}");
+    }
+    let said = fail(predict(&out("none"), &["--pixel-mm", "2", "--resize", "64"]), 2);
+    assert!(said.contains("cannot be used with"), "{said}");
+    let mut untold = trained;
+    untold.card.pixel_mm = None;
+    untold.write(&run).unwrap();
+    let said = fail(predict(&out("none"), &["--pixel-mm", "2"]), 2);
+    assert!(
+        said.contains("training images do not tell the size of their pixels") && said.contains("--resize"),
+        "{said}"
+    );
+    assert!(!out("none").exists());
+}
+
+/// Expected: of each image of an epoch, the crop that its own pixel size gives and no other's. Source: [`Augment::apply`] with each size.
+#[test]
+fn crops_are_scaled_by_the_pixels_of_their_own_image() {
+    let (image, size) = (SIZE, (32, 32));
+    let shape = Shape { bands: Band::RGB.to_vec(), width: image.0, height: image.1 };
+    let all = Selection { pick: Some(Pick::All), ..Selection::of(SET.as_path()) };
+    let store = Store::open(&[all], Pick::All, 1, &Classes::default(), &shape, false, 1 << 28).unwrap();
+    let store = Arc::new(store);
+    let told = store.pixel_sizes_mm().unwrap();
+    assert!(told.len() == 8 && told.iter().all(|mm| (mm - told[0]).abs() < 1e-9), "{told:?}");
+
+    let (range_mm, sizes) = ((1.0, 2.0), (0..8).map(|k| 1.0 + 0.25 * f64::from(k)).collect::<Vec<_>>());
+    let pixels = AugmentScale::PixelMm(range_mm.0, range_mm.1).of(|| Ok(sizes.clone())).unwrap();
+    let augment = Augment { scale: true, ..Augment::NONE };
+    let normalization = Normalization::Image;
+    let order =
+        Order { seed: 3, batch: 4, crop_size: size, rare: 0.0, augment, pixels, normalization: normalization.clone() };
+    let batches: Vec<Batch> = Loader::start(&store, &order, 0, 2, 1).unwrap().collect::<Result<_, _>>().unwrap();
+    let mut seen: Vec<usize> = Vec::new();
+    for (place, found) in batches.iter().flat_map(|batch| batch.pixels.chunks_exact(32 * 32 * 3)).enumerate() {
+        let expected = |k: usize| {
+            let crop = Crop { image, size, rare: 0.0, ground: Some(Ground { pixel_mm: sizes[k], range_mm }) };
+            let mut stream = Stream::of(3, place as u64, Purpose::Training, 2);
+            augment.apply(&store.get(k).unwrap(), &crop, &[true; 3], &normalization, &mut stream).0
+        };
+        seen.extend((0..8).filter(|k| expected(*k) == found));
+    }
+    seen.sort_unstable();
+    assert_eq!(seen, (0..8).collect::<Vec<_>>());
+}
+
+/// Images of numbers and labels of soil: a set that tells no camera.
+fn imported(folder: &Path) -> PathBuf {
+    let (photos, masks, out) = (folder.join("photos"), folder.join("masks"), folder.join("imported"));
+    let (w, h) = SIZE;
+    for k in 0..2 {
+        let (name, pixels) = (format!("{k}.png"), pictures(1, SIZE, 3, k));
+        output::write_png(&photos.join(&name), w, h, &Picture::Rgb(pixels.as_chunks().0), "").unwrap();
+        output::write_png(&masks.join(&name), w, h, &Picture::Gray(&vec![0; (w * h) as usize]), "").unwrap();
+    }
+    let mut import = trace(&["dataset", "import", "--format", "masks", "--images", path(&photos)]);
+    import.args(["--masks", path(&masks), "--out", path(&out)]);
+    succeed(import);
+    out
+}
+
+/// Expected: a plan has the range where one is asked for and not otherwise; sets whose images do not tell their pixels, a range that is none
+/// and one without scaling are refused, and leave no folder; a range of one size and an encoder that never learns are told; experiment
+/// files take the same words.
+#[test]
+fn a_range_of_pixel_sizes_is_asked_for_and_refused_with_words() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path();
+    let fit = |set: &Path, out: &str, more: &[&str]| {
+        let set = format!("{}@0..2", path(set));
+        let how = ["--network", "unet", "--size", "64x48", "--steps", "2", "--batch", "2"];
+        let out = folder.join(out);
+        train(&[&["fit", "--set", &set, "--out", path(&out)][..], &how, more].concat())
+    };
+    let plan = |out: &str| -> serde_json::Value { run::read_json(&folder.join(out).join(run::PLAN)).unwrap() };
+    let said = |output: &std::process::Output| String::from_utf8_lossy(&output.stderr).into_owned();
+    let plain = succeed(fit(&SET, "plain", &[]));
+    assert!(
+        plan("plain")["plan"].get("augment_scale").is_none() && !said(&plain).contains("warning"),
+        "{}",
+        said(&plain)
+    );
+    let auto = succeed(fit(&SET, "auto", &["--augment-scale", "auto", "--freeze", "2"]));
+    assert_eq!(plan("auto")["plan"]["augment_scale"], "auto");
+    assert!(said(&auto).contains("warning: --augment-scale auto: all crops have pixels of 5.1"), "{}", said(&auto));
+    assert!(said(&auto).contains("warning: the encoder begins at random and stays so"), "{}", said(&auto));
+    let range = succeed(fit(&SET, "range", &["--augment-scale", "3..8"]));
+    assert_eq!(plan("range")["plan"]["augment_scale"]["pixel_mm"], serde_json::json!([3.0, 8.0]));
+    assert!(!said(&range).contains("warning"), "{}", said(&range));
+    let weights = |out: &str| std::fs::read(folder.join(out).join(run::WEIGHTS)).unwrap();
+    assert!(weights("range") != weights("plain"), "the range says nothing");
+
+    let imported = imported(folder);
+    for (set, more, words) in [
+        (&imported, vec!["--augment-scale", "auto"], "image 000000 does not tell the size of its pixels on the ground"),
+        (&imported, vec!["--augment-scale", "3..8"], "leave this option out for them"),
+        (
+            &*SET,
+            vec!["--augment-scale", "8..3"],
+            "write relative, auto, or a range of millimetres a pixel such as 0.3..2",
+        ),
+        (
+            &*SET,
+            vec!["--augment-scale", "auto", "--augment", "flip"],
+            "`scale` is not among the augmentations, which are flip",
+        ),
+    ] {
+        let said = fail(fit(set, "refused", &more), 2);
+        assert!(said.contains(words) && said.contains("--augment-scale"), "{more:?}: {said}");
+        assert!(!folder.join("refused").exists(), "{more:?} has left a folder");
+    }
+    succeed(fit(&imported, "imported-run", &[]));
+
+    let file = |scale: &str| {
+        let text = r#"Experiment(networks: ["unet"], sets: {"a": Real()}, train: [(name: "A", from: [(set: "a", images: "0..4")])],
+            test: [(name: "T", set: "a", images: "5..6")], hyperparameters: (augment_scale: "SCALE"))"#;
+        Experiment::of(&RonFile::of(&text.replace("SCALE", scale)), None)
+    };
+    assert_eq!(file("0.3..2").unwrap().plan.hyper.augment_scale, AugmentScale::PixelMm(0.3, 2.0));
+    let words = file("2..0.3").unwrap_err().to_string();
+    assert!(words.contains("there is no scale `2..0.3`"), "{words}");
+}
