@@ -46,6 +46,19 @@ fn check_corners(text: &[u8]) -> Result<(), String> {
     Ok(())
 }
 
+/// An error where a material's colour has fewer than three numbers: `tobj` takes for granted that there are as many.
+fn check_colors(text: &[u8]) -> Result<(), String> {
+    for (number, line) in text.split(|byte| *byte == b'\n').enumerate() {
+        let line = String::from_utf8_lossy(line);
+        let mut words = line.split_whitespace();
+        let first = words.next().unwrap_or_default();
+        if ["Ka", "Kd", "Ks", "Ke"].contains(&first) && words.count() < 3 {
+            return Err(format!("line {}: the colour {first} has fewer than three numbers", number + 1));
+        }
+    }
+    Ok(())
+}
+
 /// Reads a file; in words what is wrong with it.
 pub(super) fn read(mut files: Files<'_>, up: Up) -> Result<Model, Wrong> {
     let text = files.own()?;
@@ -57,7 +70,9 @@ pub(super) fn read(mut files: Files<'_>, up: Up) -> Result<Model, Wrong> {
         let (files, fault) = &mut *asked;
         let name = slashed(&name.to_string_lossy());
         let read = files.named(&name).and_then(|t| {
-            tobj::load_mtl_buf(&mut t.as_slice()).map_err(|e| format!("its materials {name}: {e}").into())
+            let wrong = |e: String| Wrong::from(format!("its materials {name}: {e}"));
+            check_colors(&t).map_err(wrong)?;
+            tobj::load_mtl_buf(&mut t.as_slice()).map_err(|e| wrong(e.to_string()))
         });
         read.map_err(|e| {
             *fault = Some(e);
