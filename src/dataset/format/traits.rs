@@ -4,7 +4,7 @@
 //! Areas, lengths and angles are those of [`crate::scene::traits`], of what grew, whether it is seen or not; plants and leaves that an image
 //! neither shows nor hides have no row. `visible_area_m2` is a leaf's area times the share of its pixels that the image shows: right
 //! for a leaf that is held alike all over. Cells of what is not known (models, imported images) are empty. The first row names the columns; the
-//! first columns tell the image that a row is of ([`Origin`]).
+//! first columns tell the image that a row is of (`dataset/index/origin.rs`).
 
 use super::{Format, Whole};
 use crate::dataset::index::leaves;
