@@ -6,7 +6,7 @@ use super::crumb::{Crumbs, Law, Part, Raster, mean_gain};
 use super::grid::Grid;
 use super::record::{ClodsRecord, LayerRecord, LitterRecord, MoistureRecord, SoilRecord};
 use super::relief::Relief;
-use super::site::{Site, Sizes};
+use super::site::{FULL_CELL_M, Site, Sizes};
 use super::stone_cover;
 use super::{LayerMaps, MAX_LAYERS, Rect, SoilDesc};
 use crate::error::{Error, Result};
@@ -21,9 +21,6 @@ use std::sync::OnceLock;
 
 /// Rows of vertices that are raised at once: what is kept of them beside the ground stays small.
 const BLOCK_ROWS: usize = 64;
-
-/// Detail of the ground that plants stand on where its own grid is coarser, metres: the coarsest grid of full detail.
-const STANCE_M: f32 = 4e-3;
 
 /// Standard deviation of [`Perlin::fbm2`] with four octaves and gain 0.6.
 const FBM4_SD: f32 = 0.245;
@@ -342,7 +339,7 @@ impl Ground {
     }
 
     /// Height, metres, and unit normal of the plane that fits the ground within `radius` of a point: what a plant stands on. Where clods are drawn into
-    /// the ground it is the ground without them, as fine as 4 mm whatever the grid: plants stand as they do in full detail.
+    /// the ground it is the ground without them, as fine as full detail at its coarsest whatever the grid: plants stand as they do in full detail.
     pub fn stance<L: LayerMaps>(&self, maps: &[L], x: f32, y: f32, radius: f32) -> (f32, Vec3) {
         let Sizes { drawn, .. } = self.sizes;
         // Beyond the fine grid it stands on what is there: cells as long as a row is wide do not follow its profile.
@@ -356,7 +353,7 @@ impl Ground {
                 *n = self.blend.noise(k, p);
             }
             let heights = self.blend.heights(maps, p);
-            self.shape.height(p, STANCE_M) + self.blend.displacement(self.blend.weights(noise, heights), heights)
+            self.shape.height(p, FULL_CELL_M) + self.blend.displacement(self.blend.weights(noise, heights), heights)
         };
         (height(x, y), plane(x, y, radius, height))
     }

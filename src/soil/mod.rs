@@ -50,7 +50,7 @@ pub use pile::Pile;
 pub use record::{
     ClodsRecord, LayerRecord, LitterRecord, MoistureRecord, ReliefRecord, RowReliefRecord, SoilRecord, WheelRecord,
 };
-pub use site::{SeedRows, Site};
+pub use site::{FULL_CELL_M, FULL_TEXEL_M, SeedRows, Site};
 pub use stone::stones;
 pub use wheel::WheelDesc;
 

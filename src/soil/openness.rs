@@ -14,14 +14,10 @@ use super::bake::{Painted, Shade, closing, wet};
 use super::ground::Ground;
 use super::lit::{Heights, Lit, NEAREST_M};
 use super::pile::Pile;
-use super::site::Sizes;
+use super::site::{FULL_CELL_M, FULL_TEXEL_M, Sizes};
 use super::{Canopy, LayerMaps, Rect};
 use crate::math::{Vec2, Vec3, vec2};
 use rayon::prelude::*;
-
-/// Cells and texels of the coarsest ground of `detail: Full`, metres.
-const FULL_CELL_M: f32 = 4e-3;
-const FULL_TEXEL_M: f32 = 2e-3;
 
 /// Patches along each side of the ground, their sides, and what is made around each, metres.
 const PATCHES: usize = 4;

@@ -16,6 +16,11 @@ pub struct SeedRows {
 /// Lengths from which on aggregates are bodies, over the length of the smallest that are told from the ground.
 pub(super) const BODIES_FROM: f32 = 3.0;
 
+/// Cells of the coarsest ground of full detail, metres.
+pub const FULL_CELL_M: f32 = 4e-3;
+/// Texels of its maps, metres.
+pub const FULL_TEXEL_M: f32 = 2e-3;
+
 /// Which piece of ground to make, and how finely.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Site {

@@ -146,7 +146,7 @@ impl Builder<'_> {
             SeedRows { spacing_m: rows.spacing_m, azimuth: rows.azimuth, offset_m: rows.offset_m }
         });
         let (coarsest, smallest_mm) = match self.desc.detail {
-            Detail::Full => (4e-3, 0.0),
+            Detail::Full => (soil::FULL_CELL_M, 0.0),
             Detail::ByPixel | Detail::Instanced => (f32::INFINITY, 1e3 * things * pixel),
         };
         Site {
@@ -166,7 +166,7 @@ impl Builder<'_> {
 
     /// Side of a texel of the ground's maps, metres.
     pub(super) fn texel(&self, view: View) -> f32 {
-        let coarsest = if self.desc.detail == Detail::Full { 2e-3 } else { f32::INFINITY };
+        let coarsest = if self.desc.detail == Detail::Full { soil::FULL_TEXEL_M } else { f32::INFINITY };
         let [_, texels, _] = coarser(view);
         (0.9 * texels * self.soil_pixel()).clamp(2e-4, coarsest).max((view.near.area() / MOST_TEXELS).sqrt())
     }
