@@ -4,6 +4,7 @@
 //! had under licences of the list in `deny.toml`, each of which some dependency needs. Source: `cargo metadata`.
 
 use std::collections::BTreeSet;
+use std::path::Path;
 use std::process::Command;
 
 /// Licences that are allowed, from `deny.toml`.
@@ -50,6 +51,23 @@ fn every_dependency_has_an_allowed_licence_and_comes_from_crates_io() {
         let others = allowed.iter().filter(|other| *other != licence).cloned().collect();
         assert!(!refused(&others).is_empty(), "nothing needs {licence}: take it from deny.toml");
     }
+}
+
+/// Rationale: the fuzzer is built by itself and seldom, so a lock file that is older than `Cargo.toml` goes unseen, and what is not locked is
+/// whatever is newest. Expected: the library's entry there names all that `Cargo.toml` asks for whatever the features. Source: both files.
+#[test]
+fn the_lock_file_of_the_fuzzer_names_what_the_library_is_built_of() {
+    let read = |name: &str| std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).expect(name);
+    let (manifest, lock) = (read("Cargo.toml"), read("fuzz/Cargo.lock"));
+    let section = manifest.split("\n[dependencies]\n").nth(1).and_then(|rest| rest.split("\n[").next());
+    let lines = section.expect("a section").lines();
+    let always = lines.filter(|line| !line.starts_with('#') && !line.contains("optional = true"));
+    let asked: BTreeSet<&str> = always.filter_map(|line| Some(line.split_once(" = ")?.0)).collect();
+    assert!(asked.len() > 30, "{asked:?}");
+    let own = lock.split("[[package]]\n").find(|entry| entry.starts_with("name = \"furrow\"\n"));
+    let listed = own.expect("the library").lines().filter_map(|line| line.strip_prefix(" \""));
+    let named: BTreeSet<&str> = listed.filter_map(|line| line.split(['"', ' ']).next()).collect();
+    assert_eq!(named, asked, "build the fuzzer: sh fuzz/run.sh 1");
 }
 
 #[test]

@@ -8,13 +8,14 @@ use crate::common::dataset::{fail, path, same, succeed, tree, verb};
 use crate::common::program::{scratch, small_text, trace};
 use crate::common::python::python;
 use furrow::dataset::flow::flows;
-use furrow::dataset::{Record, Set, native};
+use furrow::dataset::{Record, Set, native, timing_log};
 use furrow::geometry::Window;
 use furrow::job::{Field, SceneFile};
 use furrow::math::Vec3;
 use furrow::render;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::Duration;
 
 /// The small page with a second camera and a drive.
 fn page(folder: &Path, name: &str, change: &dyn Fn(String) -> String) -> PathBuf {
@@ -40,6 +41,14 @@ fn labels(field: &Field) -> render::LabelMap {
     let window = Window::full(scene.camera.width(), scene.camera.height());
     let geometry = field.geometry().unwrap();
     field.threads().install(|| render::label(geometry, &scene.parts, &scene.camera, window))
+}
+
+/// The images of a dataset for which a field was grown, in order: all others were taken of a field as it was, and grew for 0 s.
+fn growers(dataset: &Path) -> Vec<u64> {
+    let rows = timing_log::rows(dataset).unwrap();
+    let mut images: Vec<u64> = rows.iter().filter(|row| row.grow_s > 0.0).map(|row| row.index).collect();
+    images.sort_unstable();
+    images
 }
 
 /// Rationale: a reader of poses takes all rows of an image to be seen from one place. Expected: planning says so where a phone's rolling shutter drives,
@@ -111,12 +120,16 @@ fn flow_leads_to_the_same_plant_and_leaf() {
     std::fs::create_dir_all(&folder).unwrap();
     let larger = |text: String| text.replace("size: (96, 72)", "size: (384, 288)");
     let mut field = grown(&page(&folder, "drive.ron", &larger));
+    field.geometry().unwrap();
+    let times = field.times();
     let maps: Vec<_> = (0..6)
         .map(|k| {
             field.take(k).unwrap();
             labels(&field)
         })
         .collect();
+    // Built once for all of them.
+    assert!(field.times() == times && times.1 > Duration::ZERO);
     let captures = &field.grown().captures;
     let (mut asked, mut wrong, mut hidden) = (0, 0, 0);
     for at in 0..6 {
@@ -146,7 +159,8 @@ fn flow_leads_to_the_same_plant_and_leaf() {
     assert!(wrong * 1000 <= asked, "{wrong} of {asked}");
 }
 
-/// Expected: one image of a drive has the same bytes alone, and after any others; shards hold whole fields; all images of a field are in one split.
+/// Expected: one image of a drive has the same bytes alone, and after any others; shards hold whole fields; all images of a field are in one split. Each
+/// field is grown once in a run, and where nothing but a lost image of it is made again, for that.
 #[test]
 fn images_of_a_drive_do_not_depend_on_the_others() {
     let (_keep, folder) = scratch();
@@ -157,6 +171,7 @@ fn images_of_a_drive_do_not_depend_on_the_others() {
         trace(&["sequence", "--scene", path(&page), "--out", path(out), "--fields", "2", "--spp", "1", "--quiet"])
     };
     succeed(make(&whole));
+    assert_eq!((timing_log::rows(&whole).unwrap().len(), growers(&whole)), (12, vec![0, 6]));
     let before = tree(&whole);
     let record = |index: u64| -> Record { native::read_record(&whole, &Set::name(index)).unwrap() };
     for index in 0..12 {
@@ -175,6 +190,7 @@ fn images_of_a_drive_do_not_depend_on_the_others() {
     }
     succeed(make(&whole));
     same(&tree(&whole), &before);
+    assert_eq!(growers(&whole), [0, 3, 6, 10]);
     let formats = "colmap,flow,mots,nerf,tum";
     succeed(trace(&[
         "dataset",
@@ -198,6 +214,7 @@ fn images_of_a_drive_do_not_depend_on_the_others() {
     }
     succeed(verb("finish", &parts, &[]));
     same(&tree(&parts), &before);
+    assert_eq!(growers(&parts), [0, 6]);
     succeed(verb("verify", &parts, &["--rerender", "3"]));
     // A further format leaves what only the renderer knows as it is, and so does a derived file that is lost.
     succeed(verb("finish", &parts, &["--format", "coco", "--quiet"]));

@@ -8,6 +8,7 @@ use crate::common::dataset::{fail, path, succeed, tree, verb};
 use crate::common::program::{SMALL, scratch, trace};
 use crate::common::python::python;
 use furrow::dataset::{Set, native};
+use furrow::job::{Field, SceneFile};
 use std::path::Path;
 use std::process::Command;
 
@@ -47,6 +48,24 @@ fn labels_are_those_of_the_photographed_fields() {
     succeed(verb("verify", &unlit, &["--rerender", "2"]));
     // Begun as what it is, it is nothing else.
     assert!(fail(make(&unlit, &["--spp", "1", "--keep", "depth32,normals16"]), 2).contains("labels_only"));
+}
+
+/// Rationale: a plan grows its first field for what is told of it, and every run of a dataset begins with one. Expected: hash, files, warnings, species,
+/// plants and conditions of the whole field, from fewer triangles and on the same random numbers. Source: the whole field.
+#[test]
+fn a_field_that_is_only_told_of_tells_the_same() {
+    for page in [SMALL, "scenes/synthetic-d.ron"] {
+        let file = SceneFile::open(page).unwrap().width(96);
+        let (whole, told) = (file.field(1).unwrap(), file.told_only().field(1).unwrap());
+        let triangles =
+            |field: &Field| -> usize { field.grown().scene.parts.iter().map(|part| part.mesh.triangles.len()).sum() };
+        assert!(triangles(&told) < triangles(&whole), "{page}");
+        let (whole, told) = (whole.grown(), told.grown());
+        assert_eq!((&told.hash, &told.files, &told.shipped), (&whole.hash, &whole.files, &whole.shipped));
+        assert_eq!((&told.warnings, &told.species, &told.models), (&whole.warnings, &whole.species, &whole.models));
+        assert!(told.plants == whole.plants && told.conditions == whole.conditions, "{page}");
+        assert_eq!(told.scene.camera.record(), whole.scene.camera.record());
+    }
 }
 
 #[test]

@@ -52,6 +52,7 @@ mod gap;
 mod guide;
 mod import;
 mod instances;
+mod keep;
 mod labels;
 mod labels_only;
 mod layers;

@@ -6,7 +6,7 @@
 //! Source: `tests/ref/small.ron`, and what `train fit --help` and `train predict --help` say.
 
 use crate::common::dataset::{fail, path, succeed};
-use crate::common::program::{names, trace};
+use crate::common::program::{names, small_text, trace};
 use crate::common::training::{self, SIZE, learn, pictures, stirred};
 use furrow::dataset::classes::Classes;
 use furrow::output::{self, Picture};
@@ -214,4 +214,78 @@ fn a_range_of_pixel_sizes_is_asked_for_and_refused_with_words() {
     assert_eq!(file("0.3..2").unwrap().plan.hyper.augment_scale, AugmentScale::PixelMm(0.3, 2.0));
     let words = file("2..0.3").unwrap_err().to_string();
     assert!(words.contains("there is no scale `2..0.3`"), "{words}");
+}
+
+/// An experiment on `frames`, bound to `set`, and on a scene; it takes seconds at most, for nothing is rendered.
+fn table(file: &Path, set: &Path, out: &Path, more: &[&str]) -> Command {
+    let real = format!("frames={}", path(set));
+    train(&[&["table", path(file), "--real", &real, "--out", path(out)][..], more].concat())
+}
+
+/// Rationale: a set takes hours to be rendered, and the training that refuses it comes after. Expected: a training set whose images do not tell
+/// their pixels is refused at its own `augment_scale`, that of the scale or that of the experiment, with exit code 2 and before anything is
+/// made, by a dry run as by a run; images that are not trained on may lack what they like, and `relative` asks for nothing. Source: none.
+#[test]
+fn sets_whose_crops_cannot_be_scaled_are_told_before_anything_is_rendered() {
+    let scratch = tempfile::tempdir().unwrap();
+    let (folder, out) = (scratch.path(), scratch.path().join("out"));
+    let imported = imported(folder);
+    let root = env!("CARGO_MANIFEST_DIR");
+    let scene = |name: &str, pitch_deg: &str| {
+        let text = small_text().replace("pitch_deg: 6", &format!("pitch_deg: {pitch_deg}"));
+        let text = text.replace("\"textures/", &format!("\"{root}/textures/"));
+        let text = text.replace("\"scenes/", &format!("\"{root}/scenes/"));
+        std::fs::write(folder.join(name), text).unwrap();
+    };
+    scene("down.ron", "6");
+    scene("level.ron", "100");
+    let text = r#"Experiment(
+    networks: ["unet"],
+    sets: {"frames": Real(), "scene": Scene(file: "SCENE", count: 10, size: (48, 36))},
+    train: [(name: "Rendered", from: [(set: "scene", images: "PICK")]), (name: "Real", from: [(set: "frames", images: "0..1")] OWN)],
+    test: [(name: "T", set: "frames", images: "1..2")],
+    hyperparameters: (size: (64, 48) ALL),
+    scales: {"less": (hyperparameters: (steps: 2 LESS))},
+)"#;
+    let file = folder.join("experiment.ron");
+    let write = |filled: &[(&str, &str)]| {
+        let usual = [("SCENE", "down.ron"), ("PICK", "train"), (" OWN", ""), (" ALL", ""), (" LESS", "")];
+        let all = filled.iter().chain(&usual);
+        let text = all.fold(text.to_owned(), |text, (word, value)| text.replace(word, value));
+        std::fs::write(&file, text).unwrap();
+    };
+    let auto = r#", augment_scale: "auto""#;
+    let own = r#", hyperparameters: (augment_scale: "3..8")"#;
+    let no_image = "no image of the set `frames` tells the size of its pixels on the ground";
+    let folders = folder.join("photos-and-masks");
+    std::fs::create_dir_all(&folders).unwrap();
+    std::fs::rename(folder.join("photos"), folders.join("images")).unwrap();
+    std::fs::rename(folder.join("masks"), folders.join("labels")).unwrap();
+    for (filled, set, line, words) in [
+        (vec![(" ALL", auto)], &imported, 6, "`Real` cannot be trained with \"auto\": image 000000 of the set"),
+        (vec![(" ALL", auto)], &folders, 6, no_image),
+        (vec![(" ALL", auto), (" OWN", own)], &folders, 4, "`Real` cannot be trained with \"3..8\": no image"),
+        (vec![(" LESS", auto)], &folders, 7, no_image),
+        (vec![(" ALL", auto), ("SCENE", "level.ron")], &*SET, 6, "image 000000 of the set `scene` does not tell"),
+        (vec![(" ALL", auto), ("SCENE", "level.ron"), ("PICK", "4..6")], &*SET, 6, "image 000004 of the set"),
+        (vec![(" ALL", auto), ("SCENE", "level.ron"), ("PICK", "random:2")], &*SET, 6, "of the set `scene` does not"),
+    ] {
+        write(&filled);
+        let scale: &[&str] = if line == 7 { &["--scale", "less"] } else { &[] };
+        for more in [&["--dry-run"][..], &[]] {
+            let said = fail(table(&file, set, &out, &[more, scale].concat()), 2);
+            assert!(said.contains(&format!("experiment.ron:{line}:")) && said.contains(words), "{filled:?}: {said}");
+            assert!(!out.exists(), "{filled:?}");
+        }
+    }
+    for (filled, set) in [
+        (vec![], &folders),
+        (vec![(" LESS", auto)], &folders),
+        (vec![(" ALL", auto), (" OWN", r#", hyperparameters: (augment_scale: "relative")"#)], &folders),
+        (vec![(" ALL", auto)], &*SET),
+    ] {
+        write(&filled);
+        succeed(table(&file, set, &out, &["--dry-run"]));
+        assert!(!out.exists(), "{filled:?}");
+    }
 }

@@ -1,8 +1,8 @@
 //! How far a dataset is, and what it will cost before it is begun.
 //!
 //! Rationale: whoever renders for a night wants to know in the evening what it takes and in between whether it gets there. Expected: the
-//! numbers of `status` are those of the files, whatever became of the runs; the bill's number of files is exact, its bytes are within
-//! 30 %, and nothing is left anywhere. Source: the files themselves, counted and measured here.
+//! numbers of `status` are those of the files, whatever became of the runs; the bill's number of files is exact, its bytes and memory are
+//! within 30 %, and nothing is left anywhere. Source: the files themselves, counted and measured here.
 
 use crate::common::dataset::{SIZE, fail, made, make, path, succeed, tree, verb};
 use crate::common::program::{SMALL, names, scratch, trace};
@@ -328,6 +328,44 @@ fn the_bill_is_what_is_taken() {
         let memory = first_number(&rows["memory"]);
         assert!((0.05..3600.0).contains(&first_number(core)) && (0.01..16.0).contains(&memory), "{rows:?}");
         assert!(rows["shards"].contains("--shards 1 "), "{rows:?}");
+    }
+}
+
+/// Most memory that a program had until it ended well, bytes: `VmHWM` of the process, which never falls, asked for again and again.
+fn peak_memory(mut command: Command) -> f64 {
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let about = format!("/proc/{}/status", child.id());
+    let mut peak = 0.0;
+    loop {
+        // The lines of memory are gone once it has ended.
+        let text = fs::read_to_string(&about).unwrap_or_default();
+        let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+        peak = line.map_or(peak, |words| 1024.0 * first_number(words.trim()));
+        if let Some(ended) = child.try_wait().unwrap() {
+            assert!(ended.success(), "{command:?}");
+            return peak;
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// Rationale: a scheduler ends what takes more memory than was asked for. Expected: memory told is within 30 % of the peak of the run itself, with
+/// one image under way and with two, of `field.ron` at 480 × 360 pixels: images of a few thousand pixels of a bare scene take little beside the
+/// program itself, and would say nothing. Source: the kernel's account of the process.
+#[test]
+fn the_memory_of_a_bill_is_what_is_taken() {
+    let order = ["dataset", "--scene", "scenes/field.ron", "--width", "480", "--spp", "4", "--count", "4"];
+    let order = [&order[..], &["--threads", "2"]].concat();
+    let (_keep, data) = scratch();
+    let rows = bill(&[&order[..], &["--out", path(&data), "--dry-run"]].concat());
+    let words = rows["memory"].as_str();
+    assert!(words.contains("with one image under way, ") && words.ends_with(" with 2 cores"), "{words}");
+    for (told, at_once) in words.split(", ").zip(["1", "2"]) {
+        let (_keep, data) = scratch();
+        let order = [&order[..], &["--out", path(&data), "--at-once", at_once, "--quiet"]].concat();
+        let taken = peak_memory(trace(&order)) / f64::from(1 << 30);
+        let off = first_number(told) / taken;
+        assert!((0.7..1.3).contains(&off), "{at_once} at once: {told} told, {taken} GiB taken, {off}");
     }
 }
 

@@ -47,11 +47,14 @@ class Sample(Dict[str, Any]):
     image      uint8, (H, W, 3)        the photograph in colour, from PNG or JPEG; none of labels alone
     nir        uint8, (H, W)           the one in near infrared, where there is one
     semantics  uint8, (H, W)           0 soil, 1 crop, 2 weed, 255 no label
-    plants     int32, (H, W)           number of the plant, 0 for none
-    leaves     int32, (H, W)           number of the leaf on its plant, 0 for none
+    plants     int32, (H, W)           number of the plant, 0 for none; not there where `--keep` left it out
+    leaves     int32, (H, W)           number of the leaf on its plant, 0 for none; likewise
     record     dict                    `record.json` of a dataset or a stream; of `render`, where the image came from
     ========== ======================= ==========================================================
     """
+
+    def __missing__(self, key: str) -> Any:
+        raise KeyError(f"{key}: this sample has no such map; its record tells plants and leaves with their masks")
 
     def _repr_png_(self) -> bytes:
         """The photograph, as notebooks show it; the classes where there is none."""
@@ -109,15 +112,15 @@ _MAPS = (
 _ENDINGS = ("png", "jpg")
 
 
-def _sample(folder: Path, photographs: str = "", labels_only: bool = False) -> Sample:
-    """The pictures and labels of an image's folder; `photographs` ends the names of other photographs."""
+def _sample(folder: Path, photographs: str = "", left_out: Sequence[str] = ()) -> Sample:
+    """The pictures and labels of an image's folder; `photographs` ends the names of other photographs, `left_out` need not be there."""
     sample = Sample()
     for name, file, kind in _MAPS:
         stem = f"{file}{photographs if name in ('image', 'nir') else ''}"
         path = folder / f"{stem}.png"
         if name in ("image", "nir") and not path.is_file() and (folder / f"{stem}.jpg").is_file():
             path = folder / f"{stem}.jpg"
-        optional = name == "nir" or (labels_only and name == "image")
+        optional = name == "nir" or name in left_out
         if not optional or path.is_file():
             sample[name] = _read(path, kind)
     return sample
@@ -151,7 +154,9 @@ class Dataset:
             self._captures = int(self.recipe["made"].get("rendered", {}).get("captures", 1))
             every = range(self.recipe["count"])
             self.indices = [k for k in every if split is None or self._split(k) == split]
-            self.labels_only = bool(self.recipe["made"].get("rendered", {}).get("labels_only"))
+            rendered = self.recipe["made"].get("rendered", {})
+            self.labels_only = bool(rendered.get("labels_only"))
+            self._left_out = [*rendered.get("omit", []), *(["image"] if self.labels_only else [])]
         except (AttributeError, KeyError, TypeError, ValueError, ZeroDivisionError) as error:
             raise Error(f"{self.path}/dataset.json is damaged: {error!r}") from error
         # Of packs that were read from: where each file lies.
@@ -166,7 +171,7 @@ class Dataset:
         if self.recipe.get("pack") and not folder.is_dir():
             sample = self._packed(index)
         else:
-            sample = _sample(folder, labels_only=self.labels_only)
+            sample = _sample(folder, left_out=self._left_out)
             sample["record"] = _json(folder / "record.json")
         return sample if self.transform is None else self.transform(sample)
 

@@ -33,6 +33,9 @@ fn go_on(folder: &Path, mut recipe: Recipe, files: &[File]) -> Result<Recipe> {
         if now.keep == Kept::usual(now.labels_only) {
             now.keep.clone_from(&then.keep);
         }
+        if now.omit.is_empty() {
+            now.omit.clone_from(&then.omit);
+        }
         if now.photo.unwrap_or_default() == Photo::default() {
             now.photo = then.photo;
         }

@@ -93,8 +93,8 @@ pub(super) struct Delivery<'a> {
     pub(super) has: &'a (dyn Fn(u64) -> bool + Sync),
     /// Told of each unit that is finished, also of those that earlier runs finished.
     pub(super) deliver: &'a (dyn Fn(Unit) -> Result<()> + Sync),
-    /// The dataset in whose timing log the run tells of itself.
-    pub(super) log: &'a Path,
+    /// The dataset's folder, wherever the run works: its timing log tells of the run, and who stops it is told its name.
+    pub(super) home: &'a Path,
 }
 
 /// Images under way at once unless said otherwise: more would take more memory than they save time.
@@ -119,7 +119,7 @@ pub fn generate(set: &Set, work: &Work<'_>, callbacks: &Callbacks<'_>) -> Result
     work.push.map_or(Ok(()), |push| push.clear(set))?;
     let deliver = |unit: Unit| work.push.map_or(Ok(()), |push| push.unit(set, unit, callbacks.now));
     deliver(Unit::Recipe)?;
-    generate_for(set, work, callbacks, &Delivery { has: &|_| false, deliver: &deliver, log: &set.folder })
+    generate_for(set, work, callbacks, &Delivery { has: &|_| false, deliver: &deliver, home: &set.folder })
 }
 
 /// The same where what is finished goes elsewhere.
@@ -172,7 +172,7 @@ pub(super) fn generate_for(
         callbacks,
         threads,
         at_once,
-        timing_log: TimingLog::new(delivery.log, &format!("{}-of-{}", shard.number, shard.of)),
+        timing_log: TimingLog::new(delivery.home, &format!("{}-of-{}", shard.number, shard.of)),
     };
     let cpu_before = meter::cpu();
     if !tasks.is_empty() {
@@ -235,7 +235,7 @@ pub(super) fn generate_for(
     if let Some(refused) = refused {
         return Err(refused);
     }
-    if lacking == 0 { Ok(()) } else { Err(interrupted(&set.folder, wanted - lacking, wanted)) }
+    if lacking == 0 { Ok(()) } else { Err(interrupted(delivery.home, wanted - lacking, wanted)) }
 }
 
 /// Told to stop when so many of the images that were asked for were there.

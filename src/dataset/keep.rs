@@ -1,4 +1,4 @@
-//! Which maps images keep beside photograph, labels and record.
+//! Which maps images keep beside photograph, labels and record, and which label maps they go without.
 
 use crate::output::half;
 use crate::{Error, Result};
@@ -45,7 +45,55 @@ impl Kept {
     pub const OLDEST: [Self; 4] = [Self::Nir, Self::Coverage, Self::Depth32, Self::Normals16];
 }
 
-/// The same in order, each once; an error where something is asked for in two precisions.
+/// A label map that an image may go without: its record tells the same, by masks and by the species of each plant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Omitted {
+    /// `species.png`.
+    Species,
+    /// `plants.png`.
+    Plants,
+    /// `leaves.png`.
+    Leaves,
+}
+
+impl Omitted {
+    /// All of them with their names and what they are.
+    pub const NAMED: [(&str, Self, &str); 3] = [
+        ("species", Self::Species, "number of each pixel's species"),
+        ("plants", Self::Plants, "number of each pixel's plant"),
+        ("leaves", Self::Leaves, "number of each pixel's leaf"),
+    ];
+
+    /// What no image goes without and may be named with them.
+    pub const NEVER: [(&str, &str); 2] =
+        [("rgb", "the photograph; always kept"), ("semantics", "class of each pixel; always kept")];
+}
+
+/// What the words of `--keep` ask for, each a name above or `none`: the maps that images keep, and the label maps that they go without.
+///
+/// Who names no label map keeps them all. Who names one, `rgb` and `semantics` among them, goes without those that are not named.
+pub fn asked(words: &[String]) -> Result<(Vec<Kept>, Vec<Omitted>)> {
+    let named = |name: &str| words.iter().any(|word| word == name);
+    if words.len() > 1 && named("none") {
+        return Err(Error::misuse("--keep none keeps nothing more, and other maps are named beside it")
+            .help("write --keep none, or the maps without it"));
+    }
+    let kept = Kept::NAMED.iter().filter(|(name, ..)| named(name)).map(|(_, map, _)| *map).collect();
+    let mut labels = Omitted::NEVER.iter().map(|(name, _)| *name).chain(Omitted::NAMED.iter().map(|(name, ..)| *name));
+    let chosen = labels.any(named);
+    let omitted = Omitted::NAMED.iter().filter(|(name, ..)| chosen && !named(name)).map(|(_, map, _)| *map).collect();
+    Ok((checked(kept)?, omitted))
+}
+
+/// The same in order, each once.
+pub fn in_order(mut omitted: Vec<Omitted>) -> Vec<Omitted> {
+    omitted.sort_unstable();
+    omitted.dedup();
+    omitted
+}
+
+/// Kept maps in order, each once; an error where something is asked for in two precisions.
 pub fn checked(mut kept: Vec<Kept>) -> Result<Vec<Kept>> {
     kept.sort_unstable();
     kept.dedup();
@@ -98,6 +146,21 @@ const STEPS: f32 = 128.0;
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Expected: words of before mean what they did; a label map that is named leaves out those that are not.
+    #[test]
+    fn words_are_read_as_written() {
+        let read = |words: &str| asked(&words.split(',').map(String::from).collect::<Vec<_>>()).unwrap();
+        assert_eq!(read("nir,coverage,depth"), (Kept::USUAL.to_vec(), Vec::new()));
+        assert_eq!(read("none"), (Vec::new(), Vec::new()));
+        let all = vec![Omitted::Species, Omitted::Plants, Omitted::Leaves];
+        assert_eq!(read("rgb,semantics"), (Vec::new(), all.clone()));
+        assert_eq!(read("depth,rgb"), (vec![Kept::Depth], all));
+        assert_eq!(read("plants,nir"), (vec![Kept::Nir], vec![Omitted::Species, Omitted::Leaves]));
+        assert_eq!(read("leaves,plants,species"), (Vec::new(), Vec::new()));
+        assert!(asked(&["none".into(), "rgb".into()]).is_err());
+        assert!(asked(&["rgb".into(), "depth".into(), "depth32".into()]).is_err());
+    }
 
     /// Expected: halves err by 2⁻¹² of a depth at most, steps by half of one, and what is not there stays so.
     #[test]

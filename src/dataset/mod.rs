@@ -23,7 +23,7 @@
 //! | `keep`, `photo` | which maps images keep; how photographs are stored |
 //! | `classes`, `labelling`, `labels` | a user's own classes; what else may be asked of labels; how formats name and choose what images show |
 //! | `render` | an image from its field, by [`crate::job`] |
-//! | `sample`, `record`, `annotate`, `rle` | one image and all that is known of it |
+//! | `sample`, `record`, `annotate`, `rle`, `label_maps` | one image and all that is known of it; label maps to records, and back |
 //! | `native`, `format` | as files: ours (`images/`), and those of other tools |
 //! | `checksum`, `checksum_record`, `set` | SHA-256 of a file; those of an image's files; the dataset on disk |
 //! | `links` | symbolic links in a dataset's folder, which are refused |
@@ -76,6 +76,7 @@ pub mod index;
 pub mod invariants;
 #[doc(hidden)]
 pub mod keep;
+mod label_maps;
 #[doc(hidden)]
 pub mod labelling;
 #[doc(hidden)]

@@ -11,9 +11,12 @@
 //! | `coverage.png` | share of soil, crop, weed in the pixel as R, G, B; sums to 255 |
 //! | `geometry.exr` | `depth.Z` (metres along the optical axis), `normal.X/Y/Z` (world), in the precision that the recipe keeps |
 //! | `record.json` | what is known in words and numbers |
+//!
+//! `species.png`, `plants.png` and `leaves.png` are left out where the recipe says so; they are read from the record then.
 
 use super::File;
-use super::keep::Kept;
+use super::keep::{Kept, Omitted};
+use super::label_maps;
 use super::photo::{Jpegs, Photo};
 use super::recipe::{Recipe, compact};
 use super::record::Record;
@@ -65,14 +68,18 @@ pub fn files(recipe: &Recipe, sample: &Sample, text: &str) -> Result<Vec<File>> 
         }
     }
     add("semantics.png", png(&Picture::Indexed(&sample.semantics, &colors))?);
-    if !sample.species.is_empty() {
+    if !sample.species.is_empty() && !recipe.omits(Omitted::Species) {
         add("species.png", png(&Picture::Gray(&sample.species))?);
     }
     if !sample.parts.is_empty() {
         add("parts.png", png(&Picture::Indexed(&sample.parts, &PartKind::palette(recipe.models().len())))?);
     }
-    add("plants.png", png(&Picture::Numbers(&sample.plants))?);
-    add("leaves.png", png(&Picture::Gray16(&sample.leaves))?);
+    if !recipe.omits(Omitted::Plants) {
+        add("plants.png", png(&Picture::Numbers(&sample.plants))?);
+    }
+    if !recipe.omits(Omitted::Leaves) {
+        add("leaves.png", png(&Picture::Gray16(&sample.leaves))?);
+    }
     if !sample.coverage.is_empty() {
         add("coverage.png", png(&Picture::Linear(&sample.coverage))?);
     }
@@ -164,12 +171,6 @@ impl<'a, F: Files + ?Sized> Image<'a, F> {
         Ok(self.optional(file)?.is_some())
     }
 
-    /// An 8-bit gray picture.
-    pub(crate) fn gray(&self, file: &str) -> Result<(u32, u32, Vec<u8>)> {
-        let (place, bytes) = self.needed(file)?;
-        output::decode_gray(&place, &bytes)
-    }
-
     /// The photograph in colour, as PNG or as JPEG: width, height, pixels.
     pub(crate) fn photograph(&self) -> Result<(u32, u32, Vec<[u8; 3]>)> {
         match self.stored("rgb")? {
@@ -197,16 +198,46 @@ impl<'a, F: Files + ?Sized> Image<'a, F> {
         Ok(None)
     }
 
-    /// A 16-bit gray picture.
-    pub(crate) fn gray16(&self, file: &str) -> Result<(u32, u32, Vec<u16>)> {
-        let (place, bytes) = self.needed(file)?;
-        output::decode_gray16(&place, &bytes)
+    /// Numbers of species, from their picture or, where there is none, from the record of an image of this size, which may be `known`
+    /// already: width, height, values. No values of an imported image.
+    pub(crate) fn species(&self, size: (u32, u32), known: Option<&Record>) -> Result<(u32, u32, Vec<u8>)> {
+        match self.optional("species.png")? {
+            Some((place, bytes)) => output::decode_gray(&place, &bytes),
+            None => self.told(size, known, label_maps::species),
+        }
     }
 
-    /// A picture of plants' numbers.
-    pub(crate) fn numbers(&self, file: &str) -> Result<(u32, u32, Vec<u32>)> {
-        let (place, bytes) = self.needed(file)?;
-        output::decode_numbers(&place, &bytes)
+    /// Numbers of plants, in the same way.
+    pub(crate) fn plants(&self, size: (u32, u32), known: Option<&Record>) -> Result<(u32, u32, Vec<u32>)> {
+        match self.optional("plants.png")? {
+            Some((place, bytes)) => output::decode_numbers(&place, &bytes),
+            None => self.told(size, known, label_maps::plants),
+        }
+    }
+
+    /// Numbers of leaves, in the same way.
+    fn leaves(&self, size: (u32, u32), known: Option<&Record>) -> Result<(u32, u32, Vec<u16>)> {
+        match self.optional("leaves.png")? {
+            Some((place, bytes)) => output::decode_gray16(&place, &bytes),
+            None => self.told(size, known, label_maps::leaves),
+        }
+    }
+
+    /// A label map of an image of this size that the record tells.
+    fn told<T>(
+        &self,
+        size: (u32, u32),
+        known: Option<&Record>,
+        map: impl Fn(&Record) -> Result<Vec<T>>,
+    ) -> Result<(u32, u32, Vec<T>)> {
+        let read = if known.is_none() { Some(record(self.files, self.name)?) } else { None };
+        let mut values = Vec::new();
+        if let Some(record) = known.or(read.as_ref()) {
+            // A map may be as large as its record says: first what was read of it.
+            check(&self.place("semantics.png"), (record.width, record.height), size)?;
+            values = map(record).map_err(|e| e.in_file(self.place("record.json")))?;
+        }
+        Ok((size.0, size.1, values))
     }
 
     /// An 8-bit indexed picture.
@@ -277,10 +308,11 @@ pub(super) fn sample(files: &(impl Files + ?Sized), name: &str) -> Result<Sample
     let record = record(files, name)?;
     let size = (record.width, record.height);
     let (rgb, nir, jpeg) = photographs(&image, &record)?;
-    let species = match image.optional("species.png")? {
-        Some((place, bytes)) => sized(&image, "species.png", size, output::decode_gray(&place, &bytes)?)?,
-        None => Vec::new(),
-    };
+    let semantics = sized(&image, "semantics.png", size, image.indexed("semantics.png")?)?;
+    let known = Some(&record);
+    let species = sized(&image, "species.png", size, image.species(size, known)?)?;
+    let plants = sized(&image, "plants.png", size, image.plants(size, known)?)?;
+    let leaves = sized(&image, "leaves.png", size, image.leaves(size, known)?)?;
     let coverage = match image.optional("coverage.png")? {
         Some((place, bytes)) => sized(&image, "coverage.png", size, output::decode_rgb(&place, &bytes)?)?,
         None => Vec::new(),
@@ -300,11 +332,11 @@ pub(super) fn sample(files: &(impl Files + ?Sized), name: &str) -> Result<Sample
     Ok(Sample {
         rgb,
         nir,
-        semantics: sized(&image, "semantics.png", size, image.indexed("semantics.png")?)?,
+        semantics,
         species,
         parts,
-        plants: sized(&image, "plants.png", size, image.numbers("plants.png")?)?,
-        leaves: sized(&image, "leaves.png", size, image.gray16("leaves.png")?)?,
+        plants,
+        leaves,
         coverage,
         depth,
         normals,

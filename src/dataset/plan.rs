@@ -3,7 +3,7 @@
 use super::begin::begin;
 use super::classes::Classes;
 use super::gather::{Gathered, gather};
-use super::keep::{self, Kept};
+use super::keep::{self, Kept, Omitted};
 use super::labelling::Labelling;
 use super::labels::Labels;
 use super::photo::Photo;
@@ -41,6 +41,8 @@ pub struct Order {
     pub labelling: Labelling,
     /// Maps that images keep beside photograph, labels and record.
     pub keep: Vec<Kept>,
+    /// Label maps that images go without, since their records tell the same; a dataset that is gone on with keeps its way where it is none.
+    pub omit: Vec<Omitted>,
     /// How photographs are stored; as PNG, a dataset that is gone on with keeps its way.
     pub photo: Photo,
     /// Whether images are labels alone: nothing is lit, and there are no photographs.
@@ -72,6 +74,7 @@ impl Order {
             formats: Vec::new(),
             labelling: Labelling::default(),
             keep: Kept::USUAL.to_vec(),
+            omit: Vec::new(),
             photo: Photo::default(),
             labels_only: false,
             split: Shares::default(),
@@ -112,7 +115,7 @@ pub(super) struct Draft {
     pub(super) scene_sha256: String,
 }
 
-/// Checks an order by growing its first field; given up where the flag is raised.
+/// Checks an order by growing its first field as far as something is told of it; given up where the flag is raised.
 pub(super) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
     // Names are checked before anything is written.
     let options = order.edit.options(order.options.clone());
@@ -124,7 +127,7 @@ pub(super) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
     // Before anything grows: what could not be rendered here.
     let kernels = Renderer::open(&options)?.kernels().to_owned();
     let source = opened(&order.scene, order)?.until(stop);
-    let first = source.field(0)?;
+    let first = source.clone().told_only().field(0)?;
     let field = first.grown();
     if field.species.len() > MOST_SPECIES {
         return Err(Error::input(format!(
@@ -158,6 +161,7 @@ pub(super) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
             parts: order.labelling.classes.as_ref().is_some_and(Classes::needs_parts),
             models: field.models.clone(),
             keep,
+            omit: keep::in_order(order.omit.clone()),
             labels_only: order.labels_only,
             photo: Some(order.photo),
             kernels,
@@ -208,7 +212,7 @@ fn opened(scene: &Path, order: &Order) -> Result<SceneFile> {
 fn hash_of_copies(order: &Order, files: &[File], scene: &str, stop: &Arc<AtomicBool>) -> Result<String> {
     let folder = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir()))?;
     checksum_record::write_files(folder.path(), files)?;
-    let first = opened(&folder.path().join(scene), order)?.until(stop).field(0)?;
+    let first = opened(&folder.path().join(scene), order)?.until(stop).told_only().field(0)?;
     let field = first.grown();
     match field.files.iter().find(|file| !file.starts_with(folder.path())) {
         None => Ok(field.hash.clone()),

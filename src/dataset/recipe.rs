@@ -4,7 +4,7 @@
 //! of a machine, no number of threads. So any shard on any machine that has the folder can go on with it.
 
 use super::classes::Classes;
-use super::keep::Kept;
+use super::keep::{Kept, Omitted};
 use super::labelling::Labelling;
 use super::photo::Photo;
 use super::split::{Shares, Split};
@@ -97,6 +97,9 @@ pub struct Rendering {
     /// Maps that images keep beside photograph, labels and record; [`Kept::OLDEST`] where a recipe of before does not say.
     #[serde(default = "oldest", skip_serializing_if = "is_oldest")]
     pub keep: Vec<Kept>,
+    /// Label maps that images go without, since their records tell the same; recipes of before name none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub omit: Vec<Omitted>,
     /// Whether images are labels alone: no photographs and nothing that samples tell, so `spp` says nothing.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub labels_only: bool,
@@ -308,6 +311,11 @@ impl Recipe {
             Made::Rendered(rendering) => rendering.keep.contains(&map),
             Made::Imported { .. } => true,
         }
+    }
+
+    /// Whether images go without a label map, which their records tell.
+    pub fn omits(&self, map: Omitted) -> bool {
+        matches!(&self.made, Made::Rendered(rendering) if rendering.omit.contains(&map))
     }
 
     /// The name of a species by its number in `species.png`; `None` for 0 and numbers of no species.

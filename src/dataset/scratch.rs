@@ -5,38 +5,74 @@
 //! pack, is copied home, pushed from there where that is asked for, and removed here. Images of a pack that is not full when the run ends come
 //! home in folders of their own, and the next run goes on with them on whatever node. The timing log is written at home. So home holds what it
 //! would hold had the run worked there.
+//!
+//! Of several runs of one shard in one place, one works at a time: a second waits for its lock, then makes what the first has left.
 
 use super::begin::write_changed;
 use super::checksum::Checksum;
 use super::checksum_record::{ChecksumRecord, write_files};
+use super::cluster::quoted;
 use super::generate::{Callbacks, Delivery, OpenPacks, Shard, Work, generate_for};
 use super::pack::{Id, Packing, store};
 use super::push::{Push, Unit, free};
 use super::set::Set;
 use super::task::{Task, task};
 use super::{File, native};
+use crate::error::Kind;
 use crate::input::{self, below};
 use crate::job::Threads;
-use crate::output::stream_atomically;
+use crate::output::{Lock, stream_atomically};
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::ErrorKind;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Makes what is missing of a shard, as [`generate`](super::generate::generate()) does, in a folder of its own below `place`. That folder is
-/// removed when all of the shard is at home.
+/// removed when all of the shard is at home. While another run works there it waits, which is told as a warning.
 pub fn generate(home: &Set, place: &Path, work: &Work<'_>, callbacks: &Callbacks<'_>) -> Result<()> {
+    let folder = own_folder(home, place, work.shard)?;
+    let done = lock(&folder, work.shard, callbacks).and_then(|_lock| generate_there(home, &folder, work, callbacks));
+    done.map_err(|error| match error.kind() {
+        Kind::Interrupted => error.help(go_on(home, place, work.shard)).in_file(&home.folder),
+        _ => error,
+    })
+}
+
+/// What goes on with a run that was stopped.
+fn go_on(home: &Set, place: &Path, shard: Shard) -> String {
+    let [home, place] = [home.folder.as_path(), place].map(|path: &Path| quoted(&path.to_string_lossy()));
+    let Shard { number, of } = shard;
+    let command = format!("trace dataset render {home} --shard {number}/{of} --scratch {place}");
+    format!("`{command}` goes on with it; give it what else this run was given")
+}
+
+/// Waits until no other run of the shard works in the folder, and keeps others out.
+fn lock(folder: &Path, shard: Shard, callbacks: &Callbacks<'_>) -> Result<Lock> {
+    let Shard { number, of } = shard;
+    let waits = || {
+        (callbacks.warn)(&format!(
+            "another run of shard {number}/{of} works in {}; this one waits until it has ended",
+            folder.display()
+        ));
+    };
+    let stop = || callbacks.soon.load(Ordering::Relaxed) || callbacks.now.load(Ordering::Relaxed);
+    Lock::wait(&folder.with_extension("lock"), waits, stop)?
+        .ok_or_else(|| Error::stopped(format!("stopped while another run of shard {number}/{of} was at work")))
+}
+
+/// Makes what is missing of a shard in this folder.
+fn generate_there(home: &Set, folder: &Path, work: &Work<'_>, callbacks: &Callbacks<'_>) -> Result<()> {
     work.push.map_or(Ok(()), |push| push.clear(home))?;
-    let here = copy(home, place, work.shard)?;
+    let here = copy(home, folder)?;
     let run = Run { home, here, shard: work.shard, push: work.push, stop: callbacks.now };
     run.push(Unit::Recipe)?;
     let there = Threads::new(work.threads)?.install(|| run.at_home())?;
     run.push_again(&there, callbacks.soon)?;
     let has = |index: u64| there.contains(&index);
     let deliver = |unit: Unit| run.deliver(unit);
-    let made = generate_for(&run.here, work, callbacks, &Delivery { has: &has, deliver: &deliver, log: &home.folder });
+    let made = generate_for(&run.here, work, callbacks, &Delivery { has: &has, deliver: &deliver, home: &home.folder });
     let rest = run.bring_rest();
     made?;
     rest?;
@@ -47,20 +83,24 @@ pub fn generate(home: &Set, place: &Path, work: &Work<'_>, callbacks: &Callbacks
     Ok(())
 }
 
-/// The dataset in a folder of `place` that belongs to this dataset and shard alone.
-fn copy(home: &Set, place: &Path, shard: Shard) -> Result<Set> {
+/// A folder in `place` that belongs to this dataset and shard alone.
+fn own_folder(home: &Set, place: &Path, shard: Shard) -> Result<PathBuf> {
     home.recipe.rendering()?;
     let full = std::path::absolute(&home.folder).map_err(Error::io(&home.folder))?;
     let words = format!("{}\n{}", full.display(), home.recipe.fingerprint()?);
     let own = Checksum::of(words.as_bytes()).sha256;
-    let folder = place.join(format!("{}-{}-of-{}", &own[..16], shard.number, shard.of));
+    Ok(place.join(format!("{}-{}-of-{}", &own[..16], shard.number, shard.of)))
+}
+
+/// The dataset's recipe and scene in this folder.
+fn copy(home: &Set, folder: &Path) -> Result<Set> {
     let paths = Unit::Recipe.contents(home)?.map(|(paths, _)| paths).unwrap_or_default();
     let read = |path: String| -> Result<File> {
         let file = below(&home.folder, &path)?;
         Ok(File { bytes: input::contents(&file).map_err(Error::reading(&file))?, path })
     };
-    write_changed(&folder, &paths.into_iter().map(read).collect::<Result<Vec<File>>>()?)?;
-    Set::open(&folder)
+    write_changed(folder, &paths.into_iter().map(read).collect::<Result<Vec<File>>>()?)?;
+    Set::open(folder)
 }
 
 /// A run that works here for a dataset at home.

@@ -22,6 +22,8 @@ pub struct Interaction {
     pub triangle: u32,
     /// Diameter of what the ray sees of the surface, metres: the width of texture to average over.
     pub footprint: f32,
+    /// Factor on the colour of what is met there, R, G, B: 1 but where parts that share a material differ.
+    pub tint: Vec3,
 }
 
 impl Interaction {
@@ -45,6 +47,7 @@ impl Interaction {
             part: hit.part,
             triangle: hit.triangle,
             footprint,
+            tint: Vec3::ONE,
         }
     }
 
@@ -55,6 +58,13 @@ impl Interaction {
         let edges = self.edges.map(|(edge, uv)| (placement.direction(edge) * placement.scale, uv));
         let [ng, ns] = [self.ng, self.ns].map(|normal| placement.direction(normal));
         Self { p: placement.point(self.p), ng, ns, edges, ..self }
+    }
+
+    /// The same of what has another tint, R, G, B.
+    #[inline]
+    #[must_use]
+    pub fn tinted(self, tint: Vec3) -> Self {
+        Self { tint, ..self }
     }
 
     /// ∂p/∂u and ∂p/∂v, metres; zero where the texture coordinates are degenerate.

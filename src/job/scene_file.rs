@@ -7,6 +7,7 @@ use crate::ablation::{Edit, FULL};
 use crate::input::Scope;
 use crate::scene::assemble::{Options, Preview, Scanner, Source};
 use crate::scene::estimate::Estimate;
+use crate::sensor::CameraRecord;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -122,6 +123,14 @@ impl SceneFile {
         self
     }
 
+    /// For what is told of its fields alone, such as hash, files, warnings and plants, all of which stay as they are; of the ground much is missing.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn told_only(mut self) -> Self {
+        self.options.told_only = true;
+        self
+    }
+
     /// With leaves that keep the joints by which they bend, for [`gltf`](crate::output::gltf).
     #[must_use]
     pub fn rigged(mut self, rigged: bool) -> Self {
@@ -157,6 +166,13 @@ impl SceneFile {
     #[doc(hidden)]
     pub fn foretold(&self, index: u64) -> Result<Vec<String>> {
         self.source.foretold(&Options { index, ..self.options.clone() })
+    }
+
+    /// The cameras of field `index`, one for each of its images of a day, in their order; nothing is grown.
+    #[doc(hidden)]
+    pub fn cameras(&self, index: u64) -> Result<Vec<CameraRecord>> {
+        let day = self.options.day.or(self.seen_days().first().copied());
+        self.source.cameras(&Options { index, day, ..self.options.clone() })
     }
 
     /// The days on which each field is seen; none where it is seen as it is written.

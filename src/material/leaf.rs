@@ -8,7 +8,7 @@ use super::swatch::{Grain, Swatch, Tone, centre};
 use super::varies::Varies;
 use crate::bsdf::{self, Bsdf, Side, SurfaceLayer};
 use crate::geometry::Interaction;
-use crate::math::{Frame, Spectrum, Vec2, Vec3};
+use crate::math::{Frame, Spectrum, Vec2, Vec3, Vec4};
 use crate::optics::{Leaf, LeafOptics, Pigments};
 use crate::ron_file::{Bound, Fraction, NonNegative, Num, Pick};
 use crate::texture::{Maps, Texture};
@@ -162,8 +162,13 @@ impl LeafMaterial {
     /// The same leaf with another chlorophyll content, as a factor on the species file's: how one specimen differs from the next.
     #[must_use]
     pub fn with_chlorophyll(&self, base: f32, factor: f32) -> Self {
+        self.tinted(self.chlorophyll_tint(base, base * factor))
+    }
+
+    /// Reflectance in R, G and B at the chlorophyll content `to` over that at `from`, µg/cm² (each held to 0..100).
+    pub fn chlorophyll_tint(&self, from: f32, to: f32) -> Vec3 {
         let rgb = |c: f32| self.optics.with_chlorophyll(c).reflectance.0.truncate().max(Vec3::splat(1e-3));
-        self.tinted(rgb(base * factor) / rgb(base))
+        rgb(to) / rgb(from)
     }
 
     /// The same leaf of another colour, as a factor on R, G and B.
@@ -229,6 +234,32 @@ impl LeafMaterial {
         self.condition.as_ref().map_or_else(Damage::default, of)
     }
 
+    /// The mean place of the picture, or the colour of the pigments, before any tint.
+    fn middle(&self) -> Vec3 {
+        match self.picture.as_ref().filter(|_| self.pictured) {
+            Some(picture) => {
+                // The coarsest level is the mean over what is opaque.
+                let [r, g, b, _] = picture.color.sample(Vec2::splat(0.5), 32.0);
+                Vec3::new(r, g, b) * self.exposure
+            }
+            None => self.plain(),
+        }
+    }
+
+    /// Factors on reflectance and transmittance of the mean place, if healthy, where the colour is `tint` times what it is.
+    pub(super) fn tint_factors(&self, tint: Vec3) -> Tone {
+        let read = |color: Vec3| self.tone(self.optics.at(color.to_array()), true);
+        let (from, to) = (read(self.middle() * self.tint), read(self.middle() * self.tint * tint));
+        // What is nearly black stays so: a factor on it would show on other places.
+        let over = |to: Spectrum, from: Spectrum| {
+            Spectrum(Vec4::select(from.0.cmpge(Vec4::splat(0.01)), to.0 / from.0, Vec4::ONE))
+        };
+        Tone {
+            reflectance: over(to.reflectance, from.reflectance),
+            transmittance: over(to.transmittance, from.transmittance),
+        }
+    }
+
     /// What a picture of the upper side shows of a tissue, hairs and bloom where there is wax.
     fn tone(&self, leaf: Leaf, waxy: bool) -> Tone {
         let transmittance = if self.transmits { leaf.transmittance } else { Spectrum::ZERO };
@@ -282,8 +313,7 @@ impl LeafMaterial {
         }
         let color = |[r, g, b, _]: [f32; 4]| Vec3::new(r, g, b) * self.exposure;
         let texel = move |x, y| read(color(picture.color.texel(x, y)));
-        // The picture's coarsest level is its mean over what is opaque.
-        let middle = color(picture.color.sample(Vec2::splat(0.5), 32.0));
+        let middle = self.middle();
         let (bare, tinted) = (read(middle), read(middle * self.tint));
         let passed = |tone: Tone| tone.transmittance.0.truncate().max(Vec3::splat(1e-4));
         let key = [Arc::as_ptr(picture) as usize, Arc::as_ptr(&self.optics) as usize];
@@ -305,8 +335,9 @@ impl LeafMaterial {
 
     pub(super) fn scatter(&self, at: &Interaction, wo: Vec3) -> (Bsdf, Frame) {
         let tangents = at.tangents();
+        let tint = self.tint * at.tint;
         let (leaf, normal) = match &self.picture {
-            None => (self.optics.at((self.plain() * self.tint).to_array()), at.ns),
+            None => (self.optics.at((self.plain() * tint).to_array()), at.ns),
             Some(picture) => {
                 // The footprint as an extent of the image, by the larger side of a texel on the surface.
                 let metres = tangents.1.length().max(1e-6);
@@ -318,7 +349,7 @@ impl LeafMaterial {
                     self.plain()
                 };
                 let slope = picture.maps.normal.sample(at.uv, lod) * self.relief;
-                (self.optics.at((color * self.tint).to_array()), bump(at, tangents, slope))
+                (self.optics.at((color * tint).to_array()), bump(at, tangents, slope))
             }
         };
         let Worn { tissue, upper: leaf, waxy } = self.worn_at(leaf, at.uv);

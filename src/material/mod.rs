@@ -54,6 +54,24 @@ impl Material {
         same
     }
 
+    /// The same leaf in another colour, as a factor on R, G and B; what is no leaf stays as it is.
+    #[must_use]
+    pub fn tinted(&self, factor: Vec3) -> Self {
+        match self {
+            Self::Leaf(m) => Self::Leaf(m.tinted(factor)),
+            Self::Ground(_) | Self::Solid(_) | Self::Painted(_) | Self::Plain(_) => self.clone(),
+        }
+    }
+
+    /// Factors on the reflectance and the transmittance of its swatch that stand for another colour, a factor on R, G and B: those of a leaf's mean
+    /// healthy place; 1 for what is no leaf.
+    pub fn tint_factors(&self, tint: Vec3) -> Tone {
+        match self {
+            Self::Leaf(m) if tint != Vec3::ONE => m.tint_factors(tint),
+            _ => Tone { reflectance: Spectrum::ONE, transmittance: Spectrum::ONE },
+        }
+    }
+
     /// Over what the scattering varies: what a program that writes the material down must sample.
     pub fn varies(&self) -> Varies {
         match self {

@@ -23,6 +23,17 @@ pub struct Grain {
     pub film: f32,
 }
 
+/// What specimens that share a picture have of their own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dye {
+    /// Factor on reflected R, G, B.
+    pub tint: Vec3,
+    /// Factor on transmitted R, G, B.
+    pub tint_transmitted: Vec3,
+    /// The mean place, tint included.
+    pub mean: Tone,
+}
+
 /// A material as others can hold it. A place's reflectance in R, G, B is that of [`Swatch::texel`] times `tint`, its
 /// transmittance times `tint_transmitted`.
 pub struct Swatch<'a> {
@@ -95,6 +106,20 @@ impl<'a> Swatch<'a> {
     /// The same with a lower side that reflects `factor` times the visible light.
     pub(super) fn paler_below(self, factor: f32) -> Self {
         Self { back_paleness: factor, ..self }
+    }
+
+    /// What it has of its own, where it is in another tint that comes to these factors, see
+    /// [`Material::tint_factors`](super::Material::tint_factors).
+    pub fn dyed(&self, by: Tone) -> Dye {
+        let mean = Tone {
+            reflectance: self.mean.reflectance * by.reflectance,
+            transmittance: self.mean.transmittance * by.transmittance,
+        };
+        Dye {
+            tint: self.tint * by.reflectance.0.truncate(),
+            tint_transmitted: self.tint_transmitted * by.transmittance.0.truncate(),
+            mean,
+        }
     }
 
     /// What is finer than the shape of texel (x, y).

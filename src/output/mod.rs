@@ -6,6 +6,7 @@ pub mod cloud;
 mod denoise;
 mod exr;
 pub mod gltf;
+mod lock;
 pub mod mitsuba;
 mod overlay;
 mod photo;
@@ -31,6 +32,7 @@ pub use self::png::{
     read_gray, read_gray16, read_indexed, read_map, read_numbers, read_rgb,
 };
 pub use denoise::Denoiser;
+pub use lock::Lock;
 pub use photo::{
     ENDINGS, decode_gray_jpeg, decode_jpeg, encode_gray_jpeg, encode_jpeg, photo_size, photograph_in, read_color_photo,
     read_gray_photo, read_photo, resize_gray, shrink, shrunk,

@@ -5,7 +5,7 @@
 
 use super::gpu::Gpu;
 use crate::geometry::AlphaMask;
-use crate::material::swatch::Swatch;
+use crate::material::swatch::{Dye, Swatch};
 use crate::math::{Spectrum, Vec4};
 use crate::scene::Scene;
 use crate::texture::ColorSpace;
@@ -61,17 +61,18 @@ impl Sheets {
                 sheets.all.push(Sheet { reflected, transmitted, relief, mask: mask.clone() });
             }
             sheets.worn.push(sheet);
-            sheets.wears.push(wear(swatch));
+            let by = scene.materials[part.material as usize].tint_factors(part.tint());
+            sheets.wears.push(wear(swatch, swatch.dyed(by)));
         }
         sheets
     }
 }
 
 /// A material without a picture wears a white one, and its colour is the tint.
-fn wear(swatch: &Swatch<'_>) -> [f32; 12] {
+fn wear(swatch: &Swatch<'_>, dye: Dye) -> [f32; 12] {
     let (tint, passed) = match swatch.size {
-        Some(_) => (swatch.tint.extend(1.0), swatch.tint_transmitted.extend(1.0)),
-        None => (swatch.mean.reflectance.0, swatch.mean.transmittance.0),
+        Some(_) => (dye.tint.extend(1.0), dye.tint_transmitted.extend(1.0)),
+        None => (dye.mean.reflectance.0, dye.mean.transmittance.0),
     };
     let mut all = [0.0; 12];
     all[..4].copy_from_slice(&tint.to_array());

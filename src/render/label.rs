@@ -97,7 +97,7 @@ pub fn row_hits(
 
 /// The normal of a part's mesh at a hit, world, on the side that a ray along `direction` comes from.
 pub(super) fn normal(part: &Part, hit: &Hit, direction: Vec3) -> Vec3 {
-    match &part.instance {
+    match part.placement() {
         None => facing(&part.mesh, hit, direction),
         Some(at) => at.direction(facing(&part.mesh, hit, at.to_mesh(direction))),
     }

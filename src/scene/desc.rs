@@ -109,8 +109,8 @@ pub enum Detail {
     /// As the pixels need it, for cameras high above: 144 m² in seconds.
     ByPixel,
     /// The same, and plants of which a pixel shows more than 2.5 mm share their meshes: each is an instance of one of 64 plants of its
-    /// population, turned by an angle and larger or smaller by a factor of its own. For fields of thousands of plants, to a hectare. With images of another size,
-    /// other plants are instances.
+    /// population, turned by an angle and larger or smaller by a factor of its own, with its own chlorophyll. For fields of thousands of
+    /// plants, to a hectare. With images of another size, other plants are instances.
     Instanced,
 }
 

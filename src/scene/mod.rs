@@ -28,7 +28,7 @@ use crate::sensor::Camera;
 use tag::{Class, Tag};
 
 pub use assemble::Field;
-pub use part::Part;
+pub use part::{Instance, Part};
 pub use part_kind::PartKind;
 
 /// What is known of one plant.

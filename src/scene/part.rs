@@ -7,6 +7,15 @@ use crate::math::Vec3;
 use std::borrow::Cow;
 use std::sync::Arc;
 
+/// What a part has of its own whose mesh and material other parts have, too.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// Where the mesh stands. Parts of one plant, which follow each other, have one placement.
+    pub placement: Arc<Placement>,
+    /// Factor on its material's colour, R, G, B. Near infrared and transmittance follow as the leaf model has them.
+    pub tint: Vec3,
+}
+
 /// One organ of one plant, one stone, the ground: a mesh with a material and a name.
 #[derive(Clone, Debug)]
 pub struct Part {
@@ -18,19 +27,31 @@ pub struct Part {
     pub material: u32,
     /// Who it is.
     pub tag: Tag,
-    /// Where a mesh stands that other parts have, too. Parts of one plant, which follow each other, have one placement.
-    pub instance: Option<Arc<Placement>>,
+    /// Where a mesh stands that other parts have, too, and in which tint.
+    pub instance: Option<Instance>,
 }
 
 impl Part {
     /// As the accelerators see it.
     pub fn surface(&self) -> Surface<'_> {
-        Surface { mesh: &self.mesh, mask: self.mask.as_ref(), instance: self.instance.as_ref() }
+        Surface { mesh: &self.mesh, mask: self.mask.as_ref(), instance: self.placement() }
+    }
+
+    /// Where its mesh stands; `None` for one in the world.
+    #[inline]
+    pub fn placement(&self) -> Option<&Arc<Placement>> {
+        self.instance.as_ref().map(|instance| &instance.placement)
+    }
+
+    /// Factor on its material's colour, R, G, B: 1 but for an instance.
+    #[inline]
+    pub fn tint(&self) -> Vec3 {
+        self.instance.as_ref().map_or(Vec3::ONE, |instance| instance.tint)
     }
 
     /// Its mesh in the world.
     pub fn in_world(&self) -> Cow<'_, Mesh> {
-        match &self.instance {
+        match self.placement() {
             None => Cow::Borrowed(&self.mesh),
             Some(placement) => {
                 let mut mesh = Mesh::clone(&self.mesh);
@@ -48,7 +69,7 @@ impl Part {
 
     /// All corners in the world, metres.
     pub fn positions(&self) -> impl Iterator<Item = Vec3> + '_ {
-        let placement = self.instance.as_deref();
+        let placement = self.placement();
         self.mesh.positions.iter().map(move |p| placement.map_or(*p, |placement| placement.point(*p)))
     }
 
@@ -63,7 +84,7 @@ impl Part {
         let at = Interaction::new(&self.mesh, hit, footprint);
         match &self.instance {
             None => at,
-            Some(placement) => at.placed(placement),
+            Some(Instance { placement, tint }) => at.placed(placement).tinted(*tint),
         }
     }
 }

@@ -334,6 +334,7 @@ mod tests {
     use crate::geometry::{Mesh, Placement};
     use crate::math::{Mat3, vec3};
     use crate::plant::LeafSize;
+    use crate::scene::Instance;
     use crate::scene::tag::{Class, Tag};
     use std::f32::consts::PI;
 
@@ -440,7 +441,8 @@ mod tests {
         let disc = AlphaMask::new(200, 500, |x, y| vec2(x as f32 - 99.5, (y as f32 - 249.5) * 0.4).length() < 80.0);
         let own = leaf(0.8, Some(disc));
         let mut instance = Part { mesh: own.mesh.clone(), mask: own.mask.clone(), ..leaf(0.8, None) };
-        instance.instance = Some(Arc::new(Placement { rotation: Mat3::IDENTITY, scale: 1.0, offset: Vec3::ZERO }));
+        let placement = Arc::new(Placement { rotation: Mat3::IDENTITY, scale: 1.0, offset: Vec3::ZERO });
+        instance.instance = Some(Instance { placement, tint: Vec3::ONE });
         let ((whole, blade), (plant, leaf)) = (measured(&own), measured(&instance));
         assert!((plant.cover_m2 / whole.cover_m2 - 1.0).abs() < 0.01, "{} {}", plant.cover_m2, whole.cover_m2);
         assert!((leaf.area_m2 / blade.area_m2 - 1.0).abs() < 1e-5, "{leaf:?} {blade:?}");

@@ -7,6 +7,7 @@ use super::{PACKS, end, files, plan, plan_with, send, task, until, whole, whole_
 use crate::common::dataset::{fail, made, path, same, succeed, tree, verb};
 use crate::common::program::{names, scratch};
 use std::collections::BTreeSet;
+use std::io::Read;
 use std::path::Path;
 use std::process::{Child, Stdio};
 
@@ -106,6 +107,68 @@ fn a_killed_run_goes_on_and_pushes_what_came_home() {
     let expected = whole_with(COUNT, &FORMATS);
     same(&files(&folder), &expected);
     same(&files(&elsewhere), &expected);
+}
+
+/// Starts shard 0 of 2 in `disk` and keeps what it says.
+fn start_heard(folder: &Path, disk: &Path) -> Child {
+    let order = ["--shard", "0/2", "--at-once", "1", "--quiet", "--scratch", path(disk)];
+    let mut command = verb("render", folder, &order);
+    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+/// Waits until a program says a line, and returns it.
+fn line(child: &mut Child) -> String {
+    let mut said = Vec::new();
+    let words = child.stderr.as_mut().unwrap();
+    // Byte by byte: nothing of what follows is taken.
+    let mut byte = [0];
+    while words.read_exact(&mut byte).is_ok() && byte != *b"\n" {
+        said.push(byte[0]);
+    }
+    String::from_utf8(said).unwrap()
+}
+
+/// The code that a program ends with, and what it says until then.
+fn ended(mut child: Child) -> (Option<i32>, String) {
+    let status = end(&mut child);
+    let mut said = String::new();
+    child.stderr.as_mut().unwrap().read_to_string(&mut said).unwrap();
+    (status.code(), said)
+}
+
+/// Three runs of one shard in one place; the first is stopped, then a third that waits, and the second goes on.
+///
+/// Rationale: a scheduler may start a job twice. Expected: one works at a time, so nothing is drawn twice; who is stopped is told the dataset's
+/// folder and the command that goes on, and nothing of the copy; in the end nothing is left on the disk. Source: none, equality is exact.
+#[test]
+fn runs_of_one_shard_in_one_place_work_one_after_the_other() {
+    const COUNT: u64 = 24;
+    let (keep, folder) = scratch();
+    let disk = keep.path().join("disk");
+    plan(&folder, COUNT);
+    let first = start_heard(&folder, &disk);
+    until("drawn", || !made(&folder).is_empty());
+    let [mut second, mut third] = [(); 2].map(|()| start_heard(&folder, &disk));
+    for waiting in [&mut second, &mut third] {
+        let said = line(waiting);
+        assert!(said.starts_with("warning: another run of shard 0/2 works in ") && said.contains("waits"), "{said}");
+    }
+    send("TERM", &third);
+    send("USR1", &first);
+    let command = format!("`trace dataset render {} --shard 0/2 --scratch {}`", path(&folder), path(&disk));
+    for (stopped, words) in [(third, "while another run of shard 0/2 was at work"), (first, "of 12 images are there")] {
+        let (code, said) = ended(stopped);
+        assert_eq!(code, Some(75), "{said}");
+        assert!(said.starts_with(&format!("{}: stopped", path(&folder))), "{said}");
+        assert!(said.contains(words) && said.contains(&command) && !said.contains("-0-of-2"), "{said}");
+    }
+    let (code, said) = ended(second);
+    assert_eq!(code, Some(0), "{said}");
+    drawn_once(&folder, COUNT / 2);
+    assert_eq!(names(&disk), Vec::<String>::new());
+    succeed(verb("render", &folder, &["--quiet"]));
+    succeed(verb("finish", &folder, &["--quiet"]));
+    same(&files(&folder), &whole(COUNT));
 }
 
 /// Expected: a format that is added later is made of the images that are at home, without drawing them again.

@@ -90,6 +90,9 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     for name in &bound.left_out {
         furrow::tell!("warning: `{name}` is left out: --without {}", args.without.join(" --without "));
     }
+    if args.only != Some(Part::Tables) {
+        table::check_pixel_sizes(&bound, &page)?;
+    }
     if args.dry_run {
         for error in [bound.check(), table::check_weights(&bound)].into_iter().filter_map(Result::err) {
             furrow::tell!("warning: {error}");

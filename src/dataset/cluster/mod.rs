@@ -14,6 +14,7 @@ mod script;
 mod slurm;
 
 pub use request::{Job, Pod, Scheduler};
+pub(super) use script::quoted;
 
 use super::Set;
 use crate::input::{refuse_links, tidy};

@@ -24,7 +24,7 @@ pub(super) fn name(dir: &str) -> String {
 }
 
 /// A word of a shell script, whatever it holds.
-pub(super) fn quoted(word: &str) -> String {
+pub(in crate::dataset) fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+:,".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
         return word.to_owned();

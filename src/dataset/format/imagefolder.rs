@@ -2,7 +2,7 @@
 //! reads the pictures named by `file_name` and every `…_file_name`, all other keys as columns.
 //!
 //! The reader takes a column's type from a split's first lines and refuses splits whose types differ. So a number that some image
-//! lacks is null there, and one that a whole split lacks is no column at all.
+//! lacks is null there, and one that a whole split lacks is no column at all. Label maps that images go without are no columns either.
 //!
 //! Source: Hugging Face datasets documentation, "Create an image dataset", ImageFolder with metadata, and "Dataset cards"; read with
 //! datasets 5.2.0, in which 16-bit masks keep their numbers, and those of three bytes.
@@ -11,6 +11,7 @@ use super::conditions::Brief;
 use super::{Format, Whole, picture};
 use crate::Result;
 use crate::dataset::File;
+use crate::dataset::keep::Omitted;
 use crate::dataset::labels::Labels;
 use crate::dataset::recipe::Recipe;
 use crate::dataset::record::Record;
@@ -36,10 +37,14 @@ impl Format for Writer {
             picture::photograph(sample, &below("images"))?,
             // Numbers, not palette colours: a reader that turns pictures into RGB would lose them.
             file("masks", &Picture::Gray(&Labels::of(recipe)?.pixels(sample)))?,
-            file("plants", &Picture::Numbers(&sample.plants))?,
-            file("leaves", &Picture::Gray16(&sample.leaves))?,
         ];
-        if !sample.species.is_empty() {
+        if !recipe.omits(Omitted::Plants) {
+            files.push(file("plants", &Picture::Numbers(&sample.plants))?);
+        }
+        if !recipe.omits(Omitted::Leaves) {
+            files.push(file("leaves", &Picture::Gray16(&sample.leaves))?);
+        }
+        if !sample.species.is_empty() && !recipe.omits(Omitted::Species) {
             files.push(file("species", &Picture::Gray(&sample.species))?);
         }
         if !sample.nir.is_empty() {
@@ -87,6 +92,7 @@ fn columns(set: &Set, record: &Record) -> Vec<(&'static str, Value)> {
         let below = format!("{kind}/{name}.{ending}");
         set.folder.join(FOLDER).join(split.name()).join(&below).is_file().then_some(below)
     };
+    let label_map = |map: Omitted, kind: &str| (!set.recipe.omits(map)).then(|| format!("{kind}/{name}.png"));
     let pixels = |class: Class| record.classes.iter().find(|c| c.class == class).map_or(0, |c| c.pixels);
     let count = |class: Class| record.seen().filter(|p| p.class == class).count();
     let species: BTreeSet<&str> = record.seen().filter_map(|p| set.recipe.species_name(p.kind)).collect();
@@ -96,8 +102,8 @@ fn columns(set: &Set, record: &Record) -> Vec<(&'static str, Value)> {
     vec![
         ("file_name", json!(format!("images/{name}.{photo}"))),
         ("mask_file_name", json!(format!("masks/{name}.png"))),
-        ("plants_file_name", json!(format!("plants/{name}.png"))),
-        ("leaves_file_name", json!(format!("leaves/{name}.png"))),
+        ("plants_file_name", json!(label_map(Omitted::Plants, "plants"))),
+        ("leaves_file_name", json!(label_map(Omitted::Leaves, "leaves"))),
         ("species_file_name", json!(file("species", "png"))),
         ("nir_file_name", json!(file("nir", photo))),
         ("index", json!(record.index)),
@@ -171,13 +177,24 @@ fn card(set: &Set, splits: &[Split], w: &mut Stream<'_>) -> Result<()> {
     }
     let labels = Labels::of(recipe)?;
     let classes = labels.classes().iter().enumerate().map(|(i, class)| format!("{i} {}", plain(&class.name)));
-    w.put(COLUMNS.replace("{classes}", &classes.collect::<Vec<_>>().join(", ")))?;
+    w.put(columns_told(recipe).replace("{classes}", &classes.collect::<Vec<_>>().join(", ")))?;
+    if recipe.omits(Omitted::Species) {
+        return Ok(());
+    }
     w.put("\n`species` numbers:\n\n| number | species | EPPO code | class |\n|---|---|---|---|\n| 0 | none | | |\n")?;
     for (i, species) in recipe.species.iter().enumerate() {
         let (name, eppo) = (plain(&species.name), plain(&species.eppo));
         w.put(format!("| {} | {name} | {eppo} | {} |\n", i + 1, species.class.name()))?;
     }
     Ok(())
+}
+
+/// What the columns hold, but for label maps that images go without.
+fn columns_told(recipe: &Recipe) -> String {
+    let there = |line: &&str| {
+        !Omitted::NAMED.iter().any(|(name, map, _)| recipe.omits(*map) && line.starts_with(&format!("| `{name}` |")))
+    };
+    COLUMNS.split_inclusive('\n').filter(there).collect()
 }
 
 const COLUMNS: &str = "\

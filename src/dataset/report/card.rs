@@ -2,7 +2,7 @@
 
 use super::statistics::{Species, Statistics};
 use crate::dataset::format;
-use crate::dataset::keep::Kept;
+use crate::dataset::keep::{Kept, Omitted};
 use crate::dataset::photo::Photo;
 use crate::dataset::recipe::{Made, Recipe, Rendering};
 use crate::dataset::split::Split;
@@ -163,14 +163,16 @@ pub(super) fn reading(recipe: &Recipe, nir: bool) -> Markup {
         rows.push((if jpeg { "nir.jpg" } else { "nir.png" }, html! { "photograph in near infrared, 8 bit" }));
     }
     rows.push(("semantics.png", html! { "class, indexed: 0 soil, 1 crop, 2 weed, 255 no label" }));
-    if rendered {
+    if rendered && !recipe.omits(Omitted::Species) {
         rows.push(("species.png", html! { "number of the species in the table above, 0 for none" }));
     }
-    rows.push((
-        "plants.png",
-        html! { "number of the plant, 0 for none; 16 bit, or R + 256 G + 65536 B where one is above 65535" },
-    ));
-    rows.push(("leaves.png", html! { "number of the leaf on its plant, 16 bit, 0 for none" }));
+    if !recipe.omits(Omitted::Plants) {
+        let plants = "number of the plant, 0 for none; 16 bit, or R + 256 G + 65536 B where one is above 65535";
+        rows.push(("plants.png", html! { (plants) }));
+    }
+    if !recipe.omits(Omitted::Leaves) {
+        rows.push(("leaves.png", html! { "number of the leaf on its plant, 16 bit, 0 for none" }));
+    }
     if recipe.keeps(Kept::Coverage) && rendered {
         let coverage = "share of soil, crop, weed in the pixel as R, G, B; they sum to 255";
         rows.push(("coverage.png", html! { (coverage) }));
@@ -184,9 +186,10 @@ pub(super) fn reading(recipe: &Recipe, nir: bool) -> Markup {
     let record =
         "plants and leaves with boxes, masks, visible fractions and keypoints; the conditions drawn for the image";
     rows.push(("record.json", html! { (record) }));
+    let example = if recipe.omits(Omitted::Plants) { WITHOUT_PLANTS } else { EXAMPLE };
     html! {
         (pairs(&rows))
-        pre { code { (if recipe.pack.is_some() { PACKED } else { FOLDERS }) (EXAMPLE) } }
+        pre { code { (if recipe.pack.is_some() { PACKED } else { FOLDERS }) (example) } }
         p {
             code { "manifest.json" } " lists every file with its SHA-256; " code { "trace dataset verify DIR" }
             " checks them and every label."
@@ -222,6 +225,13 @@ if plants.ndim == 3:  # numbers beyond 16 bits
 record = json.load(read(\"record.json\"))
 for plant in record[\"plants\"]:
     print(plant[\"number\"], plant[\"class\"], plant[\"seen\"][\"pixels\"], np.sum(plants == plant[\"number\"]))
+";
+
+/// The same where images go without `plants.png`.
+const WITHOUT_PLANTS: &str = "semantics = np.array(Image.open(read(\"semantics.png\")))
+record = json.load(read(\"record.json\"))
+for plant in record[\"plants\"]:
+    print(plant[\"number\"], plant[\"class\"], plant[\"seen\"][\"pixels\"], plant[\"seen\"][\"mask\"])
 ";
 
 /// What whoever uses it should know.

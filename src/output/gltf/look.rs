@@ -3,17 +3,17 @@
 use super::pack::Pack;
 use crate::Result;
 use crate::geometry::AlphaMask;
-use crate::material::swatch::Swatch;
+use crate::material::swatch::{Dye, Swatch};
 use crate::math::Vec3;
 use crate::model::document::{
     CLAMP_TO_EDGE, DIFFUSE_TRANSMISSION, DiffuseTransmission, Document, Image, LINEAR, LINEAR_MIPMAP_LINEAR, Material,
     NEAREST, NormalInfo, Pbr, Sampler, Texture, TextureInfo,
 };
 use crate::output::png::{self, Picture};
-use crate::scene::Scene;
+use crate::scene::{Part, Scene};
 use crate::texture::ColorSpace;
 use serde_json::json;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Which picture: the swatch's key, and the mask's address.
@@ -22,10 +22,13 @@ type Key = ([usize; 2], usize);
 /// What parts wear, as it is met.
 pub(super) struct Looks<'a> {
     scene: &'a Scene,
-    /// Material and mask of each glTF material.
-    worn: Vec<(u32, Option<&'a Arc<AlphaMask>>)>,
-    known: BTreeMap<(u32, usize), usize>,
+    /// Material, tint and mask of each glTF material.
+    worn: Vec<Worn<'a>>,
+    known: BTreeMap<(u32, [u32; 3], usize), usize>,
 }
+
+/// A material in a tint, under a mask.
+type Worn<'a> = (u32, Vec3, Option<&'a Arc<AlphaMask>>);
 
 /// A picture and everything that wears it.
 struct Sheet<'a> {
@@ -51,29 +54,41 @@ impl<'a> Looks<'a> {
         Self { scene, worn: Vec::new(), known: BTreeMap::new() }
     }
 
-    /// Number of the glTF material of a material and a mask.
-    pub(super) fn wear(&mut self, material: u32, mask: Option<&'a Arc<AlphaMask>>) -> usize {
-        let worn = &mut self.worn;
-        *self.known.entry((material, address(mask))).or_insert_with(|| {
-            worn.push((material, mask));
+    /// Number of the glTF material of a part.
+    pub(super) fn wear(&mut self, part: &'a Part) -> usize {
+        let (worn, tint, mask) = (&mut self.worn, part.tint(), part.mask.as_ref());
+        let key = (part.material, tint.to_array().map(f32::to_bits), address(mask));
+        *self.known.entry(key).or_insert_with(|| {
+            worn.push((part.material, tint, mask));
             worn.len() - 1
         })
+    }
+
+    /// The swatches of all materials that are worn.
+    fn swatches(&self) -> BTreeMap<u32, Swatch<'a>> {
+        let scene = self.scene;
+        let worn: BTreeSet<u32> = self.worn.iter().map(|(material, ..)| *material).collect();
+        worn.into_iter().map(|material| (material, scene.materials[material as usize].swatch())).collect()
     }
 
     /// Writes materials, textures, samplers and pictures.
     pub(super) fn write(&self, document: &mut Document, pack: &mut Pack) -> Result<()> {
         let scene = self.scene;
-        let swatch = |material: u32| scene.materials[material as usize].swatch();
+        let swatches = self.swatches();
+        let dye = |material: u32, tint| swatches[&material].dyed(scene.materials[material as usize].tint_factors(tint));
         let mut sheets: BTreeMap<Key, Sheet<'a>> = BTreeMap::new();
         // Numbered as they are met: addresses differ from run to run, files must not.
         let mut order: Vec<Key> = Vec::new();
-        for (i, (material, mask)) in self.worn.iter().enumerate() {
-            let swatch = swatch(*material);
-            let key = key(&swatch, *mask, i);
+        for (i, (material, tint, mask)) in self.worn.iter().enumerate() {
+            let (swatch, dye) = (&swatches[material], dye(*material, *tint));
+            let key = key(swatch, *mask, i);
             let sheet = sheets.entry(key).or_insert_with(|| {
                 order.push(key);
                 let own = scene.materials[*material as usize].swatch();
-                let (mask, most) = (mask.map(|m| &**m), most(&own));
+                // A plain colour has no picture that others wear, too: it is the tinted one.
+                let mean = || [dye.mean.reflectance, dye.mean.transmittance].map(|s| s.0.truncate());
+                let most = if own.size.is_some() { most(&own) } else { mean() };
+                let mask = mask.map(|m| &**m);
                 Sheet {
                     swatch: own,
                     mask,
@@ -84,9 +99,11 @@ impl<'a> Looks<'a> {
                     raised: false,
                 }
             });
-            sheet.tint = sheet.tint.max(swatch.tint);
             sheet.raised |= swatch.relief > 0.0;
-            sheet.tint_transmitted = sheet.tint_transmitted.max(swatch.tint_transmitted);
+            if swatch.size.is_some() {
+                sheet.tint = sheet.tint.max(dye.tint);
+                sheet.tint_transmitted = sheet.tint_transmitted.max(dye.tint_transmitted);
+            }
         }
         for sheet in sheets.values_mut() {
             // Specimens that let more light through than their picture need their part of the share. Where the brightest texels of both leave no
@@ -124,10 +141,10 @@ impl<'a> Looks<'a> {
                 [add(reflected, "reflected", cut), add(transmitted, "transmitted", 1), add(normals, "relief", 1)],
             );
         }
-        for (i, (material, mask)) in self.worn.iter().enumerate() {
-            let swatch = swatch(*material);
-            let key = key(&swatch, *mask, i);
-            document.materials.push(sheets[&key].material(&swatch, textures[&key], i));
+        for (i, (material, tint, mask)) in self.worn.iter().enumerate() {
+            let (swatch, dye) = (&swatches[material], dye(*material, *tint));
+            let key = key(swatch, *mask, i);
+            document.materials.push(sheets[&key].material(swatch, dye, textures[&key], i));
         }
         Ok(())
     }
@@ -208,16 +225,15 @@ impl Sheet<'_> {
         Ok(Drawn { reflected: Some(reflected), transmitted, normals })
     }
 
-    fn material(&self, swatch: &Swatch<'_>, textures: [Option<usize>; 3], number: usize) -> Material {
+    fn material(&self, swatch: &Swatch<'_>, dye: Dye, textures: [Option<usize>; 3], number: usize) -> Material {
         let relief = textures[2].filter(|_| swatch.relief > 0.0);
         let [reflected, transmitted, _] =
             textures.map(|t| t.map(|index| TextureInfo { index, ..TextureInfo::default() }));
         let pictured = swatch.size.is_some();
         // With a picture the factor is the tint beside the largest tint; without one it is the colour.
-        let factor =
-            if pictured { swatch.tint / self.tint } else { swatch.mean.reflectance.0.truncate() * self.lift() };
+        let factor = if pictured { dye.tint / self.tint } else { dye.mean.reflectance.0.truncate() * self.lift() };
         let [r, g, b] = factor.clamp(Vec3::ZERO, Vec3::ONE).to_array();
-        let mean = swatch.mean;
+        let mean = dye.mean;
         let mut material = Material {
             name: Some(format!("material {number}")),
             pbr_metallic_roughness: Pbr {
@@ -242,7 +258,7 @@ impl Sheet<'_> {
         }
         if self.share > 0.0 {
             let factor = if pictured {
-                swatch.tint_transmitted / self.tint_transmitted
+                dye.tint_transmitted / self.tint_transmitted
             } else {
                 mean.transmittance.0.truncate() * self.lift_transmitted()
             };

@@ -70,7 +70,7 @@ pub fn encode(scene: &Scene, plants: &[PlantRecord], provenance: &str) -> Result
     };
     // A part without triangles is no mesh there.
     for part in scene.parts.iter().filter(|p| !p.mesh.triangles.is_empty()) {
-        let material = looks.wear(part.material, part.mask.as_ref());
+        let material = looks.wear(part);
         document.meshes.push(mesh(part, material, &mut pack));
         let mesh = document.meshes.len() - 1;
         let extras = document.meshes[mesh].extras.clone();

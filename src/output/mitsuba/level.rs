@@ -6,13 +6,14 @@
 
 use crate::geometry::Mesh;
 use crate::material::{Material, Varies};
+use crate::math::Vec3;
 use crate::scene::Scene;
 use crate::sensor::Camera;
 use std::collections::BTreeMap;
 
-/// The materials of a scene, each picture on one level.
+/// The materials of a scene, each picture on one level, and each tint a material of its own.
 pub(super) struct Leveled {
-    /// One for each material and level that is in use.
+    /// One for each material, tint and level that is in use.
     pub(super) materials: Vec<Material>,
     /// For each part the index of its material among them.
     pub(super) of_parts: Vec<u32>,
@@ -21,7 +22,7 @@ pub(super) struct Leveled {
 impl Leveled {
     /// Those of a scene.
     pub(super) fn of(scene: &Scene) -> Self {
-        let mut known: BTreeMap<(u32, Option<u32>), u32> = BTreeMap::new();
+        let mut known: BTreeMap<(u32, [u32; 3], Option<u32>), u32> = BTreeMap::new();
         let mut materials = Vec::new();
         let of_parts = scene.parts.iter().map(|part| {
             let material = &scene.materials[part.material as usize];
@@ -29,8 +30,13 @@ impl Leveled {
                 Varies::Picture(w, h) => Some(level(&part.in_world(), w.max(h), &scene.camera)),
                 Varies::Nowhere | Varies::Raster(..) | Varies::Place => None,
             };
-            *known.entry((part.material, level)).or_insert_with(|| {
-                materials.push(level.map_or_else(|| material.clone(), |level| material.on_level(level)));
+            let tint = part.tint();
+            *known.entry((part.material, tint.to_array().map(f32::to_bits), level)).or_insert_with(|| {
+                let own = material.tinted(tint);
+                materials.push(match level {
+                    Some(level) => own.on_level(level),
+                    None => own,
+                });
                 materials.len() as u32 - 1
             })
         });
@@ -46,6 +52,9 @@ pub fn fix_levels(scene: &mut Scene) {
     scene.materials = materials;
     for (part, material) in scene.parts.iter_mut().zip(of_parts) {
         part.material = material;
+        if let Some(instance) = &mut part.instance {
+            instance.tint = Vec3::ONE;
+        }
     }
 }
 

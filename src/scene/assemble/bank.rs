@@ -3,13 +3,17 @@
 //! Where `detail` is `Instanced`, what stands so far away that a pixel shows more than [`COARSE`] of it is no plant of its own shape: each
 //! population has a bank of plants, grown as all of its plants are, and each plant stands in the field as an instance of one of them,
 //! turned by an angle and larger or smaller by a factor of its own, and leant as its ground. Which one that is, how it is turned and how large it is
-//! follows from the plant's own stream alone, so it does not depend on what else is in view. Wear and tint are those of the bank's plant, for
-//! materials are as many as plants in the bank.
+//! follows from the plant's own stream alone, so it does not depend on what else is in view.
+//!
+//! Its chlorophyll is its own, too: what the plant would have if it grew. Materials are as many as plants in the bank, so each organ of an instance has a
+//! factor on the R, G and B of its material, R(Cᵢ) / R(Cₘ), where R is the leaf model's reflectance, Cᵢ and Cₘ the chlorophyll contents of that
+//! organ on this plant and on the bank's. The product is the colour that the organ would have on this plant; near infrared and transmittance follow from
+//! it where it is shaded, and never sum to more than 0.99 with it ([`crate::optics::LeafOptics::at`]). Wear is that of the bank's plant.
 
 use super::builder::Builder;
 use super::grown::Grown;
 use super::member::Member;
-use super::seedling::{Place, Seedling, grow};
+use super::seedling::{Place, Seedling, greenness, grow};
 use crate::Result;
 use crate::geometry::Placement;
 use crate::math::{Frame, Mat3, Spectrum, Vec2, Vec3};
@@ -31,11 +35,13 @@ pub(super) struct Model {
     record: PlantRecord,
     /// None where it has not emerged.
     pub(super) organs: Option<Vec<Grown>>,
+    /// Its chlorophyll over its species'.
+    green: f32,
 }
 
 impl Model {
-    /// What is known of the plant of `seedling`, an instance of this one that stands at `foot` on ground with this normal, and how it stands.
-    pub(super) fn stand(&self, seedling: &Seedling, foot: Vec3, normal: Vec3) -> (PlantRecord, Placement) {
+    /// The plant of `seedling`, an instance of this one that stands at `foot` on ground with this normal.
+    pub(super) fn stand(&self, seedling: &Seedling, foot: Vec3, normal: Vec3) -> (PlantRecord, Variation) {
         let turn = Member::turn(&seedling.stream);
         let ahead = Vec3::new(turn.sin(), turn.cos(), 0.0);
         let frame = Frame::with_tangent(normal, ahead.cross(normal));
@@ -51,8 +57,16 @@ impl Model {
             leaf_axes: self.record.leaf_axes.iter().map(|axis| placed(axis, &at)).collect(),
             ..self.record.clone()
         };
-        (record, at)
+        (record, Variation { at, greener: greenness(seedling) / self.green })
     }
+}
+
+/// How an instance differs from the plant of the bank.
+pub(super) struct Variation {
+    /// Where and how large it stands.
+    pub(super) at: Placement,
+    /// Factor on the chlorophyll of all its organs.
+    pub(super) greener: f32,
 }
 
 /// The axis of a bank's leaf where an instance has it, as large as it is there.
@@ -85,7 +99,7 @@ impl Builder<'_> {
             let own = Seedling { position: Vec2::ZERO, turn: 0.0, member: None, stream, ..(*like).clone() };
             let place = Place { height: 0.0, normal: Vec3::Z, dust, cell: member.cell(), rigged: false };
             let (record, organs) = grow(&own, &place, |_| true);
-            Ok((*member, Arc::new(Model { record, organs })))
+            Ok((*member, Arc::new(Model { record, organs, green: greenness(&own) })))
         };
         wanted.par_iter().map(raise).collect()
     }

@@ -100,7 +100,8 @@ impl<'a> Ailing<'a> {
         for (k, mesh) in pieces.into_iter().enumerate() {
             let of_piece = stream.child(Purpose::Condition, 100 + k as u64);
             let marks = blade.then(|| self.marks(leaf, &mesh, (age, share), bare, &of_piece));
-            let mut one = Grown { material: own.clone(), ..grown.with(mesh) };
+            let chlorophyll = base * bare.green * green;
+            let mut one = Grown { chlorophyll, material: own.clone(), ..grown.with(mesh) };
             if let Some(marks) = marks.as_ref().filter(|m| m.cuts()) {
                 one.part.mask = Some(Arc::new(marks.cut(one.part.mask.as_deref())));
             }

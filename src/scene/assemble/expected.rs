@@ -1,10 +1,12 @@
-//! What is known of a field before it grows: its warnings, and how many plants are to be expected in its view, from its densities alone.
+//! What is known of a field before it grows: its warnings, its cameras, and how many plants are to be expected in its view, from its densities
+//! alone.
 
 use super::builder::Builder;
 use super::{Options, Source};
 use crate::Result;
 use crate::sampling::Purpose;
 use crate::scatter::{Rows, WeedsRecord};
+use crate::sensor::CameraRecord;
 use std::sync::PoisonError;
 
 impl Source {
@@ -29,6 +31,11 @@ impl Source {
             builder.warn_of_plants()?;
             Ok(std::mem::take(&mut builder.warnings))
         })
+    }
+
+    /// The cameras of field `options.index`, one for each of its images of a day, in their order.
+    pub fn cameras(&self, options: &Options) -> Result<Vec<CameraRecord>> {
+        self.ask(options, |builder| Ok(builder.captures.iter().map(|capture| capture.camera.record()).collect()))
     }
 
     /// Asks a field that has not grown.

@@ -77,7 +77,7 @@ impl Builder<'_> {
         // The bake takes as long as everything else, and neither needs the other.
         let (baked, rest) = rayon::join(
             || match &known {
-                _ if options.unlit => None,
+                _ if options.unlit || options.told_only => None,
                 Some(bed) => Some(bed.baked.clone()),
                 None => Some(Arc::new(bake(&ground, &soil))),
             },
@@ -88,7 +88,8 @@ impl Builder<'_> {
                 let plants = self.populate(&seedlings, Some(floor), shown)?;
                 let meshes = || self.scene.parts.iter().map(|part| part.mesh.clone()).collect();
                 let same = known.clone().and_then(|bed| preview?.laid(&Under { bed, plants: meshes() }));
-                let cover = if same.is_some() { Vec::new() } else { self.cover(desc, &mut earth) };
+                let uncovered = same.is_some() || options.told_only;
+                let cover = if uncovered { Vec::new() } else { self.cover(desc, &mut earth) };
                 Ok::<_, Error>((plants, same, cover))
             },
         );

@@ -29,6 +29,9 @@ pub struct Options {
     /// Whether the field is only labelled: what the ground looks like is not worked out, and it reflects nothing. Its shape, and everything that
     /// is told of the field, stays.
     pub unlit: bool,
+    /// Whether only what is told of the field is wanted: hash, files, warnings, species, plants and conditions. What the ground looks like is not worked
+    /// out, and no clods and no litter lie on it.
+    pub told_only: bool,
     /// Whether leaves and stems keep the joints by which they bend ([`LeafAxis::rig`](crate::plant::LeafAxis::rig),
     /// [`PlantRecord::rig`](crate::scene::PlantRecord::rig)) and the weights of their corners.
     pub rigged: bool,

@@ -79,8 +79,7 @@ pub(super) fn grow(
     let Place { height: z, normal, dust, cell, rigged } = *place;
     let desc: &SpeciesDesc = &s.species.desc;
     let mut stream = s.stream.clone();
-    let drawn = stage(s, &mut stream);
-    let green = (1.0 + desc.chlorophyll_sd.get() * stream.normal()).clamp(0.6, 1.5) as f32;
+    let (drawn, green) = begun(s, &mut stream);
     let axis = scatter::axis(normal, AXIS_NOISE_DEG, &mut stream);
     let shape = s.individual.as_ref().map_or(&stream, Individual::shape);
     let Some(stage) = s.individual.as_ref().map_or(drawn, |individual| stage(s, &mut individual.age())) else {
@@ -148,6 +147,7 @@ pub(super) fn grow(
             kind: organ.kind,
             key: organ.material,
             choice,
+            chlorophyll: pigments.chlorophyll.f32() * green,
             material: material.with_chlorophyll(pigments.chlorophyll.f32(), green),
             own: age.is_some(),
         };
@@ -158,6 +158,18 @@ pub(super) fn grow(
     });
     let organs = organs.collect();
     (record, Some(organs))
+}
+
+/// What of a plant is drawn first: the stage by its own stream, none before it emerges, and its chlorophyll over its species'.
+fn begun(s: &Seedling, stream: &mut Stream) -> (Option<Stage>, f32) {
+    let stage = stage(s, stream);
+    let green = (1.0 + s.species.desc.chlorophyll_sd.get() * stream.normal()).clamp(0.6, 1.5);
+    (stage, green as f32)
+}
+
+/// A plant's chlorophyll over its species': the same whether it grows or is an instance.
+pub(super) fn greenness(s: &Seedling) -> f32 {
+    begun(s, &mut s.stream.clone()).1
 }
 
 /// The stage that a plant has reached, as its growth is drawn from a stream; none before it emerges.

@@ -1,5 +1,6 @@
 //! Plants are grown and stand in the field: each with meshes of its own, or as an instance of a plant of a bank.
 
+use super::bank::Variation;
 use super::builder::{Builder, Floor};
 use super::grown::Grown;
 use super::member::Member;
@@ -9,7 +10,7 @@ use crate::geometry::Placement;
 use crate::material::Material;
 use crate::math::{Vec2, Vec3};
 use crate::scene::tag::Tag;
-use crate::scene::{Part, PlantRecord};
+use crate::scene::{Instance, Part, PlantRecord};
 use crate::soil::Rect;
 use crate::{Error, Result};
 use rayon::prelude::*;
@@ -25,7 +26,7 @@ enum Stands {
     /// With meshes of its own.
     Own(Arc<Standing>),
     /// As an instance.
-    Shared(Box<PlantRecord>, Member, Placement),
+    Shared(Box<PlantRecord>, Member, Variation),
 }
 
 impl Stands {
@@ -58,8 +59,8 @@ impl Builder<'_> {
             let Vec2 { x, y } = seedling.position;
             let (height, normal) = floor.map_or((0.0, Vec3::Z), |f| f.stance(x, y));
             if let Some(member) = seedling.member {
-                let (record, at) = bank[&member].stand(seedling, seedling.position.extend(height), normal);
-                return Ok(Stands::Shared(Box::new(record), member, at));
+                let (record, own) = bank[&member].stand(seedling, seedling.position.extend(height), normal);
+                return Ok(Stands::Shared(Box::new(record), member, own));
             }
             let place = Place { height, normal, dust, cell: cell(seedling.position), rigged: options.rigged };
             let known = options.preview.as_ref().and_then(|preview| preview.plant(seedling, &place));
@@ -84,13 +85,13 @@ impl Builder<'_> {
                     self.put_organs(number, organs, &materials, None);
                     records.push(record);
                 }
-                Stands::Shared(record, member, at) => {
+                Stands::Shared(record, member, own) => {
                     let (true, Some(organs)) = (reaches(&record), &bank[&member].organs) else { continue };
                     let record = PlantRecord { number, ..*record };
                     if let Entry::Vacant(first) = worn.entry(member) {
                         first.insert(self.dress(&record, organs)?);
                     }
-                    self.put_organs(number, organs, &worn[&member], Some(&Arc::new(at)));
+                    self.put_organs(number, organs, &worn[&member], Some(own));
                     records.push(record);
                 }
             }
@@ -126,11 +127,17 @@ impl Builder<'_> {
     }
 
     /// Puts a plant's organs into the scene: meshes of the world, or of a bank's plant that stands as an instance.
-    fn put_organs(&mut self, number: u32, organs: &[Grown], materials: &[u32], instance: Option<&Arc<Placement>>) {
+    fn put_organs(&mut self, number: u32, organs: &[Grown], materials: &[u32], instance: Option<Variation>) {
+        let instance = instance.map(|Variation { at, greener }| (Arc::new(at), greener));
         for (organ, material) in organs.iter().zip(materials) {
             self.organs.push(organ.kind);
             let tag = Tag { plant: number, ..organ.part.tag };
-            self.scene.parts.push(Part { material: *material, tag, instance: instance.cloned(), ..organ.part.clone() });
+            let own = |(placement, greener): &(Arc<Placement>, f32)| {
+                let tint = organ.tint(*greener);
+                Instance { placement: placement.clone(), tint }
+            };
+            let instance = instance.as_ref().map(own);
+            self.scene.parts.push(Part { material: *material, tag, instance, ..organ.part.clone() });
         }
     }
 }

@@ -75,9 +75,8 @@ impl Example {
         same(file, (lw, lh))?;
         let mut species = Vec::new();
         if map.needs_species() {
-            let file = "species.png";
-            let (lw, lh, numbers) = image.gray(file)?;
-            same(file, (lw, lh))?;
+            let (lw, lh, numbers) = image.species((w, h), None)?;
+            same("species.png", (lw, lh))?;
             species = numbers;
         }
         let mut parts = Vec::new();
@@ -89,9 +88,8 @@ impl Example {
         }
         let mut plants = Vec::new();
         if with_plants {
-            let file = "plants.png";
-            let (lw, lh, numbers) = image.numbers(file)?;
-            same(file, (lw, lh))?;
+            let (lw, lh, numbers) = image.plants((w, h), None)?;
+            same("plants.png", (lw, lh))?;
             plants = numbers;
         }
         let mut labels = map.labels(&semantics, &species, &parts);

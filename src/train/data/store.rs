@@ -118,6 +118,13 @@ impl Store {
         Ok(sizes)
     }
 
+    /// Number of the first image whose record is there and does not tell it, or tells one outside [`PIXEL_MM`].
+    pub fn first_untold(&self) -> Option<u64> {
+        let is_told = |place: usize| self.pixel_mm_of(place).map(|told| told.is_some_and(|mm| PIXEL_MM.contains(&mm)));
+        let lacks = |place: &usize| self.same[*place] == *place && matches!(is_told(*place), Ok(false));
+        (0..self.images.len()).find(lacks).map(|place| self.images[place].1)
+    }
+
     /// That an image does not tell the size of its pixels.
     fn untold(&self, place: usize) -> Error {
         let (set, number) = self.images[place];

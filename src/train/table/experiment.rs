@@ -2,12 +2,12 @@
 
 use super::desc::{ExperimentDesc, Named, PartDesc, ScaleDesc, SetDesc};
 use super::names::{slug, unknown};
-use super::renamed::old_name;
+use super::renamed::as_written;
 use crate::ablation::EDITS;
 use crate::dataset::classes::Classes;
 use crate::dataset::recipe::{self, Recipe};
 use crate::dataset::split::Shares;
-use crate::ron_file::{RonFile, Step, choose, place};
+use crate::ron_file::{RonFile, Step, choose};
 use crate::sampling::Sampler;
 use crate::train::baseline::Kind;
 use crate::train::data::margin::MOST;
@@ -146,26 +146,7 @@ type At<'a> = &'a [Step<'a>];
 impl Checker<'_> {
     /// What is wrong with the value at a place, and what to do.
     fn fault(&self, at: At<'_>, what: impl AsRef<str>, help: impl AsRef<str>) -> Error {
-        self.page.blame(&self.as_written(at), Error::input(what.as_ref()).help(help.as_ref()))
-    }
-
-    /// The same place with the names that the file uses: some fields are read by an old name, too.
-    fn as_written<'a>(&self, at: At<'a>) -> Vec<Step<'a>> {
-        let mut written = Vec::new();
-        for step in at {
-            let old = match step {
-                Step::Field(field) => old_name(field).map(Step::Field),
-                Step::Item(_) => None,
-            };
-            let with = |step: Step<'a>| [written.as_slice(), &[step]].concat();
-            let found = |path: &[Step<'_>]| place(&self.page.text, path) != place(&self.page.text, &written);
-            let next = match old.map(&with) {
-                Some(path) if !found(&with(*step)) && found(&path) => path,
-                _ => with(*step),
-            };
-            written = next;
-        }
-        written
+        self.page.blame(&as_written(self.page, at), Error::input(what.as_ref()).help(help.as_ref()))
     }
 
     fn experiment(&self, scale: Option<&str>) -> Result<Experiment> {

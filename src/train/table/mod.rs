@@ -34,6 +34,7 @@
 //! | `names` | names of folders |
 //! | `rows` | what is to be done, in which order, in which folder |
 //! | `sets` | images, rendered and imported |
+//! | `pixels` | whether sets tell the pixels by which their crops are to be scaled |
 //! | `evaluation` | a row's evaluation on a test set, stored |
 //! | `work` | all of it, as far as it is missing |
 //! | `seen`, `print` | rows as far as they are; tables |
@@ -45,6 +46,7 @@ mod desc;
 mod evaluation;
 mod experiment;
 mod names;
+mod pixels;
 mod print;
 mod renamed;
 mod rows;
@@ -60,6 +62,8 @@ pub use evaluation::StoredEvaluation;
 pub use experiment::{Experiment, Part, Source, TestSet, TrainSet};
 #[doc(hidden)]
 pub use names::slug;
+#[doc(hidden)]
+pub use pixels::check_pixel_sizes;
 #[doc(hidden)]
 pub use print::{RUNS, TIMES, Tables, listing, tables};
 #[doc(hidden)]

@@ -1,6 +1,6 @@
 //! Keywords of experiment files that have another name since version 0.1: both are read, for one more version.
 
-use crate::ron_file::{Keyword, Renamed};
+use crate::ron_file::{Keyword, Renamed, RonFile, Step, place};
 
 const CLASS_WEIGHTS: Keyword = Keyword::Text(&["balance", "class_weights"]);
 
@@ -27,15 +27,33 @@ pub const RENAMED: &[Renamed] = &[
     Renamed { keyword: CLASS_WEIGHTS, old: "fading", new: "annealed" },
 ];
 
+/// A place of an experiment file, the steps to it, with the names that the file uses: some fields are read by an old name, too.
+pub(super) fn as_written<'a>(page: &RonFile, at: &[Step<'a>]) -> Vec<Step<'a>> {
+    let mut written = Vec::new();
+    for step in at {
+        let old = match step {
+            Step::Field(field) => old_name(field).map(Step::Field),
+            Step::Item(_) => None,
+        };
+        let with = |step: Step<'a>| [written.as_slice(), &[step]].concat();
+        let found = |path: &[Step<'_>]| place(&page.text, path) != place(&page.text, &written);
+        let next = match old.map(&with) {
+            Some(path) if !found(&with(*step)) && found(&path) => path,
+            _ => with(*step),
+        };
+        written = next;
+    }
+    written
+}
+
 /// The old name of a field, where it had another.
-pub(super) fn old_name(field: &str) -> Option<&'static str> {
+fn old_name(field: &str) -> Option<&'static str> {
     RENAMED.iter().find(|r| r.keyword == Keyword::Field && r.new == field).map(|r| r.old)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ron_file::RonFile;
 
     #[test]
     fn old_names_are_found_where_they_stand_and_nowhere_else() {

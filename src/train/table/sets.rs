@@ -12,11 +12,11 @@ use crate::dataset::status::Status;
 use crate::dataset::{self, recipe};
 use crate::error::Kind;
 use crate::job::Threads;
+use crate::output::Lock;
 use crate::report::{Cell, Table};
 use crate::settings::{Quality, RenderOptions};
 use crate::train::data::Selection;
 use crate::{Error, Result};
-use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -114,6 +114,11 @@ impl Bound {
     /// A set's folder.
     pub fn folder(&self, set: usize) -> &Path {
         &self.sets[set].0
+    }
+
+    /// Whether the images of a set are imported, from files that tell no cameras.
+    pub(super) fn is_imported(&self, set: usize) -> bool {
+        matches!(self.sets[set].1, Origin::Imported(_))
     }
 
     /// Images of a set as a training or an evaluation opens them.
@@ -303,30 +308,11 @@ fn real_set(real: &Real, own: PathBuf) -> Result<(PathBuf, Origin)> {
     Err(Error::input(format!("--real {name}={}: {what}", folder.display())).help("name a dataset (`trace dataset import` makes one), or a folder with images/ and with masks of the same names in labels/"))
 }
 
-/// Between two looks at what is waited for.
-const LOOK: Duration = Duration::from_millis(50);
-
-/// Takes a set for this process; none where the file system knows no locks, on which files are whole all the same.
-fn lock(folder: &Path, name: &str, tell: &(dyn Fn(&str) + Sync), stop: &AtomicBool) -> Result<Option<File>> {
+/// Takes a set for this process, and waits where another makes it.
+fn lock(folder: &Path, name: &str, tell: &(dyn Fn(&str) + Sync), stop: &AtomicBool) -> Result<Lock> {
+    let waits = || tell(&format!("waiting for another process that makes the set `{name}`"));
     let path = folder.with_file_name(format!("{name}.lock"));
-    let sets = folder.parent().unwrap_or(Path::new("."));
-    std::fs::create_dir_all(sets).map_err(Error::io(sets))?;
-    let file =
-        File::options().create(true).truncate(false).read(true).write(true).open(&path).map_err(Error::io(&path))?;
-    let mut told = false;
-    loop {
-        match file.try_lock() {
-            Ok(()) => return Ok(Some(file)),
-            Err(TryLockError::Error(_)) => return Ok(None),
-            Err(TryLockError::WouldBlock) => {}
-        }
-        if stop.load(Ordering::Relaxed) {
-            let words = format!("stopped before the set `{name}` was there");
-            return Err(Error::stopped(words).help("the same command goes on with it"));
-        }
-        if !std::mem::replace(&mut told, true) {
-            tell(&format!("waiting for another process that makes the set `{name}`"));
-        }
-        std::thread::sleep(LOOK);
-    }
+    Lock::wait(&path, waits, || stop.load(Ordering::Relaxed))?.ok_or_else(|| {
+        Error::stopped(format!("stopped before the set `{name}` was there")).help("the same command goes on with it")
+    })
 }

@@ -4,7 +4,7 @@ use crate::field::{MemoryArgs, SceneArgs};
 use crate::quality::{TechniqueArgs, samples};
 use furrow::ablation::{Edit, FULL};
 use furrow::dataset::classes::Classes;
-use furrow::dataset::keep::{self, Kept};
+use furrow::dataset::keep::{self, Kept, Omitted};
 use furrow::dataset::labelling::Labelling;
 use furrow::dataset::photo::Photo;
 use furrow::dataset::plan::{self, Order};
@@ -57,7 +57,9 @@ pub(crate) struct ImageArgs {
 /// What an image is given.
 #[derive(clap::Args)]
 pub(crate) struct ContentArgs {
-    /// Maps to keep beside photograph, labels and record, separated by commas; none for nothing more.
+    /// Maps to keep beside photograph, labels and record, separated by commas; none for nothing more. Where label maps are named, or
+    /// rgb, those that are not named are left out: `--keep rgb,semantics` keeps nothing else. Records tell them all the same, so every
+    /// format can still be made.
     #[arg(long, value_delimiter = ',', value_name = "MAP", default_value = "nir,coverage,depth", value_parser = maps())]
     keep: Vec<String>,
     /// How photographs are stored: png, or jpeg with a quality from 50 to 100, such as jpeg95, whose colours are not subsampled.
@@ -74,8 +76,8 @@ pub(crate) struct LookArgs {
     /// Samples a pixel.
     #[arg(long, default_value_t = Quality::SPP, value_parser = samples())]
     spp: u32,
-    /// Draw no photographs: labels and records alone, of the same fields. Nothing is lit, and no sensor is asked; of --keep only depth and
-    /// normals can be had, and unless they are named, nothing.
+    /// Draw no photographs: labels and records alone, of the same fields. Nothing is lit, and no sensor is asked; of --keep only depth,
+    /// normals and label maps can be had, depth and normals where they are named.
     #[arg(long, conflicts_with_all = ["spp", "denoise", "engine", "without", "max_depth", "clamp"])]
     pub(crate) labels_only: bool,
     /// Take the noise of few samples out of the photographs; needs Open Image Denoise.
@@ -120,7 +122,9 @@ fn maps() -> clap::builder::PossibleValuesParser {
     let value =
         |(name, _, words): &(&'static str, Kept, &'static str)| clap::builder::PossibleValue::new(*name).help(*words);
     let none = clap::builder::PossibleValue::new("none").help("nothing more");
-    clap::builder::PossibleValuesParser::new(Kept::NAMED.iter().map(value).chain([none]))
+    let label = |(name, words): (&'static str, &'static str)| clap::builder::PossibleValue::new(name).help(words);
+    let labels = Omitted::NEVER.into_iter().chain(Omitted::NAMED.map(|(name, _, words)| (name, words))).map(label);
+    clap::builder::PossibleValuesParser::new(Kept::NAMED.iter().map(value).chain([none]).chain(labels))
 }
 
 /// The names of the formats, with what they are.
@@ -172,12 +176,11 @@ impl LookArgs {
 impl ContentArgs {
     /// Enters what is asked for into an order.
     pub(crate) fn enter(&self, order: &mut Order) -> Result<()> {
-        if self.keep.len() > 1 && self.keep.iter().any(|name| name == "none") {
-            return Err(Error::misuse("--keep none keeps nothing more, and other maps are named beside it")
-                .help("write --keep none, or the maps without it"));
+        if order.labels_only && self.keep.iter().any(|name| name == "rgb") {
+            return Err(Error::misuse("--keep rgb is a photograph, and --labels-only draws none")
+                .help("leave one of them out; semantics can be kept alone"));
         }
-        let named = |name: &String| Kept::NAMED.iter().find(|(known, ..)| known == name).map(|(_, kept, _)| *kept);
-        order.keep = keep::checked(self.keep.iter().filter_map(named).collect())?;
+        (order.keep, order.omit) = keep::asked(&self.keep)?;
         (order.photo, order.split) = (self.photo, self.split);
         Ok(())
     }

@@ -1,0 +1,107 @@
+//! Label maps made of an image's record, for images that go without their files: masks tell each pixel of every plant and leaf.
+//!
+//! [`super::invariants`] see to it that masks are the maps' before an image is written, so the maps come back value by value.
+
+use super::record::{Record, Seen};
+use crate::{Error, Result};
+
+/// Number of the plant of each pixel, 0 for none.
+pub(super) fn plants(record: &Record) -> Result<Vec<u32>> {
+    painted(record, record.seen().map(|plant| (&plant.seen, plant.number)))
+}
+
+/// Number of the leaf of each pixel on its plant, 0 for none.
+pub(super) fn leaves(record: &Record) -> Result<Vec<u16>> {
+    painted(record, record.leaves().map(|(_, leaf)| (&leaf.seen, leaf.number)))
+}
+
+/// Number of the species of each pixel in the recipe's table, 0 for none; empty of an imported image, whose source tells no species.
+pub(super) fn species(record: &Record) -> Result<Vec<u8>> {
+    if record.conditions.is_none() {
+        return Ok(Vec::new());
+    }
+    // A recipe holds no more species than 8 bits number.
+    painted(record, record.seen().map(|plant| (&plant.seen, plant.kind as u8)))
+}
+
+/// A map of numbers where masks are, row by row from the top.
+fn painted<'a, T: Copy + Default>(record: &'a Record, things: impl Iterator<Item = (&'a Seen, T)>) -> Result<Vec<T>> {
+    let (width, height) = (record.width as usize, record.height as usize);
+    let mut map = vec![T::default(); width * height];
+    for (seen, number) in things {
+        let mask = seen.mask.as_ref().filter(|mask| mask.size == [record.height, record.width]);
+        let mask = mask.ok_or_else(|| Error::damaged("it has no mask of its size of a plant or leaf that it shows"))?;
+        let mut from = 0;
+        for (i, run) in mask.runs()?.into_iter().enumerate() {
+            let to = from + run as usize;
+            // Runs go down the columns, the first of what is outside.
+            if i % 2 == 1 {
+                (from..to).for_each(|k| map[k % height * width + k / height] = number);
+            }
+            from = to;
+        }
+    }
+    Ok(map)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::annotate;
+    use crate::dataset::sample::Sample;
+    use crate::dataset::split::Split;
+
+    /// An imported image of 3 × 2 pixels.
+    fn image(plants: [u32; 6], leaves: [u16; 6]) -> Sample {
+        let record = Record {
+            index: 0,
+            name: "000000".into(),
+            source: None,
+            split: Split::Train,
+            capture: None,
+            width: 3,
+            height: 2,
+            classes: Vec::new(),
+            ignored: 0,
+            plants: Vec::new(),
+            conditions: None,
+            canopy: None,
+            exposure: None,
+            sampling: None,
+            warnings: Vec::new(),
+        };
+        let mut sample = Sample {
+            record,
+            rgb: vec![[0; 3]; 6],
+            nir: Vec::new(),
+            semantics: plants.map(|plant| u8::from(plant > 0)).to_vec(),
+            species: Vec::new(),
+            parts: Vec::new(),
+            plants: plants.to_vec(),
+            leaves: leaves.to_vec(),
+            coverage: Vec::new(),
+            depth: Vec::new(),
+            normals: Vec::new(),
+            jpeg: None,
+            film: None,
+        };
+        sample.record.plants = annotate::plants(&sample);
+        sample
+    }
+
+    /// Rationale: maps that are left out must be known all the same. Expected: those that the record was made of; a record without masks is an
+    /// error, not a map without plants.
+    #[test]
+    fn maps_come_back_from_masks() {
+        let mut sample = image([0, 70_000, 70_000, 4, 4, 0], [0, 2, 0, 1, 1, 0]);
+        assert_eq!(plants(&sample.record).unwrap(), sample.plants);
+        assert_eq!(leaves(&sample.record).unwrap(), sample.leaves);
+        assert!(species(&sample.record).unwrap().is_empty(), "nobody knows the species of an imported plant");
+        sample.record.height = 3;
+        assert!(plants(&sample.record).unwrap_err().to_string().contains("mask"));
+        sample.record.height = 2;
+        sample.record.plants[0].seen.mask = None;
+        assert!(plants(&sample.record).is_err() && leaves(&sample.record).is_ok());
+        assert_eq!(plants(&image([0; 6], [0; 6]).record).unwrap(), [0; 6]);
+    }
+}

@@ -1,0 +1,177 @@
+//! `--keep rgb,semantics`: datasets whose images go without label maps that their records tell.
+//!
+//! Rationale: who trains semantic segmentation wants photographs and classes on the disk and nothing else; that must cost neither checks nor a
+//! format. Expected: what is kept has the bytes that it has beside everything else; what is not kept comes back from the record value by value;
+//! formats are, byte for byte, those of the dataset that keeps all. Source: that dataset.
+
+use crate::common::dataset::{fail, path, same, succeed, tree, verb};
+use crate::common::program::{SMALL, names, scratch, trace};
+use crate::common::python::python;
+use furrow::dataset::{Set, native};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+/// Formats that are made of native files, and hold nothing that depends on which label maps are kept.
+const FORMATS: &str = "cityscapes,coco,cropandweed,mots,panoptic,phenobench,voc,yolo,yolo-pose";
+
+/// Classes that `species.png` tells apart.
+const CLASSES: [&str; 2] = ["--classes", "soil; beet=BEAVX; weed"];
+
+/// The command that makes `count` small images.
+fn make(folder: &Path, count: u64, more: &[&str]) -> Command {
+    let mut command = trace(&["dataset", "--scene", SMALL, "--quiet", "--out", path(folder)]);
+    command.args(["--count", &count.to_string(), "--width", "96", "--spp", "2", "--split", "2,1,1"]).args(more);
+    command
+}
+
+/// Checks a dataset and renders two of its images again.
+fn verify(folder: &Path) {
+    let said = succeed(verb("verify", folder, &["--rerender", "2"])).stderr;
+    let said = String::from_utf8_lossy(&said);
+    assert!(said.contains("2 rendered again and the same; 0 faults"), "{said}");
+}
+
+/// The files of a tree of which the path fits.
+fn those(tree: &BTreeMap<String, Vec<u8>>, fits: impl Fn(&str) -> bool) -> BTreeMap<String, Vec<u8>> {
+    tree.iter().filter(|(name, _)| fits(name)).map(|(name, bytes)| (name.clone(), bytes.clone())).collect()
+}
+
+/// Files that formats and tables consist of, but for those of `imagefolder`.
+fn of_formats(name: &str) -> bool {
+    name.ends_with(".parquet") || FORMATS.split(',').any(|format| name.starts_with(&format!("{format}/")))
+}
+
+#[test]
+fn photographs_and_classes_alone_are_as_good_as_all_maps() {
+    let (_keep, base) = scratch();
+    let [full, bare, early] = ["full", "bare", "early"].map(|name| base.join(name));
+    let formats = format!("{FORMATS},imagefolder");
+    let asked = [&["--format", &formats][..], &CLASSES].concat();
+    succeed(make(&full, 4, &[&["--keep", "none"][..], &asked].concat()));
+    succeed(make(&bare, 4, &["--keep", "rgb,semantics"]));
+    assert_eq!(names(&bare.join("images/000000")), ["record.json", "rgb.png", "semantics.png"]);
+    verify(&bare);
+    let left_out = |name: &str| ["species.png", "plants.png", "leaves.png"].iter().any(|map| name.ends_with(map));
+    let all = tree(&full);
+    same(
+        &those(&tree(&bare), |name| name.starts_with("images/")),
+        &those(&all, |name| name.starts_with("images/") && !left_out(name)),
+    );
+    let mut most = (0, 0);
+    for name in (0..4).map(Set::name) {
+        let [with, without] = [&full, &bare].map(|folder| native::read(folder, &name).expect("an image"));
+        assert!(with == without, "image {name} comes back from its record");
+        most.0 = most.0.max(with.leaves.iter().copied().max().unwrap_or(0));
+        most.1 = most.1.max(with.species.iter().copied().max().unwrap_or(0));
+    }
+    assert!(most.0 > 1 && most.1 > 1, "there are leaves and species to tell apart");
+
+    // Formats and classes that are asked for later.
+    succeed(verb("finish", &bare, &[&["--quiet"][..], &asked].concat()));
+    verify(&bare);
+    same(&those(&tree(&bare), of_formats), &those(&all, of_formats));
+    let masks =
+        |name: &str| name.starts_with("imagefolder/") && (name.contains("/masks/") || name.contains("/images/"));
+    same(&those(&tree(&bare), masks), &those(&all, masks));
+    for kind in ["plants", "leaves", "species"] {
+        let [there, here] = [&full, &bare].map(|folder| folder.join("imagefolder/train").join(kind));
+        assert!(there.is_dir() && !here.exists(), "{kind}");
+    }
+    let lines = fs::read_to_string(bare.join("imagefolder/train/metadata.jsonl")).expect("a list");
+    assert!(lines.contains("mask_file_name") && !lines.contains("plants_file_name"), "{lines}");
+    let report = fs::read_to_string(bare.join("report.html")).expect("a report");
+    assert!(report.contains("semantics.png") && !report.contains("plants.png") && !report.contains("leaves.png"));
+    // Asked for at once, and told by whoever asks how far it is.
+    succeed(make(&early, 4, &[&["--keep", "semantics,rgb"][..], &asked].concat()));
+    same(&tree(&early), &tree(&bare));
+    let said = String::from_utf8_lossy(&succeed(verb("status", &bare, &[])).stdout).into_owned();
+    assert!(said.contains("4 of 4 images"), "{said}");
+}
+
+#[test]
+fn a_dataset_goes_on_with_the_maps_that_it_has() {
+    let (_keep, base) = scratch();
+    let [bare, full] = ["bare", "full"].map(|name| base.join(name));
+    succeed(make(&bare, 1, &["--keep", "plants,depth"]));
+    let files = ["geometry.exr", "plants.png", "record.json", "rgb.png", "semantics.png"];
+    assert_eq!(names(&bare.join("images/000000")), files);
+    let recipe: Value = serde_json::from_slice(&fs::read(bare.join("dataset.json")).expect("it")).expect("a recipe");
+    assert_eq!(recipe["made"]["rendered"]["omit"], json!(["species", "leaves"]));
+    succeed(make(&bare, 3, &[]));
+    assert_eq!(names(&bare.join("images/000002")), files);
+    verify(&bare);
+
+    succeed(make(&full, 1, &["--keep", "none"]));
+    assert!(!fs::read_to_string(full.join("dataset.json")).expect("a recipe").contains("omit"));
+    for (folder, keep) in [(&full, "rgb,semantics"), (&bare, "semantics,depth")] {
+        let before = tree(folder);
+        let words = fail(make(folder, 3, &["--keep", keep]), 2);
+        assert!(words.contains("another dataset lies in this folder: omit "), "{words}");
+        same(&tree(folder), &before);
+    }
+    let other = base.join("other");
+    for (more, part) in [
+        (&["--keep", "rgb,none"][..], "--keep none keeps nothing more"),
+        (&["--keep", "rgb", "--format", "ply"], "--format ply holds nir"),
+        (&["--keep", "semantic"], "semantic"),
+    ] {
+        let words = fail(make(&other, 1, more), 2);
+        assert!(words.contains(part) && !other.join("dataset.json").exists(), "{more:?}: {words}");
+    }
+    // What it would take is told as well.
+    let said = succeed(make(&other, 5, &["--keep", "rgb,semantics", "--dry-run"]));
+    assert!(said.status.success() && !other.exists());
+}
+
+/// Expected: labels alone may be classes alone; a photograph that nobody draws cannot be kept.
+#[test]
+fn labels_alone_may_be_classes_alone() {
+    let (_keep, data) = scratch();
+    let make = |keep: &str| {
+        let mut command = trace(&["dataset", "--scene", SMALL, "--quiet", "--width", "96", "--count", "2"]);
+        command.args(["--labels-only", "--keep", keep, "--out", path(&data)]);
+        command
+    };
+    let words = fail(make("rgb,semantics"), 2);
+    assert!(words.contains("--keep rgb is a photograph") && !data.join("dataset.json").exists(), "{words}");
+    succeed(make("semantics"));
+    assert_eq!(names(&data.join("images/000001")), ["record.json", "semantics.png"]);
+    verify(&data);
+}
+
+/// Expected: archives hold what folders would; formats come from them later; Python reads both, and says what a sample does not have.
+#[test]
+fn archives_and_python_go_without_as_well() {
+    const READ: &str = "
+import sys, furrow
+for folder in sys.argv[1:]:
+    sample = furrow.Dataset(folder)[0]
+    assert sorted(sample) == ['image', 'record', 'semantics'], sorted(sample)
+    assert 'plants' not in sample and sample.get('plants') is None and sample['record']['plants']
+    try:
+        sample['plants']
+    except KeyError as error:
+        assert 'plants' in str(error) and 'record' in str(error), error
+    else:
+        raise AssertionError('there are plants')
+";
+    let (_keep, base) = scratch();
+    let [folders, packed] = ["folders", "packed"].map(|name| base.join(name));
+    succeed(make(&folders, 3, &["--keep", "rgb,semantics", "--format", "panoptic"]));
+    succeed(make(&packed, 3, &["--keep", "rgb,semantics", "--pack", "2"]));
+    verify(&packed);
+    let set = Set::open(&packed).expect("a dataset");
+    assert!((0..3).all(|k| set.sample(k).expect("an image") == native::read(&folders, &Set::name(k)).expect("it")));
+    succeed(verb("finish", &packed, &["--quiet", "--format", "panoptic"]));
+    succeed(verb("verify", &packed, &["--quiet"]));
+    let of_panoptic = |name: &str| name.starts_with("panoptic/");
+    same(&those(&tree(&packed), of_panoptic), &those(&tree(&folders), of_panoptic));
+    let Some(python) = python("import numpy, PIL") else { return };
+    let mut read = Command::new(python);
+    read.args(["-c", READ, path(&folders), path(&packed)]);
+    read.env("PYTHONPATH", Path::new(env!("CARGO_MANIFEST_DIR")).join("python"));
+    succeed(read);
+}
