@@ -144,7 +144,7 @@ pub(super) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
     order.photo.check_size(camera.width(), camera.height())?;
     let recipe = Recipe {
         furrow: env!("CARGO_PKG_VERSION").into(),
-        made: Made::Rendered(Rendering {
+        made: Made::Rendered(Box::new(Rendering {
             scene,
             scene_sha256,
             seed: field.seed,
@@ -166,7 +166,7 @@ pub(super) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
             photo: Some(order.photo),
             kernels,
             edit: order.edit.label(),
-        }),
+        })),
         count: order.count,
         split: order.split,
         formats: order.formats.clone(),

@@ -47,7 +47,7 @@ pub struct Recipe {
 #[serde(rename_all = "snake_case")]
 pub enum Made {
     /// Rendered from a scene file.
-    Rendered(Rendering),
+    Rendered(Box<Rendering>),
     /// Brought from elsewhere.
     Imported {
         /// The format that they were in.
@@ -289,7 +289,7 @@ impl Recipe {
 
     /// Whether its photographs hold a comment, as those of before do; without one, they are the very bytes that formats hold.
     pub fn has_comments(&self) -> bool {
-        matches!(&self.made, Made::Rendered(Rendering { photo: None, .. }))
+        matches!(&self.made, Made::Rendered(rendering) if rendering.photo.is_none())
     }
 
     /// How it is rendered; an error for images from elsewhere.

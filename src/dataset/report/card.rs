@@ -30,10 +30,11 @@ pub(super) fn lead(recipe: &Recipe, found: &Statistics) -> String {
         many => format!("{} sizes, {} to {} pixels", many.len(), many[0], many[many.len() - 1]),
     };
     match &recipe.made {
-        Made::Rendered(Rendering { labels_only: true, .. }) => {
+        Made::Rendered(rendering) if rendering.labels_only => {
             format!("Labels of procedurally grown crop fields at {size}, exact by their geometry, without photographs.")
         }
-        Made::Rendered(Rendering { engine, spp, .. }) => {
+        Made::Rendered(rendering) => {
+            let Rendering { engine, spp, .. } = &**rendering;
             let how = if *engine == Engine::Trace { "path traced" } else { "rasterized" };
             format!(
                 "Procedurally grown crop fields, {how} with {} a pixel in colour and near infrared at {size}, every pixel labelled \
