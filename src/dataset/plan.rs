@@ -236,6 +236,11 @@ fn rolling(recipe: &Recipe, camera: &Camera) -> Result<Option<String>> {
 /// What the formats of a recipe cannot hold or do otherwise.
 fn warnings(recipe: &Recipe) -> Result<Vec<String>> {
     let mut all = Vec::new();
+    if recipe.formats.is_empty() && !recipe.labelling.is_usual() {
+        all.push(
+            "classes and limits are those of formats, and there is none: `trace dataset finish DIR --format …` writes them".into(),
+        );
+    }
     for (name, format) in format::all(recipe)? {
         all.extend(format.warnings(recipe).into_iter().map(|words| format!("{name}: {words}")));
     }

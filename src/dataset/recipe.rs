@@ -337,7 +337,7 @@ impl Recipe {
             .filter(|key| !free.contains(&key.as_str()) && before.get(*key) != now.get(*key))
             // Images that lie in folders may be packed later.
             .filter(|key| *key != "pack" || self.pack.is_some())
-            .map(|key| format!("{key} {} there, {} here", value(&before, key), value(&now, key)))
+            .map(|key| format!("{} {} there, {} here", in_words(key), value(&before, key), value(&now, key)))
             .collect();
         if differs.is_empty() && other.count >= self.count {
             return Ok(());
@@ -351,6 +351,15 @@ impl Recipe {
             "give another --out, or the same arguments to go on with it; \
              --count may grow and --format may be longer",
         ))
+    }
+}
+
+/// What a value of the recipe is to whoever has not read it.
+fn in_words(key: &str) -> &str {
+    match key {
+        "keep" => "maps of --keep",
+        "omit" => "label maps that --keep leaves out",
+        key => key,
     }
 }
 

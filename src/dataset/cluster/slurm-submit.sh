@@ -4,7 +4,7 @@
 #   bash submit.sh            all shards; those that are complete end at once
 #   bash submit.sh 3,7-9      these shards
 #
-# Where the dataset stands: one file in its `seals` an image that is done.
+# Where the dataset stands: `trace dataset status`.
 set -eu
 # Logs lie beside this script, wherever it is called from.
 cd "$(dirname "$0")"

@@ -66,7 +66,7 @@ fn rows(folder: &Path, bill: &Bill, threads: usize) -> Vec<[String; 2]> {
         row(
             "shards",
             format!(
-                "trace dataset emit {} --shards {} --cpus {CORES} --memory {memory:.0}: about {} hours each",
+                "trace dataset emit {} --scheduler slurm --shards {} --cpus {CORES} --memory {memory:.0}: about {} hours each",
                 folder.display(),
                 bill.shards(CORES),
                 number(core_s / 3600.0 / f64::from(CORES) / bill.shards(CORES) as f64)

@@ -54,6 +54,9 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
 
 /// Tells what of the images stands in no list of a format.
 pub(super) fn tell_left_out(set: &Set) -> Result<()> {
+    if set.recipe.formats.is_empty() {
+        return Ok(());
+    }
     if let Some(LeftOut { ignored_plants, plants, leaves }) = LeftOut::of(set)? {
         furrow::tell!(
             "left out of the formats' lists: {plants} plants and {leaves} leaves too small or too hidden, {ignored_plants} plants of no class"
