@@ -31,6 +31,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 const SHARE: u32 = 3;
 /// Fewer samples tell little about how long they take.
 const FEWEST: u32 = 8;
+/// Images that are drawn whatever they take, and at most.
+const PROBES: [usize; 2] = [3, 16];
+/// Core seconds after which no further image is drawn.
+const LONG_ENOUGH_S: f64 = 20.0;
 /// How many times more samples the second drawing of a probe has than the first.
 const STEP: u32 = 4;
 /// About the length of an image's row in the timing log.
@@ -92,9 +96,11 @@ pub fn bill(order: &Order, threads: &Threads, stop: &Arc<AtomicBool>) -> Result<
     let start = cpu()?;
     let base_memory = meter::memory().unwrap_or(0);
     let images = Images::of(&recipe, scene_sha256, scene.threads(threads))?;
-    let indices = BTreeSet::from([0, recipe.count / 2, recipe.count.saturating_sub(1)]);
     let mut probes = Vec::new();
-    for index in indices {
+    for (drawn, index) in probed(recipe.count).into_iter().enumerate() {
+        if drawn >= PROBES[0] && cpu()? - start > LONG_ENOUGH_S {
+            break;
+        }
         match threads.install(|| images.probe(index, stop)) {
             Ok(probe) => probes.push(probe),
             Err(e) if e.is_of_one_field() => warnings.push(format!("image {}: {e}", Set::name(index))),
@@ -102,7 +108,7 @@ pub fn bill(order: &Order, threads: &Threads, stop: &Arc<AtomicBool>) -> Result<
         }
     }
     if probes.is_empty() {
-        return Err(Error::input(format!("no image of three could be made: {}", warnings.join("; "))));
+        return Err(Error::input(format!("no image of those that were tried could be made: {}", warnings.join("; "))));
     }
     let peak = meter::peak_memory().unwrap_or(0);
     let mean = |of: &dyn Fn(&Probe) -> f64| probes.iter().map(of).sum::<f64>() / probes.len().max(1) as f64;
@@ -133,6 +139,20 @@ pub fn bill(order: &Order, threads: &Threads, stop: &Arc<AtomicBool>) -> Result<
         image_memory: (peak.saturating_sub(base_memory) as f64 * images.largest_over(&probes)) as u64,
     };
     Ok((bill, warnings))
+}
+
+/// The images that may be drawn to know what all cost: the first, the middle and the last one, then those that lie the farthest from all before.
+fn probed(count: u64) -> Vec<u64> {
+    let last = count.saturating_sub(1);
+    let halves = (2..).flat_map(|level: u32| (1..1_u64 << level).step_by(2).map(move |odd| (odd, level)));
+    let between = halves.take(4 * PROBES[1]).map(|(odd, level)| ((u128::from(last) * u128::from(odd)) >> level) as u64);
+    let mut all = Vec::new();
+    for index in [0, count / 2, last].into_iter().chain(between) {
+        if all.len() < PROBES[1] && !all.contains(&index) {
+            all.push(index);
+        }
+    }
+    all
 }
 
 /// Core seconds of this process until now.
@@ -416,5 +436,25 @@ impl<'a> Small<'a> {
             *sum += bytes;
         }
         Ok(finished)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rationale: fields of a scene file differ, so few of them tell little of all. Expected: the first, the middle and the last image first, no image
+    /// twice, none that is not there, and those that follow spread evenly.
+    #[test]
+    fn images_that_are_drawn_lie_far_apart() {
+        assert_eq!(probed(1), [0]);
+        assert_eq!(probed(3), [0, 1, 2]);
+        assert_eq!(probed(1001)[..7], [0, 500, 1000, 250, 750, 125, 375]);
+        for count in [2, 5, 17, 1000, u64::MAX] {
+            let all = probed(count);
+            assert_eq!(all.iter().collect::<BTreeSet<_>>().len(), all.len());
+            assert!(all.iter().all(|index| *index < count));
+            assert!(all.len() as u64 >= count.min(PROBES[0] as u64) && all.len() <= PROBES[1], "{count}: {all:?}");
+        }
     }
 }

@@ -31,7 +31,7 @@
 //! | `push` | sends what is finished elsewhere, by a command of the user's |
 //! | `make` | all of it in one call |
 //! | `plan`, `gather`, `begin`, `task`, `generate`, `timing_log`, `finish` | from a scene file, copied with all that it names, to images and a manifest; what remains to be done is found by looking at the disk |
-//! | `bill`, `meter` | what a dataset will cost, from three of its images; what this process has taken |
+//! | `bill`, `meter` | what a dataset will cost, from some of its images; what this process has taken |
 //! | `status` | how far a dataset is, from what lies in its folder |
 //! | `stream` | the images of a dataset without its folder, as an archive for a program that reads them as they are made |
 //! | `scratch` | the images of a shard on a node's own disk, brought home as they are finished |

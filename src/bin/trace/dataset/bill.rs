@@ -28,18 +28,27 @@ pub(crate) fn run(folder: &Path, order: &Order, threads: usize, signals: &Signal
     Ok(Vec::new())
 }
 
+/// The first of some images, and how many there are.
+fn listed(names: &[String]) -> String {
+    match names {
+        [first, second, .., last] if names.len() > 3 => format!("{first}, {second}, … {last} ({} images)", names.len()),
+        _ => names.join(", "),
+    }
+}
+
 /// A bill in words.
 fn rows(folder: &Path, bill: &Bill, threads: usize) -> Vec<[String; 2]> {
     let Bill { images, core_s, grow_s, sample_s, bytes, files, .. } = *bill;
     let row = |name: &str, words: String| [name.to_owned(), words];
     let part = |seconds: f64| format!("{:.0} %", 100.0 * seconds / core_s.max(1e-9));
-    let probes: Vec<String> = bill.probes.iter().map(|index| dataset::Set::name(*index)).collect();
+    let mut probes: Vec<String> = bill.probes.iter().map(|index| dataset::Set::name(*index)).collect();
+    probes.sort();
     let [fewer, more] = bill.spp;
     let samples = if fewer == more { more.to_string() } else { format!("{fewer} and {more}") };
     let with = count(threads as u64, "thread", "threads");
     let memory = (bill.memory(CORES as usize) as f64 * SPARE / GIB).ceil().max(1.0);
     vec![
-        row("from", format!("{} with {samples} samples a pixel", probes.join(", "))),
+        row("from", format!("{} with {samples} samples a pixel", listed(&probes))),
         row(
             "core hours",
             format!(

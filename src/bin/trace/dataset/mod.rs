@@ -65,7 +65,7 @@ enum Verb {
 struct PlanArgs {
     #[command(flatten)]
     order: order::Args,
-    /// Begin nothing: draw three images with fewer samples, and tell core hours, disk, files, memory and a number of shards.
+    /// Begin nothing: draw three to sixteen images with fewer samples, and tell core hours, disk, files, memory and a number of shards.
     #[arg(long)]
     bill: bool,
 }
@@ -78,7 +78,7 @@ struct MakeArgs {
     work: render::WorkArgs,
     #[command(flatten)]
     push: render::PushArgs,
-    /// Make nothing: draw three images with fewer samples, and tell core hours, disk, files, memory and a number of shards.
+    /// Make nothing: draw three to sixteen images with fewer samples, and tell core hours, disk, files, memory and a number of shards.
     #[arg(long)]
     dry_run: bool,
 }
