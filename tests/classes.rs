@@ -293,7 +293,7 @@ fn maps_are_kept_as_asked() {
     assert_eq!(crate::common::program::names(&oldest.join("images/000002")), files(&oldest));
     assert!(!fs::read_to_string(oldest.join("dataset.json")).unwrap().contains("keep"));
     let words = fail(make(&oldest, "3", &["--keep", "depth"]), 2);
-    assert!(words.contains("another dataset lies in this folder: keep "), "{words}");
+    assert!(words.contains("another dataset lies in this folder: maps of --keep "), "{words}");
 }
 
 /// Rationale: a robot in view is no soil to learn from. Expected: pixels of the model that the scene file names have no label, those of the others

@@ -109,7 +109,7 @@ fn a_dataset_goes_on_with_the_maps_that_it_has() {
     for (folder, keep) in [(&full, "rgb,semantics"), (&bare, "semantics,depth")] {
         let before = tree(folder);
         let words = fail(make(folder, 3, &["--keep", keep]), 2);
-        assert!(words.contains("another dataset lies in this folder: omit "), "{words}");
+        assert!(words.contains("another dataset lies in this folder: label maps that --keep leaves out "), "{words}");
         same(&tree(folder), &before);
     }
     let other = base.join("other");
