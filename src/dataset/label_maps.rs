@@ -21,24 +21,38 @@ pub(super) fn species(record: &Record) -> Result<Vec<u8>> {
         return Ok(Vec::new());
     }
     // A recipe holds no more species than 8 bits number.
+    if record.seen().any(|plant| plant.kind > u8::MAX.into()) {
+        return Err(Error::damaged("a plant is of a species that no table holds"));
+    }
     painted(record, record.seen().map(|plant| (&plant.seen, plant.kind as u8)))
 }
 
-/// A map of numbers where masks are, row by row from the top.
+/// A map of numbers where masks are, row by row from the top. Masks that meet, or are not as large as the record says, are damage.
 fn painted<'a, T: Copy + Default>(record: &'a Record, things: impl Iterator<Item = (&'a Seen, T)>) -> Result<Vec<T>> {
     let (width, height) = (record.width as usize, record.height as usize);
     let mut map = vec![T::default(); width * height];
+    let mut taken = vec![false; width * height];
     for (seen, number) in things {
         let mask = seen.mask.as_ref().filter(|mask| mask.size == [record.height, record.width]);
         let mask = mask.ok_or_else(|| Error::damaged("it has no mask of its size of a plant or leaf that it shows"))?;
-        let mut from = 0;
-        for (i, run) in mask.runs()?.into_iter().enumerate() {
+        let runs = mask.runs().map_err(|e| Error::damaged(e.to_string()))?;
+        let (mut from, mut pixels) = (0, 0);
+        for (i, run) in runs.into_iter().enumerate() {
             let to = from + run as usize;
             // Runs go down the columns, the first of what is outside.
             if i % 2 == 1 {
-                (from..to).for_each(|k| map[k % height * width + k / height] = number);
+                for place in (from..to).map(|k| k % height * width + k / height) {
+                    map[place] = number;
+                    if std::mem::replace(&mut taken[place], true) {
+                        return Err(Error::damaged("masks of two plants or leaves have a pixel in common"));
+                    }
+                }
+                pixels += run;
             }
             from = to;
+        }
+        if pixels != u64::from(seen.pixels) {
+            return Err(Error::damaged(format!("a mask has {pixels} pixels, and its plant or leaf {}", seen.pixels)));
         }
     }
     Ok(map)
@@ -103,5 +117,17 @@ mod tests {
         sample.record.plants[0].seen.mask = None;
         assert!(plants(&sample.record).is_err() && leaves(&sample.record).is_ok());
         assert_eq!(plants(&image([0; 6], [0; 6]).record).unwrap(), [0; 6]);
+    }
+
+    /// Rationale: a record that was changed must not become labels. Expected: masks that meet, and areas that are not theirs, are refused.
+    #[test]
+    fn masks_that_cannot_be_are_refused() {
+        let sample = image([0, 7, 7, 4, 4, 0], [0, 2, 0, 1, 1, 0]);
+        let mut meeting = sample.record.clone();
+        meeting.plants[1].seen = meeting.plants[0].seen.clone();
+        assert!(plants(&meeting).unwrap_err().to_string().contains("in common"));
+        let mut smaller = sample.record;
+        smaller.plants[0].seen.pixels -= 1;
+        assert!(plants(&smaller).unwrap_err().to_string().contains("pixels"));
     }
 }
