@@ -29,29 +29,20 @@ pub(super) fn species(record: &Record) -> Result<Vec<u8>> {
 
 /// A map of numbers where masks are, row by row from the top. Masks that meet, or are not as large as the record says, are damage.
 fn painted<'a, T: Copy + Default>(record: &'a Record, things: impl Iterator<Item = (&'a Seen, T)>) -> Result<Vec<T>> {
-    let (width, height) = (record.width as usize, record.height as usize);
-    let mut map = vec![T::default(); width * height];
-    let mut taken = vec![false; width * height];
+    let all = record.width as usize * record.height as usize;
+    let (mut map, mut taken) = (vec![T::default(); all], vec![false; all]);
     for (seen, number) in things {
         let mask = seen.mask.as_ref().filter(|mask| mask.size == [record.height, record.width]);
         let mask = mask.ok_or_else(|| Error::damaged("it has no mask of its size of a plant or leaf that it shows"))?;
-        let runs = mask.runs().map_err(|e| Error::damaged(e.to_string()))?;
-        let (mut from, mut pixels) = (0, 0);
-        for (i, run) in runs.into_iter().enumerate() {
-            let to = from + run as usize;
-            // Runs go down the columns, the first of what is outside.
-            if i % 2 == 1 {
-                for place in (from..to).map(|k| k % height * width + k / height) {
-                    map[place] = number;
-                    if std::mem::replace(&mut taken[place], true) {
-                        return Err(Error::damaged("masks of two plants or leaves have a pixel in common"));
-                    }
-                }
-                pixels += run;
+        let mut pixels = 0;
+        for pixel in mask.pixels().map_err(|e| Error::damaged(e.to_string()))? {
+            map[pixel] = number;
+            if std::mem::replace(&mut taken[pixel], true) {
+                return Err(Error::damaged("masks of two plants or leaves have a pixel in common"));
             }
-            from = to;
+            pixels += 1;
         }
-        if pixels != u64::from(seen.pixels) {
+        if pixels != seen.pixels {
             return Err(Error::damaged(format!("a mask has {pixels} pixels, and its plant or leaf {}", seen.pixels)));
         }
     }

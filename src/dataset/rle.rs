@@ -103,16 +103,21 @@ impl Rle {
     pub fn decode(&self) -> Result<Vec<bool>> {
         let [height, width] = self.size.map(|n| n as usize);
         let mut mask = vec![false; width * height];
-        let mut at = 0;
-        for (i, run) in self.runs()?.into_iter().enumerate() {
-            if i % 2 == 1 {
-                for k in at..at + run as usize {
-                    mask[(k % height) * width + k / height] = true;
-                }
-            }
-            at += run as usize;
-        }
+        self.pixels()?.for_each(|pixel| mask[pixel] = true);
         Ok(mask)
+    }
+
+    /// The pixels inside, each as its place among all, which are counted row by row from the top.
+    pub fn pixels(&self) -> Result<impl Iterator<Item = usize>> {
+        let [height, width] = self.size.map(|n| n as usize);
+        let mut at = 0;
+        let inside = self.runs()?.into_iter().enumerate().flat_map(move |(i, run)| {
+            let from = at;
+            at += run as usize;
+            // Runs go down the columns, the first of what is outside.
+            (if i % 2 == 1 { from..at } else { at..at }).map(move |k| k % height * width + k / height)
+        });
+        Ok(inside)
     }
 
     fn fault(&self, what: &str) -> Error {

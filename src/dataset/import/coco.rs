@@ -384,16 +384,7 @@ fn pixels(image: &Annotated, thing: &Thing) -> Result<Vec<u32>> {
     if rle.size != [h, w] {
         return Err(wrong(format!("it is {} × {} pixels, its image {w} × {h}", rle.size[1], rle.size[0])));
     }
-    let mut all = Vec::new();
-    let mut at = 0;
-    for (k, run) in rle.runs().map_err(|e| wrong(e.to_string()))?.into_iter().enumerate() {
-        if k % 2 == 1 {
-            // Down the columns.
-            all.extend((at..at + run).map(|i| (i % u64::from(h) * u64::from(w) + i / u64::from(h)) as u32));
-        }
-        at += run;
-    }
-    Ok(all)
+    Ok(rle.pixels().map_err(|e| wrong(e.to_string()))?.map(|pixel| pixel as u32).collect())
 }
 
 /// The pixels whose centres lie in an odd number of the polygons' windings, in the order of their places. The work grows with the rows that
