@@ -186,6 +186,16 @@ impl Error {
         self
     }
 
+    /// The same said of a file of a dataset: what cannot be read of it is damage there, [`Kind::Damaged`], and nothing that the user wrote. What
+    /// the system said of a file stays as it is.
+    #[must_use]
+    pub(crate) fn in_dataset(mut self) -> Self {
+        if self.kind() == Kind::Input && self.0.source.is_none() {
+            self.0.kind = Kind::Damaged;
+        }
+        self
+    }
+
     /// Names a command that tells more about what stands at the place.
     #[must_use]
     pub(crate) fn see(mut self, command: Option<String>) -> Self {
@@ -365,6 +375,14 @@ mod tests {
         ] {
             assert_eq!((error.exit_code(), error.is_of_one_field()), (code, of_one), "{error:?}");
         }
+    }
+
+    /// Expected: a file of a dataset that is no picture is damage; one that is not there, and any other failure, is what it was.
+    #[test]
+    fn what_cannot_be_read_of_a_dataset_is_damage() {
+        assert_eq!(Error::input("no PNG").in_file("a.png").in_dataset().kind(), Kind::Damaged);
+        assert_eq!(Error::reading("a".as_ref())(ErrorKind::NotFound.into()).in_dataset().kind(), Kind::Input);
+        assert_eq!(Error::misuse("a").in_dataset().kind(), Kind::Misuse);
     }
 
     #[test]

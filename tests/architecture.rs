@@ -109,7 +109,7 @@ const ALLOWED: &[(&str, &str)] = &[
     // Images, plants, the soil's maps and the sensor's pixels: loops over what is many.
     (
         "rayon",
-        "accel/embree.rs render/ sensor/ job/threads.rs dataset/ compare/ scene/assemble/bank.rs scene/assemble/estimate.rs scene/assemble/ground.rs scene/assemble/stand.rs scene/shipped.rs scene/traits.rs soil/bake.rs soil/crumb.rs soil/ground.rs soil/openness.rs material/ground.rs raster/sheets.rs",
+        "accel/embree.rs render/ sensor/ job/threads.rs dataset/ compare/ scene/assemble/bank.rs scene/assemble/estimate.rs scene/assemble/ground.rs scene/assemble/stand.rs scene/shipped.rs scene/traits.rs soil/bake.rs soil/crumb.rs soil/ground.rs soil/in_view.rs soil/openness.rs material/ground.rs raster/sheets.rs",
     ),
     // One reader for all RON files; faults inside a value are found where they lie.
     ("ron", "ron_file/"),

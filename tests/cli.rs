@@ -431,6 +431,29 @@ fn full_and_closed_streams_end_no_work() {
     }
 }
 
+/// Rationale: a large field takes a minute to grow, and a program that says nothing seems to hang. Expected: a terminal shows what is under way, of an
+/// image and of a dataset, but not with `--quiet`. Source: `script`, which makes a terminal; where there is none, the test says so.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_terminal_shows_what_grows() {
+    let folder = folder();
+    let out = folder.path().join("out").display().to_string();
+    let image = format!("--scene scenes/field.ron --width 81 --spp 1 --out {out}/image");
+    let dataset = format!("dataset --scene scenes/field.ron --width 81 --spp 1 --count 1 --out {out}/data");
+    for (command, shown) in [(&image, true), (&format!("{image} --quiet"), false), (&dataset, true)] {
+        let program = format!("{} {command}", env!("CARGO_BIN_EXE_trace"));
+        let mut script = Command::new("script");
+        script.current_dir(env!("CARGO_MANIFEST_DIR")).args(["-qec", &program, "/dev/null"]).stdin(Stdio::null());
+        let Ok(done) = script.output() else {
+            eprintln!("skipped: no `script` makes a terminal here");
+            return;
+        };
+        let said = String::from_utf8_lossy(&done.stdout);
+        assert_eq!(done.status.code(), Some(0), "{command}: {said}");
+        assert_eq!(said.contains("growing: "), shown, "{command}: {said}");
+    }
+}
+
 /// Rationale: the driver's library prints an error that is none where there is no window system, as on servers and in containers. Expected: without
 /// that variable the program says no more than with it, whatever renders.
 #[cfg(target_os = "linux")]

@@ -7,7 +7,10 @@
 use crate::common::dataset::{fail, path, same, succeed, tree, verb};
 use crate::common::program::{SMALL, names, scratch, trace};
 use crate::common::python::python;
+use furrow::dataset::checksum::Checksum;
+use furrow::dataset::checksum_record::ChecksumRecord;
 use furrow::dataset::{Set, native};
+use furrow::output::{Picture, write_png};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fs;
@@ -106,10 +109,16 @@ fn a_dataset_goes_on_with_the_maps_that_it_has() {
 
     succeed(make(&full, 1, &["--keep", "none"]));
     assert!(!fs::read_to_string(full.join("dataset.json")).expect("a recipe").contains("omit"));
-    for (folder, keep) in [(&full, "rgb,semantics"), (&bare, "semantics,depth")] {
+    succeed(make(&full, 1, &["--keep", "leaves,plants,species"]));
+    for (folder, keep, begun) in [
+        (&full, "rgb,semantics", "none there"),
+        (&bare, "semantics,depth", r#"["species","leaves"] there"#),
+        (&bare, "species,plants,leaves,depth", r#"["species","leaves"] there, none here"#),
+    ] {
         let before = tree(folder);
         let words = fail(make(folder, 3, &["--keep", keep]), 2);
-        assert!(words.contains("another dataset lies in this folder: label maps that --keep leaves out "), "{words}");
+        let told = format!("another dataset lies in this folder: label maps that --keep leaves out {begun}");
+        assert!(words.contains(&told), "{keep}: {words}");
         same(&tree(folder), &before);
     }
     let other = base.join("other");
@@ -141,6 +150,89 @@ fn labels_alone_may_be_classes_alone() {
     assert_eq!(names(&data.join("images/000001")), ["record.json", "semantics.png"]);
     verify(&data);
 }
+
+/// Rationale: a label map that somebody puts into a dataset that goes without must not win over the record. Expected: library and Python read what
+/// they read before, whatever it holds; `verify` names it, and nothing else, until it is gone.
+#[test]
+fn label_maps_that_were_left_out_are_not_read() {
+    const READ: &str = "
+import sys, furrow
+sample = furrow.Dataset(sys.argv[1])[0]
+assert sorted(sample) == ['image', 'record', 'semantics'], sorted(sample)
+";
+    let (_keep, data) = scratch();
+    succeed(make(&data, 2, &["--keep", "rgb,semantics"]));
+    let set = Set::open(&data).expect("a dataset");
+    let before = set.sample(0).expect("an image");
+    let [plants, leaves] = ["plants.png", "leaves.png"].map(|map| data.join("images/000000").join(map));
+    let (width, height) = before.size();
+    let numbers = vec![7_u32; before.plants.len()];
+    write_png(&plants, width, height, &Picture::Numbers(&numbers), "").expect("a picture");
+    fs::write(&leaves, "no picture").expect("a file");
+    assert!(set.sample(0).expect("an image") == before);
+    assert!(native::read(&data, "000000").expect("an image") == before);
+    let words = fail(verb("verify", &data, &["--quiet"]), 1);
+    let told = ["plants", "leaves"].map(|map| {
+        format!("error: images/000000/{map}.png does not belong here: the recipe leaves it out; remove it\n")
+    });
+    assert_eq!(words, told.concat());
+    if let Some(python) = python("import numpy, PIL") {
+        let mut read = Command::new(python);
+        read.args(["-c", READ, path(&data)]);
+        read.env("PYTHONPATH", Path::new(env!("CARGO_MANIFEST_DIR")).join("python"));
+        succeed(read);
+    }
+    fs::remove_file(&plants).and_then(|()| fs::remove_file(&leaves)).expect("two files");
+    verify(&data);
+}
+
+/// Writes a file of the first image with the checksum that it has then.
+fn forge(data: &Path, file: &str, bytes: &[u8]) {
+    let path = format!("images/000000/{file}");
+    fs::write(data.join(&path), bytes).expect("a file");
+    let mut checksums = ChecksumRecord::read(data, 0).expect("checksums");
+    checksums.files.insert(path, Checksum::of(bytes));
+    checksums.write(data).expect("checksums");
+}
+
+/// Rationale: a script tells damage from a wrong command by the exit code. Expected: 1 and the file's name, whether `verify`, `finish` or a training
+/// meets it: run lengths of a mask that are none, a label map that is no picture; once it is mended, all is well.
+#[test]
+fn damage_is_damage_whoever_meets_it() {
+    let (_keep, data) = scratch();
+    succeed(make(&data, 2, &["--keep", "rgb,semantics"]));
+    let at = |file: &str| data.join("images/000000").join(file);
+    let record = fs::read_to_string(at("record.json")).expect("a record");
+    let (counts, no_counts) = ("\"counts\":\"", "\"counts\":\"~");
+    assert!(record.contains(counts), "{record}");
+    for (file, bytes) in [("record.json", record.replace(counts, no_counts)), ("semantics.png", "no picture".into())] {
+        let whole = fs::read(at(file)).expect("a file");
+        forge(&data, file, bytes.as_bytes());
+        for name in ["verify", "finish"] {
+            let words = fail(verb(name, &data, &[]), 1);
+            assert!(words.contains(&format!("images/000000/{file}: ")), "{name}: {words}");
+        }
+        cannot_be_learnt(&Set::open(&data).expect("a dataset"), file);
+        forge(&data, file, &whole);
+    }
+    succeed(verb("finish", &data, &[]));
+    verify(&data);
+}
+
+/// A training that meets a damaged file of the first image.
+#[cfg(feature = "train")]
+fn cannot_be_learnt(set: &Set, file: &str) {
+    use furrow::dataset::classes::Classes;
+    use furrow::train::data::bands::Band;
+    use furrow::train::data::example::Example;
+    let map = Classes::default().of(&set.recipe.species, &[]).expect("classes");
+    let error = Example::read_whole(set, 0, &map, 0.0, &Band::RGB, true).expect_err("damage");
+    assert_eq!(error.exit_code(), 1, "{error}");
+    assert!(error.to_string().contains(file), "{error}");
+}
+
+#[cfg(not(feature = "train"))]
+fn cannot_be_learnt(_: &Set, _: &str) {}
 
 /// Expected: archives hold what folders would; formats come from them later; Python reads both, and says what a sample does not have.
 #[test]

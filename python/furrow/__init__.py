@@ -113,15 +113,16 @@ _ENDINGS = ("png", "jpg")
 
 
 def _sample(folder: Path, photographs: str = "", left_out: Sequence[str] = ()) -> Sample:
-    """The pictures and labels of an image's folder; `photographs` ends the names of other photographs, `left_out` need not be there."""
+    """The pictures and labels of an image's folder; `photographs` ends the names of other photographs, `left_out` are not read."""
     sample = Sample()
     for name, file, kind in _MAPS:
+        if name in left_out:
+            continue
         stem = f"{file}{photographs if name in ('image', 'nir') else ''}"
         path = folder / f"{stem}.png"
         if name in ("image", "nir") and not path.is_file() and (folder / f"{stem}.jpg").is_file():
             path = folder / f"{stem}.jpg"
-        optional = name == "nir" or name in left_out
-        if not optional or path.is_file():
+        if name != "nir" or path.is_file():
             sample[name] = _read(path, kind)
     return sample
 
@@ -202,7 +203,7 @@ class Dataset:
             raise Error(f"{archive}: {error}") from error
         if "record.json" not in files:
             raise Error(f"{archive}: image {index:06d} is not there yet")
-        return _from_files(files, f"{archive}: {index:06d}")
+        return _from_files(files, f"{archive}: {index:06d}", self._left_out)
 
     def __iter__(self) -> Iterator[Any]:
         return (self[k] for k in range(len(self)))
@@ -273,10 +274,12 @@ def _entries(archive: IO[bytes]) -> Iterator[Tuple[str, bytes]]:
         yield entry.name, content
 
 
-def _from_files(files: Dict[str, bytes], key: str) -> Sample:
-    """A sample from the contents of its files, by their names; errors call it `key`."""
+def _from_files(files: Dict[str, bytes], key: str, left_out: Sequence[str] = ()) -> Sample:
+    """A sample from the contents of its files, by their names; errors call it `key`, `left_out` are not read."""
     sample = Sample()
     for of, file, kind in _MAPS:
+        if of in left_out:
+            continue
         for name in (f"{file}.{ending}" for ending in _ENDINGS):
             if name in files:
                 sample[of] = _read(io.BytesIO(files[name]), kind, f"{key}.{name}")

@@ -11,19 +11,20 @@ use crate::{Error, Result};
 use std::path::Path;
 
 /// Begins a dataset of this recipe in `folder`, whose scene is `files`, or goes on with the same one: it may get longer and get more
-/// formats. Returns the recipe that is there then. Of two programs that begin different ones at once, one is refused.
-pub(super) fn begin(folder: &Path, recipe: Recipe, files: &[File]) -> Result<Recipe> {
+/// formats, and its label maps must be those of the recipe only where they were `named`. Returns the recipe that is there then. Of two
+/// programs that begin different ones at once, one is refused.
+pub(super) fn begin(folder: &Path, recipe: Recipe, files: &[File], named: bool) -> Result<Recipe> {
     let path = folder.join(FILE);
     if path.exists() {
-        return go_on(folder, recipe, files);
+        return go_on(folder, recipe, files, named);
     }
     refuse_full(folder)?;
     write_changed(folder, files)?;
     // Last: a folder with a recipe has its scene.
-    if create_atomically(&path, &recipe.text()?)? { Ok(recipe) } else { go_on(folder, recipe, files) }
+    if create_atomically(&path, &recipe.text()?)? { Ok(recipe) } else { go_on(folder, recipe, files, named) }
 }
 
-fn go_on(folder: &Path, mut recipe: Recipe, files: &[File]) -> Result<Recipe> {
+fn go_on(folder: &Path, mut recipe: Recipe, files: &[File], named: bool) -> Result<Recipe> {
     let before = Recipe::read(folder)?;
     // Who asks for nothing in particular leaves labels and maps as they are.
     recipe.labelling = recipe.labelling.over(&before.labelling);
@@ -33,7 +34,7 @@ fn go_on(folder: &Path, mut recipe: Recipe, files: &[File]) -> Result<Recipe> {
         if now.keep == Kept::usual(now.labels_only) {
             now.keep.clone_from(&then.keep);
         }
-        if now.omit.is_empty() {
+        if !named {
             now.omit.clone_from(&then.omit);
         }
         if now.photo.unwrap_or_default() == Photo::default() {

@@ -15,6 +15,7 @@ use super::{File, format, meter, native};
 use crate::error::Kind;
 use crate::job::{Renderer, SceneFile, Threads};
 use crate::render::Watch;
+use crate::scene::assemble::BuildProgress;
 use crate::scene::estimate::usual_memory;
 use crate::{Error, Result};
 use rayon::prelude::*;
@@ -64,12 +65,14 @@ pub struct Work<'a> {
     pub memory: Option<u64>,
     /// How what is finished is sent elsewhere.
     pub push: Option<&'a Push>,
+    /// Told how far the fields are that grow.
+    pub progress: Option<&'a Arc<BuildProgress>>,
 }
 
 impl Default for Work<'_> {
     /// All images, on all cores.
     fn default() -> Self {
-        Self { shard: Shard::ALL, threads: 0, at_once: 0, memory: None, push: None }
+        Self { shard: Shard::ALL, threads: 0, at_once: 0, memory: None, push: None, progress: None }
     }
 }
 
@@ -156,7 +159,12 @@ pub(super) fn generate_for(
     let rendered = tasks.iter().find(|(_, task)| *task == Task::All).map(|(index, _)| *index);
     let source = match (rendered, &renderer) {
         (Some(index), Some(renderer)) => {
-            Some((scene_file(set)?.memory(work.memory).until(callbacks.now), index, renderer))
+            let scene = scene_file(set)?.memory(work.memory).until(callbacks.now);
+            let scene = match work.progress {
+                Some(progress) => scene.progress(progress),
+                None => scene,
+            };
+            Some((scene, index, renderer))
         }
         _ => None,
     };

@@ -70,10 +70,11 @@ impl Omitted {
         [("rgb", "the photograph; always kept"), ("semantics", "class of each pixel; always kept")];
 }
 
-/// What the words of `--keep` ask for, each a name above or `none`: the maps that images keep, and the label maps that they go without.
+/// What the words of `--keep` ask for, each a name above or `none`: the maps that images keep, and the label maps that they go without,
+/// `None` where nothing is said of label maps.
 ///
-/// Who names no label map keeps them all. Who names one, `rgb` and `semantics` among them, goes without those that are not named.
-pub fn asked(words: &[String]) -> Result<(Vec<Kept>, Vec<Omitted>)> {
+/// Who names one, `rgb` and `semantics` among them, goes without those that are not named.
+pub fn asked(words: &[String]) -> Result<(Vec<Kept>, Option<Vec<Omitted>>)> {
     let named = |name: &str| words.iter().any(|word| word == name);
     if words.len() > 1 && named("none") {
         return Err(Error::misuse("--keep none keeps nothing more, and other maps are named beside it")
@@ -82,8 +83,8 @@ pub fn asked(words: &[String]) -> Result<(Vec<Kept>, Vec<Omitted>)> {
     let kept = Kept::NAMED.iter().filter(|(name, ..)| named(name)).map(|(_, map, _)| *map).collect();
     let mut labels = Omitted::NEVER.iter().map(|(name, _)| *name).chain(Omitted::NAMED.iter().map(|(name, ..)| *name));
     let chosen = labels.any(named);
-    let omitted = Omitted::NAMED.iter().filter(|(name, ..)| chosen && !named(name)).map(|(_, map, _)| *map).collect();
-    Ok((checked(kept)?, omitted))
+    let unnamed = || Omitted::NAMED.iter().filter(|(name, ..)| !named(name)).map(|(_, map, _)| *map).collect();
+    Ok((checked(kept)?, chosen.then(unnamed)))
 }
 
 /// The same in order, each once.
@@ -151,13 +152,13 @@ mod tests {
     #[test]
     fn words_are_read_as_written() {
         let read = |words: &str| asked(&words.split(',').map(String::from).collect::<Vec<_>>()).unwrap();
-        assert_eq!(read("nir,coverage,depth"), (Kept::USUAL.to_vec(), Vec::new()));
-        assert_eq!(read("none"), (Vec::new(), Vec::new()));
-        let all = vec![Omitted::Species, Omitted::Plants, Omitted::Leaves];
+        assert_eq!(read("nir,coverage,depth"), (Kept::USUAL.to_vec(), None));
+        assert_eq!(read("none"), (Vec::new(), None));
+        let all = Some(vec![Omitted::Species, Omitted::Plants, Omitted::Leaves]);
         assert_eq!(read("rgb,semantics"), (Vec::new(), all.clone()));
         assert_eq!(read("depth,rgb"), (vec![Kept::Depth], all));
-        assert_eq!(read("plants,nir"), (vec![Kept::Nir], vec![Omitted::Species, Omitted::Leaves]));
-        assert_eq!(read("leaves,plants,species"), (Vec::new(), Vec::new()));
+        assert_eq!(read("plants,nir"), (vec![Kept::Nir], Some(vec![Omitted::Species, Omitted::Leaves])));
+        assert_eq!(read("leaves,plants,species"), (Vec::new(), Some(Vec::new())));
         assert!(asked(&["none".into(), "rgb".into()]).is_err());
         assert!(asked(&["rgb".into(), "depth".into(), "depth32".into()]).is_err());
     }

@@ -12,7 +12,8 @@
 //! | `geometry.exr` | `depth.Z` (metres along the optical axis), `normal.X/Y/Z` (world), in the precision that the recipe keeps |
 //! | `record.json` | what is known in words and numbers |
 //!
-//! `species.png`, `plants.png` and `leaves.png` are left out where the recipe says so; they are read from the record then.
+//! `species.png`, `plants.png` and `leaves.png` are left out where the recipe says so; they are read from the record then, whatever file of that
+//! name lies there.
 
 use super::File;
 use super::keep::{Kept, Omitted};
@@ -99,6 +100,9 @@ pub trait Files {
 
     /// Where it lies, or would, for messages.
     fn place(&self, path: &str) -> PathBuf;
+
+    /// Whether images go without a label map, which their records tell.
+    fn omits(&self, map: Omitted) -> bool;
 }
 
 impl Files for Path {
@@ -108,6 +112,10 @@ impl Files for Path {
 
     fn place(&self, path: &str) -> PathBuf {
         self.join(path)
+    }
+
+    fn omits(&self, map: Omitted) -> bool {
+        Recipe::read(self).is_ok_and(|recipe| recipe.omits(map))
     }
 }
 
@@ -120,6 +128,9 @@ pub fn read(dataset: &Path, name: &str) -> Result<Sample> {
 pub fn read_record(dataset: &Path, name: &str) -> Result<Record> {
     record(dataset, name)
 }
+
+/// The photograph in near infrared, without its ending.
+const NIR: &str = "nir";
 
 /// A picture in gray that lies in a file.
 pub(crate) struct GrayFile {
@@ -175,14 +186,18 @@ impl<'a, F: Files + ?Sized> Image<'a, F> {
     pub(crate) fn photograph(&self) -> Result<(u32, u32, Vec<[u8; 3]>)> {
         match self.stored("rgb")? {
             Some(stored) => stored.rgb(),
-            None => output::decode_rgb(&self.place("rgb.png"), &self.needed("rgb.png")?.1),
+            None => {
+                let (place, bytes) = self.needed("rgb.png")?;
+                output::decode_rgb(&place, &bytes).map_err(Error::in_dataset)
+            }
         }
     }
 
     /// A band in gray, such as `nir`, as PNG or as JPEG, where there is one.
     pub(crate) fn band(&self, name: &str) -> Result<Option<GrayFile>> {
         let read = |stored: Stored| {
-            let (width, height, values) = stored.gray()?;
+            // Any other band is a file of the user's.
+            let (width, height, values) = stored.gray().map_err(|e| if name == NIR { e.in_dataset() } else { e })?;
             Ok(GrayFile { place: stored.place, width, height, values })
         };
         self.stored(name)?.map(read).transpose()
@@ -198,27 +213,32 @@ impl<'a, F: Files + ?Sized> Image<'a, F> {
         Ok(None)
     }
 
+    /// The file of a label map; none where images go without it, whatever lies there.
+    fn label_map(&self, map: Omitted, file: &str) -> Result<Option<(PathBuf, Vec<u8>)>> {
+        if self.files.omits(map) { Ok(None) } else { self.optional(file) }
+    }
+
     /// Numbers of species, from their picture or, where there is none, from the record of an image of this size, which may be `known`
     /// already: width, height, values. No values of an imported image.
     pub(crate) fn species(&self, size: (u32, u32), known: Option<&Record>) -> Result<(u32, u32, Vec<u8>)> {
-        match self.optional("species.png")? {
-            Some((place, bytes)) => output::decode_gray(&place, &bytes),
+        match self.label_map(Omitted::Species, "species.png")? {
+            Some((place, bytes)) => output::decode_gray(&place, &bytes).map_err(Error::in_dataset),
             None => self.told(size, known, label_maps::species),
         }
     }
 
     /// Numbers of plants, in the same way.
     pub(crate) fn plants(&self, size: (u32, u32), known: Option<&Record>) -> Result<(u32, u32, Vec<u32>)> {
-        match self.optional("plants.png")? {
-            Some((place, bytes)) => output::decode_numbers(&place, &bytes),
+        match self.label_map(Omitted::Plants, "plants.png")? {
+            Some((place, bytes)) => output::decode_numbers(&place, &bytes).map_err(Error::in_dataset),
             None => self.told(size, known, label_maps::plants),
         }
     }
 
     /// Numbers of leaves, in the same way.
     fn leaves(&self, size: (u32, u32), known: Option<&Record>) -> Result<(u32, u32, Vec<u16>)> {
-        match self.optional("leaves.png")? {
-            Some((place, bytes)) => output::decode_gray16(&place, &bytes),
+        match self.label_map(Omitted::Leaves, "leaves.png")? {
+            Some((place, bytes)) => output::decode_gray16(&place, &bytes).map_err(Error::in_dataset),
             None => self.told(size, known, label_maps::leaves),
         }
     }
@@ -243,7 +263,7 @@ impl<'a, F: Files + ?Sized> Image<'a, F> {
     /// An 8-bit indexed picture.
     pub(crate) fn indexed(&self, file: &str) -> Result<(u32, u32, Vec<u8>)> {
         let (place, bytes) = self.needed(file)?;
-        output::decode_indexed(&place, &bytes)
+        output::decode_indexed(&place, &bytes).map_err(Error::in_dataset)
     }
 }
 
@@ -257,11 +277,8 @@ struct Stored {
 
 impl Stored {
     fn rgb(&self) -> Result<(u32, u32, Vec<[u8; 3]>)> {
-        if self.is_jpeg {
-            output::decode_jpeg(&self.place, &self.bytes)
-        } else {
-            output::decode_rgb(&self.place, &self.bytes)
-        }
+        let decode = if self.is_jpeg { output::decode_jpeg } else { output::decode_rgb };
+        decode(&self.place, &self.bytes).map_err(Error::in_dataset)
     }
 
     fn gray(&self) -> Result<(u32, u32, Vec<u8>)> {
@@ -279,7 +296,7 @@ type Photographs = (Vec<[u8; 3]>, Vec<u8>, Option<Jpegs>);
 /// The photographs of an image.
 fn photographs(image: &Image<'_, impl Files + ?Sized>, record: &Record) -> Result<Photographs> {
     let size = (record.width, record.height);
-    let (rgb, nir) = (image.stored("rgb")?, image.stored("nir")?);
+    let (rgb, nir) = (image.stored("rgb")?, image.stored(NIR)?);
     if rgb.is_none() && record.has_photograph() {
         image.needed("rgb.png")?;
     }
@@ -290,7 +307,7 @@ fn photographs(image: &Image<'_, impl Files + ?Sized>, record: &Record) -> Resul
         pixels.0 = values;
     }
     if let Some(stored) = &nir {
-        let (w, h, values) = stored.gray()?;
+        let (w, h, values) = stored.gray().map_err(Error::in_dataset)?;
         check(&stored.place, size, (w, h))?;
         pixels.1 = values;
     }
@@ -314,16 +331,22 @@ pub(super) fn sample(files: &(impl Files + ?Sized), name: &str) -> Result<Sample
     let plants = sized(&image, "plants.png", size, image.plants(size, known)?)?;
     let leaves = sized(&image, "leaves.png", size, image.leaves(size, known)?)?;
     let coverage = match image.optional("coverage.png")? {
-        Some((place, bytes)) => sized(&image, "coverage.png", size, output::decode_rgb(&place, &bytes)?)?,
+        Some((place, bytes)) => {
+            let found = output::decode_rgb(&place, &bytes).map_err(Error::in_dataset)?;
+            sized(&image, "coverage.png", size, found)?
+        }
         None => Vec::new(),
     };
     let parts = match image.optional("parts.png")? {
-        Some((place, bytes)) => sized(&image, "parts.png", size, output::decode_indexed(&place, &bytes)?)?,
+        Some((place, bytes)) => {
+            let found = output::decode_indexed(&place, &bytes).map_err(Error::in_dataset)?;
+            sized(&image, "parts.png", size, found)?
+        }
         None => Vec::new(),
     };
     let (depth, normals) = match image.optional("geometry.exr")? {
         Some((place, bytes)) => {
-            let (w, h, depth, normals) = output::decode_geometry(&place, bytes)?;
+            let (w, h, depth, normals) = output::decode_geometry(&place, bytes).map_err(Error::in_dataset)?;
             check(&place, size, (w, h))?;
             (depth, normals)
         }

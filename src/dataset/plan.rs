@@ -13,6 +13,7 @@ use super::split::Shares;
 use super::{File, checksum_record, format, links, pack};
 use crate::ablation::{Edit, FULL};
 use crate::job::{Renderer, SceneFile};
+use crate::scene::assemble::BuildProgress;
 use crate::sensor::Camera;
 use crate::settings::{Engine, RenderOptions};
 use crate::{Error, Result};
@@ -41,8 +42,9 @@ pub struct Order {
     pub labelling: Labelling,
     /// Maps that images keep beside photograph, labels and record.
     pub keep: Vec<Kept>,
-    /// Label maps that images go without, since their records tell the same; a dataset that is gone on with keeps its way where it is none.
-    pub omit: Vec<Omitted>,
+    /// Label maps that images go without, since their records tell the same. `None`: none, or those that a dataset goes without that is gone on
+    /// with.
+    pub omit: Option<Vec<Omitted>>,
     /// How photographs are stored; as PNG, a dataset that is gone on with keeps its way.
     pub photo: Photo,
     /// Whether images are labels alone: nothing is lit, and there are no photographs.
@@ -59,6 +61,8 @@ pub struct Order {
     pub edit: &'static Edit,
     /// Most bytes of memory that a field may take, where not the usual; no byte depends on it.
     pub memory: Option<u64>,
+    /// Told how far the first field is, which grows to check the order; no byte depends on it.
+    pub progress: Arc<BuildProgress>,
 }
 
 impl Order {
@@ -74,7 +78,7 @@ impl Order {
             formats: Vec::new(),
             labelling: Labelling::default(),
             keep: Kept::USUAL.to_vec(),
-            omit: Vec::new(),
+            omit: None,
             photo: Photo::default(),
             labels_only: false,
             split: Shares::default(),
@@ -83,6 +87,7 @@ impl Order {
             options: RenderOptions::default(),
             edit: &FULL,
             memory: None,
+            progress: Arc::default(),
         }
     }
 
@@ -97,7 +102,7 @@ const MOST_SPECIES: usize = u8::MAX as usize;
 /// should know.
 pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
     let Draft { recipe, files, warnings, .. } = draft(order, &Arc::default())?;
-    let recipe = begin(folder, recipe, &files)?;
+    let recipe = begin(folder, recipe, &files, order.omit.is_some())?;
     Ok((Set::new(folder, recipe), warnings))
 }
 
@@ -161,7 +166,7 @@ pub(super) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
             parts: order.labelling.classes.as_ref().is_some_and(Classes::needs_parts),
             models: field.models.clone(),
             keep,
-            omit: keep::in_order(order.omit.clone()),
+            omit: keep::in_order(order.omit.clone().unwrap_or_default()),
             labels_only: order.labels_only,
             photo: Some(order.photo),
             kernels,
@@ -204,7 +209,7 @@ fn labels_alone(order: &Order, options: &RenderOptions) -> Result<Vec<Kept>> {
 fn opened(scene: &Path, order: &Order) -> Result<SceneFile> {
     let scene = SceneFile::edited(scene, order.edit)?;
     let scene = scene.seed(order.seed).days(&order.days).width(order.width).height(order.height).memory(order.memory);
-    Ok(scene.unlit(order.labels_only))
+    Ok(scene.unlit(order.labels_only).progress(&order.progress))
 }
 
 /// SHA-256 of a scene whose copies may name other files than the originals do, found by growing the first field from them in

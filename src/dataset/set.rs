@@ -3,6 +3,7 @@
 use super::archive::entry_name;
 use super::checksum::Checksum;
 use super::checksum_record::ChecksumRecord;
+use super::keep::Omitted;
 use super::links;
 use super::native::{self, Files};
 use super::pack::record::Packs;
@@ -158,6 +159,10 @@ impl Files for Set {
             Some(id) if !full.exists() => self.folder.join(id.path()).join(entry_name(path)),
             _ => full,
         }
+    }
+
+    fn omits(&self, map: Omitted) -> bool {
+        self.recipe.omits(map)
     }
 }
 

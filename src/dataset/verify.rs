@@ -3,6 +3,7 @@
 use super::checksum::Checksum;
 use super::difference::Difference;
 use super::finish::{lacks, of_image, ranges};
+use super::keep::Omitted;
 use super::native::Files;
 use super::pack::{Id, Packing, store};
 use super::recipe::MANIFEST;
@@ -160,6 +161,7 @@ fn look(set: &Set, index: u64) -> Result<Looked> {
         missing = true;
         faults.push(format!("image {name}: it was made by another recipe, or lacks a format"));
     }
+    faults.extend(strays(set, &name));
     if !missing {
         match set.sample(index) {
             Ok(sample) => {
@@ -172,6 +174,14 @@ fn look(set: &Set, index: u64) -> Result<Looked> {
     let mut photographs = checksums.files.iter().filter(|(path, _)| native::is_photograph(path));
     let photograph = photographs.next().map(|(_, sum)| sum.sha256.clone());
     Ok(Looked { missing, faults, photograph })
+}
+
+/// Label maps that lie beside an image though its dataset goes without them, each with what is wrong with it: nobody reads them.
+fn strays(set: &Set, name: &str) -> Vec<String> {
+    let omitted = Omitted::NAMED.iter().filter(|(_, map, _)| set.recipe.omits(*map));
+    let paths = omitted.map(|(map, ..)| format!("{}/{map}.png", native::folder(name)));
+    let there = paths.filter(|path| set.length(path).is_ok());
+    there.map(|path| format!("{path} does not belong here: the recipe leaves it out; remove it")).collect()
 }
 
 /// Archives of images that were changed, or are not written yet.

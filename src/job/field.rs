@@ -7,7 +7,7 @@ use crate::geometry::Window;
 use crate::integrator::World;
 use crate::render::{self, Echo, LabelMap};
 use crate::scene;
-use crate::scene::assemble::Options;
+use crate::scene::assemble::{Options, Stage};
 use crate::sensor::Lidar;
 use crate::{Error, Result};
 use std::sync::{Arc, OnceLock};
@@ -76,6 +76,7 @@ impl Field {
     pub fn geometry(&self) -> Result<&EmbreeAccel> {
         if self.geometry.get().is_none() {
             let begin = Instant::now();
+            self.options.progress.enter(Stage::Bvh);
             let (scene, count) = (&self.grown.scene, self.threads.count() as u32);
             let build = |before: Option<&Before<'_>>| {
                 EmbreeAccel::build_until(&scene.surfaces(), count, self.options.stop.as_deref(), before)

@@ -5,7 +5,7 @@ use super::threads::Threads;
 use crate::Result;
 use crate::ablation::{Edit, FULL};
 use crate::input::Scope;
-use crate::scene::assemble::{Options, Preview, Scanner, Source};
+use crate::scene::assemble::{BuildProgress, Options, Preview, Scanner, Source};
 use crate::scene::estimate::Estimate;
 use crate::sensor::CameraRecord;
 use std::path::Path;
@@ -103,6 +103,14 @@ impl SceneFile {
     #[must_use]
     pub fn until(mut self, stop: &Arc<AtomicBool>) -> Self {
         self.options.stop = Some(Arc::clone(stop));
+        self
+    }
+
+    /// With fields that tell how far they are while they grow and are built.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn progress(mut self, progress: &Arc<BuildProgress>) -> Self {
+        self.options.progress = Arc::clone(progress);
         self
     }
 

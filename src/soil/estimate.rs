@@ -3,7 +3,7 @@
 use super::blend::Blend;
 use super::crumb::{Law, Local};
 use super::grid::Grid;
-use super::{MAX_LAYERS, Site, SoilDesc, clod, litter, stone, stone_cover};
+use super::{InView, MAX_LAYERS, Site, SoilDesc, clod, litter, stone, stone_cover, surface};
 use crate::geometry::Cost;
 use crate::math::{Vec2, vec2};
 use crate::ron_file::Step;
@@ -31,12 +31,13 @@ pub struct Expected {
     pub advice: &'static str,
 }
 
-/// What the ground of a site takes in view of the camera, whose maps have texels of so many metres; and what lies on it. The streams are
+/// What the ground of a site takes of which so much is `seen`, whose maps have texels of so many metres; and what lies on it. The streams are
 /// those of the ground, of its stones and of its litter.
 pub fn expected(
     desc: &SoilDesc,
     site: &Site,
     texel_m: f32,
+    seen: &InView,
     [ground, debris, leftovers]: [&Stream; 3],
 ) -> (Cost, Vec<Expected>) {
     let area = site.area;
@@ -45,7 +46,9 @@ pub fn expected(
     let (vertices, texels) = ((grid.columns() * grid.rows()) as f64, square / f64::from(texel_m).powi(2));
     let maps =
         Cost::work(vertices * BYTES_PER_VERTEX + texels * BYTES_PER_TEXEL, (vertices + texels) * SECONDS_PER_CELL);
-    let bare = Cost::of(2.0 * vertices, 1.0) + maps;
+    let made = seen.share();
+    let joined = (1.0 - made) * (grid.x.steps * grid.y.steps) as f64;
+    let bare = Cost::of(2.0 * vertices - surface::spared(joined), 1.0) + maps;
     let law = Law::new(&desc.clods, ground);
     let places = places(desc, site, &law, ground);
     let sizes = site.sizes(desc);
@@ -54,7 +57,7 @@ pub fn expected(
     if !desc.flat {
         add(
             &[Step::Field("clods")],
-            clod::cost(&places, sizes.clods, site.grid_m, area),
+            clod::cost(&places, sizes.clods, site.grid_m, (area, made)),
             "lower over_5mm_per_m2 or raise min_mm",
         );
     }
@@ -69,12 +72,12 @@ pub fn expected(
         "lower their amount or raise min_mm",
     );
     for (i, population) in desc.stones.iter().enumerate() {
-        let cost = stone::cost(population, area, sizes.told, &stone_cover::own(debris, i));
+        let cost = stone::cost(population, (area, made), sizes.told, &stone_cover::own(debris, i));
         add(&[Step::Field("stones"), Step::Item(i)], cost, "lower their cover or raise min_mm and median_mm");
     }
     let of = ["straw_cover", "sticks_per_m2", "bits_per_m2"];
     let advice = ["lower it, or make straws larger", "lower it, or stubs", "lower it"];
-    let costs = litter::costs(&desc.litter, area, sizes.told, leftovers);
+    let costs = litter::costs(&desc.litter, (area, made), sizes.told, leftovers);
     for ((field, advice), cost) in of.into_iter().zip(advice).zip(costs) {
         add(&[Step::Field("litter"), Step::Field(field)], cost, advice);
     }

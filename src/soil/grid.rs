@@ -109,13 +109,13 @@ impl Grid {
         if tx >= ty { a + tx * (b - a) + ty * (d - b) } else { a + ty * (c - a) + tx * (d - c) }
     }
 
-    /// Two triangles a cell, counter-clockwise from above.
-    pub(super) fn triangles(&self) -> Vec<[u32; 3]> {
+    /// Two triangles for each cell (i, j) that is `wanted`, counter-clockwise from above.
+    pub(super) fn triangles(&self, wanted: impl Fn(usize, usize) -> bool) -> Vec<[u32; 3]> {
         let n = self.columns() as u32;
         let cells = (self.columns() - 1) * (self.rows() - 1);
         let mut triangles = Vec::with_capacity(2 * cells);
         for j in 0..self.rows() as u32 - 1 {
-            for i in 0..n - 1 {
+            for i in (0..n - 1).filter(|i| wanted(*i as usize, j as usize)) {
                 let a = j * n + i;
                 triangles.push([a, a + 1, a + n + 1]);
                 triangles.push([a, a + n + 1, a + n]);

@@ -10,7 +10,6 @@ use super::site::{FULL_CELL_M, Site, Sizes};
 use super::stone_cover;
 use super::{LayerMaps, MAX_LAYERS, Rect, SoilDesc};
 use crate::error::{Error, Result};
-use crate::geometry::Mesh;
 use crate::math::{Spectrum, Vec2, Vec3, vec2};
 use crate::optics::soil::at;
 use crate::sampling::{Purpose, Stream};
@@ -50,7 +49,7 @@ pub(super) struct Look {
 pub struct Ground {
     pub(super) grid: Grid,
     pub(super) heights: Vec<f32>,
-    slopes: Vec<Vec2>,
+    pub(super) slopes: Vec<Vec2>,
     /// The ground without layers and crumbs.
     shape: Relief,
     pub(super) fine: Fine,
@@ -324,7 +323,7 @@ impl Ground {
         Self { heights: vec![0.0; n], slopes: vec![Vec2::ZERO; n], ..self.clone() }
     }
 
-    /// Height of the ground, metres: exactly the mesh's. Beyond the margin the edge goes on.
+    /// Height of the ground, metres: exactly the mesh's where that is in view. Beyond the margin the edge goes on.
     pub fn height(&self, x: f32, y: f32) -> f32 {
         self.grid.value(&self.heights, vec2(x, y))
     }
@@ -382,25 +381,6 @@ impl Ground {
     pub fn uv(&self, x: f32, y: f32) -> Vec2 {
         let area = self.area();
         (self.mirrored(vec2(x, y)) - area.corners()[0]) / area.size()
-    }
-
-    /// The displaced grid, with the texture coordinates of the baked maps.
-    pub fn mesh(&self) -> Mesh {
-        let (columns, rows) = (self.grid.columns(), self.grid.rows());
-        let mut mesh = Mesh {
-            positions: Vec::with_capacity(columns * rows),
-            normals: self.slopes.iter().map(|s| up(*s)).collect(),
-            uvs: Vec::with_capacity(columns * rows),
-            triangles: self.grid.triangles(),
-            weights: Vec::new(),
-        };
-        for (j, y) in self.grid.y.at.iter().enumerate() {
-            for (i, x) in self.grid.x.at.iter().enumerate() {
-                mesh.positions.push(Vec3::new(*x, *y, self.heights[j * columns + i]));
-                mesh.uvs.push(self.uv(*x, *y));
-            }
-        }
-        mesh
     }
 
     /// Share of the aggregates that the layers hold at `p`.
@@ -479,7 +459,8 @@ impl FineCell {
     }
 }
 
-fn up(slope: Vec2) -> Vec3 {
+/// Unit normal of a slope.
+pub(super) fn up(slope: Vec2) -> Vec3 {
     Vec3::new(-slope.x, -slope.y, 1.0).normalize()
 }
 

@@ -129,8 +129,8 @@ fn straws_per_m2(desc: &LitterDesc, drawn: &LitterRecord, stream: &Stream) -> f3
     -(1.0 - drawn.straw_cover.min(0.95)).ln() / one
 }
 
-/// What straw, sticks and bits on so much ground take, each, where lengths of `told` mm are told.
-pub(super) fn costs(desc: &LitterDesc, area: Rect, told: f32, stream: &Stream) -> [Cost; 3] {
+/// What straw, sticks and bits on so much ground take, each, where lengths of `told` mm are told and a share is `made`.
+pub(super) fn costs(desc: &LitterDesc, (area, made): (Rect, f64), told: f32, stream: &Stream) -> [Cost; 3] {
     let drawn = LitterRecord::draw(desc, stream);
     let s = own(stream, 8);
     let mean = |of: &dyn Fn(&mut Stream) -> usize| {
@@ -161,9 +161,9 @@ pub(super) fn costs(desc: &LitterDesc, area: Rect, told: f32, stream: &Stream) -
         [straws_per_m2(desc, &drawn, stream), drawn.sticks_per_m2, drawn.bits_per_m2].map(|n| on_it * f64::from(n));
     let widest = |width: &Vary<Positive>| width.usual().1;
     [
-        Cost::of(straw, 1.0) * straws + heaps(widest(&desc.straw_width_mm), 24, straws),
-        Cost::of(stick + stubs, 1.0) * sticks + heaps(widest(&desc.stick_width_mm), 32, sticks),
-        Cost::of(bit, 1.0) * bits,
+        Cost::of(straw, 1.0) * (straws * made) + heaps(widest(&desc.straw_width_mm), 24, straws),
+        Cost::of(stick + stubs, 1.0) * (sticks * made) + heaps(widest(&desc.stick_width_mm), 32, sticks),
+        Cost::of(bit, 1.0) * (bits * made),
     ]
 }
 

@@ -3,7 +3,7 @@
 //! [`SoilDesc`] is what a scene file says. [`Ground`] is one piece of ground: a displaced grid ([`Ground::mesh`]) that goes on
 //! beyond the view with growing cells, and a texture of its own ([`Ground::bake`]) with all that is finer than the grid.
 //! The same blend weights drive both. Bodies are then laid on a [`Pile`], which remembers what lies there already, largest
-//! first: [`stones()`], [`clods()`], [`litter()`].
+//! first: [`stones()`], [`clods()`], [`litter()`]. [`InView`] says of which of them meshes are made.
 //!
 //! Every random number is addressed: noise by its field, a body by the cell of the world it fell into. A larger area holds
 //! the same ground.
@@ -20,6 +20,7 @@ mod desc;
 mod estimate;
 mod grid;
 mod ground;
+mod in_view;
 mod lit;
 mod litter;
 mod openness;
@@ -30,6 +31,7 @@ mod residue;
 mod site;
 mod stone;
 mod stone_cover;
+mod surface;
 #[cfg(test)]
 mod tests;
 mod wheel;
@@ -45,6 +47,7 @@ pub use desc::{
 };
 pub use estimate::{Expected, expected};
 pub use ground::Ground;
+pub use in_view::InView;
 pub use litter::litter;
 pub use pile::Pile;
 pub use record::{

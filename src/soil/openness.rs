@@ -15,7 +15,7 @@ use super::ground::Ground;
 use super::lit::{Heights, Lit, NEAREST_M};
 use super::pile::Pile;
 use super::site::{FULL_CELL_M, FULL_TEXEL_M, Sizes};
-use super::{Canopy, LayerMaps, Rect};
+use super::{Canopy, InView, LayerMaps, Rect};
 use crate::math::{Vec2, Vec3, vec2};
 use rayon::prelude::*;
 
@@ -124,7 +124,7 @@ impl Ground {
         let sizes = Sizes { crumbs: none, drawn: none, unseen: [none; 2], clods, told: 0.0 };
         let level = self.piece(maps, area, self.step.min(FULL_CELL_M), sizes).levelled();
         let mut pile = Pile::new(&level);
-        let bodies = super::clods(&level, &mut pile, &Canopy::none(&level));
+        let bodies = super::clods(&level, &mut pile, &Canopy::none(&level), &InView::ALL);
         let heights = Heights::over(area, CLOD_SAMPLES, bodies.iter().map(|clods| &clods.mesh));
         let inner = (CLOD_SAMPLES / 4..CLOD_SAMPLES - CLOD_SAMPLES / 4).step_by(CLOD_EVERY);
         let places: Vec<[usize; 2]> = inner.clone().flat_map(|j| inner.clone().map(move |i| [i, j])).collect();

@@ -65,14 +65,14 @@ fn density(desc: &StonesDesc, stream: &Stream) -> (f32, f32) {
     (-(1.0 - cover.min(0.98)).ln() / (disc * group), group)
 }
 
-/// What a population on so much ground takes, of which lengths of `told` mm are told.
-pub(super) fn cost(desc: &StonesDesc, area: Rect, told: f32, stream: &Stream) -> Cost {
+/// What a population on so much ground takes, of which lengths of `told` mm are told and a share is `made`.
+pub(super) fn cost(desc: &StonesDesc, (area, made): (Rect, f64), told: f32, stream: &Stream) -> Cost {
     let (per_m2, group) = density(desc, stream);
     let number = f64::from(area.area()) * f64::from(per_m2) * f64::from(group);
     let mut s = stream.child(Purpose::Page, 2);
     let triangles = (0..512).map(|_| body::triangles(level(length(desc, &mut s), told))).sum::<usize>() as f64 / 512.0;
     // Each has a shape of its own, which is made whole; what lies in the ground is left out of it.
-    Cost::of(0.75 * triangles, 1.0) * number + Cost::work(0.0, SHAPE_SECONDS * triangles * number)
+    Cost::of(0.75 * triangles, 1.0) * (number * made) + Cost::work(0.0, SHAPE_SECONDS * triangles * number)
 }
 
 /// Places and lengths, largest first.

@@ -4,7 +4,7 @@ use super::*;
 use crate::geometry::Mesh;
 use crate::math::Vec3;
 use crate::ron_file::{Num, Vary};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -79,7 +79,7 @@ fn bodies(mesh: &Mesh) -> Vec<Vec<Vec3>> {
 #[test]
 fn heights_are_those_of_the_mesh_and_continuous_over_the_seam() {
     let ground = ground(&page(), 0.06);
-    let mesh = ground.mesh();
+    let mesh = ground.mesh(&InView::ALL);
     assert_eq!(mesh.fault(), None);
     for t in mesh.triangles.iter().step_by(97) {
         let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
@@ -105,6 +105,65 @@ fn heights_are_those_of_the_mesh_and_continuous_over_the_seam() {
     }
     let (lo, hi) = mesh.bounds().unwrap();
     assert!(lo.x < -0.55 && hi.y > 0.55);
+}
+
+/// The corners of all triangles of some meshes, bit by bit.
+fn triangles<'a>(meshes: impl Iterator<Item = &'a Mesh>) -> BTreeSet<[[u32; 3]; 3]> {
+    let bits = |corner: Vec3| corner.to_array().map(f32::to_bits);
+    meshes.flat_map(|mesh| (0..mesh.triangles.len() as u32).map(move |i| mesh.corners(i).map(bits))).collect()
+}
+
+/// Those of them that lie west of a line.
+fn west(triangles: &BTreeSet<[[u32; 3]; 3]>, line: f32) -> BTreeSet<[[u32; 3]; 3]> {
+    triangles.iter().filter(|t| t.iter().all(|corner| f32::from_bits(corner[0]) < line)).copied().collect()
+}
+
+/// Rationale: most of the ground about a long drive at an angle is out of view, and costs memory. Expected: there its mesh has far fewer triangles,
+/// with the same corners; no edge inside it has a triangle on one side alone, and none faces down; in view it is the mesh of the whole ground.
+/// The strip to the west is in view.
+#[test]
+fn ground_out_of_view_has_few_triangles_and_no_crack() {
+    let ground = ground(&page(), 0.2);
+    let seen = InView::of(ground.area(), |p| (p.x + 0.15).max(0.0));
+    let (whole, mesh) = (ground.mesh(&InView::ALL), ground.mesh(&seen));
+    assert_eq!(mesh.fault(), None);
+    assert!(mesh.triangles.len() * 100 < whole.triangles.len() * 65, "{}", mesh.triangles.len());
+    let (all, some) = (triangles(std::iter::once(&whole)), triangles(std::iter::once(&mesh)));
+    assert_eq!(west(&all, -0.15), west(&some, -0.15));
+    let corners: BTreeSet<[u32; 3]> = all.into_iter().flatten().collect();
+    assert!(some.iter().flatten().all(|corner| corners.contains(corner)));
+    let mut edges = BTreeMap::new();
+    for t in &mesh.triangles {
+        let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
+        assert!((b - a).cross(c - a).z > 0.0);
+        for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
+            *edges.entry((a.min(b), a.max(b))).or_insert(0) += 1;
+        }
+    }
+    let border = 2 * (ground.grid.columns() - 1 + ground.grid.rows() - 1);
+    assert_eq!(edges.values().filter(|n| **n == 1).count(), border);
+    assert!(edges.values().all(|n| *n <= 2));
+}
+
+/// Rationale: each clod rests on those that were laid before, so none may be missing from the pile. Expected: the pile is the same whatever is in
+/// view; of the clods those in view are made, the same to the bit, and few others.
+#[test]
+fn clods_out_of_view_are_laid_and_not_made() {
+    let ground = ground(&page(), 0.2);
+    let lay = |seen: &InView| {
+        let mut pile = Pile::new(&ground);
+        let clods = clods(&ground, &mut pile, &Canopy::none(&ground), seen);
+        (triangles(clods.iter().map(|group| &group.mesh)), pile)
+    };
+    let (all, whole) = lay(&InView::ALL);
+    let (some, pile) = lay(&InView::of(ground.area(), |p| (p.x + 0.15).max(0.0)));
+    for k in 0..400 {
+        let p = vec2(-0.2 + 0.02 * (k % 20) as f32, -0.2 + 0.02 * (k / 20) as f32);
+        assert_eq!(pile.at(p), whole.at(p), "{p}");
+    }
+    assert!(some.len() * 10 < all.len() * 7, "{} of {}", some.len(), all.len());
+    assert!(some.is_subset(&all));
+    assert_eq!(west(&all, -0.15), west(&some, -0.15));
 }
 
 #[test]
@@ -172,7 +231,7 @@ fn the_baked_maps_and_the_mesh_together_have_the_slopes_of_the_whole_relief() {
 fn the_same_address_gives_the_same_ground_and_a_larger_area_holds_it() {
     let page = page();
     let (a, b) = (ground(&page, 0.05), ground(&page, 0.05));
-    assert_eq!(a.mesh(), b.mesh());
+    assert_eq!(a.mesh(&InView::ALL), b.mesh(&InView::ALL));
     assert_eq!(a.bake(&MAPS, 0.0005), b.bake(&MAPS, 0.0005));
     let large = ground(&page, 0.08);
     for k in 0..400 {
@@ -190,7 +249,7 @@ fn clods_differ_in_hue_as_much_as_their_page_says() {
         let mut page = page();
         page.clods.hue_sigma = Num::new(sigma);
         let ground = ground(&page, 0.3);
-        let groups = clods(&ground, &mut Pile::new(&ground), &Canopy::none(&ground));
+        let groups = clods(&ground, &mut Pile::new(&ground), &Canopy::none(&ground), &InView::ALL);
         let ratio = |c: &Clods| {
             let [r, g, b, n] = c.tint.to_array();
             assert!((r * g / (n * n) - 1.0).abs() < 1e-4, "{:?}", c.tint);
@@ -218,7 +277,7 @@ fn nothing_floats_and_nothing_is_wholly_buried() {
     let ground = ground(&page, 0.3);
     let mut pile = Pile::new(&ground);
     let mut all: Vec<Vec<Vec3>> = Vec::new();
-    for Clods { tint, mesh, .. } in clods(&ground, &mut pile, &Canopy::none(&ground)) {
+    for Clods { tint, mesh, .. } in clods(&ground, &mut pile, &Canopy::none(&ground), &InView::ALL) {
         assert_eq!(mesh.fault(), None);
         assert!(tint.0.min_element() > 0.5 && tint.0.max_element() < 2.0);
         // Scraps of a few corners are the rim of a body whose buried side was left out.
@@ -258,7 +317,7 @@ fn nothing_is_laid_on_a_pile_that_is_given_up() {
     let outdated = Arc::new(AtomicBool::new(false));
     let mut pile = Pile::new(&ground).until(Some(&outdated));
     let lay = |pile: &mut Pile| {
-        let clods = clods(&ground, pile, &Canopy::none(&ground)).len();
+        let clods = clods(&ground, pile, &Canopy::none(&ground), &InView::ALL).len();
         let stones = stones(&page.stones, &ground, pile, &stream()).len();
         [clods, stones, litter(&page.litter, &ground, pile, &stream()).len()]
     };
@@ -287,7 +346,7 @@ fn a_seedbed_stays_within_its_budget_and_keeps_stems_clear() {
     let stem = vec2(0.15, 0.1);
     let mut canopy = Canopy::none(&ground);
     canopy.add(&sheet(stem - 0.004, stem + 0.004, ground.height(stem.x, stem.y)));
-    let groups = clods(&ground, &mut Pile::new(&ground), &canopy);
+    let groups = clods(&ground, &mut Pile::new(&ground), &canopy, &InView::ALL);
     let triangles: usize = groups.iter().map(|g| g.mesh.triangles.len()).sum();
     let per_view = triangles as f32 / 0.06 * 0.325;
     assert!(per_view > 3e5 && per_view < 1.5e6, "{per_view}");
@@ -296,7 +355,7 @@ fn a_seedbed_stays_within_its_budget_and_keeps_stems_clear() {
         assert!(mesh.positions.iter().all(|p| p.truncate().distance(stem) > 0.003));
         assert!(mesh.uvs.iter().all(|t| t.cmpge(Vec2::ZERO).all() && t.cmple(Vec2::ONE).all()));
     }
-    assert_eq!(groups, clods(&ground, &mut Pile::new(&ground), &canopy));
+    assert_eq!(groups, clods(&ground, &mut Pile::new(&ground), &canopy, &InView::ALL));
 }
 
 /// A level rectangle at a height.
@@ -323,7 +382,7 @@ fn clods_are_damp_and_dry_as_the_page_says_and_pierce_no_leaf() {
     let mut canopy = Canopy::none(&ground);
     canopy.add(&sheet(Vec2::splat(-0.03), Vec2::splat(0.03), leaf));
     let (mut wet, mut all, mut under, mut far) = (0, 0, 0, 0f32);
-    for group in clods(&ground, &mut Pile::new(&ground), &canopy) {
+    for group in clods(&ground, &mut Pile::new(&ground), &canopy, &InView::ALL) {
         for body in bodies(&group.mesh).into_iter().filter(|b| b.len() > 6) {
             all += 1;
             wet += i32::from(group.damp);

@@ -3,7 +3,7 @@
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use furrow::ablation::Edit;
 use furrow::input::shipped;
-use furrow::job::{Field, SceneFile, Threads};
+use furrow::job::{Field, SceneFile};
 use furrow::scene::drive::FIRST;
 use furrow::{Error, Result, cli};
 use std::path::{Path, PathBuf};
@@ -90,12 +90,7 @@ impl FieldArgs {
         self.scene.check()
     }
 
-    /// Grows the field as an edit has it; its warnings are told as soon as they are known.
-    pub(crate) fn grow(&self, edit: &'static Edit, threads: &Threads, tell: impl Fn(&str)) -> Result<Field> {
-        self.grow_as(edit, |scene| scene.threads(threads), tell)
-    }
-
-    /// The same of the scene file with other options.
+    /// Grows the field as an edit has it, of the scene file with these options; its warnings are told as soon as they are known.
     pub(crate) fn grow_as(
         &self,
         edit: &'static Edit,

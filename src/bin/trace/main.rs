@@ -11,6 +11,7 @@ mod display;
 mod explain;
 mod export;
 mod field;
+mod growing;
 mod init;
 mod leaf;
 mod letters;

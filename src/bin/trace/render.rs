@@ -1,6 +1,7 @@
 //! `trace --scene …`: one field, rendered, labelled and written; or one pixel of it, explained.
 
 use crate::field::FieldArgs;
+use crate::growing::Line;
 use crate::quality::{QualityArgs, TechniqueArgs, threads};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use furrow::ablation::{Edit, FULL};
@@ -75,9 +76,11 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     }
     let renderer = Renderer::open(&options)?;
     let threads = Threads::new(args.threads)?;
-    let field = args.field.grow(edit, &threads, |words| args.say(words))?;
+    let growing = Line::begin(args.quiet);
+    let tell = |words: &str| growing.pause(|| args.say(words));
+    let field = args.field.grow_as(edit, |scene| scene.threads(&threads).progress(growing.progress()), tell)?;
     if let Some(warning) = renderer.warning(&field) {
-        args.say(&format!("warning: {warning}"));
+        tell(&format!("warning: {warning}"));
     }
     let camera = &field.grown().scene.camera;
     let (width, height) = (camera.width(), camera.height());
@@ -86,13 +89,15 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     if let Some(pixel) = args.pixel {
         cli::check_pixel(pixel, width, height)?;
         let words = renderer.explain(&field, args.integrator, pixel)?;
+        growing.end();
         cli::print(&format!("{words}\n"))?;
         return Ok(Vec::new());
     }
     if options.engine == Engine::Trace {
         field.geometry()?;
-        args.say(&grown(args.field.path(), &field));
+        tell(&grown(args.field.path(), &field));
     }
+    growing.end();
     let sampled = AtomicU64::new(0);
     let bar = progress(&options.quality, window, args.quiet);
     let done = |samples| {

@@ -69,7 +69,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     order.options = args.look.options();
     order.labels_only = args.look.labels_only;
     args.content.enter(&mut order)?;
-    let set = begin(&args.out, &order)?;
+    let set = begin(&args.out, order, args.work.quiet)?;
     generate(&set, &args.work, Shard::ALL, args.memory.bytes, signals)?;
     finish::finish(&set, None)
 }

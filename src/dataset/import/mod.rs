@@ -148,7 +148,7 @@ fn begin(folder: &Path, source: &dyn Source, order: &Order) -> Result<Set> {
         licence: order.licence.clone(),
         species: Vec::new(),
     };
-    Ok(Set::new(folder, begin::begin(folder, recipe, &[])?))
+    Ok(Set::new(folder, begin::begin(folder, recipe, &[], false)?))
 }
 
 /// Brings in one image, where it is not there yet.

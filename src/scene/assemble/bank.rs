@@ -13,6 +13,7 @@
 use super::builder::Builder;
 use super::grown::Grown;
 use super::member::Member;
+use super::progress::Stage;
 use super::seedling::{Place, Seedling, greenness, grow};
 use crate::Result;
 use crate::geometry::Placement;
@@ -93,6 +94,11 @@ impl Builder<'_> {
             }
         }
         let wanted: Vec<(Member, &Seedling)> = wanted.into_iter().collect();
+        let progress = &self.options.progress;
+        if !wanted.is_empty() {
+            progress.enter(Stage::Shared);
+            progress.shared.expect(wanted.len());
+        }
         let raise = |(member, like): &(Member, &Seedling)| {
             self.options.wanted()?;
             let stream = self.stream(Purpose::Plant, member.population).child(BANK, member.number);
@@ -101,6 +107,6 @@ impl Builder<'_> {
             let (record, organs) = grow(&own, &place, |_| true);
             Ok((*member, Arc::new(Model { record, organs, green: greenness(&own) })))
         };
-        wanted.par_iter().map(raise).collect()
+        wanted.par_iter().map(raise).inspect(|_| progress.shared.add()).collect()
     }
 }

@@ -1,5 +1,6 @@
 //! The ground of a field while it is made.
 
+use super::ground_view::Onlooker;
 use crate::material::{BakedGround, Material};
 use crate::math::Spectrum;
 use crate::scene::desc::Detail;
@@ -19,6 +20,8 @@ pub(super) struct Soil {
     pub(super) site: Site,
     /// Side of a texel of its maps, metres.
     pub(super) texel: f32,
+    /// Those near whose views it is made; none where all of it is.
+    pub(super) onlookers: Vec<Onlooker>,
     /// Seed and index of the field.
     pub(super) of: (u64, u64),
 }

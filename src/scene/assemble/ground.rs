@@ -3,6 +3,7 @@
 use super::PLANT_MARGIN;
 use super::builder::{Builder, Floor};
 use super::earth::{BakedGrounds, Bed, Earth, Laid, Soil};
+use super::ground_view::{Onlooker, from_view};
 use super::preview::Under;
 use super::view::View;
 use crate::bsdf::{Bsdf, OrenNayar};
@@ -18,7 +19,7 @@ use crate::scene::layer::Layer;
 use crate::scene::tag::Tag;
 use crate::scene::{Part, PartKind, PlantRecord};
 use crate::soil::{
-    self, Canopy, Clods, Debris, DebrisKind, Expected, Ground, LayerDesc, Pile, Rect, SeedRows, Site, SoilDesc,
+    self, Canopy, Clods, Debris, DebrisKind, Expected, Ground, InView, LayerDesc, Pile, Rect, SeedRows, Site, SoilDesc,
     SoilRecord,
 };
 use crate::{Error, Result};
@@ -74,6 +75,7 @@ impl Builder<'_> {
         let floor = Floor { ground: &ground, maps: &soil.maps, flat: desc.flat };
         let record = self.soil_record(desc, &ground);
         self.warn_of_burial(floor);
+        let seen = in_view(&soil.onlookers, ground.area(), |p| floor.height(p.x, p.y));
         // The bake takes as long as everything else, and neither needs the other.
         let (baked, rest) = rayon::join(
             || match &known {
@@ -89,13 +91,13 @@ impl Builder<'_> {
                 let meshes = || self.scene.parts.iter().map(|part| part.mesh.clone()).collect();
                 let same = known.clone().and_then(|bed| preview?.laid(&Under { bed, plants: meshes() }));
                 let uncovered = same.is_some() || options.told_only;
-                let cover = if uncovered { Vec::new() } else { self.cover(desc, &mut earth) };
+                let cover = if uncovered { Vec::new() } else { self.cover(desc, &mut earth, &seen) };
                 Ok::<_, Error>((plants, same, cover))
             },
         );
         let (plants, same, clods) = rest?;
         self.options.wanted()?;
-        let laid = same.unwrap_or_else(|| Arc::new(lay(floor, clods, earth.stones, baked.as_deref())));
+        let laid = same.unwrap_or_else(|| Arc::new(lay(floor, clods, earth.stones, baked.as_deref(), &seen)));
         if let (Some(preview), Some(earth), Some(baked)) = (preview, bare, baked) {
             let bed = known.unwrap_or_else(|| Arc::new(Bed { soil, earth, baked }));
             let plants = self.scene.parts.iter().map(|part| part.mesh.clone()).collect();
@@ -114,7 +116,8 @@ impl Builder<'_> {
         let mut read = |file: &str| self.library.soil_spectrum(self.page, file);
         let colors = desc.colors.iter().map(|color| color.reflectance(&mut read)).collect::<Result<Vec<Spectrum>>>()?;
         let (site, texel, of) = (self.site(view), self.texel(view), (self.seed, self.index));
-        Ok(Soil { desc: self.weathered(desc), detail: self.desc.detail, colors, maps, site, texel, of })
+        let (desc, onlookers) = (self.weathered(desc), self.onlookers(view));
+        Ok(Soil { desc, detail: self.desc.detail, colors, maps, site, texel, onlookers, of })
     }
 
     /// The soil of the field's day: as moist as is drawn for it, with what it has of crusts.
@@ -181,7 +184,9 @@ impl Builder<'_> {
     pub(super) fn expected_soil(&self, desc: &SoilDesc, view: View) -> (Cost, Vec<Expected>) {
         let streams = [(Purpose::Soil, 0), (Purpose::Debris, STONES), (Purpose::Debris, LITTER)];
         let streams = streams.map(|(purpose, index)| self.stream(purpose, index));
-        soil::expected(desc, &self.site(view), self.texel(view), streams.each_ref())
+        let site = self.site(view);
+        let seen = in_view(&self.onlookers(view), site.area, |_| 0.0);
+        soil::expected(desc, &site, self.texel(view), &seen, streams.each_ref())
     }
 
     /// The ground as it was drawn.
@@ -190,12 +195,12 @@ impl Builder<'_> {
     }
 
     /// Clods under the plants, and litter, which joins the stones.
-    fn cover(&self, desc: &SoilDesc, Earth { ground, pile, stones: debris }: &mut Earth) -> Vec<Clods> {
+    fn cover(&self, desc: &SoilDesc, Earth { ground, pile, stones: debris }: &mut Earth, seen: &InView) -> Vec<Clods> {
         let mut canopy = Canopy::none(ground);
         for part in self.scene.parts.iter().filter(|_| !desc.flat) {
             canopy.add(&part.in_world());
         }
-        let clods = soil::clods(ground, pile, &canopy);
+        let clods = soil::clods(ground, pile, &canopy, seen);
         debris.extend(soil::litter(&desc.litter, ground, pile, &self.stream(Purpose::Debris, LITTER)));
         if !desc.flat {
             return clods;
@@ -228,6 +233,14 @@ fn beyond(view: View) -> f32 {
     (a - lo).max(hi - b).max_element().max(0.0)
 }
 
+/// What of a ground is in view of some onlookers, all of it where there are none. It is as high as a function says.
+fn in_view(onlookers: &[Onlooker], area: Rect, height: impl Fn(Vec2) -> f32 + Sync) -> InView {
+    if onlookers.is_empty() {
+        return InView::ALL;
+    }
+    InView::of(area, |p| from_view(onlookers, p.extend(height(p))))
+}
+
 /// What the ground shows; each texel has the mean colour of what of its layers it covers, unless `detail` is full.
 fn bake(ground: &Ground, Soil { desc, detail, maps, texel, .. }: &Soil) -> BakedGrounds {
     let coarser = |(map, layer): (&Arc<Layer>, &LayerDesc)| Arc::new(map.coarser(texel / layer.size_m.f32()));
@@ -243,8 +256,8 @@ fn bake(ground: &Ground, Soil { desc, detail, maps, texel, .. }: &Soil) -> Baked
     }
 }
 
-/// Makes parts of everything of the ground; black ones where it was not baked.
-fn lay(floor: Floor<'_>, clods: Vec<Clods>, debris: Vec<Debris>, baked: Option<&BakedGrounds>) -> Laid {
+/// Makes parts of everything of the ground that is in view; black ones where it was not baked.
+fn lay(floor: Floor<'_>, clods: Vec<Clods>, debris: Vec<Debris>, baked: Option<&BakedGrounds>, seen: &InView) -> Laid {
     let mut laid = Laid::default();
     let black = || Material::Plain(Bsdf::OrenNayar(OrenNayar::new(Spectrum::ZERO, 0.0)));
     let mut add = |mesh: Mesh, material: Material, kind| {
@@ -259,7 +272,7 @@ fn lay(floor: Floor<'_>, clods: Vec<Clods>, debris: Vec<Debris>, baked: Option<&
             instance: None,
         });
     };
-    let mesh = if floor.flat { floor.ground.levelled().mesh() } else { floor.ground.mesh() };
+    let mesh = if floor.flat { floor.ground.levelled().mesh(seen) } else { floor.ground.mesh(seen) };
     let shown = baked.map(|baked| Material::Ground(GroundMaterial::new(baked.ground.clone())));
     add(mesh, shown.unwrap_or_else(black), PartKind::Soil);
     for group in clods {
@@ -267,7 +280,9 @@ fn lay(floor: Floor<'_>, clods: Vec<Clods>, debris: Vec<Debris>, baked: Option<&
         let shown = maps.map(|maps| Material::Ground(GroundMaterial::clods(maps, group.tint)));
         add(group.mesh, shown.unwrap_or_else(black), PartKind::Soil);
     }
-    for (i, thing) in debris.into_iter().enumerate() {
+    // All are counted, so that each looks the same whatever is in view.
+    let debris = debris.into_iter().enumerate();
+    for (i, thing) in debris.filter(|(_, thing)| seen.holds(thing.centre.truncate(), thing.radius)) {
         let Some(baked) = baked else {
             add(thing.mesh, black(), PartKind::Debris(thing.kind));
             continue;

@@ -19,6 +19,7 @@ mod member;
 mod models;
 mod options;
 mod preview;
+mod progress;
 mod rig;
 mod scanner;
 mod season;
@@ -54,6 +55,8 @@ pub use lighting::Lighting;
 use lighting::Listed;
 pub use options::{Options, Scanner};
 pub use preview::Preview;
+pub use progress::BuildProgress;
+pub(crate) use progress::Stage;
 pub use season::Season;
 use seedling::Seedling;
 use std::path::Path;
@@ -302,6 +305,7 @@ impl<'a> Builder<'a> {
 
     /// The field, and the library with whatever was read for it.
     fn build(mut self) -> Result<(Field, Library)> {
+        self.options.progress.enter(Stage::Estimate);
         let view = self.looked_at()?;
         self.estimate(view)?.check(self.memory()).map_err(|(at, error)| self.page.blame(&at, error))?;
         let shown = self.has_ground().then_some(view.area);
@@ -314,6 +318,7 @@ impl<'a> Builder<'a> {
                 (self.populate(&seedlings, None, shown)?, None)
             }
             Some(soil) => {
+                self.options.progress.enter(Stage::Ground);
                 let (plants, record) = self.cultivate(soil, view, shown)?;
                 (plants, Some(record))
             }
@@ -381,6 +386,9 @@ impl<'a> Builder<'a> {
         let mut plants = self.plant(seedlings, floor, shown)?;
         plants.extend(self.models(seedlings.len(), floor)?);
         identity::settle(&mut plants);
+        if floor.is_some() {
+            self.options.progress.enter(Stage::Cover);
+        }
         Ok(plants)
     }
 

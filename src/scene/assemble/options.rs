@@ -1,6 +1,7 @@
 //! What is asked of a field beyond its scene file.
 
 use super::preview::Preview;
+use super::progress::BuildProgress;
 use crate::sensor::LidarDesc;
 use crate::{Error, Result};
 use std::sync::Arc;
@@ -24,6 +25,8 @@ pub struct Options {
     pub memory: Option<u64>,
     /// Where it is raised, the field is given up.
     pub stop: Option<Arc<AtomicBool>>,
+    /// Told how far the field is.
+    pub progress: Arc<BuildProgress>,
     /// Given for a preview: meshes are as coarse as its pixels, and what did not change since the field before is taken from there.
     pub preview: Option<Preview>,
     /// Whether the field is only labelled: what the ground looks like is not worked out, and it reflects nothing. Its shape, and everything that

@@ -5,6 +5,7 @@ use super::builder::{Builder, Floor};
 use super::grown::Grown;
 use super::member::Member;
 use super::preview::Standing;
+use super::progress::Stage;
 use super::seedling::{Place, Seedling, grow};
 use crate::geometry::Placement;
 use crate::material::Material;
@@ -48,6 +49,8 @@ impl Builder<'_> {
     ) -> Result<Vec<PlantRecord>> {
         let (dust, options) = (self.dust()?, self.options);
         let bank = self.bank(seedlings, dust)?;
+        options.progress.enter(Stage::Plants);
+        options.progress.plants.expect(seedlings.len());
         let cell = |at: Vec2| self.cell(at);
         // Grown to know its size, left bare where neither it nor its shadow reaches the view.
         let reaches = |plant: &PlantRecord| {
@@ -70,7 +73,8 @@ impl Builder<'_> {
                 Arc::new(Standing { seedling: seedling.clone(), place, record, organs })
             })))
         };
-        let grown: Vec<Stands> = seedlings.par_iter().map(stand).collect::<Result<_>>()?;
+        let grown = seedlings.par_iter().map(stand).inspect(|_| options.progress.plants.add());
+        let grown: Vec<Stands> = grown.collect::<Result<_>>()?;
         if let Some(preview) = &options.preview {
             preview.keep_plants(&grown.iter().filter_map(Stands::own).collect::<Vec<_>>());
         }

@@ -5,7 +5,7 @@
 //! so in its warnings, with the share of the ground in view that this is. Where it is more than half, the scene is refused.
 
 use super::builder::{Builder, FARTHEST};
-use super::ground_view::GroundView;
+use super::ground_view::{GroundView, Onlooker};
 use crate::math::{Vec2, Vec3, vec2};
 use crate::ron_file::Step;
 use crate::scene::desc::Detail;
@@ -97,6 +97,17 @@ impl Builder<'_> {
             return Err(self.page.blame(&[Step::Field("drive")], Error::input(words).help(help)));
         }
         Ok(whole)
+    }
+
+    /// The cameras of a drive in all their places, where the ground is made near what they see alone. None where all of it is: for single images
+    /// and scans, and where a camera sees more of it than is planted.
+    pub(super) fn onlookers(&self, view: View) -> Vec<Onlooker> {
+        let drives = self.captures.last().is_some_and(|last| last.frame > 0);
+        if !drives || view.open || !self.scanners.is_empty() {
+            return Vec::new();
+        }
+        let all: Option<Vec<Onlooker>> = self.captures.iter().map(|capture| Onlooker::of(&capture.camera)).collect();
+        all.unwrap_or_default()
     }
 
     /// A capture in the words of an error: its camera, and its frame on a drive.

@@ -68,7 +68,7 @@ impl Example {
         let (w, h, planes) = bands::read(&image, of)?;
         let same = |file: &str, found: (u32, u32)| {
             let what = || format!("it is {} × {} pixels, the photograph {w} × {h}", found.0, found.1);
-            if found == (w, h) { Ok(()) } else { Err(Error::input(what()).in_file(image.place(file))) }
+            if found == (w, h) { Ok(()) } else { Err(Error::damaged(what()).in_file(image.place(file))) }
         };
         let file = "semantics.png";
         let (lw, lh, semantics) = image.indexed(file)?;

@@ -90,7 +90,7 @@ pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
             bill::run(order.images.folder(), &order.order()?, 0, signals)
         }
         Some(Verb::Plan(PlanArgs { order, bill: false })) => {
-            let set = order::run(order)?;
+            let set = order::run(order, false)?;
             order::tell_plants(&set, false)?;
             Ok(vec![set.folder.join(furrow::dataset::recipe::FILE)])
         }
@@ -106,7 +106,7 @@ pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
         }
         None => {
             let push = cli.make.push.push()?;
-            let set = order::run(&cli.make.order)?;
+            let set = order::run(&cli.make.order, cli.make.work.quiet)?;
             order::tell_plants(&set, cli.make.work.quiet)?;
             let memory = cli.make.order.images.memory.bytes;
             let all = furrow::dataset::generate::Shard::ALL;

@@ -1,6 +1,7 @@
 //! What dataset: `trace dataset plan`.
 
 use crate::field::{MemoryArgs, SceneArgs};
+use crate::growing::Line;
 use crate::quality::{TechniqueArgs, samples};
 use furrow::ablation::{Edit, FULL};
 use furrow::dataset::classes::Classes;
@@ -141,9 +142,9 @@ impl Args {
     }
 }
 
-/// Begins the dataset, or finds it begun.
-pub(crate) fn run(args: &Args) -> Result<Set> {
-    begin(args.images.folder(), &args.order()?)
+/// Begins the dataset, or finds it begun; `quiet` shows nothing meanwhile.
+pub(crate) fn run(args: &Args, quiet: bool) -> Result<Set> {
+    begin(args.images.folder(), args.order()?, quiet)
 }
 
 /// Tells how many plants images are to be expected to show; `quiet` leaves only warnings.
@@ -155,10 +156,14 @@ pub(super) fn tell_plants(set: &Set, quiet: bool) -> Result<()> {
     Ok(())
 }
 
-/// Begins a dataset, or finds it begun.
-pub(crate) fn begin(folder: &Path, order: &Order) -> Result<Set> {
+/// Begins a dataset, or finds it begun; `quiet` shows nothing meanwhile.
+pub(crate) fn begin(folder: &Path, mut order: Order, quiet: bool) -> Result<Set> {
     cli::check_folder(folder)?;
-    let (set, warnings) = plan::plan(folder, order)?;
+    let growing = Line::begin(quiet);
+    order.progress.clone_from(growing.progress());
+    let planned = plan::plan(folder, &order);
+    growing.end();
+    let (set, warnings) = planned?;
     for warning in warnings {
         furrow::tell!("warning: {warning}");
     }

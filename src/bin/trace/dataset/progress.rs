@@ -1,9 +1,11 @@
 //! How far a dataset is: a bar on a terminal, a line now and then in a log.
 
+use crate::growing;
+use furrow::scene::assemble::BuildProgress;
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// Between two lines of a log.
@@ -28,6 +30,19 @@ impl Progress {
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         let log = (!quiet && !terminal).then(|| Mutex::new(Instant::now()));
         Self { begin, total: AtomicU64::new(0), done: AtomicU64::new(0), bar, log }
+    }
+
+    /// The same of rendered fields: until the first image is done, the bar says what is under way.
+    pub(crate) fn of_fields(begin: Instant, quiet: bool, growing: &Arc<BuildProgress>) -> Self {
+        let progress = Self::new(begin, quiet);
+        let template = "{bar:40} {pos} of {len} images  {msg}{growing}";
+        growing::show(&progress.bar, template, growing, |state| state.pos() == 0);
+        progress
+    }
+
+    /// Takes the bar away while something else is written.
+    pub(crate) fn pause(&self, write: impl FnOnce()) {
+        self.bar.suspend(write);
     }
 
     /// So many images are to be done.

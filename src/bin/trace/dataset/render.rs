@@ -9,6 +9,7 @@ use furrow::dataset::push::Push;
 use furrow::dataset::{Set, scratch};
 use furrow::{Error, Result, cli};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Which images.
@@ -87,7 +88,7 @@ pub(crate) struct WorkArgs {
 impl WorkArgs {
     /// The work of a shard.
     pub(crate) fn of(&self, shard: Shard, memory: Option<u64>) -> Work<'static> {
-        Work { shard, threads: self.threads, at_once: self.at_once, memory, push: None }
+        Work { shard, threads: self.threads, at_once: self.at_once, memory, ..Work::default() }
     }
 }
 
@@ -141,14 +142,16 @@ fn check_scratch(scratch: &Path, dir: &Path) -> Result<()> {
 fn generate_in(set: &Set, scratch: Option<&Path>, work: &Work<'_>, quiet: bool, signals: &Signals) -> Result<()> {
     let begin = Instant::now();
     let (soon, now) = signals.heed_patiently();
-    let progress = Progress::new(begin, quiet);
+    let growing = Arc::default();
+    let progress = Progress::of_fields(begin, quiet, &growing);
     let total = |n: usize| progress.expect(n as u64);
     let done = |_| progress.add();
-    let warn = |words: &str| furrow::tell!("warning: {words}");
+    let warn = |words: &str| progress.pause(|| furrow::tell!("warning: {words}"));
     let callbacks = Callbacks { begin: &total, warn: &warn, done: &done, soon, now };
+    let work = Work { progress: Some(&growing), ..*work };
     let made = match scratch {
-        Some(scratch) => scratch::generate(set, scratch, work, &callbacks),
-        None => generate::generate(set, work, &callbacks),
+        Some(scratch) => scratch::generate(set, scratch, &work, &callbacks),
+        None => generate::generate(set, &work, &callbacks),
     };
     let (images, rate) = progress.finish();
     if !quiet {

@@ -1,0 +1,64 @@
+//! What is under way of a field before its first sample: a line on a terminal, nothing in a log.
+
+use furrow::scene::assemble::BuildProgress;
+use indicatif::{ProgressBar, ProgressState, ProgressStyle};
+use std::fmt;
+use std::io::IsTerminal;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Between two looks at it.
+const EVERY: Duration = Duration::from_millis(100);
+
+/// A line that goes with it.
+pub(crate) struct Line {
+    progress: Arc<BuildProgress>,
+    bar: ProgressBar,
+}
+
+impl Line {
+    /// Begins it; it stays empty where nobody looks.
+    pub(crate) fn begin(quiet: bool) -> Self {
+        let progress = Arc::<BuildProgress>::default();
+        let seen = !quiet && std::io::stderr().is_terminal();
+        let bar = if seen { ProgressBar::new_spinner() } else { ProgressBar::hidden() };
+        show(&bar, "{spinner} {growing}  {elapsed} gone", &progress, |_| true);
+        Self { progress, bar }
+    }
+
+    /// What it shows; fields are to tell it.
+    pub(crate) fn progress(&self) -> &Arc<BuildProgress> {
+        &self.progress
+    }
+
+    /// Takes it away while something else is written.
+    pub(crate) fn pause(&self, write: impl FnOnce()) {
+        self.bar.suspend(write);
+    }
+
+    /// Takes it away.
+    pub(crate) fn end(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+/// Shows what is under way at `{growing}` of a bar's template, as long as that is wanted.
+pub(crate) fn show(
+    bar: &ProgressBar,
+    template: &str,
+    progress: &Arc<BuildProgress>,
+    wanted: impl Fn(&ProgressState) -> bool + Clone + Send + Sync + 'static,
+) {
+    let progress = Arc::clone(progress);
+    let growing = move |state: &ProgressState, out: &mut dyn fmt::Write| {
+        if wanted(state) {
+            // It is written to memory.
+            let _ = write!(out, "{progress}");
+        }
+    };
+    let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    bar.set_style(style.with_key("growing", growing));
+    if !bar.is_hidden() {
+        bar.enable_steady_tick(EVERY);
+    }
+}

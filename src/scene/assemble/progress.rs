@@ -1,0 +1,128 @@
+//! How far fields are while they are built: counted by the threads that build them, read by whoever shows it. No byte depends on it.
+
+use std::fmt;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+/// What of a field is under way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Stage {
+    /// Files are read, and what the field will take is estimated.
+    Estimate,
+    /// Ground and stones are made.
+    Ground,
+    /// Plants grow that others are instances of.
+    Shared,
+    /// All plants grow, or stand as instances.
+    Plants,
+    /// Clods and litter come to lie among the plants, and the ground gets its looks.
+    Cover,
+    /// The bounding volume hierarchy is built.
+    Bvh,
+}
+
+/// What is under way of one field or several, in words: it displays as `growing: plants 12000 of 103874`, and as nothing before it begins.
+#[derive(Debug, Default)]
+pub struct BuildProgress {
+    stage: Mutex<Option<Stage>>,
+    pub(super) shared: Count,
+    pub(super) plants: Count,
+}
+
+impl BuildProgress {
+    /// A field is at this stage from now on.
+    pub(crate) fn enter(&self, stage: Stage) {
+        *self.stage.lock().unwrap_or_else(PoisonError::into_inner) = Some(stage);
+    }
+}
+
+impl fmt::Display for BuildProgress {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let stage = *self.stage.lock().unwrap_or_else(PoisonError::into_inner);
+        match stage {
+            None => Ok(()),
+            Some(Stage::Estimate) => f.write_str("growing: files and estimate"),
+            Some(Stage::Ground) => f.write_str("growing: ground"),
+            Some(Stage::Shared) => write!(f, "growing: plants for instances {}", self.shared),
+            Some(Stage::Plants) => write!(f, "growing: plants {}", self.plants),
+            Some(Stage::Cover) => f.write_str("growing: clods, litter and texture of the ground"),
+            Some(Stage::Bvh) => f.write_str("building the BVH"),
+        }
+    }
+}
+
+/// How many of some things are done.
+#[derive(Debug, Default)]
+pub(super) struct Count {
+    done: AtomicUsize,
+    of: AtomicUsize,
+}
+
+impl Count {
+    /// So many more are to be done.
+    pub(super) fn expect(&self, more: usize) {
+        self.of.fetch_add(more, Ordering::Relaxed);
+    }
+
+    /// One more is done.
+    pub(super) fn add(&self) {
+        self.done.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+impl fmt::Display for Count {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} of {}", self.done.load(Ordering::Relaxed), self.of.load(Ordering::Relaxed))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Options, field_of};
+    use super::*;
+
+    /// Beets on bare ground under a camera at this height.
+    fn page(height_m: f32) -> String {
+        let camera = format!(
+            "Pinhole(size: (320, 240), intrinsics: FieldOfView(horizontal_deg: 20), pose: Nadir(height_m: {height_m}))"
+        );
+        let species = "species: \"scenes/species/sugar_beet.ron\", growth: AgeDays(20)";
+        let crops = format!("({species}, rows: (spacing_m: 0.25, in_row_m: 0.2))");
+        format!("Field(\n  detail: Instanced,\n  camera: {camera},\n  soil: (),\n  crops: [{crops}],\n)")
+    }
+
+    /// Rationale: a field that takes a minute to grow must say what it is at. Expected: nothing before it begins; every plant that is sown is counted
+    /// once, and those that others are instances of where plants are far away; the ground's cover comes last.
+    #[test]
+    fn plants_are_counted_as_they_grow() {
+        for (height_m, instances) in [(1.0, false), (12.0, true)] {
+            let options = Options::default();
+            let BuildProgress { shared, plants, .. } = &*options.progress;
+            assert_eq!(options.progress.to_string(), "");
+            let field = field_of(&page(height_m), &options).unwrap();
+            assert_eq!(options.progress.to_string(), "growing: clods, litter and texture of the ground");
+            let number = |count: &AtomicUsize| count.load(Ordering::Relaxed);
+            assert!(!field.plants.is_empty() && number(&plants.of) >= field.plants.len());
+            for count in [plants, shared] {
+                assert_eq!(number(&count.done), number(&count.of));
+            }
+            assert_eq!(number(&shared.of) > 0, instances);
+        }
+    }
+
+    #[test]
+    fn it_says_what_is_under_way() {
+        let progress = BuildProgress::default();
+        progress.plants.expect(103_874);
+        progress.plants.add();
+        for (stage, words) in [
+            (Stage::Ground, "growing: ground"),
+            (Stage::Shared, "growing: plants for instances 0 of 0"),
+            (Stage::Plants, "growing: plants 1 of 103874"),
+            (Stage::Bvh, "building the BVH"),
+        ] {
+            progress.enter(stage);
+            assert_eq!(progress.to_string(), words);
+        }
+    }
+}
