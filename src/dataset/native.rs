@@ -184,13 +184,11 @@ impl<'a, F: Files + ?Sized> Image<'a, F> {
 
     /// The photograph in colour, as PNG or as JPEG: width, height, pixels.
     pub(crate) fn photograph(&self) -> Result<(u32, u32, Vec<[u8; 3]>)> {
-        match self.stored("rgb")? {
-            Some(stored) => stored.rgb(),
-            None => {
-                let (place, bytes) = self.needed("rgb.png")?;
-                output::decode_rgb(&place, &bytes).map_err(Error::in_dataset)
-            }
+        if let Some(stored) = self.stored("rgb")? {
+            return stored.rgb();
         }
+        let (place, bytes) = self.needed("rgb.png")?;
+        output::decode_rgb(&place, &bytes).map_err(Error::in_dataset)
     }
 
     /// A band in gray, such as `nir`, as PNG or as JPEG, where there is one.
