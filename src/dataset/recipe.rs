@@ -332,11 +332,14 @@ impl Recipe {
         let value = |of: &std::collections::BTreeMap<String, String>, key: &String| {
             of.get(key).cloned().unwrap_or_else(|| "none".into())
         };
-        let differs: Vec<String> = keys
+        let differing: Vec<&String> = keys
             .into_iter()
             .filter(|key| !free.contains(&key.as_str()) && before.get(*key) != now.get(*key))
             // Images that lie in folders may be packed later.
             .filter(|key| *key != "pack" || self.pack.is_some())
+            .collect();
+        let differs: Vec<String> = differing
+            .iter()
             .map(|key| format!("{} {} there, {} here", in_words(key), value(&before, key), value(&now, key)))
             .collect();
         if differs.is_empty() && other.count >= self.count {
@@ -347,10 +350,13 @@ impl Recipe {
         } else {
             differs.join("; ")
         };
-        Err(Error::misuse(format!("another dataset lies in this folder: {what}")).in_file(folder).help(
-            "give another --out, or the same arguments to go on with it; \
-             --count may grow and --format may be longer",
-        ))
+        let maps = differing.iter().any(|key| ["keep", "omit"].contains(&key.as_str()));
+        let help = if maps {
+            "without --keep it goes on with the maps that it has; formats read label maps that were left out from the records"
+        } else {
+            "give another --out, or the same arguments to go on with it; --count may grow and --format may be longer"
+        };
+        Err(Error::misuse(format!("another dataset lies in this folder: {what}")).in_file(folder).help(help))
     }
 }
 

@@ -89,6 +89,7 @@ impl Field {
                 None => build(None).map(Arc::new),
                 Some(preview) => preview.geometry(&scene.parts, build),
             })?;
+            self.options.progress.leave();
             let _ = self.geometry.set((built, begin.elapsed()));
         }
         self.geometry.get().map(|(built, _)| built.as_ref()).ok_or_else(|| Error::failed("the scene was not built"))

@@ -124,7 +124,7 @@ fn west(triangles: &BTreeSet<[[u32; 3]; 3]>, line: f32) -> BTreeSet<[[u32; 3]; 3
 #[test]
 fn ground_out_of_view_has_few_triangles_and_no_crack() {
     let ground = ground(&page(), 0.2);
-    let seen = InView::of(ground.area(), |p| (p.x + 0.15).max(0.0));
+    let seen = InView::of(ground.area(), 0.0, |_| 0.0, |p| (p.x + 0.15).max(0.0));
     let (whole, mesh) = (ground.mesh(&InView::ALL), ground.mesh(&seen));
     assert_eq!(mesh.fault(), None);
     assert!(mesh.triangles.len() * 100 < whole.triangles.len() * 65, "{}", mesh.triangles.len());
@@ -156,7 +156,7 @@ fn clods_out_of_view_are_laid_and_not_made() {
         (triangles(clods.iter().map(|group| &group.mesh)), pile)
     };
     let (all, whole) = lay(&InView::ALL);
-    let (some, pile) = lay(&InView::of(ground.area(), |p| (p.x + 0.15).max(0.0)));
+    let (some, pile) = lay(&InView::of(ground.area(), 0.0, |_| 0.0, |p| (p.x + 0.15).max(0.0)));
     for k in 0..400 {
         let p = vec2(-0.2 + 0.02 * (k % 20) as f32, -0.2 + 0.02 * (k / 20) as f32);
         assert_eq!(pile.at(p), whole.at(p), "{p}");

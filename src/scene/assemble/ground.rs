@@ -238,7 +238,8 @@ fn in_view(onlookers: &[Onlooker], area: Rect, height: impl Fn(Vec2) -> f32 + Sy
     if onlookers.is_empty() {
         return InView::ALL;
     }
-    InView::of(area, |p| from_view(onlookers, p.extend(height(p))))
+    let run = onlookers.iter().map(Onlooker::run).fold(0.0, f32::max);
+    InView::of(area, run, height, |p| from_view(onlookers, p))
 }
 
 /// What the ground shows; each texel has the mean colour of what of its layers it covers, unless `detail` is full.

@@ -6,6 +6,8 @@ use crate::sensor::Camera;
 
 /// Places along each side of an image by which its ground is found: distortion bends sides.
 const ALONG_SIDE: u32 = 4;
+/// Cameras whose places and corners of view differ by no more see the same, metres.
+const SAME_M: f32 = 0.005;
 
 /// A convex piece of the plane z = 0.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,6 +85,22 @@ impl Onlooker {
         let around = |[lo, hi]: [Vec2; 2], p: &Vec2| [lo.min(*p), hi.max(*p)];
         let corners = sees.corners.iter().fold([Vec2::INFINITY, Vec2::NEG_INFINITY], around);
         Some(Self { eye: camera.pose().position, travel: camera.travel(), sees, corners })
+    }
+
+    /// How far a ray of its image runs over the ground at most while it sinks by a metre, metres.
+    pub(super) fn run(&self) -> f32 {
+        let foot = self.eye.truncate();
+        let farthest = self.sees.corners.iter().map(|corner| corner.distance(foot)).fold(0.0, f32::max);
+        farthest / self.eye.z
+    }
+
+    /// Whether it sees the same as another, but for a few millimetres.
+    pub(super) fn like(&self, other: &Self) -> bool {
+        let near = |(a, b): (&Vec2, &Vec2)| a.distance(*b) <= SAME_M;
+        self.eye.distance(other.eye) <= SAME_M
+            && (self.travel - other.travel).abs() <= SAME_M
+            && self.sees.corners.len() == other.sees.corners.len()
+            && self.sees.corners.iter().zip(&other.sees.corners).all(near)
     }
 
     /// The lesser of two distances, metres: `than`, and that of a point of the ground from what is seen of the level plane through it.

@@ -21,7 +21,7 @@ pub(crate) enum Stage {
     Bvh,
 }
 
-/// What is under way of one field or several, in words: it displays as `growing: plants 12000 of 103874`, and as nothing before it begins.
+/// What is under way of one field or several, in words: it displays as `growing: plants 12000 of 103874`, and as nothing before it begins and after its end.
 #[derive(Debug, Default)]
 pub struct BuildProgress {
     stage: Mutex<Option<Stage>>,
@@ -30,9 +30,18 @@ pub struct BuildProgress {
 }
 
 impl BuildProgress {
-    /// A field is at this stage from now on.
+    /// A field is at this stage from now on. Where those before it have grown, its plants are counted from nought.
     pub(crate) fn enter(&self, stage: Stage) {
+        if stage == Stage::Estimate {
+            self.shared.begin();
+            self.plants.begin();
+        }
         *self.stage.lock().unwrap_or_else(PoisonError::into_inner) = Some(stage);
+    }
+
+    /// A field has been built.
+    pub(crate) fn leave(&self) {
+        *self.stage.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 }
 
@@ -59,6 +68,15 @@ pub(super) struct Count {
 }
 
 impl Count {
+    /// Forgets what was counted, unless some of it is still to be done.
+    fn begin(&self) {
+        let (done, of) = (self.done.load(Ordering::Relaxed), self.of.load(Ordering::Relaxed));
+        if done == of {
+            self.done.fetch_sub(done, Ordering::Relaxed);
+            self.of.fetch_sub(of, Ordering::Relaxed);
+        }
+    }
+
     /// So many more are to be done.
     pub(super) fn expect(&self, more: usize) {
         self.of.fetch_add(more, Ordering::Relaxed);
@@ -124,5 +142,15 @@ mod tests {
             progress.enter(stage);
             assert_eq!(progress.to_string(), words);
         }
+        progress.leave();
+        assert_eq!(progress.to_string(), "");
+        // Another field while the first grows, and one after it.
+        progress.enter(Stage::Estimate);
+        progress.enter(Stage::Plants);
+        assert_eq!(progress.to_string(), "growing: plants 1 of 103874");
+        (1..103_874).for_each(|_| progress.plants.add());
+        progress.enter(Stage::Estimate);
+        progress.enter(Stage::Plants);
+        assert_eq!(progress.to_string(), "growing: plants 0 of 0");
     }
 }

@@ -106,8 +106,12 @@ impl Builder<'_> {
         if !drives || view.open || !self.scanners.is_empty() {
             return Vec::new();
         }
-        let all: Option<Vec<Onlooker>> = self.captures.iter().map(|capture| Onlooker::of(&capture.camera)).collect();
-        all.unwrap_or_default()
+        let mut captures: Vec<&Capture> = self.captures.iter().collect();
+        captures.sort_by(|a, b| a.name.cmp(&b.name));
+        let all: Option<Vec<Onlooker>> = captures.iter().map(|capture| Onlooker::of(&capture.camera)).collect();
+        let mut all = all.unwrap_or_default();
+        all.dedup_by(|next, kept| next.like(kept));
+        all
     }
 
     /// A capture in the words of an error: its camera, and its frame on a drive.

@@ -35,7 +35,7 @@ impl Progress {
     /// The same of rendered fields: until the first image is done, the bar says what is under way.
     pub(crate) fn of_fields(begin: Instant, quiet: bool, growing: &Arc<BuildProgress>) -> Self {
         let progress = Self::new(begin, quiet);
-        let template = "{bar:40} {pos} of {len} images  {msg}{growing}";
+        let template = "{bar:40} {pos} of {len} images  {growing}  {msg}";
         growing::show(&progress.bar, template, growing, |state| state.pos() == 0);
         progress
     }
