@@ -3,9 +3,10 @@
 
     python benches/noise.py OLD NEW scenes/field.ron scenes/04-weeds.ron
 
-For each scene file both render the same pixels with as many samples. Error: relMSE as in `race.py`, against a long render by OLD, put right
-for the noise of the reference: OLD's samples are its beginning, so 1/N is missing; NEW's are taken for others, so 1/N is too much. Where
-both draw the same numbers, say so (--same-samples).
+For each scene file both render the same pixels with as many samples. Error: relMSE as in `race.py`, against a long render by OLD with
+independent numbers (`--without qmc`), which has no sample of either. A long run of OLD's own points begins with the samples that are judged, and
+what is to be put right for that lies between nothing and n/N, by how well the points are spread. The reference's own noise is estimated by n
+of its own samples and taken off both errors.
 Time: core seconds of the process less those of one sample a pixel, which growing and building take. Efficiency is
 1 / (error × time): at twice of it an error is reached in half the time. It needs a Python with mitsuba and numpy, as `race.py` does.
 """
@@ -28,15 +29,23 @@ mitsuba.set_variant("scalar_rgb")
 from race import ROOT, read_radiance, relmse
 
 
-def render(program, scene, spp, options):
+def render(program, scene, spp, options, *more):
     """Radiance, and the core seconds of the process."""
     with tempfile.TemporaryDirectory() as folder:
-        command = [program, "--scene", scene, "--spp", str(spp), "--width", str(options.width), "--out", folder, "--quiet"]
+        command = [program, "--scene", scene, "--spp", str(spp), "--width", str(options.width), "--out", folder, "--quiet", *more]
         before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
         done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
         if done.returncode != 0:
             sys.exit(done.stderr)
         return read_radiance(Path(folder) / "radiance.exr"), resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+
+
+def independent_reference(program, scene, options):
+    """A long render with independent numbers, and its own relMSE."""
+    n, long = options.spp, options.reference_spp
+    reference, beginning = (render(program, scene, spp, options, "--without", "qmc")[0] for spp in (long, n))
+    # Of independent samples the first n of N err by v/n − v/N against all of them, which err by v/N.
+    return reference, relmse(beginning, reference) * n / (long - n)
 
 
 def main():
@@ -46,17 +55,14 @@ def main():
     parser.add_argument("scenes", nargs="+", help="scene files")
     parser.add_argument("--width", type=int, default=324)
     parser.add_argument("--spp", type=int, default=32)
-    parser.add_argument("--reference-spp", type=int, default=768)
-    parser.add_argument("--same-samples", action="store_true", help="NEW draws the numbers that OLD draws")
+    parser.add_argument("--reference-spp", type=int, default=1024)
     parser.add_argument("--rounds", type=int, default=3)
     options = parser.parse_args()
     programs = [str(Path(p).resolve()) for p in (options.old, options.new)]
     print("| scene file | error | time | efficiency |\n|---|---|---|---|")
     for scene in options.scenes:
-        reference, _ = render(programs[0], scene, options.reference_spp, options)
-        share = options.spp / options.reference_spp
-        put_right = [1 / (1 - share), 1 / (1 - share) if options.same_samples else 1 / (1 + share)]
-        error = [relmse(render(program, scene, options.spp, options)[0], reference) * p for program, p in zip(programs, put_right)]
+        reference, noise = independent_reference(programs[0], scene, options)
+        error = [relmse(render(program, scene, options.spp, options)[0], reference) - noise for program in programs]
         taken = [[], []]
         for _ in range(options.rounds):
             for k, program in enumerate(programs):

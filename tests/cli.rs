@@ -432,7 +432,8 @@ fn full_and_closed_streams_end_no_work() {
 }
 
 /// Rationale: a large field takes a minute to grow, and a program that says nothing seems to hang. Expected: a terminal shows what is under way, of an
-/// image and of a dataset, but not with `--quiet`. Source: `script`, which makes a terminal; where there is none, the test says so.
+/// image and of a dataset, but not with `--quiet`; a bar counts images, and never none of none. Source: `script`, which makes a terminal; where there
+/// is none, the test says so.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_terminal_shows_what_grows() {
@@ -440,7 +441,10 @@ fn a_terminal_shows_what_grows() {
     let out = folder.path().join("out").display().to_string();
     let image = format!("--scene scenes/field.ron --width 81 --spp 1 --out {out}/image");
     let dataset = format!("dataset --scene scenes/field.ron --width 81 --spp 1 --count 1 --out {out}/data");
-    for (command, shown) in [(&image, true), (&format!("{image} --quiet"), false), (&dataset, true)] {
+    let quiet = format!("{image} --quiet");
+    // The second time all images are there.
+    let commands = [(&image, true, false), (&quiet, false, false), (&dataset, true, true), (&dataset, true, false)];
+    for (command, shown, counted) in commands {
         let program = format!("{} {command}", env!("CARGO_BIN_EXE_trace"));
         let mut script = Command::new("script");
         script.current_dir(env!("CARGO_MANIFEST_DIR")).args(["-qec", &program, "/dev/null"]).stdin(Stdio::null());
@@ -451,6 +455,8 @@ fn a_terminal_shows_what_grows() {
         let said = String::from_utf8_lossy(&done.stdout);
         assert_eq!(done.status.code(), Some(0), "{command}: {said}");
         assert_eq!(said.contains("growing: "), shown, "{command}: {said}");
+        assert_eq!(said.contains("of 1 images"), counted, "{command}: {said}");
+        assert!(!said.contains("of 0 images"), "{command}: {said}");
     }
 }
 

@@ -9,16 +9,20 @@ use crate::common::program::{scratch, small_text, trace};
 use crate::common::python::python;
 use furrow::accel::EmbreeAccel;
 use furrow::dataset::flow::flows;
-use furrow::dataset::{Record, Set, native, timing_log};
+use furrow::dataset::time_left::TimeLeft;
+use furrow::dataset::{Callbacks, Order, Record, Set, Work, native, timing_log};
 use furrow::geometry::Window;
 use furrow::job::{Field, SceneFile};
 use furrow::math::Vec3;
 use furrow::render;
 use furrow::scene::PartKind;
 use furrow::scene::assemble::{self, Options, Source};
+use furrow::settings::{Quality, RenderOptions};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Duration;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 
 /// The small page with a second camera and a drive.
 fn page(folder: &Path, name: &str, change: &dyn Fn(String) -> String) -> PathBuf {
@@ -352,6 +356,36 @@ fn images_of_a_drive_do_not_depend_on_the_others() {
         words.contains("no frame 3 of a camera `camera`") && words.contains("frames 0 to 2 of camera, right"),
         "{words}"
     );
+}
+
+/// Rationale: the first frame of a drive waits for its field to grow, and no other does. Expected: from the first frame on, the time that is left is
+/// that of what frames take beside growing, and after the last there is none. Source: the timing log, which tells growing from the rest.
+#[test]
+fn the_time_that_is_left_counts_growing_once() {
+    let (_keep, folder) = scratch();
+    std::fs::create_dir_all(&folder).unwrap();
+    let out = folder.join("out");
+    let order = Order {
+        options: RenderOptions::path_traced(Quality::spp(1)),
+        ..Order::new(page(&folder, "drive.ron", &|t| t), 6)
+    };
+    let (never, time_left, told) = (Arc::<AtomicBool>::default(), TimeLeft::default(), Mutex::new(Vec::new()));
+    let begin = Instant::now();
+    let done = |_| {
+        let left = time_left.left().expect("an image is there");
+        told.lock().unwrap().push((left.as_secs_f64(), begin.elapsed().as_secs_f64()));
+    };
+    let callbacks = Callbacks { begin: &|_| (), warn: &|_| (), done: &done, soon: &never, now: &never };
+    let set = furrow::dataset::begin(&out, &order, &callbacks).unwrap();
+    let work = Work { at_once: 1, time_left: Some(&time_left), ..Work::default() };
+    furrow::dataset::generate::generate(&set, &work, &callbacks).unwrap();
+    let rows = timing_log::rows(&out).unwrap();
+    assert!(rows.len() == 6 && rows[0].grow_s > 0.01 * rows[0].seconds, "{rows:?}");
+    let told = told.into_inner().unwrap();
+    let (left, elapsed) = told[0];
+    let frames = 1.0 - rows[0].grow_s / rows[0].seconds;
+    assert!(left > 0.0 && left <= 5.0 * frames * elapsed * 1.000_001, "{left} after {elapsed}: {rows:?}");
+    assert_eq!(told[5].0, 0.0);
 }
 
 /// Expected: poses written by `--format tum` and read again as a path give the same images.

@@ -7,10 +7,14 @@
 use crate::common::dataset::{fail, path, same, succeed, tree, verb};
 use crate::common::program::{SMALL, names, scratch, trace};
 use crate::common::python::python;
+use furrow::compare::{Pairs, gap};
 use furrow::dataset::checksum::Checksum;
 use furrow::dataset::checksum_record::ChecksumRecord;
+use furrow::dataset::classes::Classes;
 use furrow::dataset::{Set, native};
 use furrow::output::{Picture, write_png};
+use furrow::train::data::{Band, Example, Shape};
+use furrow::train::deploy::pictures;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fs;
@@ -149,6 +153,22 @@ fn labels_alone_may_be_classes_alone() {
     succeed(make("semantics"));
     assert_eq!(names(&data.join("images/000001")), ["record.json", "semantics.png"]);
     verify(&data);
+    // A photograph that somebody puts beside them is none of theirs.
+    let before = native::read(&data, "000001").expect("an image");
+    let (width, height) = before.size();
+    let photograph = vec![[90_u8; 3]; before.pixels()];
+    let file = data.join("images/000001/rgb.png");
+    write_png(&file, width, height, &Picture::Rgb(&photograph), "").expect("a picture");
+    assert!(native::read(&data, "000001").expect("an image") == before);
+    assert_eq!(fail(verb("verify", &data, &["--quiet"]), 1), stray("000001", "rgb.png"));
+    let shape = Shape { bands: Band::RGB.to_vec(), width, height };
+    let error = pictures::find(std::slice::from_ref(&data), &shape, &[]).expect_err("no photograph");
+    assert!(error.to_string().contains("it holds labels alone"), "{error}");
+}
+
+/// What `verify` says of a file that does not belong to an image.
+fn stray(image: &str, file: &str) -> String {
+    format!("error: images/{image}/{file} does not belong here: the recipe leaves it out; remove it\n")
 }
 
 /// Rationale: a label map that somebody puts into a dataset that goes without must not win over the record. Expected: library and Python read what
@@ -172,10 +192,7 @@ assert sorted(sample) == ['image', 'record', 'semantics'], sorted(sample)
     assert!(set.sample(0).expect("an image") == before);
     assert!(native::read(&data, "000000").expect("an image") == before);
     let words = fail(verb("verify", &data, &["--quiet"]), 1);
-    let told = ["plants", "leaves"].map(|map| {
-        format!("error: images/000000/{map}.png does not belong here: the recipe leaves it out; remove it\n")
-    });
-    assert_eq!(words, told.concat());
+    assert_eq!(words, ["plants.png", "leaves.png"].map(|file| stray("000000", file)).concat());
     if let Some(python) = python("import numpy, PIL") {
         let mut read = Command::new(python);
         read.args(["-c", READ, path(&data)]);
@@ -184,6 +201,76 @@ assert sorted(sample) == ['image', 'record', 'semantics'], sorted(sample)
     }
     fs::remove_file(&plants).and_then(|()| fs::remove_file(&leaves)).expect("two files");
     verify(&data);
+}
+
+/// Rationale: who compares two sets may copy pictures of one into the other, and none may become part of a set that was made without it.
+/// Expected: library, report, formats, comparisons, training, prediction and Python read what they read before; `verify` names each such
+/// file, and nothing else, until it is gone. Source: the pictures of a set that keeps them.
+#[test]
+fn maps_that_are_not_kept_are_not_read() {
+    const READ: &str = "
+import sys, furrow
+sample = furrow.Dataset(sys.argv[1])[0]
+assert sorted(sample) == ['image', 'leaves', 'plants', 'record', 'semantics'], sorted(sample)
+";
+    let (_keep, base) = scratch();
+    let [data, full] = ["data", "full"].map(|name| base.join(name));
+    succeed(make(&data, 2, &["--keep", "none"]));
+    succeed(make(&full, 2, &[]));
+    let set = Set::open(&data).expect("a dataset");
+    let before = set.sample(0).expect("an image");
+    let at = |folder: &Path, file: &str| folder.join("images/000000").join(file);
+    let strays = ["rgb.jpg", "nir.png", "nir.jpg", "parts.png", "coverage.png", "geometry.exr"];
+    for file in strays {
+        let bytes = fs::read(at(&full, file)).unwrap_or_else(|_| "no picture".into());
+        fs::write(at(&data, file), bytes).expect("a file");
+    }
+    assert!(set.sample(0).expect("an image") == before && before.nir.is_empty() && before.depth.is_empty());
+    assert!(native::read(&data, "000000").expect("an image") == before);
+    let words = fail(verb("verify", &data, &["--quiet"]), 1);
+    assert_eq!(words, strays.map(|file| stray("000000", file)).concat());
+
+    succeed(verb("finish", &data, &["--format", "imagefolder", "--quiet"]));
+    assert!(data.join("imagefolder/train/images/000000.png").is_file() && !data.join("imagefolder/train/nir").exists());
+    let report = fs::read_to_string(data.join("report.html")).expect("a report");
+    assert!(!["nir.png", "coverage.png", "geometry.exr"].iter().any(|file| report.contains(file)));
+    assert!(gap::photos(&full, "--real").expect("pictures").iter().all(gap::Photo::has_nir));
+    assert!(!gap::photos(&data, "--synthetic").expect("pictures").iter().any(gap::Photo::has_nir));
+    for below in ["", "images", "images/000000"] {
+        let pairs = |other: &Path| Pairs::find(&full.join(below), &other.join(below), None).expect("pairs").pairs;
+        assert!(pairs(&full).iter().all(|pair| pair.nir.is_some()), "{below}");
+        assert!(pairs(&data).iter().all(|pair| pair.nir.is_none()), "{below}");
+    }
+    cannot_be_seen(&set, "nir");
+    // A band of another name is the user's own.
+    let (width, height) = before.size();
+    let gray = vec![90_u8; before.pixels()];
+    write_png(&at(&data, "thermal.png"), width, height, &Picture::Gray(&gray), "").expect("a picture");
+    assert_eq!(seen(&set, "thermal").expect("a band"), [gray]);
+    if let Some(python) = python("import numpy, PIL") {
+        let mut read = Command::new(python);
+        read.args(["-c", READ, path(&data)]);
+        read.env("PYTHONPATH", Path::new(env!("CARGO_MANIFEST_DIR")).join("python"));
+        succeed(read);
+    }
+    strays.iter().try_for_each(|file| fs::remove_file(at(&data, file))).expect("files");
+    verify(&data);
+}
+
+/// What a training sees of one band of the first image.
+fn seen(set: &Set, band: &str) -> furrow::Result<Vec<Vec<u8>>> {
+    let map = Classes::default().of(&set.recipe.species, &[])?;
+    let bands = [Band::Gray(band.into())];
+    Example::read_whole(set, 0, &map, 0.0, &bands, false).map(|(_, example)| example.planes)
+}
+
+/// Neither training nor prediction has a band that a set goes without.
+fn cannot_be_seen(set: &Set, band: &str) {
+    let error = seen(set, band).expect_err("no band");
+    assert!(error.to_string().contains(&format!("no band `{band}`: its dataset was made without")), "{error}");
+    let shape = Shape { bands: vec![Band::Red, Band::Gray(band.into())], width: 96, height: 96 };
+    let error = pictures::find(std::slice::from_ref(&set.folder), &shape, &[]).expect_err("no band");
+    assert!(error.to_string().contains(&format!("the network sees the band `{band}`")), "{error}");
 }
 
 /// Writes a file of the first image with the checksum that it has then.
@@ -220,19 +307,12 @@ fn damage_is_damage_whoever_meets_it() {
 }
 
 /// A training that meets a damaged file of the first image.
-#[cfg(feature = "train")]
 fn cannot_be_learnt(set: &Set, file: &str) {
-    use furrow::dataset::classes::Classes;
-    use furrow::train::data::bands::Band;
-    use furrow::train::data::example::Example;
     let map = Classes::default().of(&set.recipe.species, &[]).expect("classes");
     let error = Example::read_whole(set, 0, &map, 0.0, &Band::RGB, true).expect_err("damage");
     assert_eq!(error.exit_code(), 1, "{error}");
     assert!(error.to_string().contains(file), "{error}");
 }
-
-#[cfg(not(feature = "train"))]
-fn cannot_be_learnt(_: &Set, _: &str) {}
 
 /// Expected: archives hold what folders would; formats come from them later; Python reads both, and says what a sample does not have.
 #[test]
@@ -261,6 +341,18 @@ for folder in sys.argv[1:]:
     succeed(verb("verify", &packed, &["--quiet"]));
     let of_panoptic = |name: &str| name.starts_with("panoptic/");
     same(&those(&tree(&packed), of_panoptic), &those(&tree(&folders), of_panoptic));
+    // What somebody puts beside an archive is read as little as what lies beside files.
+    for folder in [&folders, &packed] {
+        let image = folder.join("images/000000");
+        fs::create_dir_all(&image).expect("a folder");
+        fs::write(image.join("nir.png"), "no picture").expect("a file");
+        assert_eq!(fail(verb("verify", folder, &["--quiet"]), 1), stray("000000", "nir.png"));
+    }
+    let packs = Set::open(&packed).expect("a dataset");
+    assert!(packs.sample(0).expect("an image") == native::read(&folders, "000000").expect("an image"));
+    let shape = Shape { bands: Band::RGB.to_vec(), width: 96, height: 96 };
+    let found = pictures::find(std::slice::from_ref(&packed), &shape, &[]).expect("pictures");
+    assert!(found.len() == 3 && found.iter().all(|picture| picture.read().is_ok()));
     let Some(python) = python("import numpy, PIL") else { return };
     let mut read = Command::new(python);
     read.args(["-c", READ, path(&folders), path(&packed)]);

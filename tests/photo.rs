@@ -8,8 +8,9 @@
 use crate::common::dataset::{fail, path, same, succeed, tree, verb};
 use crate::common::program::{SMALL, names, run, scratch, trace};
 use crate::common::python::python;
+use furrow::compare::Pairs;
 use furrow::dataset::{Sample, Set, native};
-use furrow::output;
+use furrow::output::{self, Picture};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -128,6 +129,40 @@ fn all_readers_have_the_pixels_of_the_file() {
     assert!(native::read(&jpeg, "000000").unwrap_err().to_string().contains("cut short"));
     fs::remove_file(&own).unwrap();
     assert!(native::read(&jpeg, "000000").is_err());
+}
+
+/// Rationale: pictures are often converted where they lie. Expected: a PNG beside a JPEG of a dataset is read by nobody, and `verify` names it.
+#[test]
+fn a_png_beside_a_jpeg_is_not_read() {
+    const READ: &str = "
+import sys, furrow
+sample = furrow.Dataset(sys.argv[1])[0]
+assert sample['image'].max() > 0 and sample['nir'].max() > 0
+";
+    let (_keep, data) = scratch();
+    succeed(make(&data, 1, &["--photo", "jpeg90"]));
+    let before = native::read(&data, "000000").unwrap();
+    let (width, height) = before.size();
+    let (dark, gray) = (vec![[0_u8; 3]; before.pixels()], vec![0_u8; before.pixels()]);
+    let at = |file: &str| data.join("images/000000").join(file);
+    output::write_png(&at("rgb.png"), width, height, &Picture::Rgb(&dark), "").unwrap();
+    output::write_png(&at("nir.png"), width, height, &Picture::Gray(&gray), "").unwrap();
+    let set = Set::open(&data).unwrap();
+    assert!(native::read(&data, "000000").unwrap() == before && set.sample(0).unwrap() == before);
+    learnt_alike(&set, &before);
+    let pair = Pairs::find(&data, &data, None).unwrap().pairs.remove(0);
+    assert_eq!((pair.a, pair.nir.map(|nir| nir.1)), (at("rgb.jpg"), Some(at("nir.jpg"))));
+    let said = fail(verb("verify", &data, &["--quiet"]), 1);
+    let stray = |file: &str| {
+        format!("error: images/000000/{file} does not belong here: the recipe leaves it out; remove it\n")
+    };
+    assert_eq!(said, ["rgb.png", "nir.png"].map(stray).concat());
+    if let Some(python) = python("import numpy, PIL") {
+        let mut read = Command::new(python);
+        read.args(["-c", READ, path(&data)]);
+        read.env("PYTHONPATH", Path::new(env!("CARGO_MANIFEST_DIR")).join("python"));
+        succeed(read);
+    }
 }
 
 /// Expected: networks see what the file decodes to, near infrared too.

@@ -4,7 +4,8 @@
 //! images would be worse than none. Expected: exit code 75 on INT, TERM, HUP and USR1, no file left, whatever the program is
 //! at. Source: sysexits.h, EX_TEMPFAIL; Slurm's `--signal`, which sends USR1.
 
-use crate::common::program::{SMALL, names, scratch, trace};
+use crate::common::dataset::{path, succeed, tree};
+use crate::common::program::{SMALL, names, scratch, small_text, trace};
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -108,4 +109,69 @@ fn two_signals_in_a_row_end_it_with_75() {
     send("TERM", &child);
     assert_eq!(end(&mut child).code(), Some(75));
     assert_eq!(names(&out), Vec::<String>::new());
+}
+
+/// Interrupts a command on a terminal as soon as that shows that a field grows; its exit code, and all that it said. `None` where no `script` makes
+/// a terminal.
+#[cfg(target_os = "linux")]
+fn interrupted_while_it_grows(arguments: &[&str]) -> Option<(Option<i32>, String)> {
+    let program = format!("echo $$; exec {} {}", env!("CARGO_BIN_EXE_trace"), arguments.join(" "));
+    let mut script = Command::new("script");
+    script.current_dir(env!("CARGO_MANIFEST_DIR")).env("SHELL", "/bin/sh").args(["-qec", &program, "/dev/null"]);
+    let Ok(mut script) = script.stdin(Stdio::null()).stdout(Stdio::piped()).spawn() else {
+        eprintln!("skipped: no `script` makes a terminal here");
+        return None;
+    };
+    let mut talk = script.stdout.take().unwrap();
+    let (mut said, mut bytes) = (Vec::new(), [0; 4096]);
+    while !String::from_utf8_lossy(&said).contains("growing: ") {
+        let read = talk.read(&mut bytes).unwrap();
+        assert!(read > 0, "it ended early: {}", String::from_utf8_lossy(&said));
+        said.extend_from_slice(&bytes[..read]);
+    }
+    let first = String::from_utf8_lossy(&said).lines().next().unwrap().trim().to_owned();
+    assert!(Command::new("kill").args(["-INT", &first]).status().unwrap().success(), "INT to {first}");
+    talk.read_to_end(&mut said).unwrap();
+    Some((end(&mut script).code(), String::from_utf8_lossy(&said).into_owned()))
+}
+
+/// Rationale: before its first image a dataset grows a field, which may take a minute. Expected: Ctrl-C takes away the line that shows it, and says what
+/// it says while images are made: nothing was written, or how many images are there; the code is 75, and no file is written. Source: `script`, which
+/// makes a terminal; where there is none, the test says so.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interrupt_while_a_plan_grows_its_field_is_told() {
+    let (keep, data) = scratch();
+    let page = keep.path().join("page.ron");
+    let write = |weeds_per_m2: u32| {
+        let root = env!("CARGO_MANIFEST_DIR");
+        let text = small_text().replace("spread: (per_m2: 14)", &format!("spread: (per_m2: {weeds_per_m2})"));
+        let text = text.replace("\"textures/", &format!("\"{root}/textures/"));
+        std::fs::write(&page, text.replace("\"scenes/", &format!("\"{root}/scenes/"))).unwrap();
+    };
+    let rest = ["--scene", path(&page), "--out", path(&data), "--width", "96", "--spp", "1", "--count"];
+    let stopped = |verb: &[&str], words: &str| -> bool {
+        let Some((code, said)) = interrupted_while_it_grows(&[verb, &rest, &["5"]].concat()) else { return false };
+        assert_eq!(code, Some(75), "{verb:?}: {said}");
+        let (_, after) = said.rsplit_once("growing: ").unwrap();
+        // The line is cleared, then words follow on it.
+        let (_, after) = after.split_once("\u{1b}[2K").unwrap_or_else(|| panic!("{verb:?}: the line stays: {said:?}"));
+        assert!(after.contains(&format!("{}: {words}", path(&data))), "{verb:?}: {said}");
+        assert!(!after.contains("error"), "{verb:?}: {said}");
+        true
+    };
+    // Seconds of plants.
+    write(4000);
+    for verb in [&["dataset"][..], &["dataset", "plan"]] {
+        if !stopped(verb, "stopped before it was done; nothing was written") {
+            return;
+        }
+        assert!(!data.exists(), "{verb:?}");
+    }
+    write(14);
+    succeed(trace(&[&["dataset"][..], &rest, &["1", "--quiet"]].concat()));
+    let before = tree(&data);
+    write(4000);
+    assert!(stopped(&["dataset"], "stopped: 1 of 5 images are there"));
+    assert!(before == tree(&data));
 }

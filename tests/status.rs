@@ -4,13 +4,13 @@
 //! numbers of `status` are those of the files, whatever became of the runs; the bill's number of files is exact, its bytes and memory are
 //! within 30 %, and nothing is left anywhere. Source: the files themselves, counted and measured here.
 
-use crate::common::dataset::{SIZE, fail, made, make, path, succeed, tree, verb};
-use crate::common::program::{SMALL, names, scratch, trace};
+use crate::common::dataset::{SIZE, fail, made, make, path, same, succeed, tree, verb};
+use crate::common::program::{SMALL, names, scratch, small_text, trace};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
 use std::os::unix::fs::MetadataExt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -254,7 +254,12 @@ fn what_is_no_dataset_is_refused() {
 
 /// The rows of a bill by their names.
 fn bill(arguments: &[&str]) -> BTreeMap<String, String> {
-    let output = succeed(trace(arguments));
+    rows(trace(arguments))
+}
+
+/// The same of a command.
+fn rows(command: Command) -> BTreeMap<String, String> {
+    let output = succeed(command);
     let text = String::from_utf8(output.stdout).unwrap();
     let row = |line: &str| {
         let (name, words) = line.split_once("  ").unwrap_or_else(|| panic!("no row: {line}"));
@@ -329,6 +334,89 @@ fn the_bill_is_what_is_taken() {
         assert!((0.05..3600.0).contains(&first_number(core)) && (0.01..16.0).contains(&memory), "{rows:?}");
         assert!(rows["shards"].contains("--shards 1 "), "{rows:?}");
     }
+}
+
+/// The small page, seen by two cameras in two frames, on the first of these days or as it is.
+fn several(folder: &Path, days: &str) -> PathBuf {
+    let root = env!("CARGO_MANIFEST_DIR");
+    let more = format!(
+        "cameras: [(name: \"right\", camera: Pinhole(size: (96, 72), intrinsics: FieldOfView(horizontal_deg: 40), \
+         pose: Nadir(height_m: 0.45, at_m: (0.04, 0))))], drive: (frames: 2, path: Straight(speed_m_s: 0.2)), {days}lights:"
+    );
+    let text = small_text().replacen("lights:", &more, 1).replace("\"textures/", &format!("\"{root}/textures/"));
+    let page = folder.join("page.ron");
+    fs::write(&page, text.replace("\"scenes/", &format!("\"{root}/scenes/"))).unwrap();
+    page
+}
+
+/// Expected: the bill of a drive through two fields, and of one over two days, tells images, fields, files and bytes as those of a dataset do, and
+/// nothing is left anywhere; another sequence is refused as the run refuses it.
+#[test]
+fn the_bill_of_a_sequence_is_what_is_taken() {
+    for (days, fields, images) in
+        [("", "2", "8 images of 2 fields"), ("days: (on: [9, 21]), ", "1", "8 images of 1 field")]
+    {
+        let (keep, data) = scratch();
+        let temporary = keep.path().join("temporary");
+        fs::create_dir(&temporary).unwrap();
+        let page = several(keep.path(), days);
+        let order = |spp: &str, more: &[&str]| {
+            let mut command = trace(&["sequence", "--scene", path(&page), "--fields", fields, "--spp", spp]);
+            command.args(["--quiet", "--out", path(&data)]).args(more).env("TMPDIR", &temporary);
+            command
+        };
+        let rows = rows(order("1", &["--dry-run"]));
+        assert!(!data.exists() && names(&temporary).is_empty(), "{days}");
+        assert!(rows["files"].ends_with(&format!(" ({images})")), "{rows:?}");
+        succeed(order("1", &[]));
+        let (files, bytes) = measured(&data);
+        assert_eq!(first_number(&rows["files"]) as u64, files, "{days}");
+        let (_, told) = rows["disk"].split_once('(').unwrap();
+        let off = first_number(told) * 1e6 / bytes as f64;
+        assert!((0.7..1.3).contains(&off), "{days}: {off} of {bytes} bytes");
+        let [dry, run] = [&["--dry-run"][..], &[]].map(|more| fail(order("2", more), 2));
+        assert!(dry == run && dry.contains("spp 1 there, 2 here"), "{dry}");
+    }
+}
+
+/// Rationale: who asks in the evening what a night will cost must not learn in the morning that it was refused. Expected: where another dataset lies
+/// in the folder, or something else does, a dry run ends with the run's code and words; what goes on with a dataset is told as that has it, formats
+/// and maps. Nothing is written.
+#[test]
+fn a_dry_run_refuses_what_the_run_refuses() {
+    let (keep, data) = scratch();
+    let full = keep.path().join("full");
+    fs::create_dir(&full).unwrap();
+    fs::write(full.join("notes.txt"), "mine").unwrap();
+    let order = |out: &Path, scene: &str, spp: &str, more: &[&str]| {
+        let mut command = trace(&["dataset", "--scene", scene, "--width", "64", "--spp", spp, "--quiet"]);
+        command.args(["--out", path(out)]).args(more);
+        command
+    };
+    let begun = ["--keep", "none", "--format", "coco"];
+    succeed(order(&data, SMALL, "1", &[&["--count", "2"][..], &begun].concat()));
+    let before = tree(keep.path());
+    for (out, scene, spp, more, told) in [
+        (&data, "scenes/01-one-leaf.ron", "1", &["--count", "2"][..], "another dataset lies in this folder: "),
+        (&data, SMALL, "2", &["--count", "2"], "spp 1 there, 2 here"),
+        (&data, SMALL, "1", &["--count", "2", "--seed", "7"], "seed 3 there, 7 here"),
+        (&data, SMALL, "1", &["--count", "2", "--keep", "depth"], "maps of --keep [] there"),
+        (&data, SMALL, "1", &["--count", "2", "--format", "ply"], "--format ply holds "),
+        (&data, SMALL, "1", &["--count", "1"], "it has 2 images, more than 1"),
+        (&full, SMALL, "1", &["--count", "2"], "other things lie in this folder, notes.txt among them"),
+    ] {
+        let words = [&["--dry-run"][..], &[]].map(|dry| fail(order(out, scene, spp, &[more, dry].concat()), 2));
+        assert!(words[0] == words[1] && words[0].contains(told), "{more:?}: {words:?}");
+        same(&tree(keep.path()), &before);
+    }
+    let longer = ["--count", "3", "--dry-run"];
+    let [goes_on, anew] = [
+        order(&data, SMALL, "1", &longer),
+        order(&keep.path().join("new"), SMALL, "1", &[&longer[..], &begun].concat()),
+    ]
+    .map(|command| rows(command)["files"].clone());
+    assert_eq!(goes_on, anew);
+    same(&tree(keep.path()), &before);
 }
 
 /// Most memory that a program had until it ended well, bytes: `VmHWM` of the process, which never falls, asked for again and again.

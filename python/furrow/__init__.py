@@ -112,16 +112,16 @@ _MAPS = (
 _ENDINGS = ("png", "jpg")
 
 
-def _sample(folder: Path, photographs: str = "", left_out: Sequence[str] = ()) -> Sample:
-    """The pictures and labels of an image's folder; `photographs` ends the names of other photographs, `left_out` are not read."""
+def _sample(folder: Path, photographs: str = "", left_out: Sequence[str] = (), ending: str = "png") -> Sample:
+    """The pictures and labels of an image's folder; `left_out` are not read.
+
+    `photographs` ends the names of other photographs than `rgb` and `nir`, `ending` the names of their files.
+    """
     sample = Sample()
     for name, file, kind in _MAPS:
         if name in left_out:
             continue
-        stem = f"{file}{photographs if name in ('image', 'nir') else ''}"
-        path = folder / f"{stem}.png"
-        if name in ("image", "nir") and not path.is_file() and (folder / f"{stem}.jpg").is_file():
-            path = folder / f"{stem}.jpg"
+        path = folder / (f"{file}{photographs}.{ending}" if name in ("image", "nir") else f"{file}.png")
         if name != "nir" or path.is_file():
             sample[name] = _read(path, kind)
     return sample
@@ -157,7 +157,11 @@ class Dataset:
             self.indices = [k for k in every if split is None or self._split(k) == split]
             rendered = self.recipe["made"].get("rendered", {})
             self.labels_only = bool(rendered.get("labels_only"))
-            self._left_out = [*rendered.get("omit", []), *(["image"] if self.labels_only else [])]
+            # Recipes of before do not say what images keep: near infrared is among it. Of imported ones nobody knows.
+            no_nir = self.labels_only or "nir" not in rendered.get("keep", ["nir"])
+            self._left_out = list(rendered.get("omit", []))
+            self._left_out += ["image"] * self.labels_only + ["nir"] * no_nir
+            self._ending = "jpg" if str(rendered.get("photo", "png")).startswith("jpeg") else "png"
         except (AttributeError, KeyError, TypeError, ValueError, ZeroDivisionError) as error:
             raise Error(f"{self.path}/dataset.json is damaged: {error!r}") from error
         # Of packs that were read from: where each file lies.
@@ -169,10 +173,11 @@ class Dataset:
     def __getitem__(self, item: SupportsIndex) -> Any:
         index = self.indices[operator.index(item)]
         folder = self.path / "images" / f"{index:06d}"
-        if self.recipe.get("pack") and not folder.is_dir():
+        # A folder beside packs that is no whole image was put there.
+        if self.recipe.get("pack") and not (folder / "record.json").is_file():
             sample = self._packed(index)
         else:
-            sample = _sample(folder, left_out=self._left_out)
+            sample = _sample(folder, left_out=self._left_out, ending=self._ending)
             sample["record"] = _json(folder / "record.json")
         return sample if self.transform is None else self.transform(sample)
 

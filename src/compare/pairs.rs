@@ -3,8 +3,12 @@
 //! A picture is a file, or a folder with `rgb.png` or `rgb.jpg`; `nir.png` or `nir.jpg` and `semantics.png` beside it belong to it. Any other
 //! folder holds many, below `images/` where it has that: such of folders with `rgb` (datasets, renders), by the folder's name; else every PNG and JPEG, by its own,
 //! whose labels lie below `labels/`. Names go without extensions, so that a JPEG may stand against a PNG.
+//!
+//! Of a dataset's images, files that its recipe leaves out are not read.
 
-use crate::{Error, Result, output};
+use crate::dataset::image_files::photograph_in;
+use crate::dataset::recipe::{FILE, Recipe};
+use crate::{Error, Result};
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
@@ -53,7 +57,11 @@ impl Pairs {
     /// Finds the pairs of two pictures or two folders. `labels` is a file or folder of labels; without it they are looked for beside `a`.
     /// An error where nothing can be paired, or nothing has labels though they were given.
     pub fn find(a: &Path, b: &Path, labels: Option<&Path>) -> Result<Self> {
-        let (of_a, of_b) = (source(a)?, source(b)?);
+        let (recipe_a, recipe_b) = (recipe_of(a), recipe_of(b));
+        let (of_a, of_b) = (source(a, recipe_a.as_ref())?, source(b, recipe_b.as_ref())?);
+        let infrared = |a: &Path, b: &Path| {
+            Some((beside_rgb(a, "nir", recipe_a.as_ref())?, beside_rgb(b, "nir", recipe_b.as_ref())?))
+        };
         if let Some(labels) = labels {
             there(labels)?;
         }
@@ -151,17 +159,28 @@ pub(super) fn there(path: &Path) -> Result<()> {
         .help("give a PNG or JPEG, a folder of such, a rendered image or a dataset"))
 }
 
-fn source(path: &Path) -> Result<Source> {
+/// The recipe of the dataset that a path leads to: to its folder, `images`, an image or a file of one.
+pub(super) fn recipe_of(path: &Path) -> Option<Recipe> {
+    let whole = std::fs::canonicalize(path).ok()?;
+    let leads_there = |folder: &Path| {
+        let below = whole.strip_prefix(folder).is_ok_and(|rest| rest == Path::new("") || rest.starts_with("images"));
+        below && folder.join(FILE).is_file()
+    };
+    let dataset = whole.ancestors().take(4).find(|folder| leads_there(folder))?;
+    Recipe::read(dataset).ok()
+}
+
+fn source(path: &Path, recipe: Option<&Recipe>) -> Result<Source> {
     there(path)?;
     if path.is_file() {
         return Ok(Source::One(path.into()));
     }
-    if let Some(rendered) = output::photograph_in(path, "rgb") {
+    if let Some(rendered) = photograph_in(path, "rgb", recipe) {
         return Ok(Source::One(rendered));
     }
     let images = path.join("images");
     let mut found = BTreeMap::new();
-    walk(if images.is_dir() { &images } else { path }, "", &mut found)?;
+    walk(if images.is_dir() { &images } else { path }, "", recipe, &mut found)?;
     if found.is_empty() {
         return Err(Error::input("there is no PNG or JPEG in this folder")
             .in_file(path)
@@ -170,8 +189,13 @@ fn source(path: &Path) -> Result<Source> {
     Ok(Source::Many(found))
 }
 
-/// Every picture below a folder, by its name there.
-pub(super) fn walk(folder: &Path, prefix: &str, found: &mut BTreeMap<String, PathBuf>) -> Result<()> {
+/// Every picture below a folder, by its name there; of a dataset's images those that belong to them.
+pub(super) fn walk(
+    folder: &Path,
+    prefix: &str,
+    recipe: Option<&Recipe>,
+    found: &mut BTreeMap<String, PathBuf>,
+) -> Result<()> {
     let entries = std::fs::read_dir(folder).and_then(Iterator::collect::<std::io::Result<Vec<_>>>);
     for entry in entries.map_err(Error::reading(folder))? {
         let path = entry.path();
@@ -179,10 +203,10 @@ pub(super) fn walk(folder: &Path, prefix: &str, found: &mut BTreeMap<String, Pat
         if name.starts_with('.') {
             continue;
         }
-        let (name, picture) = if let Some(rendered) = output::photograph_in(&path, "rgb") {
+        let (name, picture) = if let Some(rendered) = photograph_in(&path, "rgb", recipe) {
             (name, rendered)
         } else if path.is_dir() {
-            walk(&path, &format!("{prefix}{name}/"), found)?;
+            walk(&path, &format!("{prefix}{name}/"), recipe, found)?;
             continue;
         } else if path.extension().is_some_and(|e| PICTURES.iter().any(|p| e.eq_ignore_ascii_case(p))) {
             (stem(&path), path)
@@ -203,13 +227,9 @@ pub(super) fn stem(path: &Path) -> String {
 }
 
 /// What else is known of the picture `rgb.png` (or `rgb_denoised.png`): the file beside it whose name begins with something else.
-pub(super) fn beside_rgb(picture: &Path, other: &str) -> Option<PathBuf> {
+pub(super) fn beside_rgb(picture: &Path, other: &str, recipe: Option<&Recipe>) -> Option<PathBuf> {
     let rest = stem(picture).strip_prefix("rgb")?.to_owned();
-    output::photograph_in(picture.parent()?, &format!("{other}{rest}"))
-}
-
-fn infrared(a: &Path, b: &Path) -> Option<(PathBuf, PathBuf)> {
-    Some((beside_rgb(a, "nir")?, beside_rgb(b, "nir")?))
+    photograph_in(picture.parent()?, &format!("{other}{rest}"), recipe)
 }
 
 /// `semantics.png` beside `rgb.png` and what was made of it.

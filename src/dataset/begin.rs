@@ -24,7 +24,23 @@ pub(super) fn begin(folder: &Path, recipe: Recipe, files: &[File], named: bool) 
     if create_atomically(&path, &recipe.text()?)? { Ok(recipe) } else { go_on(folder, recipe, files, named) }
 }
 
-fn go_on(folder: &Path, mut recipe: Recipe, files: &[File], named: bool) -> Result<Recipe> {
+/// The recipe that [`begin`] would leave in `folder`. What that refuses is refused here; nothing is written.
+pub(super) fn merged_recipe(folder: &Path, recipe: Recipe, named: bool) -> Result<Recipe> {
+    if folder.join(FILE).exists() {
+        return joined(folder, recipe, named);
+    }
+    refuse_full(folder).map(|()| recipe)
+}
+
+fn go_on(folder: &Path, recipe: Recipe, files: &[File], named: bool) -> Result<Recipe> {
+    let recipe = joined(folder, recipe, named)?;
+    write_changed(folder, files)?;
+    write_changed(folder, &[File { path: FILE.into(), bytes: recipe.text()? }])?;
+    Ok(recipe)
+}
+
+/// A recipe with what the dataset that lies in the folder has beside it; an error where that is another dataset.
+fn joined(folder: &Path, mut recipe: Recipe, named: bool) -> Result<Recipe> {
     let before = Recipe::read(folder)?;
     // Who asks for nothing in particular leaves labels and maps as they are.
     recipe.labelling = recipe.labelling.over(&before.labelling);
@@ -49,8 +65,6 @@ fn go_on(folder: &Path, mut recipe: Recipe, files: &[File], named: bool) -> Resu
     recipe.formats.dedup();
     links::refuse(folder, &recipe)?;
     format::check_maps(&recipe).and_then(|()| pack::check(&recipe)).map_err(|e| e.in_file(folder))?;
-    write_changed(folder, files)?;
-    write_changed(folder, &[File { path: FILE.into(), bytes: recipe.text()? }])?;
     Ok(recipe)
 }
 

@@ -6,6 +6,7 @@
 //!
 //! Images are drawn one after another in memory; nothing is written where the dataset would lie.
 
+use super::begin::merged_recipe;
 use super::checksum_record::{BLOCK, ChecksumRecord, write_files};
 use super::finish::finish;
 use super::generate::{MOST_AT_ONCE, formatted};
@@ -14,7 +15,7 @@ use super::pack::Packing;
 use super::plan::{Draft, Order, draft};
 use super::recipe::{FILE, Made, Recipe, compact};
 use super::record::{CaptureRecord, Record};
-use super::render::{LastField, RenderedSample, render};
+use super::render::{LastField, RenderedSample, of_day, render};
 use super::set::Set;
 use super::split::{Shares, Split};
 use super::{File, invariants, meter, native, report};
@@ -55,6 +56,12 @@ const REPORTED: u64 = 24;
 pub struct Bill {
     /// Images.
     pub images: u64,
+    /// Fields that they show.
+    pub fields: u64,
+    /// How often a field grows: once for all of its images of a day.
+    pub growings: u64,
+    /// What shards share out.
+    pub units: u64,
     /// The images that were drawn to know it.
     pub probes: Vec<u64>,
     /// Samples that they were drawn with, fewer first.
@@ -78,20 +85,23 @@ pub struct Bill {
 impl Bill {
     /// Most memory of a process that shares so many cores among its images, bytes.
     pub fn memory(&self, cores: usize) -> u64 {
-        let at_once = cores.clamp(1, MOST_AT_ONCE).min(usize::try_from(self.images.max(1)).unwrap_or(usize::MAX));
+        // Images of one field follow each other.
+        let at_once = cores.clamp(1, MOST_AT_ONCE).min(usize::try_from(self.growings.max(1)).unwrap_or(usize::MAX));
         self.base_memory + at_once as u64 * self.image_memory
     }
 
     /// Shards of so many cores each, of which each takes about an hour; none is empty.
     pub fn shards(&self, cores: u32) -> u64 {
         let hours = self.core_s / 3600.0 / f64::from(cores.max(1));
-        (hours.ceil() as u64).clamp(1, self.images.max(1))
+        (hours.ceil() as u64).clamp(1, self.units.max(1))
     }
 }
 
-/// Tells what an order will cost, and what the user should know; given up where the flag is raised.
-pub fn bill(order: &Order, threads: &Threads, stop: &Arc<AtomicBool>) -> Result<(Bill, Vec<String>)> {
+/// Tells what an order will cost that is for a folder, and what the user should know; an error where another dataset lies there. Given up where the
+/// flag is raised.
+pub fn bill(folder: &Path, order: &Order, threads: &Threads, stop: &Arc<AtomicBool>) -> Result<(Bill, Vec<String>)> {
     let Draft { recipe, files, mut warnings, scene, scene_sha256 } = draft(order, stop)?;
+    let recipe = merged_recipe(folder, recipe, order.omit.is_some())?;
     // What the process has taken until now, the dataset's own process takes too.
     let start = cpu()?;
     let base_memory = meter::memory().unwrap_or(0);
@@ -113,9 +123,9 @@ pub fn bill(order: &Order, threads: &Threads, stop: &Arc<AtomicBool>) -> Result<
     let peak = meter::peak_memory().unwrap_or(0);
     let mean = |of: &dyn Fn(&Probe) -> f64| probes.iter().map(of).sum::<f64>() / probes.len().max(1) as f64;
     let all = threads.install(|| Together::of(&recipe, &files, &probes))?;
-    let growings = recipe.count.div_ceil(recipe.captures_a_day()) as f64;
+    let growings = recipe.count.div_ceil(recipe.captures_a_day());
     let (count, spp) = (recipe.count as f64, f64::from(images.spp));
-    let (grow_s, sample_s) = (growings * mean(&|p| p.grow_s), count * spp * mean(&|p| p.sample_s));
+    let (grow_s, sample_s) = (growings as f64 * mean(&|p| p.grow_s), count * spp * mean(&|p| p.sample_s));
     let rest_s = start + count * mean(&|p| p.fixed_s) + all.core_s;
     let packs = Packing::of(&recipe).map_or(0, |packing| packing.all().count() as u64);
     // An archive and its record.
@@ -128,6 +138,9 @@ pub fn bill(order: &Order, threads: &Threads, stop: &Arc<AtomicBool>) -> Result<
     }
     let bill = Bill {
         images: recipe.count,
+        fields: recipe.count.div_ceil(recipe.captures()),
+        growings,
+        units: recipe.units(),
         probes: probes.iter().map(|probe| probe.record.index).collect(),
         spp: images.drawn,
         core_s: grow_s + sample_s + rest_s,
@@ -335,7 +348,7 @@ impl Together {
     /// Of a dataset of such images that copies these files of its scene.
     fn of(recipe: &Recipe, scene: &[File], probes: &[Probe]) -> Result<Self> {
         let folder = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir()))?;
-        let small = Small::of(recipe, probes);
+        let small = Small::of(recipe, probes, 1);
         small.write(folder.path(), scene)?;
         let splits = images_of_splits(recipe).into_iter().filter(|images| *images > 0).count() as u64;
         let per_field = small.recipe.captures();
@@ -343,14 +356,23 @@ impl Together {
         let few_images = splits * per_field;
         let many_images = few_images + probes.len() as u64 * per_field;
         let few = small.finished(folder.path(), few_images)?;
-        let cut = (recipe.count % recipe.captures()).min(per_field);
+        let of_cut = recipe.count % recipe.captures();
+        let cut = of_cut.min(per_field);
         let partial = if cut == 0 { 0 } else { small.finished(folder.path(), few_images + cut)?.files - few.files };
         let begin = cpu()?;
         let many = small.finished(folder.path(), many_images)?;
         let core_s = (cpu()? - begin) / many_images as f64 * recipe.count.min(MOST_LOOKED_AT) as f64;
         let whole_fields = recipe.count / recipe.captures();
         let each = (many.files - few.files) / probes.len().max(1) as u64;
-        let files = few.files + whole_fields * each + partial - splits * each;
+        // Days after the first, of all fields.
+        let days = (recipe.days().len() as u64).saturating_sub(1);
+        let later_days = whole_fields * days + of_cut.div_ceil(recipe.captures_a_day()).saturating_sub(1);
+        let of_later_days = if later_days > 0 {
+            later_days * Small::of(recipe, probes, 2).files_of_a_field(scene, splits)?.saturating_sub(each)
+        } else {
+            0
+        };
+        let files = few.files + whole_fields * each + partial + of_later_days - splits * each;
         let prolonged = |few: u64, many: u64, images: u64| {
             let each = (many as f64 - few as f64) / (many_images - few_images).max(1) as f64;
             (few as f64 + each * (images as f64 - few_images as f64)).max(0.0)
@@ -380,14 +402,14 @@ struct Small<'a> {
 }
 
 impl<'a> Small<'a> {
-    fn of(recipe: &Recipe, probes: &'a [Probe]) -> Self {
+    /// One frame of each camera, on so many days where there are days.
+    fn of(recipe: &Recipe, probes: &'a [Probe], days: usize) -> Self {
         let mut small = recipe.clone();
         small.split = Shares(images_of_splits(recipe).map(|images| u32::from(images > 0)));
         let cameras = probes.first().map_or(1, |probe| probe.cameras.len().max(1));
         if let Made::Rendered(rendering) = &mut small.made {
-            // One frame of a drive.
-            rendering.captures = rendering.captures.min(cameras as u64);
-            rendering.days.truncate(1);
+            rendering.days.truncate(days);
+            rendering.captures = recipe.captures_a_day().min(cameras as u64) * rendering.days.len().max(1) as u64;
         }
         Self { recipe: small, probes }
     }
@@ -413,8 +435,9 @@ impl<'a> Small<'a> {
         record.name = Set::name(index);
         record.split = self.recipe.split_of(index);
         if let Some(of_probe) = &mut record.capture {
-            let camera = probe.cameras.get(capture as usize).cloned().unwrap_or_default();
-            *of_probe = CaptureRecord { field, frame: 0, camera, ..of_probe.clone() };
+            let (of_day, day) = of_day(&self.recipe, capture);
+            let camera = probe.cameras.get(of_day as usize).cloned().unwrap_or_default();
+            *of_probe = CaptureRecord { field, day, frame: 0, camera, ..of_probe.clone() };
         }
         let own = format!("{}/record.json", native::folder(&record.name));
         let renamed = |file: &File| {
@@ -423,6 +446,16 @@ impl<'a> Small<'a> {
             Ok(File { path, bytes })
         };
         probe.files.get(&record.split).into_iter().flatten().map(renamed).collect()
+    }
+
+    /// How many files that belong to all images a further field adds.
+    fn files_of_a_field(&self, scene: &[File], splits: u64) -> Result<u64> {
+        let folder = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir()))?;
+        self.write(folder.path(), scene)?;
+        let (per_field, fields) = (self.recipe.captures(), self.probes.len() as u64);
+        let few = self.finished(folder.path(), splits * per_field)?;
+        let many = self.finished(folder.path(), (splits + fields) * per_field)?;
+        Ok((many.files - few.files) / fields.max(1))
     }
 
     /// Writes what belongs to all of its first images.
@@ -456,5 +489,28 @@ mod tests {
             assert!(all.iter().all(|index| *index < count));
             assert!(all.len() as u64 >= count.min(PROBES[0] as u64) && all.len() <= PROBES[1], "{count}: {all:?}");
         }
+    }
+
+    /// Rationale: all images of a drive are of one field, which one process grows. Expected: where there is one field, a day of work is for one shard and
+    /// takes the memory of one image, however many cores share it; of a thousand fields it is for 24 shards with eight images under way.
+    #[test]
+    fn images_of_one_field_are_not_shared_out() {
+        let bill = |growings| Bill {
+            images: 1000,
+            fields: growings,
+            growings,
+            units: growings,
+            probes: Vec::new(),
+            spp: [1, 1],
+            core_s: 8.0 * 86_400.0,
+            grow_s: 0.0,
+            sample_s: 0.0,
+            bytes: 0,
+            files: 0,
+            base_memory: 7,
+            image_memory: 100,
+        };
+        assert_eq!((bill(1).shards(8), bill(1).memory(8)), (1, 107));
+        assert_eq!((bill(1000).shards(8), bill(1000).memory(8)), (24, 807));
     }
 }

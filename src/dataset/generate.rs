@@ -10,6 +10,7 @@ use super::push::{Push, Unit};
 use super::render::{LastField, Times, render, renderer, scene_file};
 use super::set::Set;
 use super::task::{Task, in_format, task};
+use super::time_left::TimeLeft;
 use super::timing_log::{Began, End, Ended, ImageFailure, ImageTiming, Row, TimingLog, now};
 use super::{File, format, meter, native};
 use crate::error::Kind;
@@ -67,12 +68,14 @@ pub struct Work<'a> {
     pub push: Option<&'a Push>,
     /// Told how far the fields are that grow.
     pub progress: Option<&'a Arc<BuildProgress>>,
+    /// Told how long images take.
+    pub time_left: Option<&'a TimeLeft>,
 }
 
 impl Default for Work<'_> {
     /// All images, on all cores.
     fn default() -> Self {
-        Self { shard: Shard::ALL, threads: 0, at_once: 0, memory: None, push: None, progress: None }
+        Self { shard: Shard::ALL, threads: 0, at_once: 0, memory: None, push: None, progress: None, time_left: None }
     }
 }
 
@@ -156,6 +159,10 @@ pub(super) fn generate_for(
     // Images of one field and day follow each other on one worker, which grows it once.
     let fields: Vec<&[(u64, Task)]> =
         tasks.chunk_by(|a, b| set.recipe.growing_of(a.0) == set.recipe.growing_of(b.0)).collect();
+    if let Some(time_left) = work.time_left {
+        let grows = |field: &&&[(u64, Task)]| field.iter().any(|(_, task)| *task == Task::All);
+        time_left.expect(tasks.len(), fields.iter().filter(grows).count());
+    }
     let rendered = tasks.iter().find(|(_, task)| *task == Task::All).map(|(index, _)| *index);
     let source = match (rendered, &renderer) {
         (Some(index), Some(renderer)) => {
@@ -181,6 +188,7 @@ pub(super) fn generate_for(
         threads,
         at_once,
         timing_log: TimingLog::new(delivery.home, &format!("{}-of-{}", shard.number, shard.of)),
+        time_left: work.time_left,
     };
     let cpu_before = meter::cpu();
     if !tasks.is_empty() {
@@ -338,6 +346,7 @@ struct Run<'a> {
     threads: usize,
     at_once: usize,
     timing_log: TimingLog,
+    time_left: Option<&'a TimeLeft>,
 }
 
 impl Run<'_> {
@@ -347,6 +356,7 @@ impl Run<'_> {
         let Set { folder, recipe, .. } = self.set;
         // Another run may have made it meanwhile.
         if self::task(self.set, index)? == Task::Done {
+            self.tell_time(begin, Duration::ZERO);
             return Ok(());
         }
         let (files, times) = if task == Task::Formats {
@@ -376,9 +386,18 @@ impl Run<'_> {
             checksums.files.extend(before.files.into_iter().filter(|(path, _)| kept(path)));
         }
         checksums.write(folder)?;
-        let seconds = begin.elapsed().as_secs_f64();
+        let seconds = self.tell_time(begin, times.grow);
         let hash = checksums.image_hash()?;
         self.timing_log.add(&Row::Image(ImageTiming::new(index, hash, seconds, &times, self.at_once, self.threads)))
+    }
+
+    /// Tells how long an image took whose field grew so long for it, seconds.
+    fn tell_time(&self, begin: Instant, grow: Duration) -> f64 {
+        let seconds = begin.elapsed().as_secs_f64();
+        if let Some(time_left) = self.time_left {
+            time_left.add(seconds, grow);
+        }
+        seconds
     }
 
     /// Notes that the run ends, and what it took since the process had taken so much.

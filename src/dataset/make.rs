@@ -24,7 +24,7 @@ pub fn make_watched(folder: &Path, order: &Order, work: &Work<'_>, callbacks: &C
 
 /// Begins a dataset, or finds it begun, and tells the warnings.
 pub fn begin(folder: &Path, order: &Order, callbacks: &Callbacks<'_>) -> Result<Set> {
-    let (set, warnings) = plan(folder, order)?;
+    let (set, warnings) = plan(folder, order, callbacks.now)?;
     for warning in &warnings {
         (callbacks.warn)(warning);
     }

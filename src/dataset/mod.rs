@@ -24,6 +24,7 @@
 //! | `classes`, `labelling`, `labels` | a user's own classes; what else may be asked of labels; how formats name and choose what images show |
 //! | `render` | an image from its field, by [`crate::job`] |
 //! | `sample`, `record`, `annotate`, `rle`, `label_maps` | one image and all that is known of it; label maps to records, and back |
+//! | `image_files` | which files an image has |
 //! | `native`, `format` | as files: ours (`images/`), and those of other tools |
 //! | `checksum`, `checksum_record`, `set` | SHA-256 of a file; those of an image's files; the dataset on disk |
 //! | `links` | symbolic links in a dataset's folder, which are refused |
@@ -32,7 +33,7 @@
 //! | `make` | all of it in one call |
 //! | `plan`, `gather`, `begin`, `task`, `generate`, `timing_log`, `finish` | from a scene file, copied with all that it names, to images and a manifest; what remains to be done is found by looking at the disk |
 //! | `bill`, `meter` | what a dataset will cost, from some of its images; what this process has taken |
-//! | `status` | how far a dataset is, from what lies in its folder |
+//! | `status`, `time_left` | how far a dataset is, from what lies in its folder; how long a run still takes |
 //! | `stream` | the images of a dataset without its folder, as an archive for a program that reads them as they are made |
 //! | `scratch` | the images of a shard on a node's own disk, brought home as they are finished |
 //! | `cluster` | the same on many machines: job files for schedulers |
@@ -68,6 +69,8 @@ pub mod format;
 mod gather;
 #[doc(hidden)]
 pub mod generate;
+#[doc(hidden)]
+pub mod image_files;
 #[doc(hidden)]
 pub mod import;
 #[doc(hidden)]
@@ -117,6 +120,8 @@ pub mod status;
 #[doc(hidden)]
 pub mod stream;
 mod task;
+#[doc(hidden)]
+pub mod time_left;
 #[doc(hidden)]
 pub mod timing_log;
 #[doc(hidden)]

@@ -12,11 +12,12 @@
 //! | `geometry.exr` | `depth.Z` (metres along the optical axis), `normal.X/Y/Z` (world), in the precision that the recipe keeps |
 //! | `record.json` | what is known in words and numbers |
 //!
-//! `species.png`, `plants.png` and `leaves.png` are left out where the recipe says so; they are read from the record then, whatever file of that
-//! name lies there.
+//! Which of them an image has, [`image_files`] says by the recipe; others of these names are neither written nor read. Where `species.png`,
+//! `plants.png` or `leaves.png` is left out, the record tells it.
 
 use super::File;
-use super::keep::{Kept, Omitted};
+use super::image_files::{self, NAMES};
+use super::keep::Kept;
 use super::label_maps;
 use super::photo::{Jpegs, Photo};
 use super::recipe::{Recipe, compact};
@@ -48,48 +49,55 @@ pub fn palette(with_ignore: bool) -> Vec<[u8; 3]> {
     colors
 }
 
-/// The files of a sample; `text` goes into the comments of label maps, and of photographs where the recipe is one of before.
+/// The files of a sample that belong to images of a recipe; `text` goes into the comments of label maps, and of photographs where the recipe is
+/// one of before.
 pub fn files(recipe: &Recipe, sample: &Sample, text: &str) -> Result<Vec<File>> {
     let (w, h) = sample.size();
     let base = folder(&sample.record.name);
     let mut files = Vec::new();
-    let mut add = |name: &str, bytes: Vec<u8>| files.push(File { path: format!("{base}/{name}"), bytes });
+    let mut add = |name: &str, encode: &dyn Fn() -> Result<Vec<u8>>| -> Result<()> {
+        if image_files::belongs(recipe, name) {
+            files.push(File { path: format!("{base}/{name}"), bytes: encode()? });
+        }
+        Ok(())
+    };
     let png = |picture: &Picture<'_>| output::encode_png(w, h, picture, text);
     let colors = palette(sample.semantics.contains(&IGNORE));
     let of_photograph = if recipe.has_comments() { text } else { "" };
     if let Some(jpeg) = &sample.jpeg {
-        let files = [("rgb.jpg", &jpeg.rgb), ("nir.jpg", &jpeg.nir)];
-        files.into_iter().filter(|(_, bytes)| !bytes.is_empty()).for_each(|(name, bytes)| add(name, bytes.clone()));
+        for (name, bytes) in [("rgb.jpg", &jpeg.rgb), ("nir.jpg", &jpeg.nir)] {
+            if !bytes.is_empty() {
+                add(name, &|| Ok(bytes.clone()))?;
+            }
+        }
     } else {
         if !sample.rgb.is_empty() {
-            add("rgb.png", output::encode_png(w, h, &Picture::Rgb(&sample.rgb), of_photograph)?);
+            add("rgb.png", &|| output::encode_png(w, h, &Picture::Rgb(&sample.rgb), of_photograph))?;
         }
         if !sample.nir.is_empty() {
-            add("nir.png", output::encode_png(w, h, &Picture::Gray(&sample.nir), of_photograph)?);
+            add("nir.png", &|| output::encode_png(w, h, &Picture::Gray(&sample.nir), of_photograph))?;
         }
     }
-    add("semantics.png", png(&Picture::Indexed(&sample.semantics, &colors))?);
-    if !sample.species.is_empty() && !recipe.omits(Omitted::Species) {
-        add("species.png", png(&Picture::Gray(&sample.species))?);
+    add("semantics.png", &|| png(&Picture::Indexed(&sample.semantics, &colors)))?;
+    if !sample.species.is_empty() {
+        add("species.png", &|| png(&Picture::Gray(&sample.species)))?;
     }
     if !sample.parts.is_empty() {
-        add("parts.png", png(&Picture::Indexed(&sample.parts, &PartKind::palette(recipe.models().len())))?);
+        let colors = PartKind::palette(recipe.models().len());
+        add("parts.png", &|| png(&Picture::Indexed(&sample.parts, &colors)))?;
     }
-    if !recipe.omits(Omitted::Plants) {
-        add("plants.png", png(&Picture::Numbers(&sample.plants))?);
-    }
-    if !recipe.omits(Omitted::Leaves) {
-        add("leaves.png", png(&Picture::Gray16(&sample.leaves))?);
-    }
+    add("plants.png", &|| png(&Picture::Numbers(&sample.plants)))?;
+    add("leaves.png", &|| png(&Picture::Gray16(&sample.leaves)))?;
     if !sample.coverage.is_empty() {
-        add("coverage.png", png(&Picture::Linear(&sample.coverage))?);
+        add("coverage.png", &|| png(&Picture::Linear(&sample.coverage)))?;
     }
     if !sample.depth.is_empty() || !sample.normals.is_empty() {
         let small = !(recipe.keeps(Kept::Depth32) && recipe.keeps(Kept::Normals16));
         let depth = if recipe.keeps(Kept::Depth) { Precision::Half } else { Precision::Single };
-        add("geometry.exr", output::encode_geometry(w, h, (&sample.depth, depth), &sample.normals, small)?);
+        let encode = || output::encode_geometry(w, h, (&sample.depth, depth), &sample.normals, small);
+        add("geometry.exr", &encode)?;
     }
-    add("record.json", compact(&sample.record)?);
+    add("record.json", &|| compact(&sample.record))?;
     Ok(files)
 }
 
@@ -101,32 +109,46 @@ pub trait Files {
     /// Where it lies, or would, for messages.
     fn place(&self, path: &str) -> PathBuf;
 
-    /// Whether images go without a label map, which their records tell.
-    fn omits(&self, map: Omitted) -> bool;
+    /// What says which files belong to images; `None` where nobody does, and all of them do.
+    fn recipe(&self) -> Option<&Recipe>;
 }
 
-impl Files for Path {
+/// A folder whose images lie in folders of their own. Its recipe is read once for all of them.
+struct Folder<'a> {
+    path: &'a Path,
+    /// `None` where there is none that can be read.
+    recipe: Option<Recipe>,
+}
+
+impl<'a> Folder<'a> {
+    fn open(path: &'a Path) -> Self {
+        Self { path, recipe: Recipe::read(path).ok() }
+    }
+}
+
+impl Files for Folder<'_> {
     fn contents(&self, path: &str) -> io::Result<Vec<u8>> {
-        crate::input::contents(&self.join(path))
+        crate::input::contents(&self.path.join(path))
     }
 
     fn place(&self, path: &str) -> PathBuf {
-        self.join(path)
+        self.path.join(path)
     }
 
-    fn omits(&self, map: Omitted) -> bool {
-        Recipe::read(self).is_ok_and(|recipe| recipe.omits(map))
+    fn recipe(&self) -> Option<&Recipe> {
+        self.recipe.as_ref()
     }
 }
 
 /// Reads an image of a dataset that lies in a folder of its own.
 pub fn read(dataset: &Path, name: &str) -> Result<Sample> {
-    sample(dataset, name)
+    sample(&Folder::open(dataset), name)
 }
 
 /// Reads what is known of an image that lies in a folder of its own, without its maps.
 pub fn read_record(dataset: &Path, name: &str) -> Result<Record> {
-    record(dataset, name)
+    // Every image has a record.
+    record(&Folder { path: dataset, recipe: None }, name)
 }
 
 /// The photograph in near infrared, without its ending.
@@ -142,12 +164,12 @@ pub(crate) struct GrayFile {
 }
 
 /// The files of one image.
-pub(crate) struct Image<'a, F: Files + ?Sized> {
+pub(crate) struct Image<'a, F: Files> {
     files: &'a F,
     name: &'a str,
 }
 
-impl<'a, F: Files + ?Sized> Image<'a, F> {
+impl<'a, F: Files> Image<'a, F> {
     pub(crate) fn of(files: &'a F, name: &'a str) -> Self {
         Self { files, name }
     }
@@ -161,10 +183,23 @@ impl<'a, F: Files + ?Sized> Image<'a, F> {
         self.files.place(&self.path(file))
     }
 
+    /// Whether a file of this name belongs to the image.
+    pub(crate) fn owns(&self, file: &str) -> bool {
+        self.files.recipe().is_none_or(|recipe| image_files::belongs(recipe, file))
+    }
+
+    /// Contents of a file; there is none that does not belong to the image, whatever lies there.
+    fn contents(&self, file: &str) -> io::Result<Vec<u8>> {
+        if self.owns(file) {
+            return self.files.contents(&self.path(file));
+        }
+        Err(io::Error::new(io::ErrorKind::NotFound, "images of this dataset have no such file"))
+    }
+
     /// A file that may be left out, with what errors call it.
     pub(crate) fn optional(&self, file: &str) -> Result<Option<(PathBuf, Vec<u8>)>> {
         let place = self.place(file);
-        match self.files.contents(&self.path(file)) {
+        match self.contents(file) {
             Ok(bytes) => Ok(Some((place, bytes))),
             Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(None),
             Err(e) => Err(Error::reading(&place)(e)),
@@ -173,7 +208,7 @@ impl<'a, F: Files + ?Sized> Image<'a, F> {
 
     fn needed(&self, file: &str) -> Result<(PathBuf, Vec<u8>)> {
         let place = self.place(file);
-        let bytes = self.files.contents(&self.path(file)).map_err(Error::reading(&place))?;
+        let bytes = self.contents(file).map_err(Error::reading(&place))?;
         Ok((place, bytes))
     }
 
@@ -184,11 +219,17 @@ impl<'a, F: Files + ?Sized> Image<'a, F> {
 
     /// The photograph in colour, as PNG or as JPEG: width, height, pixels.
     pub(crate) fn photograph(&self) -> Result<(u32, u32, Vec<[u8; 3]>)> {
-        if let Some(stored) = self.stored("rgb")? {
-            return stored.rgb();
+        match self.stored("rgb")? {
+            Some(stored) => stored.rgb(),
+            None => Err(self.no_photograph()),
         }
-        let (place, bytes) = self.needed("rgb.png")?;
-        output::decode_rgb(&place, &bytes).map_err(Error::in_dataset)
+    }
+
+    /// The error of an image whose photograph in colour is not there.
+    fn no_photograph(&self) -> Error {
+        let file = if self.owns("rgb.png") || !self.owns("rgb.jpg") { "rgb.png" } else { "rgb.jpg" };
+        let source = io::Error::new(io::ErrorKind::NotFound, "the photograph is not there");
+        Error::reading(&self.place(file))(source)
     }
 
     /// A band in gray, such as `nir`, as PNG or as JPEG, where there is one.
@@ -211,15 +252,10 @@ impl<'a, F: Files + ?Sized> Image<'a, F> {
         Ok(None)
     }
 
-    /// The file of a label map; none where images go without it, whatever lies there.
-    fn label_map(&self, map: Omitted, file: &str) -> Result<Option<(PathBuf, Vec<u8>)>> {
-        if self.files.omits(map) { Ok(None) } else { self.optional(file) }
-    }
-
     /// Numbers of species, from their picture or, where there is none, from the record of an image of this size, which may be `known`
     /// already: width, height, values. No values of an imported image.
     pub(crate) fn species(&self, size: (u32, u32), known: Option<&Record>) -> Result<(u32, u32, Vec<u8>)> {
-        match self.label_map(Omitted::Species, "species.png")? {
+        match self.optional("species.png")? {
             Some((place, bytes)) => output::decode_gray(&place, &bytes).map_err(Error::in_dataset),
             None => self.told(size, known, label_maps::species),
         }
@@ -227,7 +263,7 @@ impl<'a, F: Files + ?Sized> Image<'a, F> {
 
     /// Numbers of plants, in the same way.
     pub(crate) fn plants(&self, size: (u32, u32), known: Option<&Record>) -> Result<(u32, u32, Vec<u32>)> {
-        match self.label_map(Omitted::Plants, "plants.png")? {
+        match self.optional("plants.png")? {
             Some((place, bytes)) => output::decode_numbers(&place, &bytes).map_err(Error::in_dataset),
             None => self.told(size, known, label_maps::plants),
         }
@@ -235,7 +271,7 @@ impl<'a, F: Files + ?Sized> Image<'a, F> {
 
     /// Numbers of leaves, in the same way.
     fn leaves(&self, size: (u32, u32), known: Option<&Record>) -> Result<(u32, u32, Vec<u16>)> {
-        match self.label_map(Omitted::Leaves, "leaves.png")? {
+        match self.optional("leaves.png")? {
             Some((place, bytes)) => output::decode_gray16(&place, &bytes).map_err(Error::in_dataset),
             None => self.told(size, known, label_maps::leaves),
         }
@@ -292,11 +328,11 @@ impl Stored {
 type Photographs = (Vec<[u8; 3]>, Vec<u8>, Option<Jpegs>);
 
 /// The photographs of an image.
-fn photographs(image: &Image<'_, impl Files + ?Sized>, record: &Record) -> Result<Photographs> {
+fn photographs(image: &Image<'_, impl Files>, record: &Record) -> Result<Photographs> {
     let size = (record.width, record.height);
     let (rgb, nir) = (image.stored("rgb")?, image.stored(NIR)?);
     if rgb.is_none() && record.has_photograph() {
-        image.needed("rgb.png")?;
+        return Err(image.no_photograph());
     }
     let mut pixels = (Vec::new(), Vec::new());
     if let Some(stored) = &rgb {
@@ -318,7 +354,7 @@ fn photographs(image: &Image<'_, impl Files + ?Sized>, record: &Record) -> Resul
 }
 
 /// Reads an image.
-pub(super) fn sample(files: &(impl Files + ?Sized), name: &str) -> Result<Sample> {
+pub(super) fn sample(files: &impl Files, name: &str) -> Result<Sample> {
     let image = Image::of(files, name);
     let record = record(files, name)?;
     let size = (record.width, record.height);
@@ -368,7 +404,7 @@ pub(super) fn sample(files: &(impl Files + ?Sized), name: &str) -> Result<Sample
 }
 
 /// Reads what is known of an image, without its maps.
-pub(super) fn record(files: &(impl Files + ?Sized), name: &str) -> Result<Record> {
+pub(super) fn record(files: &impl Files, name: &str) -> Result<Record> {
     let path = format!("{}/record.json", folder(name));
     let place = files.place(&path);
     let bytes = files.contents(&path).map_err(Error::io(&place))?;
@@ -385,7 +421,7 @@ pub(super) fn record(files: &(impl Files + ?Sized), name: &str) -> Result<Record
 
 /// The values of a picture that has its record's size.
 fn sized<T>(
-    image: &Image<'_, impl Files + ?Sized>,
+    image: &Image<'_, impl Files>,
     file: &str,
     size: (u32, u32),
     (w, h, values): (u32, u32, Vec<T>),
@@ -402,22 +438,6 @@ fn check(path: &Path, expected: (u32, u32), found: (u32, u32)) -> Result<()> {
     Err(Error::damaged(format!("it has {x} × {y} pixels, its record says {w} × {h}")).in_file(path))
 }
 
-/// Names of an image's files, in the order in which [`files`] makes them and archives hold them: what is known of it comes last.
-const ORDER: [&str; 12] = [
-    "rgb.png",
-    "rgb.jpg",
-    "nir.png",
-    "nir.jpg",
-    "semantics.png",
-    "species.png",
-    "parts.png",
-    "plants.png",
-    "leaves.png",
-    "coverage.png",
-    "geometry.exr",
-    "record.json",
-];
-
 /// Whether a file is an image's own, and of no format.
 pub(super) fn is_native(path: &str) -> bool {
     path.starts_with("images/")
@@ -431,6 +451,27 @@ pub(super) fn is_photograph(path: &str) -> bool {
 /// Paths of an image's own files in the order of archives.
 pub(super) fn in_order<'a>(paths: impl Iterator<Item = &'a String>) -> Vec<&'a String> {
     let mut all: Vec<&String> = paths.collect();
-    all.sort_by_key(|path| ORDER.iter().position(|name| path.ends_with(&format!("/{name}"))));
+    all.sort_by_key(|path| NAMES.iter().position(|name| path.ends_with(&format!("/{name}"))));
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::recipe::FILE;
+
+    /// Rationale: a recipe that is read anew for each map costs as much as the smaller maps do. Expected: one that was read is asked again for a file
+    /// of any image when it is gone from the disk; a folder without one has every file.
+    #[test]
+    fn the_recipe_of_a_folder_is_read_once() {
+        let keep = tempfile::tempdir().unwrap();
+        let (recipe, image) = (keep.path().join(FILE), keep.path().join(folder("000000")));
+        std::fs::write(&recipe, Recipe::of_species(Vec::new()).text().unwrap()).unwrap();
+        std::fs::create_dir_all(&image).unwrap();
+        std::fs::write(image.join("coverage.png"), "").unwrap();
+        let imported = Folder::open(keep.path());
+        std::fs::remove_file(&recipe).unwrap();
+        assert!(!Image::of(&imported, "000000").has("coverage.png").unwrap());
+        assert!(Image::of(&Folder::open(keep.path()), "000000").has("coverage.png").unwrap());
+    }
 }

@@ -3,6 +3,7 @@
 use super::begin::begin;
 use super::classes::Classes;
 use super::gather::{Gathered, gather};
+use super::generate::interrupted;
 use super::keep::{self, Kept, Omitted};
 use super::labelling::Labelling;
 use super::labels::Labels;
@@ -10,8 +11,10 @@ use super::photo::Photo;
 use super::recipe::{FILE, Made, Recipe, Rendering};
 use super::set::Set;
 use super::split::Shares;
+use super::status::images_there;
 use super::{File, checksum_record, format, links, pack};
 use crate::ablation::{Edit, FULL};
+use crate::error::Kind;
 use crate::job::{Renderer, SceneFile};
 use crate::scene::assemble::BuildProgress;
 use crate::sensor::Camera;
@@ -99,11 +102,24 @@ impl Order {
 const MOST_SPECIES: usize = u8::MAX as usize;
 
 /// Begins a dataset in `folder`, or goes on with the same one: it may get longer and get more formats. Returns it with what the user
-/// should know.
-pub fn plan(folder: &Path, order: &Order) -> Result<(Set, Vec<String>)> {
-    let Draft { recipe, files, warnings, .. } = draft(order, &Arc::default())?;
+/// should know. Given up where the flag is raised while the first field grows: [`Kind::Interrupted`], with the number of images that are there.
+pub fn plan(folder: &Path, order: &Order, stop: &Arc<AtomicBool>) -> Result<(Set, Vec<String>)> {
+    let drafted = draft(order, stop).map_err(|error| match error.kind() {
+        Kind::Interrupted => given_up(folder, order.count, error),
+        _ => error,
+    });
+    let Draft { recipe, files, warnings, .. } = drafted?;
     let recipe = begin(folder, recipe, &files, order.omit.is_some())?;
     Ok((Set::new(folder, recipe), warnings))
+}
+
+/// An interruption, with what lies in the folder of a dataset that is to have so many images.
+fn given_up(folder: &Path, images: u64, error: Error) -> Error {
+    let begun = Set::open(folder).and_then(|set| Ok((images_there(&set)?, set.recipe.count)));
+    match begun {
+        Ok((there, before)) => interrupted(folder, there, images.max(before) as usize),
+        Err(_) => error.in_file(folder),
+    }
 }
 
 /// A dataset that was checked and not begun.

@@ -127,7 +127,7 @@ impl LastField {
 }
 
 /// Of an image of a field: which of its day it is, and the day.
-fn of_day(recipe: &Recipe, capture: u64) -> (u64, Option<u32>) {
+pub(super) fn of_day(recipe: &Recipe, capture: u64) -> (u64, Option<u32>) {
     let a_day = recipe.captures_a_day();
     (capture % a_day, recipe.days().get((capture / a_day) as usize).copied())
 }

@@ -3,7 +3,6 @@
 use super::archive::entry_name;
 use super::checksum::Checksum;
 use super::checksum_record::ChecksumRecord;
-use super::keep::Omitted;
 use super::links;
 use super::native::{self, Files};
 use super::pack::record::Packs;
@@ -161,8 +160,8 @@ impl Files for Set {
         }
     }
 
-    fn omits(&self, map: Omitted) -> bool {
-        self.recipe.omits(map)
+    fn recipe(&self) -> Option<&Recipe> {
+        Some(&self.recipe)
     }
 }
 

@@ -286,6 +286,11 @@ fn last_shards(runs: &[Run<'_>]) -> u64 {
     last.and_then(|run| run.shard).map_or(1, |(_, of)| of)
 }
 
+/// How many images of a dataset are there.
+pub(super) fn images_there(set: &Set) -> Result<usize> {
+    Ok(there(set, &AtomicBool::new(false))?.into_iter().filter(|there| *there).count())
+}
+
 /// Of each image, whether it is there.
 fn there(set: &Set, stop: &AtomicBool) -> Result<Vec<bool>> {
     let freed = push::freed(set);

@@ -56,7 +56,7 @@ impl ImageStream {
         })?;
         let keep = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir()))?;
         let order = Order { count: end, formats: Vec::new(), ..order.clone() };
-        let (set, warnings) = plan(keep.path(), &order)?;
+        let (set, warnings) = plan(keep.path(), &order, &Arc::default())?;
         Ok(Self { _keep: keep, set, scene: order.scene, indices: first..end, warnings })
     }
 

@@ -3,7 +3,7 @@
 use super::checksum::Checksum;
 use super::difference::Difference;
 use super::finish::{lacks, of_image, ranges};
-use super::keep::Omitted;
+use super::image_files::{NAMES, belongs};
 use super::native::Files;
 use super::pack::{Id, Packing, store};
 use super::recipe::MANIFEST;
@@ -176,10 +176,10 @@ fn look(set: &Set, index: u64) -> Result<Looked> {
     Ok(Looked { missing, faults, photograph })
 }
 
-/// Label maps that lie beside an image though its dataset goes without them, each with what is wrong with it: nobody reads them.
+/// Files that lie beside an image though its dataset goes without them, each with what is wrong with it: nobody reads them.
 fn strays(set: &Set, name: &str) -> Vec<String> {
-    let omitted = Omitted::NAMED.iter().filter(|(_, map, _)| set.recipe.omits(*map));
-    let paths = omitted.map(|(map, ..)| format!("{}/{map}.png", native::folder(name)));
+    let others = NAMES.iter().filter(|file| !belongs(&set.recipe, file));
+    let paths = others.map(|file| format!("{}/{file}", native::folder(name)));
     let there = paths.filter(|path| set.length(path).is_ok());
     there.map(|path| format!("{path} does not belong here: the recipe leaves it out; remove it")).collect()
 }

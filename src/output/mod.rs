@@ -34,7 +34,7 @@ pub use self::png::{
 pub use denoise::Denoiser;
 pub use lock::Lock;
 pub use photo::{
-    ENDINGS, decode_gray_jpeg, decode_jpeg, encode_gray_jpeg, encode_jpeg, photo_size, photograph_in, read_color_photo,
+    ENDINGS, decode_gray_jpeg, decode_jpeg, encode_gray_jpeg, encode_jpeg, photo_size, read_color_photo,
     read_gray_photo, read_photo, resize_gray, shrink, shrunk,
 };
 

@@ -7,15 +7,10 @@ use image::{
 };
 use std::fs::File;
 use std::io::{BufReader, Cursor, ErrorKind};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Endings of the names of photographs that we write.
 pub const ENDINGS: [&str; 2] = ["png", "jpg"];
-
-/// The photograph of this name, such as `rgb` or a band `nir`, in the folder of an image, as PNG or as JPEG; `None` where neither is there.
-pub fn photograph_in(folder: &Path, name: &str) -> Option<PathBuf> {
-    ENDINGS.iter().map(|ending| folder.join(format!("{name}.{ending}"))).find(|path| path.is_file())
-}
 
 /// Reads a PNG or JPEG photograph of any depth as 8-bit sRGB: width, height, pixels.
 pub fn read_photo(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {

@@ -82,7 +82,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         sets.push(if args.shard.is_some() {
             begun(&folder)?
         } else {
-            order::begin(&folder, args.images.order(edit)?, args.work.quiet)?
+            order::begin(&folder, args.images.order(edit)?, args.work.quiet, signals)?
         });
     }
     let mut paths = vec![page(out, &args.real)?];

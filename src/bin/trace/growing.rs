@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// Between two looks at it.
-const EVERY: Duration = Duration::from_millis(100);
+pub(crate) const EVERY: Duration = Duration::from_millis(100);
 
 /// A line that goes with it.
 pub(crate) struct Line {
@@ -22,7 +22,10 @@ impl Line {
         let progress = Arc::<BuildProgress>::default();
         let seen = !quiet && std::io::stderr().is_terminal();
         let bar = if seen { ProgressBar::new_spinner() } else { ProgressBar::hidden() };
-        show(&bar, "{spinner} {growing}  {elapsed} gone", &progress, |_| true);
+        bar.set_style(style("{spinner} {growing}  {elapsed} gone", &progress, |_| true));
+        if !bar.is_hidden() {
+            bar.enable_steady_tick(EVERY);
+        }
         Self { progress, bar }
     }
 
@@ -42,13 +45,12 @@ impl Line {
     }
 }
 
-/// Shows what is under way at `{growing}` of a bar's template, as long as that is wanted.
-pub(crate) fn show(
-    bar: &ProgressBar,
+/// A bar's style, which shows what is under way at `{growing}` of its template, as long as that is wanted.
+pub(crate) fn style(
     template: &str,
     progress: &Arc<BuildProgress>,
     wanted: impl Fn(&ProgressState) -> bool + Clone + Send + Sync + 'static,
-) {
+) -> ProgressStyle {
     let progress = Arc::clone(progress);
     let growing = move |state: &ProgressState, out: &mut dyn fmt::Write| {
         if wanted(state) {
@@ -57,8 +59,5 @@ pub(crate) fn show(
         }
     };
     let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
-    bar.set_style(style.with_key("growing", growing));
-    if !bar.is_hidden() {
-        bar.enable_steady_tick(EVERY);
-    }
+    style.with_key("growing", growing)
 }

@@ -1,5 +1,6 @@
 //! `trace sequence`: all images of a drive through one field or several, or of their days, as a dataset.
 
+use crate::dataset::bill::{self, DryRunArgs};
 use crate::dataset::order::{ContentArgs, LookArgs, begin, formats};
 use crate::dataset::render::{WorkArgs, generate};
 use crate::field::{MemoryArgs, SceneArgs};
@@ -38,6 +39,8 @@ pub(crate) struct Args {
     memory: MemoryArgs,
     #[command(flatten)]
     work: WorkArgs,
+    #[command(flatten)]
+    dry: DryRunArgs,
 }
 
 /// Days, in order.
@@ -48,7 +51,7 @@ fn days(text: &str) -> Result<Days, String> {
     DaysDesc::read(text).map(Days).map_err(|e| e.to_string())
 }
 
-/// Makes what is missing of the dataset.
+/// Makes what is missing of the dataset, or tells what it will cost.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     args.scene.check()?;
     let days = args.days.as_ref().map_or(&[][..], |days| &days.0);
@@ -69,7 +72,10 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     order.options = args.look.options();
     order.labels_only = args.look.labels_only;
     args.content.enter(&mut order)?;
-    let set = begin(&args.out, order, args.work.quiet)?;
+    if args.dry.dry_run {
+        return bill::run(&args.out, &order, args.work.threads, signals);
+    }
+    let set = begin(&args.out, order, args.work.quiet, signals)?;
     generate(&set, &args.work, Shard::ALL, args.memory.bytes, signals)?;
     finish::finish(&set, None)
 }

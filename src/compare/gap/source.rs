@@ -2,10 +2,12 @@
 //!
 //! Pictures are found as `trace compare` finds them: below `images/` where there is such a folder; of datasets and renders each `rgb.png` or `rgb.jpg`.
 //! Labels are `labels/NAME.png` or `semantics.png` beside such a picture; near infrared is `nir/NAME.png`, or the file whose name begins with
-//! `nir` where the picture's begins with `rgb`. Images of a dataset in packs are read out of their archives.
+//! `nir` where the picture's begins with `rgb`. Images of a dataset in packs are read out of their archives; files that a dataset leaves out
+//! are not read.
 
-use crate::compare::pairs::{beside, beside_rgb, first, stem, told, walk};
+use crate::compare::pairs::{beside, beside_rgb, first, recipe_of, stem, told, walk};
 use crate::compare::picture::{self, Picture};
+use crate::dataset::image_files::photograph_in;
 use crate::dataset::native::Image;
 use crate::dataset::pack::refuse_archives;
 use crate::dataset::recipe::FILE;
@@ -138,17 +140,19 @@ pub fn photos(folder: &Path, option: &str) -> Result<Vec<Photo>> {
         return Err(Error::input(format!("{option} {}: {what}", folder.display()))
             .help("give a folder with images/ and, if there are any, labels/ and nir/; or a dataset"));
     }
+    let recipe = recipe_of(folder);
+    let recipe = recipe.as_ref();
     let mut found = BTreeMap::new();
     let images = folder.join("images");
-    if let Some(rendered) = output::photograph_in(folder, "rgb") {
+    if let Some(rendered) = photograph_in(folder, "rgb", recipe) {
         found.insert(stem(&rendered), rendered);
     } else if images.is_dir() {
-        walk(&images, "", &mut found)?;
+        walk(&images, "", recipe, &mut found)?;
     } else {
-        walk(folder, "", &mut found)?;
+        walk(folder, "", recipe, &mut found)?;
         found.retain(|name, _| !name.starts_with("labels/") && !name.starts_with("nir/"));
     }
-    let partners: Vec<PathBuf> = found.values().filter_map(|rgb| beside_rgb(rgb, "nir")).collect();
+    let partners: Vec<PathBuf> = found.values().filter_map(|rgb| beside_rgb(rgb, "nir", recipe)).collect();
     found.retain(|_, rgb| !partners.contains(rgb));
     if found.is_empty() {
         return Err(Error::input(format!("{option} {}: there is no PNG or JPEG in this folder", folder.display()))
@@ -156,7 +160,7 @@ pub fn photos(folder: &Path, option: &str) -> Result<Vec<Photo>> {
     }
     let photo = |(name, rgb): (String, PathBuf)| {
         let below = |other: &str| first([folder.join(other).join(format!("{name}.png"))]);
-        let nir = beside_rgb(&rgb, "nir").or_else(|| below("nir"));
+        let nir = beside_rgb(&rgb, "nir", recipe).or_else(|| below("nir"));
         let labels = beside(&rgb).or_else(|| below("labels"));
         Photo { name, place: Place::Files { rgb, nir, labels } }
     };

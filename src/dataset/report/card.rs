@@ -2,7 +2,7 @@
 
 use super::statistics::{Species, Statistics};
 use crate::dataset::format;
-use crate::dataset::keep::{Kept, Omitted};
+use crate::dataset::image_files::belongs;
 use crate::dataset::photo::Photo;
 use crate::dataset::recipe::{Made, Recipe, Rendering};
 use crate::dataset::split::Split;
@@ -154,7 +154,7 @@ fn stages(of: &Species) -> String {
 
 /// The files of an image, and how they are opened.
 pub(super) fn reading(recipe: &Recipe, nir: bool) -> Markup {
-    let rendered = matches!(recipe.made, Made::Rendered(_));
+    let has = |file: &str| belongs(recipe, file);
     let jpeg = recipe.photo() != Photo::Png;
     let mut rows = Vec::new();
     if !recipe.labels_only() {
@@ -164,21 +164,21 @@ pub(super) fn reading(recipe: &Recipe, nir: bool) -> Markup {
         rows.push((if jpeg { "nir.jpg" } else { "nir.png" }, html! { "photograph in near infrared, 8 bit" }));
     }
     rows.push(("semantics.png", html! { "class, indexed: 0 soil, 1 crop, 2 weed, 255 no label" }));
-    if rendered && !recipe.omits(Omitted::Species) {
+    if has("species.png") {
         rows.push(("species.png", html! { "number of the species in the table above, 0 for none" }));
     }
-    if !recipe.omits(Omitted::Plants) {
+    if has("plants.png") {
         let plants = "number of the plant, 0 for none; 16 bit, or R + 256 G + 65536 B where one is above 65535";
         rows.push(("plants.png", html! { (plants) }));
     }
-    if !recipe.omits(Omitted::Leaves) {
+    if has("leaves.png") {
         rows.push(("leaves.png", html! { "number of the leaf on its plant, 16 bit, 0 for none" }));
     }
-    if recipe.keeps(Kept::Coverage) && rendered {
+    if has("coverage.png") {
         let coverage = "share of soil, crop, weed in the pixel as R, G, B; they sum to 255";
         rows.push(("coverage.png", html! { (coverage) }));
     }
-    if [Kept::Depth, Kept::Depth32, Kept::Normals, Kept::Normals16].iter().any(|map| recipe.keeps(*map)) && rendered {
+    if has("geometry.exr") {
         let geometry = html! {
             code { "depth.Z" } " in metres along the optical axis, " code { "normal.X/Y/Z" } " in world coordinates"
         };
@@ -187,7 +187,7 @@ pub(super) fn reading(recipe: &Recipe, nir: bool) -> Markup {
     let record =
         "plants and leaves with boxes, masks, visible fractions and keypoints; the conditions drawn for the image";
     rows.push(("record.json", html! { (record) }));
-    let example = if recipe.omits(Omitted::Plants) { WITHOUT_PLANTS } else { EXAMPLE };
+    let example = if has("plants.png") { EXAMPLE } else { WITHOUT_PLANTS };
     html! {
         (pairs(&rows))
         pre { code { (if recipe.pack.is_some() { PACKED } else { FOLDERS }) (example) } }

@@ -2,6 +2,7 @@
 
 use crate::dataset::Set;
 use crate::dataset::native::{GrayFile, Image};
+use crate::output::ENDINGS;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -97,9 +98,7 @@ pub(crate) fn read(image: &Image<'_, Set>, bands: &[Band]) -> Result<(u32, u32, 
             pixels.iter().map(|p| p[channel]).collect()
         } else {
             let Some(GrayFile { place, width: w, height: h, values }) = image.band(band.name())? else {
-                return Err(Error::input(format!("this image has no band `{}`", band.name()))
-                    .in_file(image.place(&format!("{}.png", band.name())))
-                    .help("choose bands that all sets have, such as --bands rgb"));
+                return Err(no_band(image, band.name()));
             };
             if *size.get_or_insert((w, h)) != (w, h) {
                 return Err(Error::input(format!("it is {w} × {h} pixels, the others are not")).in_file(place));
@@ -109,6 +108,15 @@ pub(crate) fn read(image: &Image<'_, Set>, bands: &[Band]) -> Result<(u32, u32, 
     }
     let (w, h) = size.ok_or_else(|| Error::misuse("no band was named").help("--bands rgb"))?;
     Ok((w, h, planes))
+}
+
+/// The error of an image without a band; a file of that name may lie there all the same where the dataset goes without it.
+fn no_band(image: &Image<'_, Set>, name: &str) -> Error {
+    let left_out = !ENDINGS.iter().any(|ending| image.owns(&format!("{name}.{ending}")));
+    let why = if left_out { ": its dataset was made without" } else { "" };
+    Error::input(format!("this image has no band `{name}`{why}"))
+        .in_file(image.place(&format!("{name}.png")))
+        .help("choose bands that all sets have, such as --bands rgb")
 }
 
 /// The photograph of an image; an error that says so where it is labels alone.

@@ -7,6 +7,7 @@
 //!
 //! Images of a set in packs are read out of their archives.
 
+use crate::dataset::image_files::photograph_in;
 use crate::dataset::native::Image;
 use crate::dataset::pack::refuse_archives;
 use crate::dataset::{Set, native};
@@ -25,6 +26,8 @@ use std::sync::Arc;
 const ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];
 /// The photograph of a set's image, unless it is stored as JPEG.
 const PHOTO: &str = "rgb.png";
+/// What is known of a set's image: the last file of one that is whole.
+const RECORD: &str = "record.json";
 
 /// A picture without labels.
 #[derive(Clone, Debug)]
@@ -168,22 +171,31 @@ fn selection(input: &Path) -> Result<Option<Selection>> {
     }
 }
 
-/// A set's images, in folders or in packs.
+/// A set's images, in folders or in packs, each with the files that the set's recipe gives it.
 fn images(selection: &Selection, shape: &Shape) -> Result<Vec<Picture>> {
     let (set, numbers) = selection.open(Pick::All, 0)?;
+    if set.recipe.labels_only() {
+        return Err(Error::input("there are no photographs in this set: it holds labels alone")
+            .help("predict images of a set that was made without --labels-only")
+            .in_file(set.folder.clone()));
+    }
     let set = Arc::new(set);
+    let recipe = Some(&set.recipe);
     let image = |number: u64| {
         let name = Set::name(number);
         let folder = set.folder.join(native::folder(&name));
-        if folder.is_dir() {
-            let photo = output::photograph_in(&folder, "rgb").unwrap_or_else(|| folder.join(PHOTO));
-            let beside = |band: &Band| output::photograph_in(&folder, band.name());
-            let source = Source::Files(planes(&photo, shape, &beside)?);
-            return Ok(Picture { name, photo, source });
-        }
-        if set.recipe.pack.is_some() && Image::of(set.as_ref(), &name).has("record.json")? {
+        // A folder beside packs that is no whole image: something was left in it, or put there.
+        let is_packed = set.recipe.pack.is_some() && !folder.join(RECORD).is_file();
+        if is_packed && Image::of(set.as_ref(), &name).has(RECORD)? {
             let source = Source::Packed(Arc::clone(&set), shape.bands.clone());
             return Ok(Picture { photo: folder.join(PHOTO), name, source });
+        }
+        if folder.is_dir() {
+            let missing = || folder.join(format!("rgb.{}", set.recipe.photo().ending()));
+            let photo = photograph_in(&folder, "rgb", recipe).unwrap_or_else(missing);
+            let beside = |band: &Band| photograph_in(&folder, band.name(), recipe);
+            let source = Source::Files(planes(&photo, shape, &beside)?);
+            return Ok(Picture { name, photo, source });
         }
         Err(Error::input("this image is not there yet").in_file(folder).help("the command that began the set makes it"))
     };

@@ -1,4 +1,4 @@
-//! What a dataset will cost: `trace dataset … --dry-run` and `trace dataset plan … --bill`.
+//! What a dataset will cost: `trace dataset … --dry-run`, `trace sequence … --dry-run` and `trace dataset plan … --bill`.
 
 use furrow::cli;
 use furrow::cli::signal::Signals;
@@ -16,11 +16,19 @@ const SPARE: f64 = 1.25;
 /// Bytes of a GiB.
 const GIB: f64 = (1_u64 << 30) as f64;
 
-/// Tells what an order will cost; nothing is written into its folder.
+/// Whether anything is made.
+#[derive(clap::Args)]
+pub(crate) struct DryRunArgs {
+    /// Make nothing: draw three to sixteen images with fewer samples, and tell core hours, disk, files, memory and a number of shards.
+    #[arg(long)]
+    pub(crate) dry_run: bool,
+}
+
+/// Tells what an order will cost, or that it cannot go into its folder, where nothing is written.
 pub(crate) fn run(folder: &Path, order: &Order, threads: usize, signals: &Signals) -> Result<Vec<PathBuf>> {
     cli::check_folder(folder)?;
     let threads = Threads::new(threads)?;
-    let (bill, warnings) = bill::bill(order, &threads, signals.heed())?;
+    let (bill, warnings) = bill::bill(folder, order, &threads, signals.heed())?;
     for warning in warnings {
         furrow::tell!("warning: {warning}");
     }
@@ -38,7 +46,7 @@ fn listed(names: &[String]) -> String {
 
 /// A bill in words.
 fn rows(folder: &Path, bill: &Bill, threads: usize) -> Vec<[String; 2]> {
-    let Bill { images, core_s, grow_s, sample_s, bytes, files, .. } = *bill;
+    let Bill { images, fields, core_s, grow_s, sample_s, bytes, files, .. } = *bill;
     let row = |name: &str, words: String| [name.to_owned(), words];
     let part = |seconds: f64| format!("{:.0} %", 100.0 * seconds / core_s.max(1e-9));
     let mut probes: Vec<String> = bill.probes.iter().map(|index| dataset::Set::name(*index)).collect();
@@ -46,6 +54,7 @@ fn rows(folder: &Path, bill: &Bill, threads: usize) -> Vec<[String; 2]> {
     let [fewer, more] = bill.spp;
     let samples = if fewer == more { more.to_string() } else { format!("{fewer} and {more}") };
     let with = count(threads as u64, "thread", "threads");
+    let of_fields = if fields < images { format!(" of {}", count(fields, "field", "fields")) } else { String::new() };
     let memory = (bill.memory(CORES as usize) as f64 * SPARE / GIB).ceil().max(1.0);
     vec![
         row("from", format!("{} with {samples} samples a pixel", listed(&probes))),
@@ -62,7 +71,7 @@ fn rows(folder: &Path, bill: &Bill, threads: usize) -> Vec<[String; 2]> {
         ),
         row("here", format!("{} hours with {with}", number(core_s / 3600.0 / threads as f64))),
         row("disk", format!("{} GB ({} MB)", number(bytes as f64 / 1e9), number(bytes as f64 / 1e6))),
-        row("files", format!("{} ({})", number(files as f64), count(images, "image", "images"))),
+        row("files", format!("{} ({}{of_fields})", number(files as f64), count(images, "image", "images"))),
         row(
             "memory",
             format!(

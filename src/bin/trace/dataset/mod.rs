@@ -1,6 +1,6 @@
 //! `trace dataset`: many fields, with all their labels, in the formats of other tools.
 
-mod bill;
+pub(crate) mod bill;
 mod emit;
 mod finish;
 mod import;
@@ -78,9 +78,8 @@ struct MakeArgs {
     work: render::WorkArgs,
     #[command(flatten)]
     push: render::PushArgs,
-    /// Make nothing: draw three to sixteen images with fewer samples, and tell core hours, disk, files, memory and a number of shards.
-    #[arg(long)]
-    dry_run: bool,
+    #[command(flatten)]
+    dry: bill::DryRunArgs,
 }
 
 /// Runs a verb on datasets; returns the paths of the files that matter.
@@ -90,7 +89,7 @@ pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
             bill::run(order.images.folder(), &order.order()?, 0, signals)
         }
         Some(Verb::Plan(PlanArgs { order, bill: false })) => {
-            let set = order::run(order, false)?;
+            let set = order::run(order, false, signals)?;
             order::tell_plants(&set, false)?;
             Ok(vec![set.folder.join(furrow::dataset::recipe::FILE)])
         }
@@ -100,13 +99,13 @@ pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
         Some(Verb::Status(args)) => status::run(args, signals),
         Some(Verb::Verify(args)) => verify::run(args, signals),
         Some(Verb::Emit(args)) => emit::run(args),
-        None if cli.make.dry_run => {
+        None if cli.make.dry.dry_run => {
             let MakeArgs { order, work, .. } = &cli.make;
             bill::run(order.images.folder(), &order.order()?, work.threads, signals)
         }
         None => {
             let push = cli.make.push.push()?;
-            let set = order::run(&cli.make.order, cli.make.work.quiet)?;
+            let set = order::run(&cli.make.order, cli.make.work.quiet, signals)?;
             order::tell_plants(&set, cli.make.work.quiet)?;
             let memory = cli.make.order.images.memory.bytes;
             let all = furrow::dataset::generate::Shard::ALL;

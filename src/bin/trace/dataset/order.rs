@@ -4,6 +4,7 @@ use crate::field::{MemoryArgs, SceneArgs};
 use crate::growing::Line;
 use crate::quality::{TechniqueArgs, samples};
 use furrow::ablation::{Edit, FULL};
+use furrow::cli::signal::Signals;
 use furrow::dataset::classes::Classes;
 use furrow::dataset::keep::{self, Kept, Omitted};
 use furrow::dataset::labelling::Labelling;
@@ -143,8 +144,8 @@ impl Args {
 }
 
 /// Begins the dataset, or finds it begun; `quiet` shows nothing meanwhile.
-pub(crate) fn run(args: &Args, quiet: bool) -> Result<Set> {
-    begin(args.images.folder(), args.order()?, quiet)
+pub(crate) fn run(args: &Args, quiet: bool, signals: &Signals) -> Result<Set> {
+    begin(args.images.folder(), args.order()?, quiet, signals)
 }
 
 /// Tells how many plants images are to be expected to show; `quiet` leaves only warnings.
@@ -156,12 +157,12 @@ pub(super) fn tell_plants(set: &Set, quiet: bool) -> Result<()> {
     Ok(())
 }
 
-/// Begins a dataset, or finds it begun; `quiet` shows nothing meanwhile.
-pub(crate) fn begin(folder: &Path, mut order: Order, quiet: bool) -> Result<Set> {
+/// Begins a dataset, or finds it begun; `quiet` shows nothing meanwhile. A signal ends it while the first field grows.
+pub(crate) fn begin(folder: &Path, mut order: Order, quiet: bool, signals: &Signals) -> Result<Set> {
     cli::check_folder(folder)?;
     let growing = Line::begin(quiet);
     order.progress.clone_from(growing.progress());
-    let planned = plan::plan(folder, &order);
+    let planned = plan::plan(folder, &order, signals.heed());
     growing.end();
     let (set, warnings) = planned?;
     for warning in warnings {

@@ -1,8 +1,9 @@
 //! How far a dataset is: a bar on a terminal, a line now and then in a log.
 
 use crate::growing;
+use furrow::dataset::time_left::TimeLeft;
 use furrow::scene::assemble::BuildProgress;
-use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
@@ -16,7 +17,12 @@ pub(crate) struct Progress {
     begin: Instant,
     total: AtomicU64,
     done: AtomicU64,
+    /// Drawn as soon as it is known how many there are.
     bar: ProgressBar,
+    /// Whether somebody looks at the bar.
+    seen: bool,
+    /// What tells the time left, where images take different times; at their mean rate otherwise.
+    time_left: Option<Arc<TimeLeft>>,
     /// When the log's last line was written; `None` where no log is wanted.
     log: Option<Mutex<Instant>>,
 }
@@ -25,18 +31,24 @@ impl Progress {
     /// Begins to count; `begin` is when the work began.
     pub(crate) fn new(begin: Instant, quiet: bool) -> Self {
         let terminal = std::io::stderr().is_terminal();
-        let bar = if quiet || !terminal { ProgressBar::hidden() } else { ProgressBar::new(0) };
+        let bar = ProgressBar::hidden();
         let style = ProgressStyle::with_template("{bar:40} {pos} of {len} images  {msg}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         let log = (!quiet && !terminal).then(|| Mutex::new(Instant::now()));
-        Self { begin, total: AtomicU64::new(0), done: AtomicU64::new(0), bar, log }
+        let (total, done) = (AtomicU64::new(0), AtomicU64::new(0));
+        Self { begin, total, done, bar, seen: terminal && !quiet, time_left: None, log }
     }
 
     /// The same of rendered fields: until the first image is done, the bar says what is under way.
-    pub(crate) fn of_fields(begin: Instant, quiet: bool, growing: &Arc<BuildProgress>) -> Self {
-        let progress = Self::new(begin, quiet);
+    pub(crate) fn of_fields(
+        begin: Instant,
+        quiet: bool,
+        growing: &Arc<BuildProgress>,
+        time_left: &Arc<TimeLeft>,
+    ) -> Self {
+        let progress = Self { time_left: Some(Arc::clone(time_left)), ..Self::new(begin, quiet) };
         let template = "{bar:40} {pos} of {len} images  {growing}  {msg}";
-        growing::show(&progress.bar, template, growing, |state| state.pos() == 0);
+        progress.bar.set_style(growing::style(template, growing, |state| state.pos() == 0));
         progress
     }
 
@@ -49,7 +61,10 @@ impl Progress {
     pub(crate) fn expect(&self, total: u64) {
         self.total.store(total, Ordering::Relaxed);
         self.bar.set_length(total);
-        self.bar.tick();
+        if self.seen && total > 0 {
+            self.bar.set_draw_target(ProgressDrawTarget::stderr());
+            self.bar.enable_steady_tick(growing::EVERY);
+        }
     }
 
     /// One more is done.
@@ -67,12 +82,12 @@ impl Progress {
 
     fn rate(&self, done: u64) -> String {
         let seconds = self.begin.elapsed().as_secs_f64();
-        let left = self.total.load(Ordering::Relaxed).saturating_sub(done) as f64 * seconds / done.max(1) as f64;
-        format!(
-            "{:.0} images an hour, {} left",
-            3600.0 * done as f64 / seconds.max(1e-9),
-            HumanDuration(Duration::from_secs_f64(left.max(0.0)))
-        )
+        let at_this_rate = || {
+            let left = self.total.load(Ordering::Relaxed).saturating_sub(done) as f64;
+            Duration::from_secs_f64(left * seconds / done.max(1) as f64)
+        };
+        let left = self.time_left.as_deref().and_then(TimeLeft::left).unwrap_or_else(at_this_rate);
+        format!("{:.0} images an hour, {} left", 3600.0 * done as f64 / seconds.max(1e-9), HumanDuration(left))
     }
 
     /// Ends the bar; returns how many images were done, and images per hour.

@@ -142,13 +142,13 @@ fn check_scratch(scratch: &Path, dir: &Path) -> Result<()> {
 fn generate_in(set: &Set, scratch: Option<&Path>, work: &Work<'_>, quiet: bool, signals: &Signals) -> Result<()> {
     let begin = Instant::now();
     let (soon, now) = signals.heed_patiently();
-    let growing = Arc::default();
-    let progress = Progress::of_fields(begin, quiet, &growing);
+    let (growing, time_left) = (Arc::default(), Arc::default());
+    let progress = Progress::of_fields(begin, quiet, &growing, &time_left);
     let total = |n: usize| progress.expect(n as u64);
     let done = |_| progress.add();
     let warn = |words: &str| progress.pause(|| furrow::tell!("warning: {words}"));
     let callbacks = Callbacks { begin: &total, warn: &warn, done: &done, soon, now };
-    let work = Work { progress: Some(&growing), ..*work };
+    let work = Work { progress: Some(&growing), time_left: Some(&time_left), ..*work };
     let made = match scratch {
         Some(scratch) => scratch::generate(set, scratch, &work, &callbacks),
         None => generate::generate(set, &work, &callbacks),
