@@ -153,9 +153,8 @@ assert sample['image'].max() > 0 and sample['nir'].max() > 0
     let pair = Pairs::find(&data, &data, None).unwrap().pairs.remove(0);
     assert_eq!((pair.a, pair.nir.map(|nir| nir.1)), (at("rgb.jpg"), Some(at("nir.jpg"))));
     let said = fail(verb("verify", &data, &["--quiet"]), 1);
-    let stray = |file: &str| {
-        format!("error: images/000000/{file} does not belong here: the recipe leaves it out; remove it\n")
-    };
+    let stray =
+        |file: &str| format!("error: images/000000/{file} does not belong here: the recipe leaves it out; remove it\n");
     assert_eq!(said, ["rgb.png", "nir.png"].map(stray).concat());
     if let Some(python) = python("import numpy, PIL") {
         let mut read = Command::new(python);

@@ -74,7 +74,9 @@ mod tests {
     /// Seconds that are left of so many images of fields that grow so many times, once these are done: the seconds of each, and of them growing.
     fn left(images: usize, growings: usize, elapsed_s: f64, done: &[(f64, u64)]) -> Option<f64> {
         let mut run = Run { begin: Instant::now(), images, growings, done: 0, grown: 0, work_s: 0.0, grow_s: 0.0 };
-        done.iter().for_each(|(seconds, grow)| run.add(*seconds, Duration::from_secs(*grow)));
+        for (seconds, grow) in done {
+            run.add(*seconds, Duration::from_secs(*grow));
+        }
         run.left(elapsed_s)
     }
 
