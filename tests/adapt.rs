@@ -12,6 +12,7 @@ use furrow::train::run::{self, Results};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::LazyLock;
 use std::time::Duration;
 
 const SIZE: (u32, u32) = (64, 48);
@@ -59,13 +60,17 @@ fn succeed(arguments: &str) {
     assert!(output.status.success(), "{arguments}: {}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// A network trained on eight images of the first light, in a folder.
-fn trained(folder: &Path) -> PathBuf {
+/// A network trained on eight images of the first light; their set lies in `day` beside it. Stays until the next time.
+static TRAINED: LazyLock<PathBuf> = LazyLock::new(|| {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("adapt");
+    if folder.exists() {
+        fs::remove_dir_all(&folder).unwrap();
+    }
     let (set, out) = (set(&folder.join("day"), DAY, 0, true), folder.join("run"));
     let how = "--network unet --size 64x48 --steps 80 --rate 0.003 --augment flip,crop --normalization image";
     succeed(&format!("fit --set {}@all --out {} {how} --batch 4", set.display(), out.display()));
     out
-}
+});
 
 /// Mean I/U of the classes.
 fn score(run: &Path, set: &Path) -> f64 {
@@ -82,11 +87,11 @@ fn weights(run: &Path) -> Vec<u8> {
 fn photographs_without_labels_make_a_network_better_on_others_like_them() {
     let scratch = tempfile::tempdir().unwrap();
     let folder = scratch.path();
-    let run = trained(folder);
+    let run = TRAINED.as_path();
     let photos = set(&folder.join("photos"), LAMP, 100, false);
     let labelled = set(&folder.join("labelled"), LAMP, 100, true);
     let test = set(&folder.join("test"), LAMP, 200, true);
-    let before = score(&run, &test);
+    let before = score(run, &test);
     let adapt = |from: &str, out: &Path, steps: u64| {
         format!("adapt {} --images {from} --out {} --steps {steps}", run.display(), out.display())
     };
@@ -142,8 +147,9 @@ fn refuse(arguments: &str) -> String {
 fn what_cannot_be_adapted_is_told() {
     let scratch = tempfile::tempdir().unwrap();
     let folder = scratch.path();
-    let run = trained(folder);
-    let (run_name, images) = (run.display(), folder.join("day/images"));
+    let run = TRAINED.as_path();
+    let day = run.with_file_name("day");
+    let (run_name, images) = (run.display(), day.join("images"));
     let out = folder.join("out");
     let adapt = |more: &str| refuse(&format!("adapt {run_name} --out {} {more}", out.display()));
     let images = images.display();
@@ -167,7 +173,7 @@ fn what_cannot_be_adapted_is_told() {
     }
     let said = refuse(&format!("adapt {} --images {images} --out {}", alone.display(), out.display()));
     assert!(said.contains("--set DIR"), "{said}");
-    let set = folder.join("day/set");
+    let set = day.join("set");
     let (alone, set, out) = (alone.display(), set.display(), out.display());
     succeed(&format!("adapt {alone} --images {images} --set {set}@all --out {out} --steps 2"));
 }
@@ -178,7 +184,7 @@ fn what_cannot_be_adapted_is_told() {
 fn a_validation_set_is_logged_and_not_learnt_from() {
     let scratch = tempfile::tempdir().unwrap();
     let folder = scratch.path();
-    let run = trained(folder);
+    let run = TRAINED.as_path();
     let (photos, val) = (set(&folder.join("photos"), LAMP, 100, false), set(&folder.join("val"), LAMP, 200, true));
     let adapt = |name: &str, more: &str| -> Results {
         let out = folder.join(name);

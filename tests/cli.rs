@@ -431,6 +431,21 @@ fn full_and_closed_streams_end_no_work() {
     }
 }
 
+/// All that a command says on a terminal, where it must succeed; `None` where no `script` makes one.
+#[cfg(target_os = "linux")]
+fn said_on_a_terminal(command: &str) -> Option<String> {
+    let program = format!("{} {command}", env!("CARGO_BIN_EXE_trace"));
+    let mut script = Command::new("script");
+    script.current_dir(env!("CARGO_MANIFEST_DIR")).args(["-qec", &program, "/dev/null"]).stdin(Stdio::null());
+    let Ok(done) = script.output() else {
+        eprintln!("skipped: no `script` makes a terminal here");
+        return None;
+    };
+    let said = String::from_utf8_lossy(&done.stdout).into_owned();
+    assert_eq!(done.status.code(), Some(0), "{command}: {said}");
+    Some(said)
+}
+
 /// Rationale: a large field takes a minute to grow, and a program that says nothing seems to hang. Expected: a terminal shows what is under way, of an
 /// image and of a dataset, but not with `--quiet`; a bar counts images, and never none of none. Source: `script`, which makes a terminal; where there
 /// is none, the test says so.
@@ -445,18 +460,32 @@ fn a_terminal_shows_what_grows() {
     // The second time all images are there.
     let commands = [(&image, true, false), (&quiet, false, false), (&dataset, true, true), (&dataset, true, false)];
     for (command, shown, counted) in commands {
-        let program = format!("{} {command}", env!("CARGO_BIN_EXE_trace"));
-        let mut script = Command::new("script");
-        script.current_dir(env!("CARGO_MANIFEST_DIR")).args(["-qec", &program, "/dev/null"]).stdin(Stdio::null());
-        let Ok(done) = script.output() else {
-            eprintln!("skipped: no `script` makes a terminal here");
-            return;
-        };
-        let said = String::from_utf8_lossy(&done.stdout);
-        assert_eq!(done.status.code(), Some(0), "{command}: {said}");
+        let Some(said) = said_on_a_terminal(command) else { return };
         assert_eq!(said.contains("growing: "), shown, "{command}: {said}");
         assert_eq!(said.contains("of 1 images"), counted, "{command}: {said}");
         assert!(!said.contains("of 0 images"), "{command}: {said}");
+    }
+}
+
+/// Expected: so it is where a bill grows fields; the line says that images are drawn in between, and is gone before the table is there.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_terminal_shows_what_grows_for_a_bill() {
+    let folder = folder();
+    let out = folder.path().join("out").display().to_string();
+    let order = |verb: &str, bill: &str| {
+        format!("{verb} --scene scenes/field.ron --width 81 --spp 300 --count 1 --out {out} {bill}")
+    };
+    let commands = [
+        (order("dataset", "--dry-run"), true),
+        (order("dataset plan", "--bill"), true),
+        (order("dataset", "--dry-run --quiet"), false),
+    ];
+    for (command, shown) in commands {
+        let Some(said) = said_on_a_terminal(&command) else { return };
+        assert_eq!(said.contains("growing: ") && said.contains("drawing images"), shown, "{command}: {said}");
+        let table = said.rsplit_once("\u{1b}[2K").map_or(said.as_str(), |(_, after)| after);
+        assert!(table.contains("core hours") && !table.contains(" gone"), "{command}: {said:?}");
     }
 }
 

@@ -190,7 +190,7 @@ fn every_format_comes_out_the_same_from_the_native_files() {
 /// that holds the files, and itself.
 fn little_known(numbers: [u32; 2]) -> (tempfile::TempDir, PathBuf, Sample) {
     let (mut recipe, _) = samples(&FIELD);
-    recipe.made = Made::Imported { from: "masks".into(), source_sha256: String::new() };
+    recipe.made = Made::Imported { from: "masks".into(), source_sha256: String::new(), nir: None };
     recipe.species.clear();
     let [crop, weed] = numbers;
     let mut sample = Sample {

@@ -4,16 +4,23 @@
 //! images come in pixel by pixel; what we wrote in a format of others comes back as it was; a second import makes the same bytes;
 //! every fault is one sentence with a file in it and exit code 2. Source: the layouts in `src/dataset/import/`.
 
+use crate::common::dataset::{fail, succeed, verb};
 use crate::common::program::{SMALL, scratch, trace};
+use crate::common::python::python;
+use furrow::compare::{Pairs, gap};
+use furrow::dataset::checksum_record::ChecksumRecord;
+use furrow::dataset::classes::Classes;
+use furrow::dataset::recipe::{FILE, Made};
 use furrow::dataset::record::Record;
 use furrow::dataset::split::Split;
 use furrow::dataset::{Sample, Set, native};
 use furrow::output::{Picture, encode_jpeg, write_png};
 use furrow::scene::tag::Class;
+use furrow::train::data::{Band, Example};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
-use std::process::Output;
+use std::process::{Command, Output};
 
 const W: u32 = 13;
 const H: u32 = 9;
@@ -207,6 +214,96 @@ fn an_import_goes_on_where_it_was_stopped_and_makes_the_same_bytes() {
     assert!(whole == files(&out), "a refused import has changed something");
 }
 
+/// Whether a set's recipe says that its images came with near infrared.
+fn says_nir(set: &Set) -> Option<bool> {
+    match &set.recipe.made {
+        Made::Imported { nir, .. } => *nir,
+        Made::Rendered(_) => panic!("these images were imported"),
+    }
+}
+
+/// Rationale: who compares two sets may copy pictures of one into the other, and no image may get a band that its source did not have. Expected: the
+/// recipe says whether images came with near infrared; where they did not, library, formats, comparisons, training and Python read none that
+/// somebody puts beside them, and `verify` names it, and nothing else, until it is gone. Source: the same images imported with it.
+#[test]
+fn near_infrared_that_did_not_come_in_is_not_read() {
+    const READ: &str = "
+import sys, furrow
+assert ['nir' in furrow.Dataset(folder)[0] for folder in sys.argv[1:]] == [False, True]
+";
+    let (kept, out) = scratch();
+    let root = kept.path();
+    numbered(root);
+    let [images, masks, nir, full] = ["images", "masks", "nir", "full"].map(|name| root.join(name));
+    let arguments = ["--format", "masks", "--images", text(&images), "--masks", text(&masks), "--mask-suffix", "_mask"];
+    let with_nir = [&arguments[..], &["--nir", text(&nir)]].concat();
+    let (set, before) = imported(&out, &arguments);
+    let (with, _) = imported(&full, &with_nir);
+    assert_eq!((says_nir(&set), says_nir(&with)), (Some(false), Some(true)));
+    let words = refused(&out, &with_nir);
+    assert!(words.contains("another dataset lies in this folder: near infrared false there, true here"), "{words}");
+
+    let stray = out.join("images/000000/nir.png");
+    std::fs::copy(full.join("images/000000/nir.png"), &stray).unwrap();
+    assert!(set.sample(0).unwrap() == before[0] && native::read(&out, "000000").unwrap() == before[0]);
+    let words = fail(verb("verify", &out, &["--quiet"]), 1);
+    let expected = "error: images/000000/nir.png does not belong here: the recipe leaves it out; remove it\n";
+    assert_eq!(words, expected);
+    succeed(verb("finish", &out, &["--format", "imagefolder", "--quiet"]));
+    assert!(out.join("imagefolder/train/images/000000.png").is_file() && !out.join("imagefolder/train/nir").exists());
+    assert!(gap::photos(&full, "--real").unwrap().iter().all(gap::Photo::has_nir));
+    assert!(!gap::photos(&out, "--real").unwrap().iter().any(gap::Photo::has_nir));
+    let pairs = |other: &Path| Pairs::find(&full, other, None).unwrap().pairs;
+    assert!(pairs(&full).iter().all(|pair| pair.nir.is_some()) && pairs(&out).iter().all(|pair| pair.nir.is_none()));
+    let learnt = |set: &Set| {
+        let map = Classes::default().of(&set.recipe.species, &[]).unwrap();
+        Example::read_whole(set, 0, &map, 0.0, &[Band::Gray("nir".into())], false)
+    };
+    assert!(learnt(&with).is_ok());
+    let error = learnt(&set).unwrap_err();
+    assert!(error.to_string().contains("no band `nir`: its dataset was made without"), "{error}");
+    if let Some(python) = python("import numpy, PIL") {
+        let mut read = Command::new(python);
+        read.args(["-c", READ, text(&out), text(&full)]);
+        read.env("PYTHONPATH", Path::new(env!("CARGO_MANIFEST_DIR")).join("python"));
+        succeed(read);
+    }
+    std::fs::remove_file(&stray).unwrap();
+    succeed(verb("verify", &out, &["--quiet"]));
+}
+
+/// Rationale: recipes of earlier builds do not say whether there is near infrared, and the program may be a newer one when an import goes on. Expected:
+/// such a set keeps its recipe, is whole, and goes on with the same command to the same bytes; near infrared that lies there is read, as ever.
+#[test]
+fn an_import_of_an_earlier_build_goes_on() {
+    let (kept, out) = scratch();
+    let root = kept.path();
+    numbered(root);
+    let [images, masks] = ["images", "masks"].map(|name| root.join(name));
+    let arguments = ["--format", "masks", "--images", text(&images), "--masks", text(&masks), "--mask-suffix", "_mask"];
+    let mut recipe = imported(&out, &arguments).0.recipe;
+    if let Made::Imported { nir, .. } = &mut recipe.made {
+        *nir = None;
+    }
+    let written = String::from_utf8(recipe.text().unwrap()).unwrap();
+    assert!(!written.contains("nir"), "{written}");
+    std::fs::write(out.join(FILE), &written).unwrap();
+    for index in 0..recipe.count {
+        let mut checksums = ChecksumRecord::read(&out, index).unwrap();
+        checksums.recipe = recipe.fingerprint().unwrap();
+        checksums.write(&out).unwrap();
+    }
+    let (set, _) = imported(&out, &arguments);
+    assert_eq!((says_nir(&set), std::fs::read_to_string(out.join(FILE)).unwrap()), (None, written));
+    let whole = files(&out);
+    std::fs::remove_dir_all(out.join("images/000001")).unwrap();
+    std::fs::remove_file(out.join("manifest.json")).unwrap();
+    imported(&out, &arguments);
+    assert!(whole == files(&out), "other bytes after going on");
+    std::fs::copy(root.join("nir/train/a.png"), out.join("images/000000/nir.png")).unwrap();
+    assert_eq!(set.sample(0).unwrap().nir.len(), N);
+}
+
 /// A rendered dataset in other people's formats.
 fn rendered(out: &Path, formats: &str) -> Vec<Sample> {
     let mut command =
@@ -314,11 +411,10 @@ fn plants_beyond_16_bits_come_in_and_back() {
     assert!(finished.status.success(), "{}", String::from_utf8_lossy(&finished.stderr));
     let (_, back) = imported(&root.join("back"), &["--format", "coco", "--from", text(&out.join("coco"))]);
     assert_eq!(back[0].plants, samples[0].plants);
-    let Some(python) = crate::common::python::python("import numpy, PIL") else { return };
+    let Some(python) = python("import numpy, PIL") else { return };
     let module = Path::new(env!("CARGO_MANIFEST_DIR")).join("python");
     let words = "import furrow, sys; plants = furrow.Dataset(sys.argv[1])[0]['plants']; print(plants.dtype, *sorted(set(plants.flat)))";
-    let read =
-        std::process::Command::new(python).args(["-c", words]).arg(&out).env("PYTHONPATH", module).output().unwrap();
+    let read = Command::new(python).args(["-c", words]).arg(&out).env("PYTHONPATH", module).output().unwrap();
     assert_eq!(
         String::from_utf8_lossy(&read.stdout),
         "int32 0 4464 70000\n",

@@ -6,8 +6,14 @@
 //! files are those of one run. Source: the dataset in folders; the packages `webdataset`, `datasets`, pandas, polars and DuckDB as readers.
 
 use crate::common::dataset::{fail, path, same, succeed, tree, verb};
-use crate::common::program::{SMALL, scratch, trace};
+use crate::common::program::{SMALL, names, scratch, trace};
 use crate::common::python::{ask, python, torch_with};
+use furrow::compare::gap;
+use furrow::dataset::classes::Classes;
+use furrow::dataset::{Set, native};
+use furrow::output::{Picture, write_png};
+use furrow::train::data::{Band, Example, Shape};
+use furrow::train::deploy::pictures;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::Read;
@@ -118,6 +124,83 @@ fn however_it_is_made_its_files_are_those_of_one_run() {
     }
     succeed(packed(&killed, 11, &[]));
     same(&tree(&killed), &whole);
+}
+
+/// Rationale: files of other names in the folders of images are the user's, such as further bands for training; to pack images must not remove them.
+/// Expected: they, and nothing else, stay where they are; the library, training, prediction, comparison and Python take images out of the
+/// archives beside them, and a further band from its folder; the command goes on, also where an archive is mended, and all else has the bytes
+/// that it has without them. What killed runs have left goes away.
+#[test]
+fn files_of_the_user_stay_when_images_are_packed() {
+    const READ: &str = "
+import sys, furrow
+data = furrow.Dataset(sys.argv[1])
+assert [sample['record']['index'] for sample in data] == list(range(6)) and sorted(data[0]) == sorted(data[1])
+";
+    let (_keep, whole) = scratch();
+    succeed(packed(&whole, 6, &[]));
+    let mut whole = tree(&whole);
+    let (_keep, data) = scratch();
+    let mut folders = trace(&["dataset", "--scene", SMALL, "--quiet", "--width", "48", "--spp", "1", "--count", "6"]);
+    folders.args(["--split", "3,1,0", "--out"]).arg(&data);
+    succeed(folders);
+    let before = native::read(&data, "000000").expect("an image");
+    let (width, height) = before.size();
+    let thermal = vec![90_u8; before.pixels()];
+    write_png(&data.join("images/000000/thermal.png"), width, height, &Picture::Gray(&thermal), "").expect("a picture");
+    fs::create_dir(data.join("images/000003/mine")).expect("a folder");
+    fs::write(data.join("images/000003/mine/notes.txt"), "wet").expect("a file");
+    for file in ["images/000000/thermal.png", "images/000003/mine/notes.txt"] {
+        whole.insert(file.into(), fs::read(data.join(file)).expect("a file"));
+    }
+    fs::write(data.join("images/000001/.furrow-left"), "half a file").expect("a file");
+    succeed(packed(&data, 6, &[]));
+    same(&tree(&data), &whole);
+    assert_eq!(names(&data.join("images")), ["000000", "000003"]);
+
+    let set = Set::open(&data).expect("a dataset");
+    assert!(set.sample(0).expect("an image") == before);
+    let map = Classes::default().of(&set.recipe.species, &[]).expect("classes");
+    let (_, learnt) = Example::read_whole(&set, 0, &map, 0.0, &[Band::Gray("thermal".into())], true).expect("a band");
+    assert_eq!(learnt.planes, [thermal]);
+    let shape = Shape { bands: Band::RGB.to_vec(), width, height };
+    let found = || pictures::find(std::slice::from_ref(&data), &shape, &[]);
+    let pictures = found().expect("pictures");
+    assert!(pictures.len() == 6 && pictures.iter().all(|picture| picture.read().is_ok()));
+    assert_eq!(gap::photos(&data, "--real").expect("pictures").len(), 6);
+    let images = data.join("images");
+    for arguments in [["compare", path(&images), path(&images)], ["compare", "--real", path(&images)]] {
+        let mut command = trace(&arguments);
+        if arguments[1] == "--real" {
+            command.args(["--synthetic", path(&images)]);
+        }
+        let said = fail(command, 2);
+        assert!(said.contains("lie in archives"), "{said}");
+    }
+    if let Some(python) = python("import numpy, PIL") {
+        let mut read = Command::new(python);
+        read.args(["-c", READ, path(&data)]);
+        read.env("PYTHONPATH", Path::new(env!("CARGO_MANIFEST_DIR")).join("python"));
+        succeed(read);
+    }
+
+    let archive = data.join("packs/train-000000.tar");
+    let mut other = fs::read(&archive).expect("an archive");
+    other[700] ^= 1;
+    fs::write(&archive, other).expect("an archive");
+    succeed(packed(&data, 6, &[]));
+    same(&tree(&data), &whole);
+    succeed(verb("verify", &data, &["--quiet", "--rerender", "1"]));
+    let said = String::from_utf8_lossy(&succeed(verb("status", &data, &[])).stdout).into_owned();
+    assert!(said.contains("6 of 6 images"), "{said}");
+    // The folder of an image that is in no archive is none of it.
+    for file in ["packs/val-000000.tar", "seals/val-000000.json"] {
+        fs::remove_file(data.join(file)).expect("a file");
+    }
+    let error = found().expect_err("no image");
+    assert!(error.to_string().contains("this image is not there yet"), "{error}");
+    succeed(packed(&data, 6, &[]));
+    same(&tree(&data), &whole);
 }
 
 /// Expected: a changed byte of an archive, wherever it is, is found and mended; so is a lost record.

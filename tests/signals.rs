@@ -135,6 +135,31 @@ fn interrupted_while_it_grows(arguments: &[&str]) -> Option<(Option<i32>, String
     Some((end(&mut script).code(), String::from_utf8_lossy(&said).into_owned()))
 }
 
+/// What such a command says once the line that shows its field is gone; its code must be 75. `None` where no `script` makes a terminal.
+#[cfg(target_os = "linux")]
+fn said_after_it_grew(arguments: &[&str]) -> Option<String> {
+    let (code, said) = interrupted_while_it_grows(arguments)?;
+    assert_eq!(code, Some(75), "{arguments:?}: {said}");
+    let (_, after) = said.rsplit_once("growing: ").unwrap();
+    // The line is cleared, then words follow on it.
+    let (_, after) = after.split_once("\u{1b}[2K").unwrap_or_else(|| panic!("{arguments:?}: the line stays: {said:?}"));
+    assert!(!after.contains("error"), "{arguments:?}: {said}");
+    Some(after.to_owned())
+}
+
+/// Writes the small page with so many weeds on a square metre.
+#[cfg(target_os = "linux")]
+fn write_weeds(page: &Path, weeds_per_m2: u32) {
+    let root = env!("CARGO_MANIFEST_DIR");
+    let text = small_text().replace("spread: (per_m2: 14)", &format!("spread: (per_m2: {weeds_per_m2})"));
+    let text = text.replace("\"textures/", &format!("\"{root}/textures/"));
+    std::fs::write(page, text.replace("\"scenes/", &format!("\"{root}/scenes/"))).unwrap();
+}
+
+/// More of them than grow in a second.
+#[cfg(target_os = "linux")]
+const MANY: u32 = 4000;
+
 /// Rationale: before its first image a dataset grows a field, which may take a minute. Expected: Ctrl-C takes away the line that shows it, and says what
 /// it says while images are made: nothing was written, or how many images are there; the code is 75, and no file is written. Source: `script`, which
 /// makes a terminal; where there is none, the test says so.
@@ -143,35 +168,38 @@ fn interrupted_while_it_grows(arguments: &[&str]) -> Option<(Option<i32>, String
 fn an_interrupt_while_a_plan_grows_its_field_is_told() {
     let (keep, data) = scratch();
     let page = keep.path().join("page.ron");
-    let write = |weeds_per_m2: u32| {
-        let root = env!("CARGO_MANIFEST_DIR");
-        let text = small_text().replace("spread: (per_m2: 14)", &format!("spread: (per_m2: {weeds_per_m2})"));
-        let text = text.replace("\"textures/", &format!("\"{root}/textures/"));
-        std::fs::write(&page, text.replace("\"scenes/", &format!("\"{root}/scenes/"))).unwrap();
-    };
     let rest = ["--scene", path(&page), "--out", path(&data), "--width", "96", "--spp", "1", "--count"];
     let stopped = |verb: &[&str], words: &str| -> bool {
-        let Some((code, said)) = interrupted_while_it_grows(&[verb, &rest, &["5"]].concat()) else { return false };
-        assert_eq!(code, Some(75), "{verb:?}: {said}");
-        let (_, after) = said.rsplit_once("growing: ").unwrap();
-        // The line is cleared, then words follow on it.
-        let (_, after) = after.split_once("\u{1b}[2K").unwrap_or_else(|| panic!("{verb:?}: the line stays: {said:?}"));
-        assert!(after.contains(&format!("{}: {words}", path(&data))), "{verb:?}: {said}");
-        assert!(!after.contains("error"), "{verb:?}: {said}");
+        let Some(after) = said_after_it_grew(&[verb, &rest, &["5"]].concat()) else { return false };
+        assert!(after.contains(&format!("{}: {words}", path(&data))), "{verb:?}: {after}");
         true
     };
-    // Seconds of plants.
-    write(4000);
+    write_weeds(&page, MANY);
     for verb in [&["dataset"][..], &["dataset", "plan"]] {
         if !stopped(verb, "stopped before it was done; nothing was written") {
             return;
         }
         assert!(!data.exists(), "{verb:?}");
     }
-    write(14);
+    write_weeds(&page, 14);
     succeed(trace(&[&["dataset"][..], &rest, &["1", "--quiet"]].concat()));
     let before = tree(&data);
-    write(4000);
+    write_weeds(&page, MANY);
     assert!(stopped(&["dataset"], "stopped: 1 of 5 images are there"));
     assert!(before == tree(&data));
+}
+
+/// Expected: the same of what tells the costs of a dataset, which grows fields as a plan does and writes nothing.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interrupt_while_a_bill_grows_its_fields_is_told() {
+    let (keep, data) = scratch();
+    let page = keep.path().join("page.ron");
+    write_weeds(&page, MANY);
+    let order = ["--scene", path(&page), "--out", path(&data), "--width", "96", "--spp", "1", "--count", "5"];
+    for (verb, bill) in [(&["dataset"][..], "--dry-run"), (&["dataset", "plan"], "--bill")] {
+        let Some(after) = said_after_it_grew(&[verb, &order, &[bill]].concat()) else { return };
+        assert!(after.contains("stopped before it was done; nothing was written"), "{verb:?}: {after}");
+        assert!(!after.contains("core hours") && !data.exists(), "{verb:?}: {after}");
+    }
 }

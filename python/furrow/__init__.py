@@ -157,8 +157,9 @@ class Dataset:
             self.indices = [k for k in every if split is None or self._split(k) == split]
             rendered = self.recipe["made"].get("rendered", {})
             self.labels_only = bool(rendered.get("labels_only"))
-            # Recipes of before do not say what images keep: near infrared is among it. Of imported ones nobody knows.
-            no_nir = self.labels_only or "nir" not in rendered.get("keep", ["nir"])
+            # Recipes of before do not say what images keep: near infrared is among it. Imported ones may have it, too, unless theirs says no.
+            imported = self.recipe["made"].get("imported", {})
+            no_nir = self.labels_only or "nir" not in rendered.get("keep", ["nir"]) or imported.get("nir") is False
             self._left_out = list(rendered.get("omit", []))
             self._left_out += ["image"] * self.labels_only + ["nir"] * no_nir
             self._ending = "jpg" if str(rendered.get("photo", "png")).startswith("jpeg") else "png"

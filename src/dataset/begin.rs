@@ -45,17 +45,22 @@ fn joined(folder: &Path, mut recipe: Recipe, named: bool) -> Result<Recipe> {
     // Who asks for nothing in particular leaves labels and maps as they are.
     recipe.labelling = recipe.labelling.over(&before.labelling);
     recipe.pack = recipe.pack.or(before.pack);
-    if let (Made::Rendered(now), Made::Rendered(then)) = (&mut recipe.made, &before.made) {
-        now.parts = then.parts;
-        if now.keep == Kept::usual(now.labels_only) {
-            now.keep.clone_from(&then.keep);
+    match (&mut recipe.made, &before.made) {
+        (Made::Rendered(now), Made::Rendered(then)) => {
+            now.parts = then.parts;
+            if now.keep == Kept::usual(now.labels_only) {
+                now.keep.clone_from(&then.keep);
+            }
+            if !named {
+                now.omit.clone_from(&then.omit);
+            }
+            if now.photo.unwrap_or_default() == Photo::default() {
+                now.photo = then.photo;
+            }
         }
-        if !named {
-            now.omit.clone_from(&then.omit);
-        }
-        if now.photo.unwrap_or_default() == Photo::default() {
-            now.photo = then.photo;
-        }
+        // A recipe of before does not say it; to say it now would change the fingerprint that its images have.
+        (Made::Imported { nir, .. }, Made::Imported { nir: None, .. }) => *nir = None,
+        _ => {}
     }
     before.check_goes_on(folder, &recipe)?;
     // Formats that are there stay.

@@ -24,7 +24,8 @@ pub(super) const NAMES: [&str; 12] = [
     "record.json",
 ];
 
-/// Whether a file of this name belongs to the images of a dataset. Near infrared may belong to imported ones, for some sources have it.
+/// Whether a file of this name belongs to the images of a dataset. Near infrared may belong to imported ones whose recipe is one of before and
+/// does not say it.
 pub(crate) fn belongs(recipe: &Recipe, file: &str) -> bool {
     let rendering = match &recipe.made {
         Made::Rendered(rendering) => Some(rendering),
@@ -97,9 +98,15 @@ mod tests {
         assert_eq!(stored, expected);
         let labels = rendered(|rendering| rendering.labels_only = true);
         assert_eq!(labels, [&photographs[2..], &["geometry.exr", "record.json"]].concat());
-        let imported = Recipe::of_species(Vec::new());
-        let expected = ["rgb.png", "nir.png", "semantics.png", "plants.png", "leaves.png", "record.json"];
-        assert_eq!(of(&imported), expected);
-        assert!(belongs(&imported, "thermal.png"));
+        let mut imported = Recipe::of_species(Vec::new());
+        let with_nir = ["rgb.png", "nir.png", "semantics.png", "plants.png", "leaves.png", "record.json"];
+        let without = ["rgb.png", "semantics.png", "plants.png", "leaves.png", "record.json"];
+        for (said, expected) in [(None, &with_nir[..]), (Some(true), &with_nir), (Some(false), &without)] {
+            if let Made::Imported { nir, .. } = &mut imported.made {
+                *nir = said;
+            }
+            assert_eq!(of(&imported), expected);
+            assert!(belongs(&imported, "thermal.png"));
+        }
     }
 }

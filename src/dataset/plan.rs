@@ -64,7 +64,7 @@ pub struct Order {
     pub edit: &'static Edit,
     /// Most bytes of memory that a field may take, where not the usual; no byte depends on it.
     pub memory: Option<u64>,
-    /// Told how far the first field is, which grows to check the order; no byte depends on it.
+    /// Told how far the first field is, which grows to check the order, and of a bill those of the images that are drawn; no byte depends on it.
     pub progress: Arc<BuildProgress>,
 }
 

@@ -54,6 +54,9 @@ pub enum Made {
         from: String,
         /// SHA-256 of everything that told how they were read: options, names and lengths of files.
         source_sha256: String,
+        /// Whether they have near infrared: all of them or none. Recipes of before do not say.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        nir: Option<bool>,
     },
 }
 
@@ -209,7 +212,7 @@ impl Recipe {
     pub(super) fn of_species(species: Vec<SpeciesRecord>) -> Self {
         Self {
             furrow: String::new(),
-            made: Made::Imported { from: String::new(), source_sha256: String::new() },
+            made: Made::Imported { from: String::new(), source_sha256: String::new(), nir: None },
             count: 0,
             split: Shares::default(),
             formats: Vec::new(),
@@ -305,11 +308,11 @@ impl Recipe {
         }
     }
 
-    /// Whether images keep a map; all of them do that were imported with it.
+    /// Whether images keep a map. Imported ones do that came with it; where their recipe is one of before, near infrared may be among them.
     pub fn keeps(&self, map: Kept) -> bool {
         match &self.made {
             Made::Rendered(rendering) => rendering.keep.contains(&map),
-            Made::Imported { .. } => true,
+            Made::Imported { nir, .. } => map != Kept::Nir || nir.unwrap_or(true),
         }
     }
 
@@ -365,6 +368,7 @@ fn in_words(key: &str) -> &str {
     match key {
         "keep" => "maps of --keep",
         "omit" => "label maps that --keep leaves out",
+        "nir" => "near infrared",
         key => key,
     }
 }

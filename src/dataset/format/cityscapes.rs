@@ -183,7 +183,7 @@ mod tests {
     #[test]
     fn a_city_has_no_underscore() {
         let of = |from: &str| Recipe {
-            made: Made::Imported { from: from.into(), source_sha256: String::new() },
+            made: Made::Imported { from: from.into(), source_sha256: String::new(), nir: None },
             ..Recipe::of_species(Vec::new())
         };
         assert_eq!(city(&of("Pheno_Bench 2")), "phenobench2");

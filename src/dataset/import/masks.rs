@@ -144,6 +144,10 @@ impl Source for Masks {
         &self.words
     }
 
+    fn has_nir(&self) -> bool {
+        self.folders.nir.is_some()
+    }
+
     fn read(&self, place: usize) -> Result<Labelled> {
         let Files { image, mask, nir } = &self.files[place];
         let (w, h, rgb) = output::read_photo(image)?;

@@ -47,6 +47,11 @@ pub trait Source: Sync {
     /// Everything that decides what is read, in words: options, names, lengths of files. No path of a machine.
     fn words(&self) -> &str;
 
+    /// Whether its images have near infrared: all of them or none.
+    fn has_nir(&self) -> bool {
+        false
+    }
+
     /// What the user should know of the source as a whole.
     fn warnings(&self) -> &[String] {
         &[]
@@ -72,7 +77,7 @@ pub struct Labelled {
     pub size: (u32, u32),
     /// 8-bit sRGB.
     pub rgb: Vec<[u8; 3]>,
-    /// Near infrared; empty where there is none.
+    /// Near infrared; empty where the source [has none](Source::has_nir).
     pub nir: Vec<u8>,
     /// Class, or [`super::sample::IGNORE`].
     pub semantics: Vec<u8>,
@@ -139,7 +144,11 @@ fn begin(folder: &Path, source: &dyn Source, order: &Order) -> Result<Set> {
     let split = if counts == [0; 3] { order.split } else { Shares(counts) };
     let recipe = Recipe {
         furrow: env!("CARGO_PKG_VERSION").into(),
-        made: Made::Imported { from: source.name().into(), source_sha256: hex::encode(Sha256::digest(source.words())) },
+        made: Made::Imported {
+            from: source.name().into(),
+            source_sha256: hex::encode(Sha256::digest(source.words())),
+            nir: Some(source.has_nir()),
+        },
         count: images.len() as u64,
         split,
         formats: Vec::new(),

@@ -23,11 +23,12 @@ pub fn check(recipe: &Recipe) -> Result<()> {
     }
 }
 
-/// An error where a path is a dataset in packs, its folder of archives or one of them, for what reads pictures from folders.
+/// An error where a path is a dataset in packs, its folder of archives or one of them, for what reads pictures from folders; also where it is its folder
+/// of images: what is left in there is the user's.
 pub fn refuse_archives(path: &Path) -> Result<()> {
     let is_archive = path.extension().is_some_and(|ending| ending == "tar");
-    let packs = if is_archive { path.parent() } else { Some(path) };
-    let above = packs.filter(|packs| packs.ends_with("packs")).and_then(Path::parent);
+    let within = if is_archive { path.parent() } else { Some(path) };
+    let above = within.filter(|within| within.ends_with("packs") || within.ends_with("images")).and_then(Path::parent);
     let is_packed =
         |dir: &&Path| dir.join(FILE).is_file() && Recipe::read(dir).is_ok_and(|recipe| recipe.pack.is_some());
     match above.into_iter().chain([path]).find(is_packed) {

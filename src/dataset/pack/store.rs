@@ -10,9 +10,11 @@ use crate::dataset::set::{Set, Whole};
 use crate::dataset::task::{Task, remaining};
 use crate::dataset::{File, native};
 use crate::input::below;
+use crate::output::{is_unfinished, remove_unfinished_in};
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::ffi::OsString;
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -89,7 +91,7 @@ fn is_complete(set: &Set, id: Id, record: &PackRecord) -> Result<bool> {
     Ok(true)
 }
 
-/// Puts the images of a pack into it where all are there, and removes their folders. Does nothing where some are missing.
+/// Puts the images of a pack into it where all are there, and clears their folders. Does nothing where some are missing.
 pub(in crate::dataset) fn close(set: &Set, id: Id) -> Result<()> {
     match written(set, id) {
         // Another run may have put them there meanwhile, and removed their folders.
@@ -141,22 +143,37 @@ fn written(set: &Set, id: Id) -> Result<()> {
     clear(folder, &record)
 }
 
-/// Removes the folders of images that a pack holds.
+/// Removes the files of images that a pack holds, and their folders. A folder stays in which something else lies: that is the user's.
 pub(in crate::dataset) fn clear(folder: &Path, record: &PackRecord) -> Result<()> {
-    for index in record.images.iter().map(|image| image.index) {
+    for image in &record.images {
         // First what says that it is whole.
-        remove(&below(folder, &ChecksumRecord::path_below(index))?, |path| std::fs::remove_file(path))?;
-        remove_folder(&below(folder, &native::folder(&Set::name(index)))?)?;
+        remove(&below(folder, &ChecksumRecord::path_below(image.index))?)?;
+        clear_image(folder, image)?;
     }
     Ok(())
 }
 
-/// Removes a folder into which another run may be writing just now: what that one makes is in the pack already.
-fn remove_folder(path: &Path) -> Result<()> {
+/// Removes the files of an image from its folder, with what killed runs have left of such, and the folder where nothing else lies in it. Another run
+/// may be writing there just now: what that one makes is in the pack already.
+fn clear_image(folder: &Path, image: &ChecksumRecord) -> Result<()> {
+    let own = below(folder, &native::folder(&Set::name(image.index)))?;
     for _ in 0..TRIES {
-        match std::fs::remove_dir_all(path) {
-            Err(e) if e.kind() == ErrorKind::DirectoryNotEmpty => std::thread::sleep(PAUSE),
-            Err(e) if e.kind() != ErrorKind::NotFound => return Err(Error::io(path)(e)),
+        if !own.is_dir() {
+            return Ok(());
+        }
+        for path in image.files.keys().filter(|path| native::is_native(path)) {
+            remove(&below(folder, path)?)?;
+        }
+        if let Err(e) = remove_unfinished_in(&own)
+            && !e.is_not_found()
+        {
+            return Err(e);
+        }
+        match std::fs::remove_dir(&own) {
+            Err(e) if e.kind() == ErrorKind::DirectoryNotEmpty && !is_users(&own, image) => std::thread::sleep(PAUSE),
+            Err(e) if !matches!(e.kind(), ErrorKind::DirectoryNotEmpty | ErrorKind::NotFound) => {
+                return Err(Error::io(&own)(e));
+            }
             _ => return Ok(()),
         }
     }
@@ -164,12 +181,21 @@ fn remove_folder(path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// How often a folder is removed that fills again, and how long is waited in between.
+/// How often a folder is cleared that fills again, and how long is waited in between.
 const TRIES: u32 = 50;
 const PAUSE: std::time::Duration = std::time::Duration::from_millis(20);
 
-fn remove(path: &Path, by: impl Fn(&Path) -> std::io::Result<()>) -> Result<()> {
-    match by(path) {
+/// Whether all that lies in the folder of an image is the user's: nothing of the image, and nothing that is unfinished.
+fn is_users(own: &Path, image: &ChecksumRecord) -> bool {
+    let entries = std::fs::read_dir(own).into_iter().flatten();
+    let names: Vec<OsString> = entries.filter_map(|entry| Some(entry.ok()?.file_name())).collect();
+    let files = || image.files.keys().filter(|path| native::is_native(path));
+    let is_of_image = |name: &OsString| files().any(|path| Path::new(path).file_name() == Some(name.as_os_str()));
+    !names.is_empty() && !names.iter().any(|name| is_unfinished(name) || is_of_image(name))
+}
+
+fn remove(path: &Path) -> Result<()> {
+    match std::fs::remove_file(path) {
         Err(e) if e.kind() != ErrorKind::NotFound => Err(Error::io(path)(e)),
         _ => Ok(()),
     }
@@ -196,7 +222,7 @@ fn take_apart(set: &Set, id: Id, record: &PackRecord) -> Result<()> {
     packs.forget(id);
     // First what says that it is whole.
     for path in [id.seal(), id.path()] {
-        remove(&below(folder, &path)?, |path| std::fs::remove_file(path))?;
+        remove(&below(folder, &path)?)?;
     }
     Ok(())
 }

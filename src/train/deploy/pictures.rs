@@ -190,7 +190,7 @@ fn images(selection: &Selection, shape: &Shape) -> Result<Vec<Picture>> {
             let source = Source::Packed(Arc::clone(&set), shape.bands.clone());
             return Ok(Picture { photo: folder.join(PHOTO), name, source });
         }
-        if folder.is_dir() {
+        if !is_packed && folder.is_dir() {
             let missing = || folder.join(format!("rgb.{}", set.recipe.photo().ending()));
             let photo = photograph_in(&folder, "rgb", recipe).unwrap_or_else(missing);
             let beside = |band: &Band| photograph_in(&folder, band.name(), recipe);

@@ -1,5 +1,6 @@
 //! What a dataset will cost: `trace dataset … --dry-run`, `trace sequence … --dry-run` and `trace dataset plan … --bill`.
 
+use crate::growing::Line;
 use furrow::cli;
 use furrow::cli::signal::Signals;
 use furrow::dataset::Order;
@@ -24,11 +25,21 @@ pub(crate) struct DryRunArgs {
     pub(crate) dry_run: bool,
 }
 
-/// Tells what an order will cost, or that it cannot go into its folder, where nothing is written.
-pub(crate) fn run(folder: &Path, order: &Order, threads: usize, signals: &Signals) -> Result<Vec<PathBuf>> {
+/// Tells what an order will cost, or that it cannot go into its folder, where nothing is written; `quiet` shows nothing meanwhile.
+pub(crate) fn run(
+    folder: &Path,
+    mut order: Order,
+    threads: usize,
+    quiet: bool,
+    signals: &Signals,
+) -> Result<Vec<PathBuf>> {
     cli::check_folder(folder)?;
     let threads = Threads::new(threads)?;
-    let (bill, warnings) = bill::bill(folder, order, &threads, signals.heed())?;
+    let growing = Line::begin_among(quiet, "drawing images");
+    order.progress.clone_from(growing.progress());
+    let told = bill::bill(folder, &order, &threads, signals.heed());
+    growing.end();
+    let (bill, warnings) = told?;
     for warning in warnings {
         furrow::tell!("warning: {warning}");
     }

@@ -86,7 +86,7 @@ struct MakeArgs {
 pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
     match &cli.verb {
         Some(Verb::Plan(PlanArgs { order, bill: true })) => {
-            bill::run(order.images.folder(), &order.order()?, 0, signals)
+            bill::run(order.images.folder(), order.order()?, 0, false, signals)
         }
         Some(Verb::Plan(PlanArgs { order, bill: false })) => {
             let set = order::run(order, false, signals)?;
@@ -101,7 +101,7 @@ pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
         Some(Verb::Emit(args)) => emit::run(args),
         None if cli.make.dry.dry_run => {
             let MakeArgs { order, work, .. } = &cli.make;
-            bill::run(order.images.folder(), &order.order()?, work.threads, signals)
+            bill::run(order.images.folder(), order.order()?, work.threads, work.quiet, signals)
         }
         None => {
             let push = cli.make.push.push()?;

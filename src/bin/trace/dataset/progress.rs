@@ -48,7 +48,7 @@ impl Progress {
     ) -> Self {
         let progress = Self { time_left: Some(Arc::clone(time_left)), ..Self::new(begin, quiet) };
         let template = "{bar:40} {pos} of {len} images  {growing}  {msg}";
-        progress.bar.set_style(growing::style(template, growing, |state| state.pos() == 0));
+        progress.bar.set_style(growing::style(template, growing, "", |state| state.pos() == 0));
         progress
     }
 
