@@ -19,7 +19,8 @@ the error of a pixel about threefold and ties its noise to that of its neighbour
 
 Error: relMSE = mean over pixels and R, G, B of (x − ref)² / (ref² + 0.01 mean(ref)²), put right for the noise of the
 reference: Mitsuba's N samples are others than the n of a run, so 1/N is too much; Furrow's run is the beginning of its reference, so 1/N is
-missing (with stratified points less than that, for both: what is put right favours Mitsuba). Runs of the two alternate, --rounds times; medians are shown. From the errors, which fall as 1/n, follow the
+missing (with stratified points less than that, for both: what is put right favours Mitsuba). Runs of the two alternate, --rounds times;
+medians are shown. From the errors, which fall as 1/n, follow the
 samples that reach --target; a last run with that many confirms error and time. As samples come in blocks of 16 or in squares, it has
 some too many or too few: its seconds times its error over the target are compared. Seconds are those of rendering; Mitsuba's first
 kernels are compiled before, and their time and that of loading stand below the table, beside the whole time of Furrow's process.
