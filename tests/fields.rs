@@ -668,7 +668,7 @@ fn a_preview_of_a_file_that_did_not_change_is_not_grown_again() {
 
 /// Rationale: a field of a drone is made of fewer triangles, not of other plants. Expected: at most one pixel in
 /// a hundred gets another class or plant, where a tenth are plants; soil whose small aggregates became heights of the ground, or too small to be drawn, is
-/// as bright within 3 %; a quarter of the triangles. Source: the same scene in full detail, seed and all.
+/// as bright within 5 %, as under clods elsewhere (`detail`); a quarter of the triangles. Source: the same scene in full detail, seed and all.
 #[test]
 fn detail_by_pixel_shows_the_same_field() {
     let page = |detail: &str| {
@@ -703,7 +703,7 @@ fn detail_by_pixel_shows_the_same_field() {
         pixels.map(|(pixel, _)| pixel.mean).fold(Spectrum::ZERO, |sum, mean| sum + mean)
     };
     let ratio = (soil(&film) / soil(&fine)).to_array();
-    assert!(ratio.iter().all(|ratio| (ratio - 1.0).abs() < 0.03), "{ratio:?}");
+    assert!(ratio.iter().all(|ratio| (ratio - 1.0).abs() < 0.05), "{ratio:?}");
 }
 
 /// Rationale: a camera that looks along the rows sees plants a metre away and plants of a few pixels; each must be as fine as its own pixels, and still be the

@@ -60,7 +60,9 @@ fn networks_compute_what_an_independent_program_does() {
         for bands in ["rgb", "rgbn"] {
             let folder = tempfile::tempdir().unwrap();
             let trained = learn(*network, bands, NormalizationMode::Image, &SET, &folder.path().join("trained"));
-            for (name, learnt) in [("stirred", &stirred(&trained, 3)), ("trained", &trained)] {
+            // As it was learnt, in one of both: another band is another first layer alone.
+            let learnt = [("stirred", &stirred(&trained, 3)), ("trained", &trained)];
+            for (name, learnt) in learnt.into_iter().take(if bands == "rgb" { 2 } else { 1 }) {
                 let folder = folder.path().join(name);
                 record(learnt, &folder);
                 for (engine, python) in &engines {

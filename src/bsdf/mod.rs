@@ -5,14 +5,17 @@ pub mod fresnel;
 mod leaf;
 pub mod microfacet;
 mod sample;
+mod shadowed;
 mod surface_layer;
 mod wet;
 
 use crate::math::{Spectrum, Vec3};
+use crate::optics::Shadowing;
 
 pub use diffuse::OrenNayar;
 pub use leaf::{Leaf, Side};
 pub use sample::{BsdfSample, Scatter};
+pub use shadowed::{Rough, Shadowed};
 pub use surface_layer::SurfaceLayer;
 pub use wet::Wet;
 
@@ -23,6 +26,8 @@ pub enum Bsdf {
     OrenNayar(OrenNayar),
     /// The same under a film of water.
     Wet(Wet),
+    /// Either, with relief that is too fine to be made.
+    Shadowed(Shadowed),
     /// A thin sheet that reflects and transmits under a coat.
     Leaf(Leaf),
 }
@@ -32,6 +37,7 @@ macro_rules! each {
         match $self {
             Bsdf::OrenNayar($b) => $e,
             Bsdf::Wet($b) => $e,
+            Bsdf::Shadowed($b) => $e,
             Bsdf::Leaf($b) => $e,
         }
     };
@@ -67,6 +73,7 @@ impl Bsdf {
         match self {
             Self::OrenNayar(b) => b.albedo(),
             Self::Wet(b) => b.albedo(),
+            Self::Shadowed(b) => b.albedo(),
             Self::Leaf(b) => b.reflectance(cos_o),
         }
     }
@@ -98,12 +105,18 @@ impl Bsdf {
                 [Spectrum::new(0.07, 0.11, 0.05, 0.44), Spectrum::new(0.1, 0.15, 0.08, 0.44)].map(side);
             Leaf::new(upper, lower, Spectrum::new(0.07, 0.12, 0.02, 0.5))
         };
+        let shadowed = |base: Rough| {
+            let factors = std::array::from_fn(|k| 0.6 + 0.06 * k as f32);
+            Self::Shadowed(Shadowed::new(base, Vec3::new(0.28, 0.0, 0.96), Shadowing::from_above(factors)))
+        };
         vec![
             ("lambert", Self::OrenNayar(OrenNayar::new(Spectrum::splat(0.5), 0.0))),
             ("dry soil", Self::OrenNayar(OrenNayar::new(soil, 0.35))),
             ("rough soil", Self::OrenNayar(OrenNayar::new(soil, 0.7))),
             ("moist soil", Self::Wet(Wet::new(soil, 0.35, 0.4, 0.3))),
             ("wet soil", Self::Wet(Wet::new(soil, 0.35, 1.0, 0.15))),
+            ("coarse soil", shadowed(Rough::Dry(OrenNayar::new(soil, 0.35)))),
+            ("coarse wet soil", shadowed(Rough::Wet(Wet::new(soil, 0.35, 0.7, 0.6)))),
             ("glossy leaf", Self::Leaf(leaf(0.15, 0.5))),
             ("beet leaf", Self::Leaf(leaf(0.3, 0.5))),
             ("dull leaf", Self::Leaf(leaf(0.6, 0.6))),

@@ -33,6 +33,11 @@ impl Wet {
         Self { base: OrenNayar::new(base, sigma), coat: Ggx { alpha: [alpha; 2], ior: WATER }, film }
     }
 
+    /// What a film of the roughness `alpha` reflects less than a smooth one at normal incidence, by light that meets it twice.
+    pub fn lacks(alpha: f32) -> f32 {
+        (F0 - Ggx { alpha: [alpha; 2], ior: WATER }.albedo(1.0)).max(0.0)
+    }
+
     /// Reflectance at normal incidence.
     pub fn albedo(&self) -> Spectrum {
         self.base.albedo() + Spectrum::splat(self.film * F0)

@@ -4,9 +4,10 @@ use super::feature::Feature;
 use super::shading::frame;
 use super::swatch::{Grain, Swatch, Tone};
 use super::varies::Varies;
-use crate::bsdf::{Bsdf, OrenNayar, Wet};
+use crate::bsdf::{Bsdf, OrenNayar, Rough, Shadowed, Wet};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Spectrum, Vec2, Vec3, vec2};
+use crate::optics::Shadowing;
 use crate::optics::soil::{at as four_bands, wet};
 use crate::soil::{FACETS, GroundMaps};
 use rayon::prelude::*;
@@ -16,6 +17,15 @@ use std::sync::Arc;
 const FILM_ROUGHNESS: f32 = 0.3;
 /// Below this share of film the gloss is not worth its cost: it would add less than 0.1 % of reflectance.
 const DRY: f32 = 0.04;
+
+/// What no soil reflects more than.
+const MOST_REFLECTANCE: f32 = 0.95;
+
+/// Roughness α of a film that lies on slopes too fine to be made, too: variances of slopes add up, and along either axis that of microfacets is α² / 2
+/// (Olano & Baker 2010, "LEAN mapping").
+fn rougher(slope: f32) -> f32 {
+    (FILM_ROUGHNESS * FILM_ROUGHNESS + 2.0 * slope).sqrt().min(1.0)
+}
 
 /// One texel, ready to shade.
 #[derive(Clone, Copy, Debug, Default)]
@@ -36,6 +46,11 @@ pub struct BakedGround {
     texels: Vec<Texel>,
     /// Square of i / 255.
     decode: [f32; 256],
+    /// What relief that is too fine to be made hides.
+    shadowing: Option<Shadowing>,
+    /// Roughness α of the film of water, and what it reflects less than a smooth one at normal incidence.
+    film_roughness: f32,
+    film_lacks: f32,
 }
 
 impl BakedGround {
@@ -45,18 +60,22 @@ impl BakedGround {
             let open = f32::from(maps.ao[i]) / 255.0;
             let dry = four_bands(GroundMaps::decode(maps.albedo[i]), maps.like) * open;
             let (moist, film) = wet(dry, f32::from(maps.moisture[i]) / 255.0);
-            let moist = moist.map(|r| r * (1.0 - maps.hidden) / (1.0 - r * maps.hidden));
+            let moist = maps.lost.map_or(moist, |lost| moist.map(|r| lost.darken(r)));
             Texel {
                 reflectance: moist.to_array().map(|r| (r.max(0.0).sqrt() * 255.0 + 0.5) as u8),
                 slope: maps.slope[i],
                 film: (film * 255.0 + 0.5) as u8,
             }
         };
+        let film_roughness = maps.lost.map_or(FILM_ROUGHNESS, |lost| rougher(lost.slope));
         Self {
             width: maps.width,
             height: maps.height,
             texels: (0..maps.width * maps.height).into_par_iter().map(texel).collect(),
             decode: std::array::from_fn(|i| (i as f32 / 255.0).powi(2)),
+            shadowing: maps.lost.map(|lost| lost.shadowing),
+            film_roughness,
+            film_lacks: maps.lost.map_or(0.0, |_| Wet::lacks(film_roughness)),
         }
     }
 
@@ -145,7 +164,9 @@ impl Ground {
     #[inline]
     pub(super) fn scatter(&self, at: &Interaction, wo: Vec3) -> (Bsdf, Frame) {
         let (reflectance, slope, film) = self.baked.sample(at.uv);
-        let reflectance = (reflectance * self.tint).clamp(0.0, 0.95);
+        let shadowing = self.baked.shadowing;
+        let most = MOST_REFLECTANCE / shadowing.map_or(1.0, |shadowing| shadowing.most().max(1.0));
+        let reflectance = (reflectance * self.tint).clamp(0.0, most);
         let normal = if self.relief {
             // Slopes of heights over the plane add up; the mesh's normal is (−∂z/∂x, −∂z/∂y, 1) to scale.
             let n = at.ns / at.ns.z.max(0.05);
@@ -153,11 +174,21 @@ impl Ground {
         } else {
             at.ns
         };
-        let bsdf = match self.facets {
-            None => Bsdf::OrenNayar(OrenNayar::new(reflectance, 0.0)),
-            Some(sigma) if film < DRY => Bsdf::OrenNayar(OrenNayar::new(reflectance, sigma)),
-            Some(sigma) => Bsdf::Wet(Wet::new(reflectance, sigma, film, FILM_ROUGHNESS)),
+        let base = match self.facets {
+            None => Rough::Dry(OrenNayar::new(reflectance, 0.0)),
+            Some(sigma) if film < DRY => Rough::Dry(OrenNayar::new(reflectance, sigma)),
+            Some(sigma) => {
+                let BakedGround { film_roughness, film_lacks, .. } = *self.baked;
+                Rough::Wet(Wet::new(reflectance + Spectrum::splat(film * film_lacks), sigma, film, film_roughness))
+            }
         };
-        (bsdf, frame(at, normal, wo))
+        let frame = frame(at, normal, wo);
+        let bsdf = match (shadowing, base) {
+            (None, Rough::Dry(base)) => Bsdf::OrenNayar(base),
+            (None, Rough::Wet(base)) => Bsdf::Wet(base),
+            // What is lost lay on ground that is level on the mean.
+            (Some(shadowing), base) => Bsdf::Shadowed(Shadowed::new(base, frame.to_local(Vec3::Z), shadowing)),
+        };
+        (bsdf, frame)
     }
 }

@@ -1,7 +1,7 @@
 //! What leaves and soils do to light, band by band, from what they are made of.
 //!
 //! Pigments and water decide a leaf's reflectance and transmittance ([`prospect`]); the four bands come from weighing the
-//! spectra ([`bands`]); [`LeafOptics`] turns a texel's colour into both sides of the leaf; [`soil`] darkens soil by moisture. Soils of
+//! spectra ([`bands`]); [`LeafOptics`] turns a texel's colour into both sides of the leaf; [`soil`] darkens soil by moisture, [`Shadowing`] by relief. Soils of
 //! one's own come as spectra ([`measured`]) or by [`Munsell`] notation.
 
 pub mod ageing;
@@ -12,8 +12,10 @@ pub mod measured;
 mod munsell;
 mod pigments;
 pub mod prospect;
+mod shadowing;
 pub mod soil;
 
 pub use leaf::{Leaf, LeafOptics};
 pub use munsell::Munsell;
 pub use pigments::{LeafBands, Pigments};
+pub use shadowing::{LostRelief, SUNS, Shadowing};

@@ -5,6 +5,7 @@ use super::crumb::Raster;
 use super::ground::blur;
 use super::{Ground, LayerMaps, MAX_LAYERS};
 use crate::math::{Spectrum, Vec2, Vec3, vec2};
+use crate::optics::LostRelief;
 use rayon::prelude::*;
 
 /// A texture over [`Ground::area`], row 0 in the south, so that [`Ground::uv`] reads it with v growing down its rows.
@@ -31,9 +32,8 @@ pub struct GroundMaps {
     pub ao: Vec<u8>,
     /// Mean reflectance of the dry soil, whose NIR over red is that of every texel.
     pub like: Spectrum,
-    /// Share of the light that relief hides which neither the mesh nor the maps show, 0..1: 0 on ground of full detail. Bright soil gets
-    /// more of it back from around.
-    pub hidden: f32,
+    /// Relief that neither the mesh nor the maps show; none on ground of full detail.
+    pub lost: Option<LostRelief>,
 }
 
 impl GroundMaps {
@@ -77,13 +77,13 @@ pub(super) struct Shade {
     pub(super) sky: f32,
     /// Depth of a pit that keeps all of its wetness, metres.
     pub(super) wet: f32,
-    /// Share of the light that relief hides which neither the mesh nor the pits show.
-    pub(super) hidden: f32,
+    /// Relief that neither the mesh nor the pits show.
+    pub(super) lost: Option<LostRelief>,
 }
 
 impl Shade {
     /// That of a ground of full detail.
-    pub(super) const FULL: Self = Self { sky: HALF_SKY_M, wet: HALF_SKY_M, hidden: 0.0 };
+    pub(super) const FULL: Self = Self { sky: HALF_SKY_M, wet: HALF_SKY_M, lost: None };
 }
 
 impl Painted {
@@ -118,13 +118,14 @@ pub(super) fn wet(pit: f32, full: f32) -> f32 {
 impl Ground {
     /// Bakes the texture with texels of at most `texel_m`; `maps` are those the ground was made with.
     pub fn bake<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32) -> GroundMaps {
-        let painted = self.paint(maps, texel_m);
-        let shade = self.shade(maps, &painted);
+        let clods = self.lost_clods(maps, texel_m);
+        let painted = self.paint(maps, texel_m, clods.laid);
+        let shade = self.shade(maps, &painted, &clods);
         self.finish(painted, shade)
     }
 
-    /// Everything of the texture but openness and moisture.
-    pub(super) fn paint<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32) -> Painted {
+    /// Everything of the texture but openness and moisture; `laid` as [`Ground::crumbs`] takes it.
+    pub(super) fn paint<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32, laid: f32) -> Painted {
         let area = self.area();
         // Texels that split the grid's steps evenly: the area then holds whole texels, and each knows its cell.
         let split = ((self.step / texel_m.max(2e-5) - 1e-3).ceil() as usize).max(1);
@@ -143,10 +144,10 @@ impl Ground {
             slope: Vec::new(),
             ao: Vec::new(),
             like: self.color.like,
-            hidden: 0.0,
+            lost: None,
         };
         let look = self.look();
-        let crumbs = self.crumbs(raster);
+        let crumbs = self.crumbs(raster, laid);
         let mut detail = crumbs.height;
         let rows = (
             detail.par_chunks_mut(width),
@@ -208,7 +209,7 @@ impl Ground {
             slope: vec![[0; 2]; n],
             ao: vec![255; n],
             like: self.color.like,
-            hidden: 0.0,
+            lost: None,
         }
     }
 
@@ -252,7 +253,8 @@ impl Ground {
     }
 
     /// What lies in pits of the detail sees less of the sky and dries later; crumbs dry first.
-    fn finish(&self, painted: Painted, Shade { sky, wet: full, hidden }: Shade) -> GroundMaps {
+    fn finish(&self, painted: Painted, shade: Shade) -> GroundMaps {
+        let Shade { sky, wet: full, lost } = shade;
         let moistures = &self.look().moisture;
         let width = painted.maps.width;
         let shade = |k: usize| (255.0 / closing(painted.pits[k], sky) + 0.5) as u8;
@@ -262,7 +264,7 @@ impl Ground {
             ((wet * painted.left(k)).clamp(0.0, 1.0) * 255.0 + 0.5) as u8
         };
         let (ao, moisture) = (0..painted.pits.len()).into_par_iter().map(|k| (shade(k), moisture(k))).unzip();
-        GroundMaps { moisture, ao, hidden, ..painted.maps }
+        GroundMaps { moisture, ao, lost, ..painted.maps }
     }
 }
 

@@ -102,7 +102,7 @@ impl Local {
     }
 
     /// Area of those between two lengths as seen from above, over that of the ground.
-    fn cover(self, (min_mm, max_mm): (f32, f32)) -> f32 {
+    pub(super) fn cover(self, (min_mm, max_mm): (f32, f32)) -> f32 {
         // Of n(L) = D N₅ 5^D L^{−D−1} ellipses of OUTLINE · L² each.
         let by = 2.0 - self.exponent;
         let powers = if by.abs() < 1e-3 { (max_mm / min_mm).ln() } else { (max_mm.powf(by) - min_mm.powf(by)) / by };

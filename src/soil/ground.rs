@@ -198,7 +198,7 @@ impl Ground {
 
     /// Crumbs, which are drawn into the fine grid's heights.
     fn strew(&mut self) {
-        let crumbs = self.crumbs(self.raster());
+        let crumbs = self.crumbs(self.raster(), 1.0);
         let columns = self.grid.columns();
         for (k, h) in crumbs.height.iter().enumerate() {
             let (i, j) = (k % self.fine_columns(), k / self.fine_columns());
@@ -211,13 +211,14 @@ impl Ground {
         }
     }
 
-    /// The crumbs on any raster.
-    pub(super) fn crumbs(&self, raster: Raster) -> Crumbs {
+    /// The crumbs on any raster; of the clods that are too small to be drawn the share `laid` of what the law says.
+    pub(super) fn crumbs(&self, raster: Raster, laid: f32) -> Crumbs {
         let stream = self.stream.child(Purpose::Debris, 100);
         let Sizes { drawn, unseen, .. } = self.sizes;
         let crumbs = |mm| Part { mm, amount: self.crumbs_amount, gain: |_| 0.0 };
-        let clods = |mm| Part { mm, amount: 1.0, gain: mean_gain };
-        let (seen, unseen) = ([crumbs(self.sizes.crumbs), clods(drawn)], [crumbs(unseen[0]), clods(unseen[1])]);
+        let clods = |mm, amount| Part { mm, amount, gain: mean_gain };
+        let seen = [crumbs(self.sizes.crumbs), clods(drawn, 1.0)];
+        let unseen = [crumbs(unseen[0]), clods(unseen[1], laid)];
         Crumbs::draw(raster, &self.law, seen, unseen, &stream, |p| self.share(p))
     }
 

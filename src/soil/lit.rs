@@ -1,6 +1,6 @@
 //! The light of one place of a ground: what of sky and sun it sends up, past the relief around it.
 //!
-//! Half of the light comes from an even sky, half from suns all round at 45°. Horizons are searched along [`AZIMUTHS`] directions up to [`REACH_M`], as in
+//! Either an even sky or one of [`SUNS`] suns shines, each from all round. Horizons are searched along [`AZIMUTHS`] directions, as in
 //! Dozier and Frew 1990, "Rapid calculation of terrain parameters for radiation modeling from digital elevation data". Facets reflect as
 //! Oren and Nayar 1994 say, seen from above: sides that turn away from the light are brighter for it than Lambert's.
 
@@ -8,60 +8,79 @@ use super::Rect;
 use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3};
 use crate::optics::soil::facets;
+use crate::optics::{SUNS, Shadowing};
 use std::f32::consts::TAU;
 
 /// Directions of the search for the horizon, and angles of the sky in each.
 const AZIMUTHS: usize = 12;
 const HEIGHTS: usize = 12;
 
-/// Distances at which the horizon is searched, metres: from one to the next by this factor.
-pub(super) const NEAREST_M: f32 = 1.5e-3;
-const REACH_M: f32 = 0.06;
-const FARTHER: f32 = 1.3;
+/// Steepest slope that counts for the roughness of a film of water: there is none on walls.
+const STEEPEST: f32 = 2.0;
+
+/// Distances at which the horizon is searched: from one to the next by this factor.
+const FARTHER: f32 = 1.15;
 
 /// Light of one place, of which level ground has 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Lit {
-    /// What it sends up, over what level ground of its reflectance sends up.
-    pub(super) up: f32,
-    /// Share of the light that does not reach it.
+    /// What it sends up under an even sky, over what level ground of its reflectance sends up.
+    pub(super) sky: f32,
+    /// The same under the suns of [`Shadowing::cosine`].
+    pub(super) suns: [f32; SUNS],
+    /// Share of the sky that it does not see.
     pub(super) missed: f32,
+    /// Mean square of its slope along either axis.
+    pub(super) slope: f32,
+}
+
+/// How far a horizon is searched, metres.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reach {
+    pub(super) from: f32,
+    pub(super) to: f32,
 }
 
 impl Lit {
     /// Of a surface that faces `normal` and whose facets' slope angles have the standard deviation `sigma`, radians. `rise` tells how far what
-    /// stands at a distance, from `nearest` on, rises above it, all in metres.
-    pub(super) fn of(normal: Vec3, sigma: f32, nearest: f32, rise: impl Fn(Vec2) -> f32) -> Self {
+    /// stands at a distance rises above it, all in metres.
+    pub(super) fn of(normal: Vec3, sigma: f32, reach: Reach, rise: impl Fn(Vec2) -> f32) -> Self {
         let [a, b] = facets(sigma);
         let reflected = |light: Vec3| {
-            let incident = normal.dot(light);
+            let incident = normal.dot(light).max(0.0);
             let same_side = (light.z - normal.z * incident).max(0.0);
             (a + b * same_side / normal.z.max(incident).max(1e-3)) * incident
         };
-        let (mut up, mut reaching) = (0.0, 0.0);
-        let mut add = |light: Vec3, share: f32| {
-            let incident = normal.dot(light).max(0.0) * share;
-            reaching += incident;
-            if incident > 0.0 {
-                up += reflected(light) * share;
-            }
-        };
+        let (mut sky, mut suns, mut reaching) = (0.0, [0.0; SUNS], 0.0);
         for k in 0..AZIMUTHS {
-            let way = Vec2::from_angle(k as f32 / AZIMUTHS as f32 * TAU);
-            let distances = std::iter::successors(Some(nearest), |d| Some(d * FARTHER)).take_while(|d| *d <= REACH_M);
+            let way = Vec2::from_angle((k as f32 + 0.5) / AZIMUTHS as f32 * TAU);
+            let distances =
+                std::iter::successors(Some(reach.from), |d| Some(d * FARTHER)).take_while(|d| *d <= reach.to);
             let horizon = distances.map(|d| rise(way * d) / d).fold(0.0, f32::max);
             // Of a whole sky 2 (n·ω) sin θ dθ, averaged over directions around, is 1 on level ground.
             let step = (1.0 / horizon.max(1e-6)).atan() / HEIGHTS as f32;
             for i in 0..HEIGHTS {
                 let (sin, cos) = ((i as f32 + 0.5) * step).sin_cos();
-                add((way * sin).extend(cos), 0.5 * 2.0 * sin * step);
+                let light = (way * sin).extend(cos);
+                reaching += normal.dot(light).max(0.0) * 2.0 * sin * step;
+                sky += reflected(light) * 2.0 * sin * step;
             }
-            if horizon < 1.0 {
-                add((way.extend(1.0)).normalize(), 0.5 * std::f32::consts::SQRT_2);
+            for (k, sun) in suns.iter_mut().enumerate() {
+                let cos = Shadowing::cosine(k);
+                let sin = (1.0 - cos * cos).max(0.0).sqrt();
+                if horizon * sin < cos {
+                    *sun += reflected((way * sin).extend(cos)) / cos;
+                }
             }
         }
         let n = AZIMUTHS as f32;
-        Self { up: up / (n * a), missed: (1.0 - reaching / n).max(0.0) }
+        let slope = normal.truncate() / normal.z.max(1.0 / STEEPEST);
+        Self {
+            sky: sky / (n * a),
+            suns: suns.map(|sun| sun / (n * a)),
+            missed: (1.0 - reaching / n).max(0.0),
+            slope: 0.5 * slope.length_squared().min(STEEPEST * STEEPEST),
+        }
     }
 }
 
@@ -129,7 +148,8 @@ impl Heights {
         let y = self.sample(i, j + 1) - self.sample(i, j.saturating_sub(1));
         let p = Vec2::new(i as f32, j as f32) * self.step;
         let own = self.sample(i, j);
-        Lit::of(Vec3::new(-x, -y, 2.0 * self.step).normalize(), sigma, self.step, |d| self.at(p + d) - own)
+        let reach = Reach { from: self.step, to: 0.25 * self.step * self.side as f32 };
+        Lit::of(Vec3::new(-x, -y, 2.0 * self.step).normalize(), sigma, reach, |d| self.at(p + d) - own)
     }
 }
 
@@ -137,26 +157,33 @@ impl Heights {
 mod tests {
     use super::*;
 
-    /// Expected: level ground has all light; under a horizon of 30° all round it misses sin² 30° of the sky and none of suns at 45°, under one of
-    /// 60° sin² 60° and all suns; a wall-less slope of 20° has (1 + cos 20°) / 2 of the sky and cos 20° of the suns. Source: view factors of a
-    /// cone and of a plane, means over azimuths; Lambert's facets.
+    /// Expected: level ground has all light; under a horizon of 30° all round it misses sin² 30° of the sky and the suns below, under one of
+    /// 60° sin² 60°; a wall-less slope of 20° has (1 + cos 20°) / 2 of the sky and cos 20° of the high suns, and a slope of tan 20°, half of whose square is
+    /// along either axis. Source: view factors of a cone and of a plane, means over azimuths; Lambert's facets.
     #[test]
     fn surfaces_have_the_light_that_their_closed_forms_say() {
-        let lit = |normal: Vec3, horizon: f32| Lit::of(normal, 0.0, NEAREST_M, |d| d.length() * horizon);
+        let reach = Reach { from: 1.5e-3, to: 0.06 };
+        let lit = |normal: Vec3, horizon: f32| Lit::of(normal, 0.0, reach, |d| d.length() * horizon);
         let level = lit(Vec3::Z, 0.0);
-        assert!((level.up - 1.0).abs() < 2e-3 && level.missed < 2e-3, "{level:?}");
-        for (degrees, missed) in [(30.0f32, 0.5 * 0.25), (60.0, 0.5 * 0.75 + 0.5)] {
+        assert!((level.sky - 1.0).abs() < 4e-3 && level.missed < 4e-3 && level.slope == 0.0, "{level:?}");
+        assert!(level.suns.iter().all(|sun| (sun - 1.0).abs() < 1e-4), "{level:?}");
+        for (degrees, missed) in [(30.0f32, 0.25), (60.0, 0.75)] {
             let found = lit(Vec3::Z, degrees.to_radians().tan());
             assert!(
-                (found.missed - missed).abs() < 2e-3 && (found.up - 1.0 + missed).abs() < 2e-3,
+                (found.missed - missed).abs() < 4e-3 && (found.sky - 1.0 + missed).abs() < 4e-3,
                 "{degrees}: {found:?}"
             );
+            for (k, sun) in found.suns.into_iter().enumerate() {
+                let above = Shadowing::cosine(k) > degrees.to_radians().sin();
+                assert!((sun - f32::from(u8::from(above))).abs() < 1e-4, "{degrees}, {k}: {found:?}");
+            }
         }
         let (sin, cos) = 20f32.to_radians().sin_cos();
-        let tilted = Lit::of(Vec3::new(sin, 0.0, cos), 0.0, NEAREST_M, |_| 0.0).up;
-        let expected = 0.5 * (0.5 * (1.0 + cos) + cos);
-        assert!((tilted - expected).abs() < 0.01, "{tilted} and {expected}");
-        assert!(Lit::of(Vec3::new(sin, 0.0, cos), 0.35, NEAREST_M, |_| 0.0).up > tilted + 0.005);
+        let tilted = Lit::of(Vec3::new(sin, 0.0, cos), 0.0, reach, |_| 0.0);
+        assert!((tilted.sky - 0.5 * (1.0 + cos)).abs() < 0.01, "{tilted:?}");
+        assert!((tilted.suns[SUNS - 2] - cos).abs() < 1e-3, "{tilted:?}");
+        assert!((tilted.slope - 0.5 * (sin / cos).powi(2)).abs() < 1e-4, "{tilted:?}");
+        assert!(Lit::of(Vec3::new(sin, 0.0, cos), 0.35, reach, |_| 0.0).sky > tilted.sky + 0.005);
     }
 
     /// Expected: a block of 4 mm on a square of 10 mm stands as high as its lid where that is, its ground is 0; half-way between both the mean.

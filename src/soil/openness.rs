@@ -12,11 +12,12 @@
 use super::FACETS;
 use super::bake::{Painted, Shade, closing, wet};
 use super::ground::Ground;
-use super::lit::{Heights, Lit, NEAREST_M};
+use super::lit::{Heights, Lit, Reach};
 use super::pile::Pile;
 use super::site::{FULL_CELL_M, FULL_TEXEL_M, Sizes};
 use super::{Canopy, InView, LayerMaps, Rect};
 use crate::math::{Vec2, Vec3, vec2};
+use crate::optics::{LostRelief, SUNS, Shadowing};
 use rayon::prelude::*;
 
 /// Patches along each side of the ground, their sides, and what is made around each, metres.
@@ -24,10 +25,15 @@ const PATCHES: usize = 4;
 const PATCH_M: f32 = 0.12;
 const AROUND_M: f32 = 0.06;
 
-/// Places in each patch whose light is reckoned.
+/// Places in each patch whose light is reckoned, and how near and far horizons are searched there, metres.
 const SAMPLES: usize = 800;
+const HORIZON: Reach = Reach { from: 1.5e-3, to: AROUND_M };
 
-/// Side of the square on which clods are laid, in lengths of the longest, and at least, metres; samples of their heights along it, and every how many
+/// Squares on which clods are laid along each side of the ground: as many as measure this together, metres, within limits.
+const CLODS_M: f32 = 0.6;
+const CLOD_SQUARES: (usize, usize) = (2, 5);
+
+/// Side of such a square, in lengths of the longest, and at least, metres; samples of their heights along it, and every how many
 /// of them the light is reckoned, in the middle half.
 const LONGEST_CLODS: f32 = 8.0;
 const LEAST_CLOD_M: f32 = 0.1;
@@ -38,7 +44,7 @@ const CLOD_EVERY: usize = 7;
 const LEAST_M: f32 = super::bake::HALF_SKY_M;
 const MOST_M: f32 = 10.0;
 
-/// Most of the light that lost relief may hide.
+/// Most of what ground reflects that it may meet again.
 const MOST_HIDDEN: f32 = 0.9;
 
 /// Halvings of their logarithm: to a part in a thousand.
@@ -57,37 +63,60 @@ struct Sample {
     albedo: f32,
 }
 
+/// Clods that are bodies in full detail, but not here.
+pub(super) struct LostClods {
+    /// Places of level ground under them.
+    samples: Vec<Sample>,
+    /// Share of the ground that they cover.
+    cover: f32,
+    /// Share of those too small to be drawn that stay where the law says, as far as their cover tells: the others roll off what lies there.
+    pub(super) laid: f32,
+}
+
 impl Ground {
     /// How pits and lost relief darken it: [`Shade::FULL`] on ground of full detail; on coarse ground what makes it send as much
     /// light, and hold as much water, as full detail would.
-    pub(super) fn shade<L: LayerMaps + Sync>(&self, maps: &[L], painted: &Painted) -> Shade {
+    pub(super) fn shade<L: LayerMaps + Sync>(&self, maps: &[L], painted: &Painted, clods: &LostClods) -> Shade {
         let full = Shade::FULL;
-        let as_fine = self.step <= FULL_CELL_M && painted.maps.texel_m <= FULL_TEXEL_M;
-        let all_clods = self.sizes.unseen[1].0 >= self.sizes.drawn.1;
-        if self.sizes.told <= 0.0 || as_fine && all_clods {
+        if self.is_full(painted.maps.texel_m) {
             return full;
         }
+        let LostClods { samples: clods, cover, .. } = clods;
         let texel = painted.maps.texel_m.min(FULL_TEXEL_M);
         let patches = self.patches();
         let fine: Vec<Sample> = (patches.iter())
             .flat_map(|patch| {
                 let ground = self.finely(maps, patch.grown(AROUND_M));
-                let painted = ground.paint(maps, texel);
+                let painted = ground.paint(maps, texel, 1.0);
                 ground.samples(&painted, *patch)
             })
             .collect();
         let coarse: Vec<Sample> = patches.iter().flat_map(|patch| self.samples(painted, *patch)).collect();
         let reflectance = self.mean_dry(maps).to_array().iter().sum::<f32>() / 4.0;
-        let (clods, cover) = self.clod_samples(maps);
-        let clods = if clods.is_empty() { 1.0 } else { light(&clods, full.sky, reflectance) };
+        let fine_light = Light::of(&fine, full.sky, reflectance);
+        let clod_light = if clods.is_empty() { Light::LEVEL } else { Light::of(clods, full.sky, reflectance) };
         // Pits under clods are not seen.
-        let bright = cover + (1.0 - cover) * light(&fine, full.sky, reflectance);
+        let bright = cover + (1.0 - cover) * fine_light.sky;
         let damp = (1.0 - cover) * wetness(&fine, full.wet);
-        let sky = solve(|half| light(&coarse, half, reflectance) < bright);
+        let sky = solve(|half| Light::of(&coarse, half, reflectance).sky < bright);
+        let made = Light::of(&coarse, sky, reflectance);
+        let darker = bright * clod_light.sky / made.sky;
+        let by_sun = |k: usize| {
+            let wanted = (cover + (1.0 - cover) * fine_light.suns[k]) * clod_light.suns[k];
+            wanted / (made.suns[k] * darker)
+        };
+        let lost = |of: fn(&Sample) -> f32| (1.0 - cover) * mean(&fine, of) + mean(clods, of) - mean(&coarse, of);
+        let slope = lost(|s| s.lit.slope);
+        let back = lost(|s| s.lit.missed).clamp(0.0, MOST_HIDDEN);
         Shade {
             sky,
             wet: solve(|half| wetness(&coarse, half) > damp),
-            hidden: hidden(bright * clods / light(&coarse, sky, reflectance), reflectance),
+            lost: Some(LostRelief {
+                open: darker * (1.0 - reflectance * back),
+                back,
+                shadowing: Shadowing::from_above(std::array::from_fn(by_sun)),
+                slope: slope.max(0.0),
+            }),
         }
     }
 
@@ -110,26 +139,49 @@ impl Ground {
         self.piece(maps, area, self.step.min(FULL_CELL_M), sizes)
     }
 
-    /// Level ground under the clods that are bodies in full detail, but not here, and the share of it that these cover.
-    fn clod_samples<L: LayerMaps + Sync>(&self, maps: &[L]) -> (Vec<Sample>, f32) {
-        let (shortest, longest) = (self.sizes.unseen[1].0, self.sizes.drawn.1);
-        if self.flat || shortest >= longest {
-            return (Vec::new(), 0.0);
+    /// Whether nothing is lost.
+    fn is_full(&self, texel_m: f32) -> bool {
+        let as_fine = self.step <= FULL_CELL_M && texel_m <= FULL_TEXEL_M;
+        self.sizes.told <= 0.0 || as_fine && self.sizes.unseen[1].0 >= self.sizes.drawn.1
+    }
+
+    /// The clods that are bodies in full detail, but not on this ground, whose texels are at most `texel_m` wide.
+    pub(super) fn lost_clods<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32) -> LostClods {
+        let Sizes { drawn, unseen, .. } = self.sizes;
+        let (shortest, longest) = (unseen[1].0, drawn.1);
+        if self.is_full(texel_m) || self.flat || shortest >= longest {
+            return LostClods { samples: Vec::new(), cover: 0.0, laid: 1.0 };
         }
-        let half = 0.5 * (LONGEST_CLODS * 1e-3 * longest).max(LEAST_CLOD_M);
-        let middle = 0.5 * (self.area().corners()[0] + self.area().corners()[1]);
-        let area = Rect::new(middle.x - half, middle.y - half, middle.x + half, middle.y + half);
+        let side = (LONGEST_CLODS * 1e-3 * longest).max(LEAST_CLOD_M);
         let none = (shortest, shortest);
         let clods = (shortest, longest);
         let sizes = Sizes { crumbs: none, drawn: none, unseen: [none; 2], clods, told: 0.0 };
-        let level = self.piece(maps, area, self.step.min(FULL_CELL_M), sizes).levelled();
-        let mut pile = Pile::new(&level);
-        let bodies = super::clods(&level, &mut pile, &Canopy::none(&level), &InView::ALL);
-        let heights = Heights::over(area, CLOD_SAMPLES, bodies.iter().map(|clods| &clods.mesh));
         let inner = (CLOD_SAMPLES / 4..CLOD_SAMPLES - CLOD_SAMPLES / 4).step_by(CLOD_EVERY);
         let places: Vec<[usize; 2]> = inner.clone().flat_map(|j| inner.clone().map(move |i| [i, j])).collect();
-        let sample = |[i, j]: [usize; 2]| Sample { lit: heights.lit(i, j, FACETS), pit: 0.0, left: 1.0, albedo: 1.0 };
-        (places.into_par_iter().map(sample).collect(), heights.cover())
+        let square = |middle: Vec2| {
+            let (lo, hi) = (middle - 0.5 * side, middle + 0.5 * side);
+            let area = Rect::new(lo.x, lo.y, hi.x, hi.y);
+            let level = self.piece(maps, area, self.step.min(FULL_CELL_M), sizes).levelled();
+            let mut pile = Pile::new(&level);
+            let bodies = super::clods(&level, &mut pile, &Canopy::none(&level), &InView::ALL);
+            let heights = Heights::over(area, CLOD_SAMPLES, bodies.iter().map(|clods| &clods.mesh));
+            let lit = |[i, j]: [usize; 2]| heights.lit(i, j, FACETS);
+            let sample = |place| Sample { lit: lit(place), pit: 0.0, left: 1.0, albedo: 1.0 };
+            (places.iter().copied().map(sample).collect::<Vec<Sample>>(), heights.cover())
+        };
+        let (corner, size) = (self.area().corners()[0], self.area().size());
+        let many = ((CLODS_M / side) as usize).clamp(CLOD_SQUARES.0, CLOD_SQUARES.1);
+        let at = |k: usize| (k as f32 + 0.5) / many as f32;
+        let middle = |k: usize| corner + size * vec2(at(k % many), at(k / many));
+        let middles: Vec<Vec2> = (0..many * many).map(middle).collect();
+        let (samples, covers): (Vec<Vec<Sample>>, Vec<f32>) = middles.par_iter().map(|p| square(*p)).unzip();
+        let over_squares = |sum: f32| sum / middles.len() as f32;
+        let cover = over_squares(covers.iter().sum());
+        let law = |mm| over_squares(middles.iter().map(|p| self.law.at(*p, self.share(*p)).cover(mm)).sum());
+        // Those that are drawn lie where the law says, one over the other.
+        let left = -(1.0 - cover).max(f32::MIN_POSITIVE).ln() - law(drawn);
+        let laid = (left / law(unseen[1]).max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+        LostClods { samples: samples.concat(), cover, laid }
     }
 
     /// Places of a patch, the same on every ground: points of the R₂ sequence (Roberts 2018).
@@ -145,33 +197,46 @@ impl Ground {
         let albedo = super::GroundMaps::decode(painted.maps.albedo[k]).iter().sum();
         let height = self.height(p.x, p.y);
         let rise = |d: Vec2| if self.flat { 0.0 } else { self.height(p.x + d.x, p.y + d.y) - height };
-        Sample { lit: Lit::of(normal, FACETS, NEAREST_M, rise), pit: painted.pits[k], left: painted.left(k), albedo }
+        Sample { lit: Lit::of(normal, FACETS, HORIZON, rise), pit: painted.pits[k], left: painted.left(k), albedo }
     }
 }
 
-/// Light that ground of a mean reflectance sends up, over what level ground of it does: what of its light each texel misses it gets from
-/// ground as bright as the mean.
-fn light(samples: &[Sample], half: f32, reflectance: f32) -> f32 {
-    let (mut albedos, mut direct, mut again) = (0.0, 0.0, 0.0);
-    for Sample { lit, pit, albedo, .. } in samples {
-        let open = f64::from(albedo / closing(*pit, half));
-        albedos += f64::from(*albedo);
-        direct += open * f64::from(lit.up);
-        again += open * f64::from(lit.missed);
-    }
-    (direct / (albedos - f64::from(reflectance) * again).max(f64::MIN_POSITIVE)) as f32
+/// Light that ground sends up, over what level ground of its mean reflectance does: under an even sky, and under each sun.
+#[derive(Clone, Copy, Debug)]
+struct Light {
+    sky: f32,
+    suns: [f32; SUNS],
 }
 
-/// Share of the light on ground of a mean reflectance that relief hides where it makes the ground darker by a factor: r = V / (1 − ρ (1 − V)).
-fn hidden(darker: f32, reflectance: f32) -> f32 {
-    let open = darker * (1.0 - reflectance) / (1.0 - darker * reflectance);
-    (1.0 - open).clamp(0.0, MOST_HIDDEN)
+impl Light {
+    const LEVEL: Self = Self { sky: 1.0, suns: [1.0; SUNS] };
+
+    /// Of ground of a mean reflectance whose pits of the depth `half` see half of the sky: in place of what a texel does not see of the sky it sees ground as
+    /// bright as the mean.
+    fn of(samples: &[Sample], half: f32, reflectance: f32) -> Self {
+        let (mut albedos, mut sky, mut again) = (0.0, 0.0, 0.0);
+        let mut suns = [0.0; SUNS];
+        for Sample { lit, pit, albedo, .. } in samples {
+            let open = f64::from(albedo / closing(*pit, half));
+            albedos += f64::from(*albedo);
+            sky += open * f64::from(lit.sky);
+            again += open * f64::from(lit.missed);
+            for (sum, sun) in suns.iter_mut().zip(lit.suns) {
+                *sum += open * f64::from(sun);
+            }
+        }
+        let level = (albedos - f64::from(reflectance) * again).max(f64::MIN_POSITIVE);
+        Self { sky: (sky / level) as f32, suns: suns.map(|sun| (sun / level) as f32) }
+    }
+}
+
+fn mean(samples: &[Sample], of: impl Fn(&Sample) -> f32) -> f32 {
+    (samples.iter().map(|s| f64::from(of(s))).sum::<f64>() / samples.len().max(1) as f64) as f32
 }
 
 /// Mean wetness that pits keep.
 fn wetness(samples: &[Sample], full: f32) -> f32 {
-    let sum = samples.iter().map(|s| f64::from(wet(s.pit, full) * s.left)).sum::<f64>();
-    (sum / samples.len().max(1) as f64) as f32
+    mean(samples, |s| wet(s.pit, full) * s.left)
 }
 
 /// Where a depth is large enough, by halving.
@@ -191,10 +256,10 @@ mod tests {
     /// Expected: ground that sees half of the sky, and for the rest ground of its own brightness, B = ρ (½ + ½ B).
     #[test]
     fn what_misses_the_sky_is_lit_by_the_ground() {
-        let sample = Sample { lit: Lit { up: 0.5, missed: 0.5 }, pit: 0.0, left: 1.0, albedo: 3.0 };
-        let e = light(&[sample; 3], 1.0, 0.4);
-        assert!((e - 0.5 / 0.8).abs() < 1e-6, "{e}");
-        assert!((hidden(e, 0.4) - 0.5).abs() < 1e-5);
+        let lit = Lit { sky: 0.5, suns: [0.75; SUNS], missed: 0.5, slope: 0.0 };
+        let light = Light::of(&[Sample { lit, pit: 0.0, left: 1.0, albedo: 3.0 }; 3], 1.0, 0.4);
+        let e = light.sky;
+        assert!((e - 0.5 / 0.8).abs() < 1e-6 && (light.suns[0] - 0.75 / 0.8).abs() < 1e-6, "{light:?}");
     }
 
     #[test]

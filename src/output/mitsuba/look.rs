@@ -4,10 +4,11 @@
 //! texel of the one level that its pictures are read on, see [`super::level`].
 
 use crate::bsdf::microfacet::Ggx;
-use crate::bsdf::{Bsdf, SurfaceLayer};
+use crate::bsdf::{Bsdf, OrenNayar, Rough, SurfaceLayer, Wet};
 use crate::geometry::{Hit, Interaction, Mesh};
 use crate::material::{Material, Varies};
 use crate::math::{Spectrum, Vec2, Vec3, vec2};
+use crate::optics::Shadowing;
 
 /// What does not vary over a material.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,6 +19,8 @@ pub(super) enum Kind {
         shape: [f32; 2],
         /// The film's surface.
         film: Option<Ggx>,
+        /// What relief that is too fine to be made hides.
+        shadowing: Option<Shadowing>,
     },
     /// A thin sheet with a coat on its upper and lower side, or none.
     Sheet {
@@ -93,7 +96,9 @@ impl Kind {
     /// What holds for texels of both kinds: some of a ground may lie under water, some of a leaf's wax under soil.
     fn and(self, other: Self) -> Self {
         match (self, other) {
-            (Self::Soil { shape, film: None }, Self::Soil { film, .. }) => Self::Soil { shape, film },
+            (Self::Soil { shape, film: None, shadowing }, Self::Soil { film, .. }) => {
+                Self::Soil { shape, film, shadowing }
+            }
             (Self::Sheet { coats: [a, b], layers: [v, w] }, Self::Sheet { coats: [c, d], layers: [x, y] }) => {
                 Self::Sheet { coats: [a.or(c), b.or(d)], layers: [v.or(x), w.or(y)] }
             }
@@ -133,12 +138,19 @@ fn at(material: &Material, patch: &Mesh, uv: Vec2) -> (Kind, Texel) {
     let (bsdf, frame) = material.scatter(&point, patch.normals[0]);
     let opaque =
         |albedo: Spectrum, film: f32| Texel { reflect: [albedo; 2], transmit: Spectrum::ZERO, film, normal: frame.z };
+    let dry =
+        |b: &OrenNayar, shadowing| (Kind::Soil { shape: b.shape(), film: None, shadowing }, opaque(b.albedo(), 0.0));
+    let wet = |b: &Wet, shadowing| {
+        let kind = Kind::Soil { shape: b.base().shape(), film: Some(b.coat()), shadowing };
+        (kind, opaque(b.base().albedo(), b.film()))
+    };
     match bsdf {
-        Bsdf::OrenNayar(b) => (Kind::Soil { shape: b.shape(), film: None }, opaque(b.albedo(), 0.0)),
-        Bsdf::Wet(b) => {
-            let kind = Kind::Soil { shape: b.base().shape(), film: Some(b.coat()) };
-            (kind, opaque(b.base().albedo(), b.film()))
-        }
+        Bsdf::OrenNayar(b) => dry(&b, None),
+        Bsdf::Shadowed(b) => match b.base() {
+            Rough::Dry(base) => dry(base, Some(*b.shadowing())),
+            Rough::Wet(base) => wet(base, Some(*b.shadowing())),
+        },
+        Bsdf::Wet(b) => wet(&b, None),
         Bsdf::Leaf(b) => {
             let [upper, lower] = b.both_sides();
             let reflect = [upper.diffuse(), lower.diffuse()];

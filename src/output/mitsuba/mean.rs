@@ -23,6 +23,7 @@ use crate::bsdf::{Bsdf, SurfaceLayer, fresnel};
 use crate::geometry::{Interaction, Ray};
 use crate::integrator::World;
 use crate::math::{Frame, Spectrum, Vec3, vec2};
+use crate::optics::Shadowing;
 use crate::scene::Scene;
 use std::f32::consts::PI;
 
@@ -147,8 +148,14 @@ impl Mean {
     }
 
     /// What an albedo is multiplied by in place of Oren and Nayar's A and B, and of the share of a film of water that dims what is below
-    /// it: k of this module's equation, over surfaces with relief or over those without where the image has both.
-    pub(super) fn soil(&self, [a, b]: [f32; 2], film: Option<(Ggx, f32)>, relief: bool) -> f32 {
+    /// it, and with what fine relief hides: k of this module's equation, over surfaces with relief or over those without where the image has both.
+    pub(super) fn soil(
+        &self,
+        [a, b]: [f32; 2],
+        film: Option<(Ggx, f32)>,
+        shadowing: Option<Shadowing>,
+        relief: bool,
+    ) -> f32 {
         let any = self.pairs.iter().any(|pair| pair.relief == relief && pair.written > 0.0);
         let scale = film.map_or(1.0, |(coat, _)| norm(coat.ior));
         let through = |cos: f32| {
@@ -159,7 +166,8 @@ impl Mean {
             let [eye, light] = pair.cos;
             // max(0, cos Δφ) sin α tan β of Oren & Nayar 1994 without trigonometry, as `OrenNayar` has it.
             let s = (pair.between - eye * light).max(0.0) / eye.max(light);
-            ours += f64::from(pair.weight * (a + b * s) * through(eye) * through(light));
+            let open = shadowing.map_or(1.0, |relief| relief.factor(light, eye, pair.between));
+            ours += f64::from(pair.weight * (a + b * s) * through(eye) * through(light) * open);
             written += f64::from(pair.written);
         }
         if written > 0.0 { (ours / written) as f32 } else { a }
@@ -222,6 +230,7 @@ fn sight(world: &World<'_>, leveled: &Leveled, i: u32) -> Option<Sight> {
     let (weight, leaf) = match bsdf {
         Bsdf::OrenNayar(b) => (b.albedo().mean(), false),
         Bsdf::Wet(b) => (b.base().albedo().mean(), false),
+        Bsdf::Shadowed(b) => (b.albedo().mean(), false),
         Bsdf::Leaf(_) => (1.0, true),
     };
     let side = 1.0_f32.copysign(at.ng.dot(-direction));
@@ -318,12 +327,12 @@ mod tests {
         };
         let near = |a: Spectrum, b: Spectrum| (a - b).map(f32::abs).max() < 1e-5;
         let soil = OrenNayar::new(Spectrum::splat(0.2), 0.5);
-        let factor = mean.soil(soil.shape(), None, false);
+        let factor = mean.soil(soil.shape(), None, None, false);
         assert!(near(brightness(Bsdf::OrenNayar(soil)), Spectrum::splat(0.2) * factor));
         // What is below a film, without what the film itself reflects. Where no pair has relief those without it count.
         let wet = Wet::new(Spectrum::splat(0.2), 0.5, 0.6, 1.0);
         let film = brightness(Bsdf::Wet(wet)) - brightness(Bsdf::Wet(Wet::new(Spectrum::ZERO, 0.5, 0.6, 1.0)));
-        let factor = mean.soil(wet.base().shape(), Some((wet.coat(), wet.film())), true);
+        let factor = mean.soil(wet.base().shape(), Some((wet.coat(), wet.film())), None, true);
         assert!(near(film, wet.base().albedo() * factor));
 
         let layer = SurfaceLayer::new(0.3, 0.2).unwrap();

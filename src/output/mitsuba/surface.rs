@@ -171,9 +171,9 @@ impl Surface {
     /// What reflectances at a mesh's corners are multiplied by.
     pub(super) fn corner_factor(look: &Look, mean: &Mean) -> f32 {
         match look.kind {
-            Kind::Soil { shape, film } => {
+            Kind::Soil { shape, film, shadowing } => {
                 let below = film.map(|coat| (coat, look.mean_film()));
-                mean.soil(shape, below, look.has_relief()) / film.map_or(1.0, |_| 1.0 - FILM)
+                mean.soil(shape, below, shadowing, look.has_relief()) / film.map_or(1.0, |_| 1.0 - FILM)
             }
             Kind::Sheet { .. } => 1.0,
         }
@@ -185,7 +185,12 @@ impl Surface {
             warnings.insert((what, name.to_owned()));
         };
         match self.kind {
-            Kind::Soil { shape: [_, b], film } => {
+            Kind::Soil { shape: [_, b], film, shadowing } => {
+                if shadowing.is_some() {
+                    warn(
+                        "shadows of relief that is too fine to be made are equal on the mean over the light and the view",
+                    );
+                }
                 if b > 0.0 {
                     warn("Oren–Nayar is written as Lambert, equal on the mean over the light and the view");
                 }
@@ -272,7 +277,7 @@ impl Surface {
 
     fn own(&self, band: Band) -> Element {
         let mut own = match self.kind {
-            Kind::Soil { shape: [a, b], film } => {
+            Kind::Soil { shape: [a, b], film, .. } => {
                 let soil = Element::plugin("bsdf", "furrow_soil")
                     .float("a", a)
                     .float("b", b)
@@ -360,7 +365,7 @@ fn picture(name: &str, path: &str, filter: &str) -> Element {
 /// a material varies over the world in another way.
 pub(super) fn rough(look: &Look) -> Result<[u32; 4]> {
     match look.kind {
-        Kind::Soil { shape: [a, b], film } => {
+        Kind::Soil { shape: [a, b], film, .. } => {
             let share = look.texels.first().map_or(0.0, |t| t.film);
             Ok([a, b, share, film.map_or(0.0, |coat| coat.alpha[0])].map(f32::to_bits))
         }
