@@ -23,24 +23,31 @@ pub struct Wet {
     base: OrenNayar,
     coat: Ggx,
     film: f32,
+    /// The coat's albedo at normal incidence.
+    gloss: f32,
 }
 
 impl Wet {
     /// `reflectance` of the wet soil at normal incidence; `sigma` of its facets, radians; `film`: covered fraction 0–1;
     /// `alpha`: the film's roughness.
     pub fn new(reflectance: Spectrum, sigma: f32, film: f32, alpha: f32) -> Self {
-        let base = (reflectance - Spectrum::splat(film * F0)).clamp(0.0, 1.0);
-        Self { base: OrenNayar::new(base, sigma), coat: Ggx { alpha: [alpha; 2], ior: WATER }, film }
+        Self::rougher(reflectance, sigma, film, alpha, F0)
     }
 
-    /// What a film of the roughness `alpha` reflects less than a smooth one at normal incidence, by light that meets it twice.
-    pub fn lacks(alpha: f32) -> f32 {
-        (F0 - Ggx { alpha: [alpha; 2], ior: WATER }.albedo(1.0)).max(0.0)
+    /// [`Wet::new`] for a film so rough that its albedo at normal incidence, `gloss` of [`Wet::gloss`], is another than that of smooth water.
+    pub fn rougher(reflectance: Spectrum, sigma: f32, film: f32, alpha: f32, gloss: f32) -> Self {
+        let base = (reflectance - Spectrum::splat(film * gloss)).clamp(0.0, 1.0);
+        Self { base: OrenNayar::new(base, sigma), coat: Ggx { alpha: [alpha; 2], ior: WATER }, film, gloss }
+    }
+
+    /// Albedo at normal incidence of a film of the roughness `alpha`; of up to 0.3 that of smooth water, which it is but for a tenth. By quadrature: ask once.
+    pub fn gloss(alpha: f32) -> f32 {
+        if alpha <= 0.3 { F0 } else { Ggx { alpha: [alpha; 2], ior: WATER }.albedo(1.0) }
     }
 
     /// Reflectance at normal incidence.
     pub fn albedo(&self) -> Spectrum {
-        self.base.albedo() + Spectrum::splat(self.film * F0)
+        self.base.albedo() + Spectrum::splat(self.film * self.gloss)
     }
 
     /// The soil below the film.

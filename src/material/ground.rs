@@ -48,9 +48,11 @@ pub struct BakedGround {
     decode: [f32; 256],
     /// What relief that is too fine to be made hides.
     shadowing: Option<Shadowing>,
-    /// Roughness α of the film of water, and what it reflects less than a smooth one at normal incidence.
+    /// What no texel reflects more than.
+    most: f32,
+    /// Roughness α of the film of water, and its albedo at normal incidence.
     film_roughness: f32,
-    film_lacks: f32,
+    gloss: f32,
 }
 
 impl BakedGround {
@@ -74,8 +76,9 @@ impl BakedGround {
             texels: (0..maps.width * maps.height).into_par_iter().map(texel).collect(),
             decode: std::array::from_fn(|i| (i as f32 / 255.0).powi(2)),
             shadowing: maps.lost.map(|lost| lost.shadowing),
+            most: MOST_REFLECTANCE / maps.lost.map_or(1.0, |lost| lost.shadowing.most().max(1.0)),
             film_roughness,
-            film_lacks: maps.lost.map_or(0.0, |_| Wet::lacks(film_roughness)),
+            gloss: Wet::gloss(film_roughness),
         }
     }
 
@@ -164,8 +167,7 @@ impl Ground {
     #[inline]
     pub(super) fn scatter(&self, at: &Interaction, wo: Vec3) -> (Bsdf, Frame) {
         let (reflectance, slope, film) = self.baked.sample(at.uv);
-        let shadowing = self.baked.shadowing;
-        let most = MOST_REFLECTANCE / shadowing.map_or(1.0, |shadowing| shadowing.most().max(1.0));
+        let BakedGround { shadowing, most, film_roughness, gloss, .. } = *self.baked;
         let reflectance = (reflectance * self.tint).clamp(0.0, most);
         let normal = if self.relief {
             // Slopes of heights over the plane add up; the mesh's normal is (−∂z/∂x, −∂z/∂y, 1) to scale.
@@ -177,10 +179,7 @@ impl Ground {
         let base = match self.facets {
             None => Rough::Dry(OrenNayar::new(reflectance, 0.0)),
             Some(sigma) if film < DRY => Rough::Dry(OrenNayar::new(reflectance, sigma)),
-            Some(sigma) => {
-                let BakedGround { film_roughness, film_lacks, .. } = *self.baked;
-                Rough::Wet(Wet::new(reflectance + Spectrum::splat(film * film_lacks), sigma, film, film_roughness))
-            }
+            Some(sigma) => Rough::Wet(Wet::rougher(reflectance, sigma, film, film_roughness, gloss)),
         };
         let frame = frame(at, normal, wo);
         let bsdf = match (shadowing, base) {

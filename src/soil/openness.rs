@@ -45,7 +45,7 @@ const LEAST_M: f32 = super::bake::HALF_SKY_M;
 const MOST_M: f32 = 10.0;
 
 /// Most of what ground reflects that it may meet again.
-const MOST_HIDDEN: f32 = 0.9;
+const MOST_BACK: f32 = 0.9;
 
 /// Halvings of their logarithm: to a part in a thousand.
 const HALVINGS: usize = 16;
@@ -107,7 +107,7 @@ impl Ground {
         };
         let lost = |of: fn(&Sample) -> f32| (1.0 - cover) * mean(&fine, of) + mean(clods, of) - mean(&coarse, of);
         let slope = lost(|s| s.lit.slope);
-        let back = lost(|s| s.lit.missed).clamp(0.0, MOST_HIDDEN);
+        let back = lost(|s| s.lit.missed).clamp(0.0, MOST_BACK);
         Shade {
             sky,
             wet: solve(|half| wetness(&coarse, half) > damp),

@@ -19,7 +19,7 @@ use super::look;
 use crate::Result;
 use crate::accel::EmbreeAccel;
 use crate::bsdf::microfacet::Ggx;
-use crate::bsdf::{Bsdf, SurfaceLayer, fresnel};
+use crate::bsdf::{Bsdf, Rough, SurfaceLayer, fresnel};
 use crate::geometry::{Interaction, Ray};
 use crate::integrator::World;
 use crate::math::{Frame, Spectrum, Vec3, vec2};
@@ -230,7 +230,10 @@ fn sight(world: &World<'_>, leveled: &Leveled, i: u32) -> Option<Sight> {
     let (weight, leaf) = match bsdf {
         Bsdf::OrenNayar(b) => (b.albedo().mean(), false),
         Bsdf::Wet(b) => (b.base().albedo().mean(), false),
-        Bsdf::Shadowed(b) => (b.albedo().mean(), false),
+        Bsdf::Shadowed(b) => match b.base() {
+            Rough::Dry(base) => (base.albedo().mean(), false),
+            Rough::Wet(base) => (base.base().albedo().mean(), false),
+        },
         Bsdf::Leaf(_) => (1.0, true),
     };
     let side = 1.0_f32.copysign(at.ng.dot(-direction));
