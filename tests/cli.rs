@@ -467,7 +467,7 @@ fn a_terminal_shows_what_grows() {
     }
 }
 
-/// Expected: so it is where a bill grows fields; the line says that images are drawn in between, and is gone before the table is there.
+/// Expected: so it is where a bill grows fields, of a dataset and of days; the line says which image is drawn, and is gone before the table is there.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_terminal_shows_what_grows_for_a_bill() {
@@ -476,14 +476,17 @@ fn a_terminal_shows_what_grows_for_a_bill() {
     let order = |verb: &str, bill: &str| {
         format!("{verb} --scene scenes/field.ron --width 81 --spp 300 --count 1 --out {out} {bill}")
     };
+    let of_days = "--days 20 --width 81 --spp 300 --format tum --dry-run";
+    let days = format!("sequence --scene scenes/field.ron {of_days} --out {out}");
     let commands = [
         (order("dataset", "--dry-run"), true),
+        (days, true),
         (order("dataset plan", "--bill"), true),
         (order("dataset", "--dry-run --quiet"), false),
     ];
     for (command, shown) in commands {
         let Some(said) = said_on_a_terminal(&command) else { return };
-        assert_eq!(said.contains("growing: ") && said.contains("drawing images"), shown, "{command}: {said}");
+        assert_eq!(said.contains("growing: ") && said.contains("drawing images, 1 of 1"), shown, "{command}: {said}");
         let table = said.rsplit_once("\u{1b}[2K").map_or(said.as_str(), |(_, after)| after);
         assert!(table.contains("core hours") && !table.contains(" gone"), "{command}: {said:?}");
     }

@@ -133,5 +133,15 @@ fn the_same_field_has_the_same_points_and_too_many_are_refused() {
     assert!(!export(&["--format", "gltf"]).status.success());
     let done = export(&["--format", "ply"]);
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
-    assert!(std::fs::read(folder.join("points.ply")).unwrap().starts_with(b"ply\nformat binary_little_endian"));
+    let file = std::fs::read(folder.join("points.ply")).unwrap();
+    assert!(file.starts_with(b"ply\nformat binary_little_endian"));
+    // The last line tells how many there are, how many of them are of the ground, and how large the file is.
+    let said = String::from_utf8_lossy(&done.stderr);
+    let told = said.lines().last().unwrap().split_whitespace();
+    let numbers: Vec<f64> = told.filter_map(|word| word.parse().ok()).collect();
+    let [points, of_soil, megabytes] = numbers[..] else { panic!("{said}") };
+    let head = format!("element vertex {points}\n");
+    assert!(file.windows(head.len()).any(|text| text == head.as_bytes()), "{said}");
+    assert!(0.5 * points < of_soil && of_soil < points, "{said}");
+    assert!((megabytes - file.len() as f64 * 1e-6).abs() < 0.051, "{said}");
 }

@@ -113,6 +113,45 @@ fn what_is_damaged_is_found_and_made_again_and_nothing_else() {
     succeed(verb("verify", &data, &[]));
 }
 
+/// Rationale: a folder that was copied in part may have other faults. Expected: with an image missing, the scene's copy and the tables are held against the
+/// manifest all the same, and the image's files are not told one by one; what no manifest tells yet is said not to have been checked, and is no fault.
+#[test]
+fn what_is_of_all_images_is_checked_though_one_is_missing() {
+    let (_keep, data) = scratch();
+    succeed(make(&data, 3, &[]));
+    let whole = tree(&data);
+    fs::remove_dir_all(data.join("images/000001")).unwrap();
+    fs::remove_file(data.join("seals/000001.json")).unwrap();
+    fs::remove_file(data.join("imagefolder/train/masks/000001.png")).unwrap();
+    let told = || fail(verb("verify", &data, &[]), 1);
+    let said = told();
+    assert!(said.contains("2 of 3 images checked") && said.contains("; 0 faults"), "{said}");
+    assert!(said.contains("1 of 3 images are missing: 1"), "{said}");
+    assert!(said.contains("not checked: whether missing photographs are in two splits\n"), "{said}");
+    let of_all = ["scene/tests/ref/small.ron", "plants.parquet"];
+    for name in of_all {
+        fs::write(data.join(name), [&whole[name][..], b"\n"].concat()).unwrap();
+    }
+    let said = told();
+    for name in of_all {
+        let length = whole[name].len();
+        assert!(said.contains(&format!("{name} has {} bytes instead of {length}", length + 1)), "{said}");
+        fs::write(data.join(name), &whole[name]).unwrap();
+    }
+    assert!(said.contains("; 2 faults"), "{said}");
+    // One that is made longer: the manifest is of before.
+    let page = ["dataset", "plan", "--scene", SMALL, "--out", path(&data), "--count", "4"];
+    succeed(trace(&[&page[..], &crate::common::dataset::SIZE].concat()));
+    let said = told();
+    assert!(said.contains("2 of 4 images are missing: 1,3") && said.contains("; 0 faults"), "{said}");
+    assert!(said.contains("not checked: dataset.json and images by manifest.json"), "{said}");
+    // One that was never finished.
+    fs::remove_file(data.join("manifest.json")).unwrap();
+    let said = told();
+    assert!(said.contains("; 0 faults") && !said.contains("manifest.json is missing"), "{said}");
+    assert!(said.contains("not checked: scene, lists and tables, for manifest.json is written when"), "{said}");
+}
+
 /// Rationale: tables and lists repeat what records say. Expected: a record of which a number was changed ends `finish` with its name, and no table is written anew.
 #[test]
 fn finish_takes_no_record_that_was_changed() {

@@ -13,52 +13,85 @@ const LIGHTS: [&str; 4] = [
 ];
 const MOISTURES: [&str; 2] = ["moisture: (mean: 0, spread: 0)", "moisture: (mean: 0.3)"];
 
-/// Mean radiance of bare ground seen from above, by pixels of so many millimetres.
-fn mean(lights: &str, soil: &str, detail: &str, pixel_mm: f64) -> Spectrum {
+/// A camera that looks straight down on pixels of so many millimetres.
+fn from_above(pixel_mm: f64) -> String {
     let (size, focal) = (80, 240.0);
+    let lens = format!("intrinsics: Pixels(fx: {focal}, fy: {focal}, cx: 40, cy: 40)");
+    format!("size: ({size}, {size}), {lens}, pose: Nadir(height_m: {})", focal * pixel_mm * 1e-3)
+}
+
+/// A camera that looks at the origin from three metres away, north, so many degrees above the horizon; 5 mm across a pixel.
+fn at_a_slant(degrees: f64) -> String {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    let pose = format!("LookAt(position_m: (0, {}, {}), target_m: (0, 0, 0))", -3.0 * cos, 3.0 * sin);
+    format!("size: (100, 24), intrinsics: Pixels(fx: 600, fy: 600, cx: 50, cy: 12), pose: {pose}")
+}
+
+/// Mean radiance of bare ground.
+fn mean(camera: &str, lights: &str, soil: &str, detail: &str) -> Spectrum {
     let text = format!(
         r#"Field(
             seed: 3,
             detail: {detail},
-            camera: Pinhole(size: ({size}, {size}), intrinsics: Pixels(fx: {focal}, fy: {focal}, cx: 40, cy: 40), pose: Nadir(height_m: {})),
+            camera: Pinhole({camera}),
             lights: [{lights}],
             soil: (
                 layers: [(albedo: "textures/soil/dirt.png", height: "textures/soil/dirt.height.png", size_m: 0.5, height_mm: (-4, 8))],
                 relief: (rms_mm: 0), stones: [], litter: (bits_per_m2: 0, sticks_per_m2: 0, straw_cover: 0), {soil}
             ),
-        )"#,
-        focal * pixel_mm * 1e-3
+        )"#
     );
     let (film, _) = shoot(&field(&text, &Options::default()), 16, 0);
     film.pixels.iter().map(|pixel| pixel.mean).fold(Spectrum::ZERO, |sum, mean| sum + mean) / film.pixels.len() as f32
 }
 
-/// Ratios of the mean radiance of bare ground made by pixel to that in full detail, in each band, at two sizes of pixels, printed and held to `bound`.
-fn compare(clods: &str, bound: f32) {
+/// Ratio of the mean radiance of bare ground made by pixel to that in full detail, in each band, printed and held to `bound`.
+fn compare(camera: &str, lights: &str, soil: &str, bound: f32) {
+    let ratio = (mean(camera, lights, soil, "ByPixel") / mean(camera, lights, soil, "Full")).to_array();
+    let name = format!("{soil}, {lights}, {camera}: {ratio:.3?}");
+    eprintln!("{name}");
+    assert!(ratio.iter().all(|ratio| (ratio - 1.0).abs() < bound), "{name}");
+}
+
+/// The same from above at two sizes of pixels, under all lights, dry and moist.
+fn compare_from_above(clods: &str, bound: f32) {
     for moisture in MOISTURES {
         for lights in LIGHTS {
             for pixel_mm in [5.0, 15.0] {
-                let soil = format!("{moisture}, clods: ({clods})");
-                let ratio = mean(lights, &soil, "ByPixel", pixel_mm) / mean(lights, &soil, "Full", pixel_mm);
-                let ratio = ratio.to_array();
-                let name = format!("{soil}, {lights}, {pixel_mm} mm: {ratio:.3?}");
-                eprintln!("{name}");
-                assert!(ratio.iter().all(|ratio| (ratio - 1.0).abs() < bound), "{name}");
+                compare(&from_above(pixel_mm), lights, &format!("{moisture}, clods: ({clods})"), bound);
             }
         }
     }
 }
 
 /// Rationale: a field that a drone sees must not be darker or brighter than the same field is, by what its ground no longer shows, wherever the
-/// sun stands. Expected: mean radiance of bare ground in each band within 3 % of that of full detail, at pixels of 5 and 15 mm, dry and moist,
+/// sun stands. Expected: mean radiance of bare ground in each band within 4 % of that of full detail, at pixels of 5 and 15 mm, dry and moist,
 /// under an even sky and under suns of 30°, 50° and 70°. Source: the same scene file in full detail.
 #[test]
 fn coarse_ground_is_as_bright_as_the_ground() {
-    compare("over_5mm_per_m2: 0", 0.03);
+    compare_from_above("over_5mm_per_m2: 0", 0.04);
 }
 
-/// Expected: the same under clods, which shade each other, within 5 %.
+/// Expected: the same under clods, which shade each other, within 6 %.
 #[test]
 fn coarse_ground_is_as_bright_as_the_clods_on_it() {
-    compare("over_5mm_per_m2: 9000", 0.05);
+    compare_from_above("over_5mm_per_m2: 9000", 0.06);
+}
+
+/// Rationale: what a front camera sees far away is seen at a grazing angle, where ground that only hides would go black. Expected: as bright as in full
+/// detail within 10 % at 20° and 8° above the horizon, under an even sky and under a sun beside and behind the camera, within 30 % where it stands
+/// before it.
+#[test]
+fn coarse_ground_is_as_bright_at_a_slant() {
+    for degrees in [20.0, 8.0] {
+        let camera = at_a_slant(degrees);
+        for clods in ["over_5mm_per_m2: 0", "over_5mm_per_m2: 9000"] {
+            let soil = format!("{}, clods: ({clods})", MOISTURES[1]);
+            compare(&camera, LIGHTS[0], &soil, 0.1);
+            for (azimuth, bound) in [(0, 0.3), (90, 0.1), (180, 0.1)] {
+                let sun = format!("Daylight(sun: Angles(elevation_deg: 34, azimuth_deg: {azimuth}), turbidity: 3)");
+                compare(&camera, &sun, &soil, bound);
+            }
+        }
+    }
 }

@@ -5,7 +5,7 @@
 //! the pinhole camera's geometry; equality is exact otherwise. COLMAP's own reader and OpenCV's stereo matcher are asked as well.
 
 use crate::common::dataset::{fail, path, same, succeed, tree, verb};
-use crate::common::program::{scratch, small_text, trace};
+use crate::common::program::{SMALL, scratch, small_text, trace};
 use crate::common::python::python;
 use furrow::accel::EmbreeAccel;
 use furrow::dataset::flow::flows;
@@ -18,6 +18,8 @@ use furrow::render;
 use furrow::scene::PartKind;
 use furrow::scene::assemble::{self, Options, Source};
 use furrow::settings::{Quality, RenderOptions};
+use serde_json::{Value, json};
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::AtomicBool;
@@ -358,6 +360,88 @@ fn images_of_a_drive_do_not_depend_on_the_others() {
     );
 }
 
+/// Rationale: who trains on videos reads a list of them, their frames in order, and a number that stays with a plant; frames of two cameras in one video have
+/// no order. Expected: a video for each camera of each field, named as the files of MOTS are; its frames count from 0 in the order of time; plants and leaves have
+/// in all of them the identities of the records. Shards, a lost image, archives and a format that comes later give the bytes of one run. Where each image is of a
+/// field of its own, there is none of these keys. Source: the records; the list of `CocoVID` in MMTracking.
+#[test]
+fn coco_has_a_video_for_each_camera_of_each_field() {
+    let (_keep, folder) = scratch();
+    std::fs::create_dir_all(&folder).unwrap();
+    let page = page(&folder, "drive.ron", &|text| text);
+    let order = |verb: &[&str], out: &Path, more: &[&str]| {
+        let scene = ["--scene", path(&page), "--width", "48", "--spp", "1", "--split", "1,1,0", "--out", path(out)];
+        trace(&[verb, &scene[..], more].concat())
+    };
+    let whole = folder.join("whole");
+    let one_run = || order(&["sequence"], &whole, &["--fields", "2", "--format", "coco,mots,panoptic", "--quiet"]);
+    succeed(one_run());
+    let before = tree(&whole);
+    let record = |index: u64| -> Record { native::read_record(&whole, &Set::name(index)).unwrap() };
+    let mut tracks: BTreeMap<u64, BTreeSet<(u64, u64)>> = BTreeMap::new();
+    for (field, split) in [(0_u64, "train"), (1, "val")] {
+        for file in ["coco/annotations/instances", "coco/annotations/leaves", "panoptic/annotations/panoptic"] {
+            let told: Value = serde_json::from_slice(&before[&format!("{file}_{split}.json")]).unwrap();
+            let [images, annotations] = ["images", "annotations"].map(|key| told[key].as_array().unwrap());
+            let video = |(k, camera): (u64, &str)| {
+                assert!(before.contains_key(&format!("mots/{field:06}-{camera}.txt")));
+                json!({ "id": 2 * field + k, "name": format!("{field:06}-{camera}"), "width": 48, "height": 36 })
+            };
+            assert_eq!(told["videos"], Value::from([(1, "camera"), (2, "right")].map(video).to_vec()));
+            for (k, camera) in [(1, "camera"), (2, "right")] {
+                let of = images.iter().filter(|image| image["video_id"] == 2 * field + k);
+                let frames: Vec<u64> = of.clone().map(|image| image["frame_id"].as_u64().unwrap()).collect();
+                assert_eq!(frames, [0, 1, 2], "{file}");
+                for image in of {
+                    let capture = record(image["id"].as_u64().unwrap() - 1).capture.unwrap();
+                    assert!(image["camera"] == camera && capture.camera == camera && capture.field == field);
+                    assert_eq!(image["frame_id"], capture.frame);
+                }
+            }
+            for annotation in annotations.iter().filter(|_| file.starts_with("coco")) {
+                let image = annotation["image_id"].as_u64().unwrap();
+                let seen = images.iter().find(|other| other["id"] == image).unwrap();
+                let (attributes, record) = (&annotation["attributes"], record(image - 1));
+                let plant = record.plants.iter().find(|plant| attributes["plant"] == plant.number).unwrap();
+                let leaf = plant.leaves.iter().find(|leaf| attributes["leaf"] == leaf.number);
+                let identity = leaf.map_or(plant.id, |leaf| leaf.id).unwrap();
+                for of in [&annotation["instance_id"], &annotation["track_id"], &attributes["track_id"]] {
+                    assert_eq!(*of, identity, "{file}");
+                }
+                assert!(leaf.is_some() == file.ends_with("leaves") && annotation["video_id"] == seen["video_id"]);
+                let frame = [&seen["video_id"], &seen["frame_id"]].map(|number| number.as_u64().unwrap());
+                tracks.entry(u64::from(identity)).or_default().insert(frame.into());
+            }
+        }
+    }
+    assert!(tracks.values().any(|seen| seen.len() == 6), "a plant in all images of its field: {tracks:?}");
+    // What is lost is made again.
+    std::fs::remove_dir_all(whole.join("images/000003")).unwrap();
+    std::fs::remove_dir_all(whole.join("coco/annotations")).unwrap();
+    succeed(one_run());
+    same(&tree(&whole), &before);
+    let parts = folder.join("parts");
+    succeed(order(&["dataset", "plan"], &parts, &["--count", "12", "--format", "mots"]));
+    for shard in ["1/2", "0/2"] {
+        succeed(verb("render", &parts, &["--shard", shard, "--quiet"]));
+    }
+    succeed(verb("finish", &parts, &["--format", "coco,panoptic", "--quiet"]));
+    same(&tree(&parts), &before);
+    succeed(verb("verify", &parts, &[]));
+    let packs = folder.join("packs");
+    let packed = ["--count", "12", "--format", "coco,mots,panoptic", "--pack", "6", "--quiet"];
+    succeed(order(&["dataset"], &packs, &packed));
+    let lists = |files: BTreeMap<String, Vec<u8>>| -> BTreeMap<String, Vec<u8>> {
+        files.into_iter().filter(|(name, _)| name.contains("/annotations/")).collect()
+    };
+    same(&lists(tree(&packs)), &lists(before));
+    let single = folder.join("single");
+    let small = ["--width", "48", "--spp", "1", "--count", "1", "--format", "coco", "--quiet", "--out", path(&single)];
+    succeed(trace(&[&["dataset", "--scene", SMALL][..], &small[..]].concat()));
+    let text = std::fs::read_to_string(single.join("coco/annotations/instances_train.json")).unwrap();
+    assert!(!["video", "frame_id", "instance_id", "track_id"].iter().any(|key| text.contains(key)), "{text}");
+}
+
 /// Rationale: the first frame of a drive waits for its field to grow, and no other does. Expected: from the first frame on, the time that is left is
 /// that of what frames take beside growing, and after the last there is none. Source: the timing log, which tells growing from the rest.
 #[test]
@@ -412,6 +496,39 @@ fn written_poses_are_a_path() {
     let dataset = folder.join("flown");
     succeed(trace(&["sequence", "--scene", path(&again), "--out", path(&dataset), "--spp", "1", "--quiet"]));
     assert!(dataset.join("scene").join("flight.tum").is_file() || find(&dataset.join("scene"), "flight.tum"));
+}
+
+/// Rationale: some programs write the scalar of a quaternion first, others last, and the first line of a table alone tells which. Expected: a table as
+/// EuRoC writes it gives the cameras of the same flight as TUM writes it; names that are not understood end the program with exit code 2, the line and
+/// the names, and so does a file in UTF-16. Source: equality.
+#[test]
+fn a_table_of_poses_is_read_by_the_names_of_its_columns() {
+    let (_keep, folder) = scratch();
+    std::fs::create_dir_all(&folder).unwrap();
+    let flown = |name: &str, poses: &[u8]| {
+        std::fs::write(folder.join(name), poses).unwrap();
+        along(&folder, &format!("{name}.ron"), 2, &format!("Poses(\"{name}\")"))
+    };
+    let cameras = |page: &Path| SceneFile::open(page).unwrap().cameras(0).unwrap();
+    let tum = "0 0 0 0.9 0.92388 0.382683 0 0\n0.25 0 0.1 0.9 0.92388 0.382683 0 0\n";
+    let euroc = "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []\n\
+                 0,0,0,0.9,0,0.92388,0.382683,0\n250000000,0,0.1,0.9,0,0.92388,0.382683,0\n";
+    let (one, two) = (flown("flight.tum", tum.as_bytes()), flown("flight.csv", euroc.as_bytes()));
+    assert_eq!(cameras(&one), cameras(&two));
+    let wide: Vec<u8> = tum.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let unknown = tum.replacen("0 0 0 0.9", "time x y height qx qy qz qw\n0 0 0 0.9", 1);
+    for (name, poses, words) in [
+        (
+            "unknown.csv",
+            unknown.as_bytes(),
+            "line 1 names the columns time, x, y, height, qx, qy, qz, qw: `height` is none",
+        ),
+        ("wide.tum", wide.as_slice(), "not UTF-8 text"),
+    ] {
+        let page = flown(name, poses);
+        let said = fail(trace(&["--scene", path(&page), "--spp", "1", "--out", path(&folder.join("no"))]), 2);
+        assert!(said.contains(words) && said.contains(name), "{said}");
+    }
 }
 
 /// Whether a folder holds a file of this name at any depth.

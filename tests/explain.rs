@@ -120,6 +120,20 @@ fn messages_tell_what_to_write() {
     assert!(words.contains("write Uniform(0.8, 0.9)"), "{words}");
 }
 
+/// Expected: what pages say of soil is what the program takes, and what the scenes that teach have.
+#[test]
+fn what_is_said_of_soil_is_so() {
+    let told = |path: &str| {
+        let words = said(&trace(&["explain", path]));
+        words.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    assert_eq!(furrow::soil::MAX_LAYERS, 4);
+    assert!(told("soil").contains("One to four layers"), "{}", told("soil"));
+    assert!(fs::read_to_string("scenes/11-drone.ron").unwrap().contains("patch_m: 2.5"));
+    let patches = told("soil.moisture.patch_m");
+    assert!(patches.contains("0.02–0.15") && patches.contains("some metres in those of a field"), "{patches}");
+}
+
 /// Method: scene files with what is allowed and hardly meant. Expected: a warning for each, and none for the scenes that teach.
 #[test]
 fn what_was_hardly_meant_is_told() {

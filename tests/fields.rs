@@ -225,6 +225,57 @@ fn all_that_a_camera_sees_is_planted_or_told() {
     assert!(refused.contains("m away") && refused.contains("lower the camera"), "{refused}");
 }
 
+/// Rationale: ground that falls away is seen farther out than the plane z = 0, and clods and fine ground ended within the image. Expected: in each band of an
+/// image's rows, and of each beam of a LiDAR, clods are met at least a quarter as often as on the mean, whichever way the ground falls, in the second of these
+/// fields away from both. Source: clods lie everywhere alike.
+#[test]
+fn ground_is_made_as_far_as_it_is_seen_where_it_slopes() {
+    use furrow::accel::EmbreeAccel;
+    use furrow::geometry::{Intersect, Ray, Window};
+    use furrow::render::label;
+    use furrow::scene::assemble::Scanner;
+    let text = "Field(
+        seed: 3,
+        camera: Pinhole(
+            size: (100, 24),
+            intrinsics: Pixels(fx: 600, fy: 600, cx: 50, cy: 12),
+            pose: LookAt(position_m: (0, -2.9708, 0.4175), target_m: (0, 0, 0)),
+        ),
+        lidar: (position_m: (0, 0, 1), beams: Fan(count: 6, from_deg: -40, to_deg: -20), azimuth_deg: (-10, 10), pulses: StepDeg(0.1)),
+        lights: [Constant(radiance: (1, 1, 1, 1))],
+        soil: (
+            relief: (rms_mm: 0, tilt_deg: 3),
+            clods: (over_5mm_per_m2: 12000, min_mm: 6, max_mm: 40, exponent: 2.2, clustering: 0, sorting: 0),
+            litter: (straw_cover: 0, sticks_per_m2: 0, bits_per_m2: 0),
+        ),
+    )";
+    for index in [0, 1, 4] {
+        for scan in [None, Some(Scanner::OfScene)] {
+            let field = field(text, &Options { index, scan, ..Options::default() });
+            let geometry = EmbreeAccel::build(&field.scene.surfaces(), 2).expect("an accelerator");
+            // The ground itself is part 0.
+            let bands: Vec<Vec<bool>> = match field.scanners.first() {
+                None => {
+                    let window = Window::full(100, 24);
+                    let parts = label(&geometry, &field.scene.parts, &field.scene.camera, window).parts;
+                    parts.chunks(300).map(|rows| rows.iter().map(|part| *part > 0).collect()).collect()
+                }
+                Some(lidar) => {
+                    let clod = |beam, column| {
+                        let pulse = lidar.pulse(column, beam);
+                        geometry.closest(&Ray::new(pulse.origin, pulse.direction)).is_some_and(|hit| hit.part > 0)
+                    };
+                    (0..lidar.beams()).map(|beam| (0..lidar.columns()).map(|k| clod(beam, k)).collect()).collect()
+                }
+            };
+            let share = |band: &Vec<bool>| band.iter().filter(|clod| **clod).count() as f64 / band.len() as f64;
+            let shares: Vec<f64> = bands.iter().map(share).collect();
+            let mean = shares.iter().sum::<f64>() / shares.len() as f64;
+            assert!(mean > 0.1 && shares.iter().all(|share| *share > 0.25 * mean), "{index}: {shares:.2?}");
+        }
+    }
+}
+
 /// Rationale: a camera within a clod or a ridge takes pictures of nothing, and who took them did not know why. Expected: a warning that says so where the
 /// ground's own triangle at the camera's place is above it, and none where it is not; both happen in sixteen fields.
 #[test]

@@ -150,13 +150,13 @@ fn samples(folder: &Path) -> (Recipe, Vec<Sample>) {
 #[test]
 fn every_format_writes_files_for_every_image_with_plants_and_without() {
     for folder in [&*FIELD, &*BARE] {
-        let (_, samples) = samples(folder);
+        let (recipe, samples) = samples(folder);
         assert!(samples.iter().all(|s| s.record.plants.is_empty() == (*folder == *BARE)));
         for sample in &samples {
             let seal = checksum_record::ChecksumRecord::read(folder, sample.record.index).unwrap();
             let formats: BTreeSet<&str> = seal.files.keys().filter_map(|path| Some(path.split_once('/')?.0)).collect();
             let of_images =
-                NAMES.iter().map(|(name, _)| *name).filter(|name| format::named(name).unwrap().has_images());
+                NAMES.iter().map(|(name, _)| *name).filter(|name| format::named(name).unwrap().has_images(&recipe));
             let expected: BTreeSet<&str> = of_images.chain(["images"]).collect();
             assert_eq!(formats, expected);
         }
@@ -175,7 +175,7 @@ fn every_format_comes_out_the_same_from_the_native_files() {
             }
             for sample in &samples {
                 let files = writer.image(&recipe, sample).unwrap();
-                assert_eq!(files.is_empty(), !writer.has_images(), "{name}");
+                assert_eq!(files.is_empty(), !writer.has_images(&recipe), "{name}");
                 for file in files {
                     assert!(file.path.starts_with(&format!("{name}/")), "{}", file.path);
                     let written = std::fs::read(folder.join(&file.path)).unwrap();

@@ -403,6 +403,23 @@ fn plants_have_the_identities_of_an_image() {
     assert_eq!(image.label().unwrap(), plain.label().unwrap());
 }
 
+/// Rationale: a LiDAR brings its own light, so a scene file for scans alone needs none. Expected: a scan of one without lights warns of nothing, and an image
+/// of it would be black and says so.
+#[test]
+fn a_scan_needs_no_light() {
+    let (_keep, folder) = scratch();
+    std::fs::create_dir_all(&folder).unwrap();
+    let scene = folder.join("dark.ron");
+    let camera =
+        "camera: Pinhole(size: (8, 6), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.5))";
+    std::fs::write(&scene, format!("Field({camera}, {RAYS} lights: [])")).unwrap();
+    let image = SceneFile::open(&scene).unwrap();
+    let warns =
+        |scene: SceneFile| scene.foretold(0).unwrap().iter().any(|words| words.contains("no light in the scene"));
+    assert!(!warns(image.clone().scanned(Scanner::OfScene)));
+    assert!(warns(image));
+}
+
 /// Expected: exit code 2, one error that says what to write, and no file; then a scan that does write.
 #[test]
 fn mistakes_are_told_and_write_nothing() {

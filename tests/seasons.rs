@@ -4,10 +4,10 @@
 //! more. Expected: identities and places stay, leaves come and grow, holes stay where they were on the leaf, weeds are not there before they
 //! emerge, and no byte depends on which other days are rendered. Equality is exact.
 
-use crate::common::dataset::{fail, path, same, succeed, tree, verb};
-use crate::common::program::{scratch, small_text, trace};
+use crate::common::dataset::{fail, made, path, same, succeed, tree, verb};
+use crate::common::program::{SMALL, scratch, small_text, trace};
 use crate::common::python::{ask, python};
-use furrow::dataset::{Record, Set, native};
+use furrow::dataset::{Record, Set, format, native};
 use furrow::geometry::AlphaMask;
 use furrow::light::LightRecord;
 use furrow::math::vec2;
@@ -18,7 +18,7 @@ use furrow::scene::assemble::{Options, field_of};
 use furrow::scene::days::DaysDesc;
 use furrow::scene::traits::Traits;
 use furrow::scene::{Field, PartKind};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 const CAMERA: &str = "Pinhole(size: (24, 18), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.6))";
@@ -286,10 +286,49 @@ fn images_of_days_do_not_depend_on_the_others() {
     // Another list of days is another dataset.
     assert!(fail(make(&one, &["--days", "9,21"]), 2).contains("days [21] there, [9,21] here"));
     // Tables tell field, camera and day of what they list.
-    succeed(verb("finish", &whole, &["--format", "traits"]));
+    succeed(verb("finish", &whole, &["--format", "coco,traits"]));
+    let told = std::fs::read(whole.join("coco/annotations/instances_train.json")).unwrap();
+    let told: serde_json::Value = serde_json::from_slice(&told).unwrap();
+    // A video is what one camera takes on all days.
+    for (video, name) in [(1, "000000-camera"), (2, "000000-right")] {
+        assert_eq!(told["videos"][video - 1]["name"], name);
+        let of = told["images"].as_array().unwrap().iter().filter(|image| image["video_id"] == video);
+        assert!(of.map(|image| image["frame_id"].as_u64().unwrap()).eq(0..4), "{name}");
+    }
     if let Some(python) = python("import pandas, pyarrow") {
         ask(&python, "formats/check_index.py", &[path(&whole)]);
     }
+}
+
+/// Rationale: a warning of what nobody asked for is noise. Expected: where none is named, formats that have nothing to tell of these images are left out in
+/// silence; those that are named are told of. Optical flow, which leads nowhere with one image a day, has no files then, and the dataset is whole.
+#[test]
+fn formats_that_have_nothing_to_tell_are_left_out() {
+    let (_keep, folder) = scratch();
+    std::fs::create_dir_all(&folder).unwrap();
+    let run = |out: &Path, scene: &str, more: &[&str]| {
+        let size = ["--scene", scene, "--width", "64", "--quiet", "--out", path(out)];
+        let said = succeed(trace(&[&["sequence"][..], &size[..], more].concat())).stderr;
+        let folders = tree(out).into_keys().filter_map(|name| Some(name.split_once('/')?.0.to_owned()));
+        let formats: BTreeSet<String> = folders.filter(|name| format::named(name).is_some()).collect();
+        (String::from_utf8(said).unwrap(), formats.into_iter().collect::<Vec<_>>())
+    };
+    let days = ["--days", "9,21", "--spp", "1"];
+    let (said, formats) = run(&folder.join("usual"), SMALL, &days);
+    assert!(!said.contains("one image a day"), "{said}");
+    assert_eq!(formats, ["mots", "tum"]);
+    let named = folder.join("named");
+    let (said, formats) = run(&named, SMALL, &[&days[..], &["--format", "colmap,flow,tum"]].concat());
+    for name in ["colmap", "flow"] {
+        assert!(said.contains(&format!("warning: {name}: each field has one image a day")), "{said}");
+    }
+    assert_eq!(formats, ["colmap", "tum"]);
+    succeed(verb("render", &named, &["--quiet"]));
+    assert_eq!(made(&named).len(), 2, "nothing is made again");
+    succeed(verb("verify", &named, &["--rerender", "1"]));
+    let page = page(&folder);
+    let (_, formats) = run(&folder.join("labels"), path(&page), &["--days", "21", "--labels-only"]);
+    assert_eq!(formats, ["flow", "mots", "tum"]);
 }
 
 #[test]

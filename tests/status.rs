@@ -319,6 +319,8 @@ fn the_bill_is_what_is_taken() {
         let rows =
             bill(&[&["dataset", "plan"][..], order, &["--count", count, "--out", path(&data), "--bill"]].concat());
         assert!(!data.exists(), "{order:?}");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(said.contains("drawing images, 1 of 3"), "a log says what is under way: {said}");
         let text = String::from_utf8(output.stdout).unwrap();
         for name in rows.keys() {
             assert!(text.contains(name), "the same rows: {name}: {text}");

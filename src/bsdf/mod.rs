@@ -106,8 +106,10 @@ impl Bsdf {
             Leaf::new(upper, lower, Spectrum::new(0.07, 0.12, 0.02, 0.5))
         };
         let shadowed = |base: Rough| {
-            let factors = std::array::from_fn(|k| 0.6 + 0.06 * k as f32);
-            Self::Shadowed(Shadowed::new(base, Vec3::new(0.28, 0.0, 0.96), Shadowing::from_above(factors)))
+            // The brighter the higher both stand, and the nearer to each other.
+            let factor = |pair: usize, turn: usize| 0.6 + 0.02 * pair as f32 - 0.05 * turn as f32;
+            let factors = std::array::from_fn(|pair| std::array::from_fn(|turn| factor(pair, turn)));
+            Self::Shadowed(Shadowed::new(base, Vec3::new(0.28, 0.0, 0.96), Shadowing::new(&factors)))
         };
         vec![
             ("lambert", Self::OrenNayar(OrenNayar::new(Spectrum::splat(0.5), 0.0))),

@@ -23,7 +23,8 @@ macro_rules! each {
     };
 }
 
-/// A rough surface times the [`Shadowing`] of its relief, whose angles are measured from `up`.
+/// A rough surface times the [`Shadowing`] of its relief, whose angles are measured from `up`. A film of water is not: its roughness
+/// has masking and shadowing of its own.
 #[derive(Clone, Copy, Debug)]
 pub struct Shadowed {
     base: Rough,
@@ -61,13 +62,24 @@ impl Shadowed {
 impl Scatter for Shadowed {
     #[inline]
     fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Spectrum, f32) {
-        let (value, pdf) = each!(&self.base, b => b.eval_pdf(wo, wi));
-        (value * self.factor(wo, wi), pdf)
+        let factor = self.factor(wo, wi);
+        match &self.base {
+            Rough::Dry(base) => {
+                let (value, pdf) = base.eval_pdf(wo, wi);
+                (value * factor, pdf)
+            }
+            Rough::Wet(base) => base.eval_pdf_below(wo, wi, factor),
+        }
     }
 
     #[inline]
     fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
-        let sample = each!(&self.base, b => b.sample(wo, u))?;
-        Some(BsdfSample { weight: sample.weight * self.factor(wo, sample.wi), ..sample })
+        match &self.base {
+            Rough::Dry(base) => {
+                let sample = base.sample(wo, u)?;
+                Some(BsdfSample { weight: sample.weight * self.factor(wo, sample.wi), ..sample })
+            }
+            Rough::Wet(base) => base.sample_below(wo, u, |wi| self.factor(wo, wi)),
+        }
     }
 }

@@ -25,19 +25,24 @@ pub struct Wet {
     film: f32,
     /// The coat's albedo at normal incidence.
     gloss: f32,
+    /// How far the film's facets face directions that graze the surface: mean square of their cosine there.
+    tilt: f32,
 }
 
 impl Wet {
     /// `reflectance` of the wet soil at normal incidence; `sigma` of its facets, radians; `film`: covered fraction 0–1;
     /// `alpha`: the film's roughness.
     pub fn new(reflectance: Spectrum, sigma: f32, film: f32, alpha: f32) -> Self {
-        Self::rougher(reflectance, sigma, film, alpha, F0)
+        Self { tilt: 0.0, ..Self::rougher(reflectance, sigma, film, alpha, F0) }
     }
 
-    /// [`Wet::new`] for a film so rough that its albedo at normal incidence, `gloss` of [`Wet::gloss`], is another than that of smooth water.
+    /// [`Wet::new`] for a film so rough that its albedo at normal incidence, `gloss` of [`Wet::gloss`], is another than that of smooth water, and that what is
+    /// seen of it at a grazing angle are facets that lean towards the eye: of slopes s of the variance α² / 2 the cosine of the angle there is s / √(1 + s²).
     pub fn rougher(reflectance: Spectrum, sigma: f32, film: f32, alpha: f32, gloss: f32) -> Self {
         let base = (reflectance - Spectrum::splat(film * gloss)).clamp(0.0, 1.0);
-        Self { base: OrenNayar::new(base, sigma), coat: Ggx { alpha: [alpha; 2], ior: WATER }, film, gloss }
+        let variance = 0.5 * alpha * alpha;
+        let tilt = variance / (1.0 + variance);
+        Self { base: OrenNayar::new(base, sigma), coat: Ggx { alpha: [alpha; 2], ior: WATER }, film, gloss, tilt }
     }
 
     /// Albedo at normal incidence of a film of the roughness `alpha`; of up to 0.3 that of smooth water, which it is but for a tenth. By quadrature: ask once.
@@ -81,39 +86,58 @@ impl Wet {
 }
 
 impl Wet {
-    /// Value and density for directions that both lie above; the film reflects `fresnel` towards `wo`.
+    /// What the film reflects of light at this cosine to the surface.
     #[inline]
-    fn upper(&self, wo: Vec3, wi: Vec3, fresnel: f32) -> (Spectrum, f32) {
+    fn fresnel(&self, cos: f32) -> f32 {
+        let square = cos * cos;
+        fresnel::dielectric((square + (1.0 - square) * self.tilt).sqrt(), WATER)
+    }
+
+    /// Value and density for directions that both lie above; the film reflects `fresnel` towards `wo`. What is below it is `open` to both.
+    #[inline]
+    fn upper(&self, wo: Vec3, wi: Vec3, fresnel: f32, open: f32) -> (Spectrum, f32) {
         let (coat, coat_pdf) = self.coat.eval_pdf(wo, wi);
-        let base = self.base.upper(wo, wi) * (self.through(fresnel) * self.through(fresnel::dielectric(wi.z, WATER)));
+        let base = self.base.upper(wo, wi) * (self.through(fresnel) * self.through(self.fresnel(wi.z)) * open);
         let p = self.chance(fresnel);
         (base + Spectrum::splat(self.film * coat), p * coat_pdf + (1.0 - p) * wi.z * FRAC_1_PI)
+    }
+
+    /// [`Scatter::eval_pdf`] where relief leaves this share of the soil below the film open to both directions.
+    #[inline]
+    pub(super) fn eval_pdf_below(&self, wo: Vec3, wi: Vec3, open: f32) -> (Spectrum, f32) {
+        if wo.z * wi.z <= 0.0 {
+            return (Spectrum::ZERO, 0.0);
+        }
+        let s = wo.z.signum();
+        self.upper(facing(wo, s), facing(wi, s), self.fresnel(wo.z.abs()), open)
+    }
+
+    /// [`Scatter::sample`] where relief leaves the share `open(wi)` of the soil below the film open to both directions.
+    #[inline]
+    pub(super) fn sample_below(&self, wo: Vec3, u: [f32; 3], open: impl Fn(Vec3) -> f32) -> Option<BsdfSample> {
+        let s = wo.z.signum();
+        let up = facing(wo, s);
+        if up.z == 0.0 {
+            return None;
+        }
+        let fresnel = self.fresnel(up.z);
+        let wi = if u[0] < self.chance(fresnel) { self.coat.sample(up, u[1], u[2]) } else { cosine(u[1], u[2]) };
+        if wi.z <= 0.0 {
+            return None;
+        }
+        let (value, pdf) = self.upper(up, wi, fresnel, open(facing(wi, s)));
+        (pdf > 0.0).then(|| BsdfSample { wi: facing(wi, s), weight: value / pdf, pdf })
     }
 }
 
 impl Scatter for Wet {
     #[inline]
     fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Spectrum, f32) {
-        if wo.z * wi.z <= 0.0 {
-            return (Spectrum::ZERO, 0.0);
-        }
-        let s = wo.z.signum();
-        self.upper(facing(wo, s), facing(wi, s), fresnel::dielectric(wo.z.abs(), WATER))
+        self.eval_pdf_below(wo, wi, 1.0)
     }
 
     #[inline]
     fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
-        let s = wo.z.signum();
-        let up = facing(wo, s);
-        if up.z == 0.0 {
-            return None;
-        }
-        let fresnel = fresnel::dielectric(up.z, WATER);
-        let wi = if u[0] < self.chance(fresnel) { self.coat.sample(up, u[1], u[2]) } else { cosine(u[1], u[2]) };
-        if wi.z <= 0.0 {
-            return None;
-        }
-        let (value, pdf) = self.upper(up, wi, fresnel);
-        (pdf > 0.0).then(|| BsdfSample { wi: facing(wi, s), weight: value / pdf, pdf })
+        self.sample_below(wo, u, |_| 1.0)
     }
 }

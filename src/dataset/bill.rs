@@ -97,9 +97,31 @@ impl Bill {
     }
 }
 
-/// Tells what an order will cost that is for a folder, and what the user should know; an error where another dataset lies there. Given up where the
-/// flag is raised.
-pub fn bill(folder: &Path, order: &Order, threads: &Threads, stop: &Arc<AtomicBool>) -> Result<(Bill, Vec<String>)> {
+/// What a bill is at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Step {
+    /// An image is drawn.
+    Image {
+        /// Which of those that are drawn, from 1.
+        number: usize,
+        /// How many will be at least.
+        least: usize,
+        /// How many will be at most.
+        most: usize,
+    },
+    /// What belongs to all images is written for a few.
+    Lists,
+}
+
+/// Tells what an order will cost that is for a folder, and what the user should know; an error where another dataset lies there. `begun` is told each
+/// step as it begins. Given up where the flag is raised.
+pub fn bill(
+    folder: &Path,
+    order: &Order,
+    threads: &Threads,
+    begun: &dyn Fn(Step),
+    stop: &Arc<AtomicBool>,
+) -> Result<(Bill, Vec<String>)> {
     let Draft { recipe, files, mut warnings, scene, scene_sha256 } = draft(order, stop)?;
     let recipe = merged_recipe(folder, recipe, order.omit.is_some())?;
     // What the process has taken until now, the dataset's own process takes too.
@@ -107,10 +129,13 @@ pub fn bill(folder: &Path, order: &Order, threads: &Threads, stop: &Arc<AtomicBo
     let base_memory = meter::memory().unwrap_or(0);
     let images = Images::of(&recipe, scene_sha256, scene.threads(threads))?;
     let mut probes = Vec::new();
-    for (drawn, index) in probed(recipe.count).into_iter().enumerate() {
+    let some = probed(recipe.count);
+    let (least, most) = (PROBES[0].min(some.len()), some.len());
+    for (drawn, index) in some.into_iter().enumerate() {
         if drawn >= PROBES[0] && cpu()? - start > LONG_ENOUGH_S {
             break;
         }
+        begun(Step::Image { number: drawn + 1, least, most });
         match threads.install(|| images.probe(index, stop)) {
             Ok(probe) => probes.push(probe),
             Err(e) if e.is_of_one_field() => warnings.push(format!("image {}: {e}", Set::name(index))),
@@ -120,6 +145,7 @@ pub fn bill(folder: &Path, order: &Order, threads: &Threads, stop: &Arc<AtomicBo
     if probes.is_empty() {
         return Err(Error::input(format!("no image of those that were tried could be made: {}", warnings.join("; "))));
     }
+    begun(Step::Lists);
     let peak = meter::peak_memory().unwrap_or(0);
     let mean = |of: &dyn Fn(&Probe) -> f64| probes.iter().map(of).sum::<f64>() / probes.len().max(1) as f64;
     let all = threads.install(|| Together::of(&recipe, &files, &probes))?;

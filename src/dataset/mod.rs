@@ -37,7 +37,7 @@
 //! | `stream` | the images of a dataset without its folder, as an archive for a program that reads them as they are made |
 //! | `scratch` | the images of a shard on a node's own disk, brought home as they are finished |
 //! | `cluster` | the same on many machines: job files for schedulers |
-//! | `invariants`, `difference`, `verify` | what must hold of every image; how far two of them lie apart; whether all is so |
+//! | `invariants`, `difference`, `listed`, `verify` | what must hold of every image; how far two of them lie apart; what the manifest lists and is not so; whether all is so |
 //! | `import` | other people's images and labels |
 //! | `index` | what images and plants are chosen by, as tables |
 //! | `report` | all of it on one page, for people |
@@ -85,6 +85,7 @@ pub mod labelling;
 #[doc(hidden)]
 pub mod labels;
 mod links;
+mod listed;
 mod make;
 #[doc(hidden)]
 pub mod meter;

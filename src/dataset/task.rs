@@ -44,7 +44,7 @@ pub(crate) fn remaining(set: &Set, checksums: &ChecksumRecord) -> Result<Task> {
     let other_labels = checksums.labelling != set.recipe.labelling.fingerprint()?;
     let mut task = if other_labels { Task::Formats } else { Task::Done };
     for (name, format) in format::all(&set.recipe)? {
-        if format.has_images() && !checksums.files.keys().any(|path| in_format(path, name)) {
+        if format.has_images(&set.recipe) && !checksums.files.keys().any(|path| in_format(path, name)) {
             if format.needs_film() {
                 return Ok(Task::All);
             }

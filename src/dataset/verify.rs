@@ -1,18 +1,16 @@
 //! Whether a dataset is whole and is what it says it is.
 
-use super::checksum::Checksum;
 use super::difference::Difference;
-use super::finish::{lacks, of_image, ranges};
+use super::finish::{lacks, ranges};
 use super::image_files::{NAMES, belongs};
+use super::listed::{Listed, listed};
 use super::native::Files;
 use super::pack::{Id, Packing, store};
-use super::recipe::MANIFEST;
 use super::render::{LastField, RenderedSample, render, scene_file};
 use super::set::{Set, in_parallel};
 use super::split::Split;
 use super::task::{Task, remaining};
 use super::{File, format, invariants, native, push, timing_log};
-use crate::input::below;
 use crate::job::{Renderer, Threads};
 use crate::render::Watch;
 use crate::sampling::rng::mix;
@@ -28,6 +26,8 @@ pub struct Findings {
     pub missing: Vec<u64>,
     /// What is wrong, one sentence each.
     pub faults: Vec<String>,
+    /// What was not checked for want of images; nothing where none is missing.
+    pub unchecked: Option<String>,
     /// Images that were checked.
     pub checked: u64,
     /// Images that were rendered again and came out the same, or nearly so where that was done by other kernels.
@@ -113,8 +113,16 @@ pub fn verify(
     }
     found.faults.extend(shared_between_splits(set, &looked));
     found.faults.extend(made_differently(set)?);
-    if found.missing.is_empty() {
-        found.faults.extend(listed(set)?);
+    let Listed { mut faults, unchecked } = listed(set, &found.missing)?;
+    // An archive may have been told of already.
+    let told: BTreeSet<&String> = found.faults.iter().collect();
+    faults.retain(|fault| !told.contains(fault));
+    // Those of images may be so many that the last are not told.
+    faults.append(&mut found.faults);
+    found.faults = faults;
+    if !found.missing.is_empty() {
+        let photographs = "whether missing photographs are in two splits".to_owned();
+        found.unchecked = Some(unchecked.into_iter().chain([photographs]).collect::<Vec<_>>().join("; "));
     }
     let Some(renderer) = again.renderer.filter(|_| again.images > 0) else { return Ok(found) };
     found.kernels = OtherKernels::of(set, renderer)?;
@@ -222,50 +230,6 @@ fn made_differently(set: &Set) -> Result<Vec<String>> {
         return Ok(Vec::new());
     }
     Ok(vec![format!("two runs made different files of the images {}: are all machines alike?", ranges(&several))])
-}
-
-/// A manifest, as far as it is checked.
-#[derive(serde::Deserialize)]
-struct Listed {
-    files: BTreeMap<String, Checksum>,
-}
-
-/// What the manifest lists and is not so.
-fn listed(set: &Set) -> Result<Vec<String>> {
-    let path = set.folder.join(MANIFEST);
-    let bytes = match crate::input::contents(&path) {
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
-            return Ok(vec![format!(
-                "{MANIFEST} is missing: `trace dataset finish {}` writes it",
-                set.folder.display()
-            )]);
-        }
-        other => other.map_err(Error::io(&path))?,
-    };
-    let listed: Listed = match serde_json::from_slice(&bytes) {
-        Ok(listed) => listed,
-        Err(e) => return Ok(vec![format!("{MANIFEST} is damaged: {e}")]),
-    };
-    let mut sealed: BTreeMap<String, Checksum> = BTreeMap::new();
-    for image in set.all_checksums().flatten() {
-        sealed.extend(of_image(&set.recipe, &image).map(|(path, sum)| (path.clone(), sum.clone())));
-    }
-    let mut faults = Vec::new();
-    for (path, sum) in &listed.files {
-        match sealed.remove(path) {
-            // Looked at with its image.
-            Some(checksums) if checksums == *sum => {}
-            Some(_) => faults.push(format!("{path} is another file than {MANIFEST} lists")),
-            None => match below(&set.folder, path) {
-                Ok(full) => faults.extend(sum.fault(&full).map(|fault| format!("{path} {fault}"))),
-                Err(_) => faults.push(format!("{path} does not lie in the dataset's folder")),
-            },
-        }
-    }
-    if !sealed.is_empty() {
-        faults.push(format!("{MANIFEST} lacks {} files: `trace dataset finish` writes it anew", sealed.len()));
-    }
-    Ok(faults)
 }
 
 /// Which images are rendered again: spread over the dataset, the same ones every time.

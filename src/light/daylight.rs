@@ -132,7 +132,7 @@ pub fn daylight(elevation_deg: f64, azimuth_deg: f64, turbidity: f64, cloud: f32
     let towards = direction(zenith_deg.to_radians() as f32, azimuth_deg.to_radians() as f32).normalize();
     let clear = clear_sky(zenith_deg, optical_depth(turbidity));
     let (beam, clear_part, cloud_part) = clouded(clear, towards, cloud);
-    let mut dome = HosekWilkie::new(towards, turbidity as f32).dome(clear_part);
+    let mut dome = Dome::clear(HosekWilkie::new(towards, turbidity as f32)).with_irradiance(clear_part);
     if cloud > 0.0 {
         dome = dome.plus(&Dome::overcast(cloud_part));
     }

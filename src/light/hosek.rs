@@ -4,7 +4,6 @@
 //! α = ln(L_B/L_R) / ln(615/470), L_N = L_R (824/615)^−α, with α held to 0.3..4.1 (haze to pure Rayleigh scattering). The result
 //! is a shape: every band is scaled to a given irradiance afterwards (see `clearsky`).
 
-use super::sky::Dome;
 use crate::math::{Spectrum, Vec3};
 use hw_skymodel::rgb::{Channel, SkyParams, SkyState};
 use std::f32::consts::FRAC_PI_2;
@@ -39,10 +38,5 @@ impl HosekWilkie {
             [Channel::R, Channel::G, Channel::B].map(|channel| self.state.radiance(theta, gamma, channel).max(0.0));
         let slope = if r > 0.0 && b > 0.0 { (b / r).ln() / (615.0_f32 / 470.0).ln() } else { 0.3 };
         Spectrum::new(r, g, b, r * (824.0_f32 / 615.0).powf(-slope.clamp(0.3, 4.1)))
-    }
-
-    /// The model as a table, each band scaled so that a horizontal plane receives `horizontal` (W·m⁻²·nm⁻¹).
-    pub fn dome(&self, horizontal: Spectrum) -> Dome {
-        Dome::bake(|dir| self.radiance(dir)).with_irradiance(horizontal)
     }
 }

@@ -7,9 +7,11 @@
 //!
 //! Radiance is constant within a cell (about 1°), and so is the density of drawn directions, proportional to radiance × solid angle ×
 //! (1 − w + w cos θ), w = 0.9: by what a cell gives the ground, and a little more for what leans. The irradiance that the table gives
-//! is known and can be set. Zero below the horizon. A camera that looks at the sky sees the table
-//! interpolated between the cells' centres, and below the horizon, where no ground is, the haze on it.
+//! is known and can be set. Zero below the horizon. A camera that looks at the sky sees the functions that the cells are means of, not the
+//! cells: between their centres nothing can be interpolated where the map is folded, at the four azimuths of the axes. Below the horizon,
+//! where no ground is, it sees the haze on it.
 
+use super::hosek::HosekWilkie;
 use super::sample::{Emitter, LampHit, LightSample};
 use crate::math::{Spectrum, Vec3, vec3};
 use crate::sampling::distribution::Distribution2D;
@@ -23,33 +25,59 @@ const SUB: usize = 3;
 /// How far directions are drawn by the cosine to the zenith; the rest keeps what stands upright from waiting long for the horizon.
 const BY_COSINE: f32 = 0.9;
 
+/// How radiance changes over the upper hemisphere.
+#[derive(Clone, Copy, Debug)]
+enum Shape {
+    /// A clear sky.
+    Clear(HosekWilkie),
+    /// The CIE overcast sky.
+    Overcast,
+}
+
+impl Shape {
+    /// From a unit direction, z ≥ 0.
+    fn radiance(&self, dir: Vec3) -> Spectrum {
+        match self {
+            Self::Clear(model) => model.radiance(dir),
+            Self::Overcast => Spectrum::splat(1.0 + 2.0 * dir.z),
+        }
+    }
+}
+
 /// A table of radiances over the upper hemisphere.
 #[derive(Clone, Debug)]
 pub struct Dome {
     cells: Vec<Spectrum>,
+    /// What the cells are the means of: the sum of these shapes, each band of them times a number.
+    shapes: Vec<(Shape, Spectrum)>,
 }
 
 impl Dome {
-    /// Tabulates `radiance` of unit directions of the upper hemisphere.
-    pub fn bake(mut radiance: impl FnMut(Vec3) -> Spectrum) -> Self {
+    /// Tabulates a shape as it is.
+    fn bake(shape: Shape) -> Self {
         let cells = (0..SIDE * SIDE)
             .map(|cell| {
                 let mut sum = Spectrum::ZERO;
                 let mut weight = 0.0;
                 for (dir, solid_angle) in points(cell) {
-                    sum += radiance(dir) * solid_angle;
+                    sum += shape.radiance(dir) * solid_angle;
                     weight += solid_angle;
                 }
                 sum / weight
             })
             .collect();
-        Self { cells }
+        Self { cells, shapes: vec![(shape, Spectrum::ONE)] }
+    }
+
+    /// A clear sky, in the units of its model.
+    pub fn clear(model: HosekWilkie) -> Self {
+        Self::bake(Shape::Clear(model))
     }
 
     /// The CIE overcast sky, giving a horizontal plane the irradiance `horizontal`: L = Lz (1 + 2 cos θ)/3, E = 7π/9 Lz.
     /// Source: Moon & Spencer 1942; CIE S 011.
     pub fn overcast(horizontal: Spectrum) -> Self {
-        Self::bake(|d| Spectrum::splat(1.0 + 2.0 * d.z)).with_irradiance(horizontal)
+        Self::bake(Shape::Overcast).with_irradiance(horizontal)
     }
 
     /// The same table with each band scaled so that a horizontal plane receives `horizontal` (W·m⁻²·nm⁻¹); a band without
@@ -62,6 +90,9 @@ impl Dome {
         for cell in &mut self.cells {
             *cell *= scale;
         }
+        for (_, by) in &mut self.shapes {
+            *by *= scale;
+        }
         self
     }
 
@@ -71,7 +102,13 @@ impl Dome {
         for (cell, more) in self.cells.iter_mut().zip(&other.cells) {
             *cell += *more;
         }
+        self.shapes.extend_from_slice(&other.shapes);
         self
+    }
+
+    /// Radiance from a unit direction of the upper hemisphere, of which the table has means.
+    fn radiance(&self, dir: Vec3) -> Spectrum {
+        self.shapes.iter().fold(Spectrum::ZERO, |sum, (shape, by)| sum + shape.radiance(dir) * *by)
     }
 
     /// Irradiance of a horizontal plane, W·m⁻²·nm⁻¹ per band.
@@ -138,16 +175,8 @@ impl Emitter for Sky {
     }
 
     fn seen(&self, dir: Vec3) -> Spectrum {
-        let place = to_square(dir.with_z(dir.z.max(0.0))).map(|v| v * SIDE as f32 - 0.5);
-        let [(s0, s1, s), (t0, t1, t)] = place.map(|v| {
-            let index = |v: f32| v.clamp(0.0, (SIDE - 1) as f32) as usize;
-            (index(v.floor()), index(v.floor() + 1.0), v - v.floor())
-        });
-        let row = |t: usize| {
-            let [a, b] = [s0, s1].map(|column| self.dome.cells[t * SIDE + column]);
-            a * (1.0 - s) + b * s
-        };
-        row(t0) * (1.0 - t) + row(t1) * t
+        let level = || dir.with_z(0.0).normalize_or(Vec3::Y);
+        self.dome.radiance(if dir.z < 0.0 { level() } else { dir })
     }
 
     #[inline]

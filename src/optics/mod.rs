@@ -12,10 +12,10 @@ pub mod measured;
 mod munsell;
 mod pigments;
 pub mod prospect;
-mod shadowing;
+pub mod shadowing;
 pub mod soil;
 
 pub use leaf::{Leaf, LeafOptics};
 pub use munsell::Munsell;
 pub use pigments::{LeafBands, Pigments};
-pub use shadowing::{LostRelief, SUNS, Shadowing};
+pub use shadowing::{LostRelief, Shadowing};

@@ -1,16 +1,35 @@
 //! What relief that is too fine to be made hides of light that comes and goes at an angle.
 //!
-//! Such relief is told by how bright the surface is from straight above under suns of several heights. To that the height-correlated masking and
-//! shadowing of Smith's model is fitted (Ross, Dion & Potvin 2005; Heitz 2014, "Understanding the masking-shadowing function in microfacet-based
-//! BRDFs", eq. 99), with Λ as a table in place of that of a distribution of slopes: both directions may be exchanged, and where
-//! both graze the surface it is not hidden twice. The nearer both azimuths are, the less does one hide beyond the other (van Ginneken, Stavridi &
-//! Koenderink 1998, "Diffuse and specular reflectance from rough surfaces").
+//! Such relief is told by a table: how bright the surface is from one direction under a light from another, over what it would be without its relief. As
+//! that is told of facets that both see, weighted by the area that each shows, both directions may be exchanged, and a surface seen at a grazing
+//! angle does not go dark: what is seen of it there are the facets that face the eye. Smith's masking and shadowing
+//! (Heitz 2014, "Understanding the masking-shadowing function in microfacet-based BRDFs") is the same of facets whose heights are independent; here they are
+//! those of the surface.
 
-/// Suns of the table.
-pub const SUNS: usize = 8;
+/// Angles from the normal, and turns between the azimuths of both directions, of the table.
+pub const SLANTS: usize = 6;
+pub const TURNS: usize = 4;
 
-/// Least and greatest factors that a table may have.
-const FACTORS: (f32, f32) = (0.05, 2.0);
+/// Pairs of angles, whichever comes first.
+pub const PAIRS: usize = SLANTS * (SLANTS + 1) / 2;
+
+/// Turns, in twelfths of a whole one.
+pub const TWELFTHS: [usize; TURNS] = [0, 1, 3, 6];
+
+/// Sine of half of each turn.
+const HALF_SINES: [f32; TURNS] = [0.0, 0.258_819_04, std::f32::consts::FRAC_1_SQRT_2, 1.0];
+
+/// Square root of the lowest cosine of the table, and from one to the next.
+const LOWEST_ROOT: f32 = 0.3;
+const ROOT_STEP: f32 = (1.0 - LOWEST_ROOT) / (SLANTS - 1) as f32;
+
+/// Least and greatest factors that a table may have, and what a factor is stored times: it is carried along with every point that light meets.
+const FACTORS: (f32, f32) = (0.05, 4.0);
+const STORED: f32 = 16_000.0;
+
+/// Pairs without the zenith, of which alone the turn matters; those with it are the last.
+const SLANTED: usize = SLANTS * (SLANTS - 1) / 2;
+const STORED_FACTORS: usize = SLANTED * TURNS + SLANTS;
 
 /// What relief that is too fine to be made does to light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,83 +51,166 @@ impl LostRelief {
     }
 }
 
-/// How fast directions of different azimuth hide apart from each other, 1/rad: λ = rφ / (rφ + 1). Source: van Ginneken et al. 1998.
-const APART: f32 = 4.41;
+/// Values at the pairs of angles and the turns between both directions.
+pub type Table = [[f32; TURNS]; PAIRS];
 
-/// A factor of a surface's scattering: `s / (1 + max Λ + λ(φ) min Λ)` of Λ(θi) and Λ(θo), λ from 0 where both azimuths are equal to 1.
+/// A factor of a surface's scattering, linear in the square roots of both cosines and the sine of half of the turn between both directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shadowing {
-    /// Factor where both directions are the normal.
-    scale: f32,
-    /// Λ at [`Shadowing::cosine`].
-    lambda: [f32; SUNS],
+    factors: [u16; STORED_FACTORS],
 }
 
 impl Shadowing {
-    /// Cosine between the normal and the sun `k`; the last stands in the zenith.
+    /// Cosine between the normal and a direction of the table: 0.09 for the first, 1 for the last.
     pub fn cosine(k: usize) -> f32 {
-        (k + 1) as f32 / SUNS as f32
+        (LOWEST_ROOT + k as f32 * ROOT_STEP).powi(2)
     }
 
-    /// That of a surface which, seen from straight above, is `factors[k]` times as bright as without it under the sun `k`; 0.05 to 2.
-    pub fn from_above(factors: [f32; SUNS]) -> Self {
-        let factors = factors.map(|f| f.clamp(FACTORS.0, FACTORS.1));
-        let scale = factors[SUNS - 1];
-        Self { scale, lambda: factors.map(|f| scale / f - 1.0) }
+    /// Row of the table of two of its cosines.
+    #[inline]
+    pub const fn pair(j: usize, k: usize) -> usize {
+        let (low, high) = if j < k { (j, k) } else { (k, j) };
+        high * (high + 1) / 2 + low
+    }
+
+    /// Of the factors at the table's angles and turns; 0.05 to 4. Where one direction is the zenith the first turn's is taken.
+    pub fn new(factors: &Table) -> Self {
+        let stored = |f: f32| (f.clamp(FACTORS.0, FACTORS.1) * STORED + 0.5) as u16;
+        let (slanted, zenith) = factors.split_at(SLANTED);
+        let all = slanted.as_flattened().iter().chain(zenith.iter().map(|row| &row[0]));
+        let mut factors = [0; STORED_FACTORS];
+        factors.iter_mut().zip(all).for_each(|(to, f)| *to = stored(*f));
+        Self { factors }
     }
 
     /// The factor for directions at these cosines to the normal and to each other.
     #[inline]
     pub fn factor(&self, cos_i: f32, cos_o: f32, between: f32) -> f32 {
-        let [i, o] = [self.lambda(cos_i), self.lambda(cos_o)];
         let across = ((1.0 - cos_i * cos_i) * (1.0 - cos_o * cos_o)).max(1e-12).sqrt();
-        let apart = APART * ((between - cos_i * cos_o) / across).clamp(-1.0, 1.0).acos();
-        self.scale / (1.0 + i.max(o) + apart / (apart + 1.0) * i.min(o)).max(0.5)
+        let turn = ((between - cos_i * cos_o) / across).clamp(-1.0, 1.0);
+        self.at(cos_i, cos_o, (0.5 - 0.5 * turn).sqrt())
     }
 
-    /// The greatest factor.
-    pub fn most(&self) -> f32 {
-        let least = self.lambda.iter().fold(0.0f32, |least, l| least.min(*l));
-        self.scale / (1.0 + 2.0 * least).max(0.5)
-    }
-
-    /// Linear between the table's cosines; below the lowest it grows as that of Smith's model does, with one over the cosine.
     #[inline]
-    fn lambda(&self, cos: f32) -> f32 {
-        let place = cos.clamp(1e-3, 1.0) * SUNS as f32 - 1.0;
-        if place <= 0.0 {
-            let first = self.lambda[0];
-            return if first > 0.0 { first / (place + 1.0) } else { first };
-        }
-        let k = (place as usize).min(SUNS - 2);
-        self.lambda[k] + (place - k as f32) * (self.lambda[k + 1] - self.lambda[k])
+    fn at(&self, cos_i: f32, cos_o: f32, half_sine: f32) -> f32 {
+        let [(i, s), (o, t)] = [place(cos_i), place(cos_o)];
+        let turn = if half_sine < HALF_SINES[1] {
+            0
+        } else if half_sine < HALF_SINES[2] {
+            1
+        } else {
+            2
+        };
+        let u = (half_sine - HALF_SINES[turn]) / (HALF_SINES[turn + 1] - HALF_SINES[turn]);
+        let stored = |place: usize| f32::from(self.factors[place]);
+        let value = |j: usize, k: usize| {
+            let pair = Self::pair(j, k);
+            if pair < SLANTED {
+                let first = pair * TURNS + turn;
+                stored(first) + u * (stored(first + 1) - stored(first))
+            } else {
+                stored(SLANTED * TURNS + pair - SLANTED)
+            }
+        };
+        let near = (1.0 - t) * value(i, o) + t * value(i, o + 1);
+        let far = (1.0 - t) * value(i + 1, o) + t * value(i + 1, o + 1);
+        ((1.0 - s) * near + s * far) / STORED
     }
+
+    /// Mean over an even sky, as level ground weighs it, of what is `told` of each of the table's angles.
+    pub fn under_even_sky(told: impl Fn(usize) -> f32) -> f32 {
+        const STEPS: usize = 64;
+        let cosine = |step: usize| (step as f32 + 0.5) / STEPS as f32;
+        let at = |cos: f32| {
+            let (k, t) = place(cos);
+            2.0 * cos * ((1.0 - t) * told(k) + t * told(k + 1))
+        };
+        (0..STEPS).map(|step| at(cosine(step))).sum::<f32>() / STEPS as f32
+    }
+
+    /// The most light that the factor lets a surface reflect which reflects 1 of any light without it.
+    pub fn most(&self) -> f32 {
+        const STEPS: usize = 24;
+        let middle = |k: usize| (k as f32 + 0.5) / STEPS as f32;
+        let sent = |cos_i: f32| -> f32 {
+            let of = |k: usize| {
+                let cos = middle(k);
+                let turned = |l: usize| (middle(l) * std::f32::consts::FRAC_PI_2).sin();
+                let around: f32 = (0..STEPS).map(|l| self.at(cos_i, cos, turned(l))).sum();
+                2.0 * cos * around / (STEPS * STEPS) as f32
+            };
+            (0..STEPS).map(of).sum()
+        };
+        (0..SLANTS).map(|k| sent(Self::cosine(k))).fold(0.0, f32::max)
+    }
+}
+
+/// The cosine of the table below this one, and how far it is to the next; below the lowest and above the highest these are held.
+#[inline]
+fn place(cos: f32) -> (usize, f32) {
+    let place = ((cos.clamp(0.0, 1.0).sqrt() - LOWEST_ROOT) / ROOT_STEP).clamp(0.0, (SLANTS - 1) as f32);
+    let k = (place as usize).min(SLANTS - 2);
+    (k, place - k as f32)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f32::consts::TAU;
 
-    /// Expected: from above the factors that were given, at the table's cosines and half-way between the mean of their Λ; the same with both
-    /// directions exchanged; where both graze more than the product of each; never above the greatest.
+    fn table() -> Table {
+        std::array::from_fn(|row| std::array::from_fn(|turn| 0.5 + 0.02 * row as f32 + 0.03 * turn as f32))
+    }
+
+    /// Expected: at the table's angles and turns its factors, within rounding; between them the mean of both; the same with both directions exchanged.
     #[test]
-    fn it_is_as_bright_from_above_as_was_asked_and_reciprocal() {
-        let factors = std::array::from_fn(|k| 0.5 + 0.08 * k as f32);
-        let shadowing = Shadowing::from_above(factors);
-        for (k, factor) in factors.into_iter().enumerate() {
-            let cos = Shadowing::cosine(k);
-            assert!((shadowing.factor(cos, 1.0, cos) - factor).abs() < 1e-5);
-            assert_eq!(shadowing.factor(cos, 0.3, 0.2), shadowing.factor(0.3, cos, 0.2));
+    fn factors_are_those_of_the_table_and_reciprocal() {
+        let shadowing = Shadowing::new(&table());
+        let factor = |i: f32, o: f32, angle: f32| {
+            let across = ((1.0 - i * i) * (1.0 - o * o)).sqrt();
+            shadowing.factor(i, o, i * o + across * angle.cos())
+        };
+        for j in 0..SLANTS - 1 {
+            for k in 0..SLANTS - 1 {
+                let (i, o) = (Shadowing::cosine(j), Shadowing::cosine(k));
+                for (turn, twelfths) in TWELFTHS.into_iter().enumerate() {
+                    let angle = twelfths as f32 / 12.0 * TAU;
+                    let expected = table()[Shadowing::pair(j, k)][turn];
+                    assert!((factor(i, o, angle) - expected).abs() < 2e-3, "{j} {k} {turn}");
+                    assert_eq!(factor(i, o, angle), factor(o, i, angle));
+                }
+            }
         }
-        let between = shadowing.factor(1.5 / SUNS as f32, 1.0, 1.5 / SUNS as f32);
-        assert!(factors[0] < between && between < factors[1], "{between}");
-        let lone = factors[0] / factors[SUNS - 1];
-        let low = Shadowing::cosine(0);
-        let opposite = shadowing.factor(low, low, 2.0 * low * low - 1.0);
-        assert!(opposite > factors[SUNS - 1] * lone * lone);
-        // What the eye sees is lit from there.
-        assert!((shadowing.factor(low, low, 1.0) - factors[0]).abs() < 1e-3, "{}", shadowing.factor(low, low, 1.0));
-        assert!((0..100).all(|i| shadowing.factor(i as f32 * 0.01, 0.9, 0.3) <= shadowing.most() + 1e-6));
-        assert!(shadowing.factor(0.0, 1.0, 0.0) < 0.05, "{}", shadowing.factor(0.0, 1.0, 0.0));
+        let between = |low: f32, high: f32| (0.5 * (low.sqrt() + high.sqrt())).powi(2);
+        let middle = between(Shadowing::cosine(0), Shadowing::cosine(1));
+        let mean = 0.5 * (table()[Shadowing::pair(0, 0)][3] + table()[Shadowing::pair(0, 1)][3]);
+        assert!((factor(Shadowing::cosine(0), middle, 0.5 * TAU) - mean).abs() < 1e-3);
+    }
+
+    /// Expected: what grazes the surface has the factor of the lowest angle of the table, at the horizon too.
+    #[test]
+    fn the_horizon_is_as_bright_as_the_lowest_angle() {
+        let shadowing = Shadowing::new(&table());
+        let lowest = shadowing.factor(Shadowing::cosine(0), 0.74, 0.1);
+        assert!((shadowing.factor(0.0, 0.74, 0.1) / lowest - 1.0).abs() < 0.1, "{lowest}");
+    }
+
+    /// Expected: of what is everywhere the same that; of the square root of the cosine 2 ∫ c^1.5 dc = 0.8, but for what is held below 5°.
+    #[test]
+    fn an_even_sky_weighs_directions_by_their_cosine() {
+        assert!((Shadowing::under_even_sky(|_| 0.7) - 0.7).abs() < 1e-3);
+        let root = Shadowing::under_even_sky(|k| Shadowing::cosine(k).sqrt());
+        assert!((root - 0.8).abs() < 2e-3, "{root}");
+    }
+
+    /// Expected: of a factor that is everywhere the same that factor; of one that is larger for a single angle less than that.
+    #[test]
+    fn the_most_that_is_reflected_is_a_mean_over_directions() {
+        let even = Shadowing::new(&[[0.7; TURNS]; PAIRS]).most();
+        assert!((even - 0.7).abs() < 1e-3, "{even}");
+        let mut peaked = [[0.7; TURNS]; PAIRS];
+        peaked[Shadowing::pair(1, 1)][0] = 3.0;
+        let most = Shadowing::new(&peaked).most();
+        assert!(most > 0.7 && most < 1.0, "{most}");
     }
 }

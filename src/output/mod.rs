@@ -70,6 +70,8 @@ pub struct Export {
     pub paths: Vec<PathBuf>,
     /// What the other program cannot hold, one sentence each.
     pub warnings: Vec<String>,
+    /// How much they hold, in a few words, where their number does not tell it.
+    pub amount: Option<String>,
 }
 
 /// Where an image came from: what its files say about themselves.

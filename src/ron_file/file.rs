@@ -124,7 +124,7 @@ impl RonFile {
         let path = path_at(&self.text, fault.start);
         let (depth, names) = known(&path);
         let exists = |told: Error| told.see(more(&path[..depth]));
-        let help = decimal_comma(&self.text, &fault).or_else(|| named_value(&self.text, &fault, &names));
+        let help = decimal_comma(&self.text, &fault, &known).or_else(|| named_value(&self.text, &fault, &names));
         let fault = Fault { help: help.unwrap_or(fault.help.clone()), ..fault };
         let fault = unopened(&self.text, error).unwrap_or(fault);
         let ron::Error::MissingStructField { field, outer: Some(outer) } = &error.code else {
@@ -316,20 +316,35 @@ fn unopened(text: &str, error: &SpannedError) -> Option<Fault> {
     })
 }
 
-/// What to tell who writes 0,85: a comma ends a number, which then is out of range, or is followed by what is no field.
-fn decimal_comma(text: &str, fault: &Fault) -> Option<String> {
+/// What to tell who writes 0,85 where one number belongs: a comma ends a number, which then is out of range, or is followed by what is no field.
+fn decimal_comma(text: &str, fault: &Fault, known: impl Fn(&[&str]) -> (usize, Vec<Name>)) -> Option<String> {
     let is_number = |t: &str| !t.is_empty() && t.bytes().all(|b| b.is_ascii_digit());
     let (before, at, after) = (text.get(..fault.start)?, text.get(fault.start..fault.end)?, text.get(fault.end..)?);
     if !is_number(at) {
         return None;
     }
     let digit = |c: char| c.is_ascii_digit();
-    let (whole, part) = match (before.strip_suffix(','), after.strip_prefix(',')) {
-        (_, Some(rest)) if rest.starts_with(digit) => (at, &rest[..rest.find(|c| !digit(c)).unwrap_or(rest.len())]),
-        (Some(rest), _) if rest.ends_with(digit) => (rest.rsplit(|c| !digit(c)).next().unwrap_or(rest), at),
+    let (begin, whole, part) = match (before.strip_suffix(','), after.strip_prefix(',')) {
+        (_, Some(rest)) if rest.starts_with(digit) => {
+            (before.len(), at, &rest[..rest.find(|c| !digit(c)).unwrap_or(rest.len())])
+        }
+        (Some(rest), _) if rest.ends_with(digit) => {
+            let whole = rest.rsplit(|c| !digit(c)).next().unwrap_or(rest);
+            (rest.len() - whole.len(), whole, at)
+        }
         _ => return None,
     };
-    Some(format!("decimals are written with a point: {whole}.{part}"))
+    one_belongs(text, begin, known).then(|| format!("decimals are written with a point: {whole}.{part}"))
+}
+
+/// Whether one number alone belongs where the one that begins at a byte of the text stands: behind the colon of a field, or in the brackets of a
+/// name that takes one. Elsewhere it is one of several.
+fn one_belongs(text: &str, begin: usize, known: impl Fn(&[&str]) -> (usize, Vec<Name>)) -> bool {
+    let before = text[..begin].trim_end_matches(['-', '+']).trim_end();
+    let Some(name) = before.strip_suffix('(') else { return before.ends_with(':') };
+    let path = path_at(text, begin);
+    let Some((last, around)) = path.split_last() else { return false };
+    name.trim_end().ends_with(last) && known(around).1.iter().any(|name| name.name == *last && name.takes_number)
 }
 
 /// `notch: 0.05`, `Leaf(size: …)`: a file needs neither `Some` nor doubled brackets.
@@ -374,6 +389,47 @@ mod tests {
         assert!(m.contains(" ^^\n") || m.ends_with(" ^^"), "{m}");
         let m = message("Sun(elevation_deg: Unifrom(1, 2), azimuth_deg: 1)");
         assert!(m.contains("page.ron:1:20") && m.contains("did you mean `Uniform`"), "{m}");
+    }
+
+    /// Rationale: two numbers with a comma between are one to who writes decimals so, and two to everybody else. Expected: help with a point where one
+    /// number belongs, behind a colon or alone in a name's brackets; none in a pair, a list and a distribution of two.
+    #[test]
+    fn a_decimal_comma_is_told_where_one_number_belongs() {
+        #[derive(Debug, Deserialize, JsonSchema)]
+        #[serde(deny_unknown_fields)]
+        #[allow(dead_code)]
+        struct Sheet {
+            side: Option<Vary<Positive>>,
+            size: Option<(Vary<Positive>, Vary<Positive>)>,
+            all: Option<Vec<Vary<Positive>>>,
+            step: Option<Pace>,
+        }
+        #[derive(Debug, Deserialize, JsonSchema)]
+        #[allow(dead_code)]
+        enum Pace {
+            Even(Vary<Positive>),
+            Each(Vec<Vary<Positive>>),
+            Both(Vary<Positive>, Vary<Positive>),
+        }
+        let told = |text: &str| RonFile::of(text).parse_all::<Sheet>().unwrap_err().to_string();
+        for (text, words) in [
+            ("Sheet(side: 0,85)", "decimals are written with a point: 0.85"),
+            ("Sheet(side: 3,85)", "decimals are written with a point: 3.85"),
+        ] {
+            assert!(told(text).contains(words), "{}", told(text));
+        }
+        for text in [
+            "Sheet(size: (0,0))",
+            "Sheet(size: (64,0))",
+            "Sheet(all: [0,5])",
+            "Sheet(side: Uniform(0,5))",
+            "Sheet(side: Choice([0,5]))",
+            "Sheet(step: Each([0,5]))",
+            "Sheet(step: Both(0,5))",
+        ] {
+            let words = told(text);
+            assert!(words.contains("out of range") && !words.contains("with a point"), "{words}");
+        }
     }
 
     #[test]

@@ -93,7 +93,8 @@ pub struct FieldDesc {
 ///
 /// From a drone most of what a field camera sees is smaller than a pixel. By pixels, the cells of leaves, of the ground and of its maps
 /// grow with the pixels on the ground, and aggregates shorter than three pixels become heights of the ground instead of bodies. Plants
-/// stand and grow as they do in full detail, their leaves moved by less than a cell; what lies on the ground is another draw.
+/// stand and grow as they do in full detail, their leaves moved by less than a cell; what lies on the ground is another draw. Of instances
+/// the places are the same, and the leaves are others.
 ///
 /// ```
 /// use furrow::scene::desc::{Detail, FieldDesc};
@@ -110,7 +111,8 @@ pub enum Detail {
     ByPixel,
     /// The same, and plants of which a pixel shows more than 2.5 mm share their meshes: each is an instance of one of 64 plants of its
     /// population, turned by an angle and larger or smaller by a factor of its own, with its own chlorophyll. For fields of thousands of
-    /// plants, to a hectare. With images of another size, other plants are instances.
+    /// plants, to a hectare. Such plants have the leaves, the age and the stage of that one: their pixels and traits are not those of the same
+    /// field in `Full`. With images of another size, other plants are instances.
     Instanced,
 }
 

@@ -6,7 +6,7 @@
 //! The vehicle shakes as an Ornstein–Uhlenbeck process: normally distributed about its path, with correlations that fall as exp(−t / τ).
 //! Source: Uhlenbeck & Ornstein 1930, "On the theory of the Brownian motion"; the exact discretisation, Gillespie 1996.
 
-use crate::math::{Mat3, Vec2, Vec3, vec2, vec3};
+use crate::math::{Mat3, Vec2, Vec3, vec2};
 use crate::ron_file::{Finite, NonNegative, Num, Positive, PositiveCount, Vary};
 use crate::sampling::Stream;
 use crate::sensor::{Camera, Lidar, Pose};
@@ -72,7 +72,8 @@ pub enum PathDesc {
         speed_m_s: Vary<Positive>,
     },
     /// As a file tells of the first camera, one image a line: time (s), position (m), quaternion x y z w of the camera's axes (right, down,
-    /// forward) in the world; between blanks or commas. That is the format of the TUM RGB-D benchmark, and what `--format tum` writes.
+    /// forward) in the world; between blanks or commas. That is the format of the TUM RGB-D benchmark, and what `--format tum` writes. A first
+    /// line that names the columns may give another order.
     #[schemars(extend("x-example" = "(\"flight.tum\")"))]
     Poses(String),
 }
@@ -336,62 +337,11 @@ fn flown(poses: &[(f64, Pose)], first: Pose) -> Vec<Moment> {
     poses.iter().enumerate().map(moment).collect()
 }
 
-/// Farthest place along an axis, metres: single precision tells 0.06 mm apart there.
-const FARTHEST: f64 = 1000.0;
-/// Latest time, seconds: three thousand years after the epoch.
-const LATEST: f64 = 1e11;
-/// Shortest time from one pose to the next, seconds.
-const SHORTEST: f64 = 1e-6;
-
-/// Reads times and poses as [`PathDesc::Poses`] has them; `#` begins a comment. The error names the line.
-pub(super) fn read_poses(text: &str) -> Result<Vec<(f64, Pose)>> {
-    let mut all: Vec<(f64, Pose)> = Vec::new();
-    let mut first = true;
-    for (k, line) in text.lines().enumerate() {
-        let line = line.split('#').next().unwrap_or_default();
-        let words = line.split(|c: char| c.is_whitespace() || c == ',').filter(|w| !w.is_empty());
-        // One more than there may be: a line may be as long as the file.
-        let words: Vec<&str> = words.take(9).collect();
-        if words.is_empty() {
-            continue;
-        }
-        let wrong = |what: &str| {
-            Error::input(format!("line {} {what}", k + 1)).help("write: time x y z qx qy qz qw, in seconds and metres")
-        };
-        let numbers: Option<Vec<f64>> = words.iter().map(|w| w.parse().ok().filter(|x: &f64| x.is_finite())).collect();
-        // The first line of a CSV file names its columns.
-        let heading = std::mem::replace(&mut first, false);
-        let Some(numbers) = numbers else {
-            if heading && words.len() > 1 && words.iter().all(|w| w.parse::<f64>().is_err()) {
-                continue;
-            }
-            return Err(wrong("holds something that is no number"));
-        };
-        let [time, x, y, z, qx, qy, qz, qw] = numbers[..] else {
-            let held =
-                if numbers.len() > 8 { "more than 8".to_owned() } else { format!("{} numbers, not 8", numbers.len()) };
-            return Err(wrong(&format!("holds {held}")));
-        };
-        let norm = (qx * qx + qy * qy + qz * qz + qw * qw).sqrt();
-        if !(0.9..1.1).contains(&norm) {
-            return Err(wrong("holds no quaternion of length 1"));
-        }
-        if time.abs() > LATEST || [x, y, z].iter().any(|v| v.abs() > FARTHEST) {
-            return Err(wrong(&format!("lies beyond {FARTHEST} m from the world's origin, or beyond {LATEST} s")));
-        }
-        if all.last().is_some_and(|(before, _)| time - before < SHORTEST) {
-            return Err(wrong("is not later than the one before"));
-        }
-        let q = [qx, qy, qz, qw].map(|v| (v / norm) as f32);
-        let axes = Mat3::from_quat(crate::math::Quat::from_array(q));
-        all.push((time, Pose { position: vec3(x as f32, y as f32, z as f32), axes }));
-    }
-    Ok(all)
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::poses;
     use super::*;
+    use crate::math::vec3;
     use crate::ron_file::RonFile;
     use crate::sampling::Purpose;
     use crate::sensor::CameraDesc;
@@ -478,7 +428,7 @@ mod tests {
             "timestamp,tx,ty,tz,qx,qy,qz,qw\n5.0,0,0,1,1,0,0,0 # looking down\n5.2,0.3,-0.2,1.4,{},{},{},{}\n",
             q[0], q[1], q[2], q[3]
         );
-        let around = Around { poses: read_poses(&text).unwrap(), ..Around::default() };
+        let around = Around { poses: poses::read(text.as_bytes()).unwrap(), ..Around::default() };
         let all = drive(r#"(frames: 2, path: Poses("x"))"#, &around).unwrap();
         close(all[0].camera.pose().position, vec3(0.0, 0.0, 1.0));
         close(all[2].camera.pose().position, turned.position);
@@ -491,23 +441,6 @@ mod tests {
         close(all[0].camera.motion().velocity, vec3(1.5, -1.0, 2.0));
         let fewer = drive(r#"(frames: 3, path: Poses("x"))"#, &around).unwrap_err().to_string();
         assert!(fewer.contains("2 poses, fewer than the 3 frames"), "{fewer}");
-    }
-
-    #[test]
-    fn lines_that_are_no_poses_are_named() {
-        for (text, words) in [
-            ("0 0 0 1 1 0 0 0\nx", "line 2 holds something"),
-            ("0 0 0 1", "line 1 holds 4 numbers"),
-            ("0 0 0 1 0 0 0 0", "no quaternion"),
-            ("1 0 0 1 1 0 0 0\n1 0 0 1 1 0 0 0", "line 2 is not later"),
-            ("0 0 0 NaN 1 0 0 0", "line 1 holds something"),
-            ("a b\nc d\n0 0 0 1 1 0 0 0", "line 2 holds something"),
-            ("0 1e300 0 1 1 0 0 0", "line 1 lies beyond 1000 m"),
-            ("-1e300 0 0 1 1 0 0 0", "line 1 lies beyond"),
-        ] {
-            let error = read_poses(text).unwrap_err().to_string();
-            assert!(error.contains(words), "{error}");
-        }
     }
 
     #[test]

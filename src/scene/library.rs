@@ -1,10 +1,10 @@
 //! Everything that scene files name, read once: species, pictures, soil layers.
 
 use super::desc::{ModelDesc, SpeciesDesc};
-use super::drive;
 use super::growing::Growing;
 use super::layer::Layer;
 use super::pictures::{self, Pictures};
+use super::poses;
 use super::shipped::species as shipped_species;
 use super::species_text::SpeciesFile;
 use crate::error::{Kind, Place};
@@ -350,8 +350,7 @@ impl Library {
         let full = self.need(page, path)?;
         let bytes = input::read(&full, MOST_POSES).map_err(|refusal| refusal.into_error(&full))?;
         self.files.insert(full.clone(), Sha256::digest(&bytes).into());
-        let poses = drive::read_poses(&String::from_utf8_lossy(&bytes));
-        poses.map_err(|e| at_its_place(page, path, "", e.in_file(&full)))
+        poses::read(&bytes).map_err(|e| at_its_place(page, path, "", e.in_file(&full)))
     }
 
     /// Band means of the soil whose spectrum `page` names.

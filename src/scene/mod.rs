@@ -11,6 +11,7 @@ mod library;
 mod part;
 mod part_kind;
 mod pictures;
+mod poses;
 pub mod record;
 pub mod shipped;
 pub mod species_file;

@@ -15,11 +15,11 @@ use std::sync::Arc;
 /// What is measured of a leaf.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LeafTraits {
-    /// Area of its blade, one side, m².
+    /// Area of its blade, one side, m²; of a divided leaf that of all its segments, whether they lie over each other or not.
     pub area_m2: f32,
     /// Length of the blade along its midrib, of a compound leaf along its rachis, metres.
     pub length_m: f32,
-    /// Largest width of the flat blade, metres.
+    /// Largest width of the flat blade, of a divided leaf that of the outline which its segments fill, metres.
     pub width_m: f32,
     /// Length of its petiole, of a grass leaf of its sheath, metres; 0 for a sessile leaf.
     pub petiole_m: f32,

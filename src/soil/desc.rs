@@ -38,7 +38,7 @@ fn shipped() -> Vec<LayerDesc> {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SoilDesc {
-    /// One to eight layers; one of crumbled soil that ships unless given.
+    /// One to four layers; one of crumbled soil that ships unless given.
     #[serde(default = "shipped")]
     pub layers: Vec<LayerDesc>,
     /// The dry soil's colour: each field has a random mix of these measured soils, and the layers' pictures vary around it. Empty:
@@ -193,7 +193,7 @@ pub struct MoistureDesc {
     pub mean: Vary<Fraction>,
     /// Standard deviation of the patches.
     pub spread: Vary<Fraction>,
-    /// Size of the patches, metres: 0.02–0.15.
+    /// Size of the largest patches, metres: 0.02–0.15 in pictures of a square metre, some metres in those of a field.
     pub patch_m: Vary<Positive>,
     /// How much drier a place is for each standard deviation that it stands out of its surroundings.
     pub drying: Num<Fraction>,

@@ -3,7 +3,9 @@
 use super::blend::Blend;
 use super::crumb::{Law, Local};
 use super::grid::Grid;
-use super::{InView, MAX_LAYERS, Site, SoilDesc, clod, litter, stone, stone_cover, surface};
+use super::openness::Squares;
+use super::site::{FULL_CELL_M, Sizes};
+use super::{InView, MAX_LAYERS, Rect, Site, SoilDesc, clod, litter, stone, stone_cover, surface};
 use crate::geometry::Cost;
 use crate::math::{Vec2, vec2};
 use crate::ron_file::Step;
@@ -55,11 +57,9 @@ pub fn expected(
     let mut all = Vec::new();
     let mut add = |at: &[Step<'static>], cost, advice| all.push(Expected { at: at.to_vec(), cost, advice });
     if !desc.flat {
-        add(
-            &[Step::Field("clods")],
-            clod::cost(&places, sizes.clods, site.grid_m, (area, made)),
-            "lower over_5mm_per_m2 or raise min_mm",
-        );
+        let bodies = clod::cost(&places, sizes.clods, site.grid_m, (area, made));
+        let advice = "lower over_5mm_per_m2 or raise min_mm";
+        add(&[Step::Field("clods")], bodies + reckoned(&places, &sizes, area), advice);
     }
     let amount = f64::from(desc.crumbs.amount.draw32(&mut ground.child(Purpose::Soil, 20)));
     let mean =
@@ -82,6 +82,18 @@ pub fn expected(
         add(&[Step::Field("litter"), Step::Field(field)], cost, advice);
     }
     (bare, all)
+}
+
+/// What clods take that are bodies in full detail and not here: they are laid on squares, and their light is reckoned.
+fn reckoned(places: &[Local], sizes: &Sizes, area: Rect) -> Cost {
+    let (shortest, longest) = (sizes.unseen[1].0, sizes.drawn.1);
+    if sizes.told <= 0.0 || shortest >= longest {
+        return Cost::default();
+    }
+    let per_m2 = places.iter().map(|law| law.number(shortest, longest)).sum::<f32>() / places.len().max(1) as f32;
+    let Squares { many, side } = Squares::of(area.size(), per_m2, longest);
+    let side = side * many as f32;
+    clod::cost(places, (shortest, longest), FULL_CELL_M, (Rect::new(0.0, 0.0, side, side), 1.0))
 }
 
 /// The law of clods at places all over a site.

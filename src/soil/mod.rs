@@ -17,6 +17,7 @@ mod color;
 mod crumb;
 mod debris;
 mod desc;
+mod envelope;
 mod estimate;
 mod grid;
 mod ground;
@@ -45,6 +46,7 @@ pub use desc::{
     BlendDesc, ClodsDesc, CrumbsDesc, LAYERS, LayerDesc, LitterDesc, MoistureDesc, ReliefDesc, RowReliefDesc, SoilDesc,
     StonesDesc,
 };
+pub use envelope::Envelope;
 pub use estimate::{Expected, expected};
 pub use ground::Ground;
 pub use in_view::InView;

@@ -13,6 +13,15 @@ use crate::texture::noise::Perlin;
 /// Standard deviation of one octave of [`Perlin::at2`] over the plane; a test holds it.
 const PERLIN_SD: f32 = 0.43;
 
+/// Standard deviations of the noise within which all of a ground lies but for one place or two in a hundred; in furrows, which are a tenth of it, and in the
+/// tracks of wheels, which press it flat, as many hundredths of the whole.
+const EXTREME: f32 = 2.5;
+const EXTREME_IN_FURROW: f32 = 1.3;
+const EXTREME_IN_TRACK: f32 = 0.4;
+/// How deep a furrow is where it is deep, over the depth that was asked for, and its shoulders' height over its depth.
+const DEEP: f32 = 1.25;
+const SHOULDER: f32 = 0.2;
+
 /// Wavelengths are counted down to this one, so that the height asked for means the same at every grid spacing.
 const SHORTEST_M: f32 = 0.001;
 
@@ -95,6 +104,27 @@ impl Relief {
         }
     }
 
+    /// Metres that it rises for each metre to the east and to the north.
+    pub(super) fn tilt(&self) -> Vec2 {
+        self.tilt
+    }
+
+    /// How far it lies below the tilted plane through the world's origin, and above it, metres; but for one place or two in a hundred.
+    pub(super) fn departs(&self) -> (f32, f32) {
+        let sd = 1e-3 * self.record.rms_mm;
+        let (mut below, mut above) = (EXTREME * sd, EXTREME * sd);
+        if let Some(rows) = &self.rows {
+            below = below.max(DEEP * rows.depth + EXTREME_IN_FURROW * sd);
+            let shoulder = SHOULDER * rows.depth + EXTREME_IN_FURROW * sd;
+            above = above.max(shoulder) + rows.ridge;
+        }
+        for (track, rim) in self.wheels.iter().map(Wheel::departs) {
+            below = below.max(track + EXTREME_IN_TRACK * sd);
+            above = above.max(rim + EXTREME * sd);
+        }
+        (below, above)
+    }
+
     /// Height at `p`, leaving out what is finer than two cells.
     pub(super) fn height(&self, p: Vec2, cell: f32) -> f32 {
         let tracks: f32 = self.wheels.iter().map(|w| w.height(p)).sum();
@@ -135,7 +165,8 @@ impl Relief {
         let print = 1.0 - smoothstep(0.1 * rows.half_width, 1.1 * rows.half_width, d);
         let shoulder = (-((d - 1.3 * rows.half_width) / (0.4 * rows.half_width)).powi(2)).exp();
         let ridge = 0.5 + 0.5 * (std::f32::consts::TAU * d / rows.spacing).cos();
-        rows.depth * (1.0 + 0.5 * rows.wander * wander(0.15, 401.3)) * (0.2 * shoulder - print) + rows.ridge * ridge
+        let depth = rows.depth * (1.0 + 0.5 * rows.wander * wander(0.15, 401.3));
+        depth * (SHOULDER * shoulder - print) + rows.ridge * ridge
     }
 }
 

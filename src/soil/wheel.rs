@@ -40,6 +40,8 @@ impl Default for WheelDesc {
 const SIDE: f32 = 0.12;
 /// Share of the clods that a wheel leaves whole, and of the roughness that it leaves.
 const LEFT: f32 = 0.15;
+/// Height of what is pushed up at its sides, of its depth.
+const RIM: f32 = 0.15;
 /// Depth of a lug's print below the floor, of the floor's depth, and its width, of the way from lug to lug.
 const LUG: (f32, f32) = (0.5, 0.35);
 /// Slant of the lugs: how far ahead they reach at the side, of the half-width.
@@ -100,7 +102,13 @@ impl Wheel {
         } else {
             0.0
         };
-        self.depth * (0.15 * rim - self.pressed(p) * (1.0 + LUG.0 * lug))
+        self.depth * (RIM * rim - self.pressed(p) * (1.0 + LUG.0 * lug))
+    }
+
+    /// How far it lies below the ground beside it at its deepest, and above it at its highest, metres.
+    pub(super) fn departs(&self) -> (f32, f32) {
+        let lug = if self.lugs > 0.0 { LUG.0 } else { 0.0 };
+        (self.depth * (1.0 + lug), RIM * self.depth)
     }
 
     /// What was drawn.

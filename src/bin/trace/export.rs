@@ -90,6 +90,7 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     for warning in &export.warnings {
         tell(&format!("warning: {warning}"));
     }
-    tell(&format!("{}: {} files in {}", args.field.path().display(), export.paths.len(), out.display()));
+    let amount = export.amount.unwrap_or_else(|| format!("{} files", export.paths.len()));
+    tell(&format!("{}: {amount} in {}", args.field.path().display(), out.display()));
     Ok(export.paths)
 }

@@ -5,9 +5,9 @@ use crate::dataset::order::{ContentArgs, LookArgs, begin, formats};
 use crate::dataset::render::{WorkArgs, generate};
 use crate::field::{MemoryArgs, SceneArgs};
 use furrow::cli::signal::Signals;
-use furrow::dataset::finish;
 use furrow::dataset::generate::Shard;
 use furrow::dataset::plan::Order;
+use furrow::dataset::{finish, format};
 use furrow::job::SceneFile;
 use furrow::scene::days::DaysDesc;
 use furrow::{Error, Result};
@@ -28,8 +28,9 @@ pub(crate) struct Args {
     /// Folder of the dataset.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Formats to write beside the native one, separated by commas.
-    #[arg(long, value_delimiter = ',', value_name = "FORMAT", default_value = "colmap,flow,mots,nerf,tum", value_parser = formats())]
+    /// Formats to write beside the native one, separated by commas. Unless given colmap, flow, mots, nerf and tum, but for those that have
+    /// nothing to tell: colmap, flow and nerf where a field has one image a day, colmap and nerf with --labels-only.
+    #[arg(long, value_delimiter = ',', value_name = "FORMAT", value_parser = formats())]
     format: Vec<String>,
     #[command(flatten)]
     content: ContentArgs,
@@ -41,6 +42,19 @@ pub(crate) struct Args {
     work: WorkArgs,
     #[command(flatten)]
     dry: DryRunArgs,
+}
+
+/// Formats of a sequence for which none is named, each with whether it tells of several images of one day.
+const USUAL: [(&str, bool); 5] = [("colmap", true), ("flow", true), ("mots", false), ("nerf", true), ("tum", false)];
+
+/// Those of [`USUAL`] that have something to tell of fields of so many images each, on so many days.
+fn usual_formats(captures: u64, days: usize, labels_only: bool) -> Vec<String> {
+    let a_day = captures / days.max(1) as u64;
+    let tells = |(name, of_one_day): &(&str, bool)| {
+        let images = if *of_one_day { a_day } else { captures };
+        images > 1 && !(labels_only && format::named(name).is_some_and(format::Format::needs_photograph))
+    };
+    USUAL.into_iter().filter(tells).map(|(name, _)| name.to_owned()).collect()
 }
 
 /// Days, in order.
@@ -66,7 +80,11 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     (order.seed, order.width, order.height) = (args.scene.seed, args.scene.width, args.scene.height);
     order.days = days.to_vec();
     order.memory = args.memory.bytes;
-    order.formats.clone_from(&args.format);
+    order.formats = if args.format.is_empty() {
+        usual_formats(captures, scene.seen_days().len(), args.look.labels_only)
+    } else {
+        args.format.clone()
+    };
     order.formats.sort();
     order.formats.dedup();
     order.options = args.look.options();

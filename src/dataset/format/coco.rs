@@ -12,11 +12,13 @@
 //! `attributes`, which `pycocotools` passes over and datumaro and CVAT read, tell the number in `plants.png` and `leaves.png`, the
 //! species, and how much is visible.
 //!
-//! Of drives and rigs, images have the keys of video data sets, `video_id` (the field, from 1) and `frame_id`, and their `camera`;
-//! `track_id` among the attributes is the identity of a plant or a leaf, which stays the same in all images of its field.
+//! Of drives, rigs and days, files have the keys of data sets of videos: a list of `videos`, one for each camera of each field; of images
+//! `video_id`, `frame_id` from 0 in the order of time, and `camera`; of annotations `video_id`, and the identity of the plant or leaf, which stays the same
+//! in all images of its field, as `instance_id` (MMTracking's CocoVID), as `track_id` (TAO) and as `track_id` among the attributes.
 //!
 //! Source: COCO data format, <https://cocodataset.org/#format-data>; cocoapi issue 332 on id 0.
 
+use super::videos::Videos;
 use super::{Format, Whole, picture};
 use crate::dataset::labels::Labels;
 use crate::dataset::recipe::Recipe;
@@ -41,6 +43,7 @@ impl Format for Writer {
 
     fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
         let labels = Labels::of(&set.recipe)?;
+        let videos = Videos::of(set)?;
         for split in Split::ALL {
             if set.names(split).is_empty() {
                 continue;
@@ -50,11 +53,11 @@ impl Format for Writer {
                 ("leaves", vec![about_leaves(&labels)], leaves as OfImage),
             ] {
                 out.file(&format!("{FOLDER}/annotations/{file}_{}.json", split.name()), |w| {
-                    head(w, set, split)?;
+                    head(w, set, split, videos.as_ref())?;
                     w.put("\"categories\": [")?;
                     w.items(categories.into_iter().map(Ok))?;
                     w.put("],\n\"annotations\": [")?;
-                    w.items(annotations(set, &labels, split, of_image))?;
+                    w.items(annotations(set, &labels, split, (of_image, videos.as_ref())))?;
                     w.put("]\n}\n")
                 })?;
             }
@@ -63,16 +66,21 @@ impl Format for Writer {
     }
 }
 
-/// What COCO files of all kinds begin with: where they come from, their licence, their images.
-pub(super) fn head(w: &mut Stream<'_>, set: &Set, split: Split) -> Result<()> {
+/// What COCO files of all kinds begin with: where they come from, their licence, their videos where there are some, their images.
+pub(super) fn head(w: &mut Stream<'_>, set: &Set, split: Split, videos: Option<&Videos>) -> Result<()> {
     let recipe = &set.recipe;
     let info = json!({ "description": "Crop fields rendered by Furrow", "version": recipe.furrow });
     w.put("{\n\"info\": ")?;
     w.json(&info)?;
     w.put(",\n\"licenses\": ")?;
     w.json(&json!([{ "id": 1, "name": recipe.licence, "url": "" }]))?;
+    if let Some(videos) = videos {
+        w.put(",\n\"videos\": [")?;
+        w.items(videos.entries(set, split))?;
+        w.put("]")?;
+    }
     w.put(",\n\"images\": [")?;
-    w.items(set.records(split).map(|record| Ok(image(set, &record?))))?;
+    w.items(set.records(split).map(|record| image(set, videos, &record?)))?;
     w.put("],\n")
 }
 
@@ -81,7 +89,7 @@ pub(super) fn image_id(record: &Record) -> u64 {
     record.index + 1
 }
 
-fn image(set: &Set, record: &Record) -> Value {
+fn image(set: &Set, videos: Option<&Videos>, record: &Record) -> Result<Value> {
     let mut image = json!({
         "id": image_id(record),
         "file_name": format!("{}.{}", record.name, set.recipe.photo().ending()),
@@ -89,20 +97,12 @@ fn image(set: &Set, record: &Record) -> Value {
         "height": record.height,
         "license": 1,
     });
-    if let Some(capture) = &record.capture {
-        image["video_id"] = capture.field.saturating_add(1).into();
+    if let (Some(videos), Some(capture)) = (videos, &record.capture) {
+        image["video_id"] = videos.id(capture)?.into();
         image["frame_id"] = capture.frame.into();
         image["camera"] = capture.camera.clone().into();
     }
-    image
-}
-
-/// Adds the identity that a plant or a leaf has in all images of a field where there are several.
-fn tracked(set: &Set, id: Option<u32>, mut about: Value) -> Value {
-    if set.recipe.captures() > 1 {
-        about["track_id"] = id.into();
-    }
-    about
+    Ok(image)
 }
 
 /// The category of a class: its place among those that plants may have, from 1.
@@ -143,20 +143,46 @@ struct Annotation {
     keypoints: Vec<Value>,
     num_keypoints: usize,
     attributes: Value,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    video_id: Option<u64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    instance_id: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    track_id: Option<u32>,
 }
 
-/// What of an image a file tells.
-type OfImage = fn(&Set, &Labels<'_>, &Record) -> Vec<Annotation>;
+impl Annotation {
+    /// The same of a plant or a leaf that has this identity in all images of its field.
+    fn in_video(self, video: u64, identity: Option<u32>) -> Self {
+        let mut attributes = self.attributes;
+        attributes["track_id"] = identity.into();
+        Self { attributes, video_id: Some(video), instance_id: identity, track_id: identity, ..self }
+    }
+}
+
+/// What of an image a file tells, each with its identity.
+type OfImage = fn(&Set, &Labels<'_>, &Record) -> Vec<(Annotation, Option<u32>)>;
 
 /// All annotations of a split, image by image.
 fn annotations<'a>(
     set: &'a Set,
     labels: &'a Labels<'a>,
     split: Split,
-    of_image: OfImage,
+    (of_image, videos): (OfImage, Option<&'a Videos>),
 ) -> impl Iterator<Item = Result<Annotation>> + 'a {
-    let of_image = move |record: Result<Record>| match record {
-        Ok(record) => of_image(set, labels, &record).into_iter().map(Ok).collect(),
+    let of_record = move |record: Record| -> Result<Vec<Annotation>> {
+        let video = match (videos, &record.capture) {
+            (Some(videos), Some(capture)) => Some(videos.id(capture)?),
+            _ => None,
+        };
+        let told = |(annotation, identity): (Annotation, Option<u32>)| match video {
+            Some(video) => annotation.in_video(video, identity),
+            None => annotation,
+        };
+        Ok(of_image(set, labels, &record).into_iter().map(told).collect())
+    };
+    let of_image = move |record: Result<Record>| match record.and_then(of_record) {
+        Ok(all) => all.into_iter().map(Ok).collect(),
         Err(e) => vec![Err(e)],
     };
     let numbered = |(i, annotation): (usize, Result<Annotation>)| {
@@ -166,15 +192,15 @@ fn annotations<'a>(
 }
 
 /// The plants.
-fn plants(set: &Set, labels: &Labels<'_>, record: &Record) -> Vec<Annotation> {
+fn plants(set: &Set, labels: &Labels<'_>, record: &Record) -> Vec<(Annotation, Option<u32>)> {
     let of_plant = |(plant, class): (&Plant, u8)| {
-        annotation(record, category(labels, class), &plant.seen, &[plant.stem], about(set, plant))
+        (annotation(record, category(labels, class), &plant.seen, &[plant.stem], about(set, plant)), plant.id)
     };
     labels.plants(record).map(of_plant).collect()
 }
 
 /// The leaves.
-fn leaves(set: &Set, labels: &Labels<'_>, record: &Record) -> Vec<Annotation> {
+fn leaves(_set: &Set, labels: &Labels<'_>, record: &Record) -> Vec<(Annotation, Option<u32>)> {
     let mut all = Vec::new();
     for plant in record.seen() {
         let Some(class) = labels.class(plant) else { continue };
@@ -187,7 +213,7 @@ fn leaves(set: &Set, labels: &Labels<'_>, record: &Record) -> Vec<Annotation> {
                 "inside_fraction": leaf.seen.inside_fraction(),
             });
             let points = [leaf.base, leaf.tip];
-            all.push(annotation(record, leaf_category(labels), &leaf.seen, &points, tracked(set, leaf.id, about)));
+            all.push((annotation(record, leaf_category(labels), &leaf.seen, &points, about), leaf.id));
         }
     }
     all
@@ -213,6 +239,9 @@ fn annotation(
         num_keypoints: points.iter().filter(|p| p[2] != 0).count(),
         keypoints: points.concat(),
         attributes,
+        video_id: None,
+        instance_id: None,
+        track_id: None,
     }
 }
 
@@ -230,12 +259,11 @@ fn keypoint(point: Option<Keypoint>) -> Option<[Value; 3]> {
 }
 
 fn about(set: &Set, plant: &Plant) -> Value {
-    let about = json!({
+    json!({
         "plant": plant.number,
         "species": set.recipe.species_name(plant.kind),
         "bbch": plant.grown.as_ref().map(|g| g.bbch),
         "visible_fraction": plant.seen.visible_fraction(),
         "inside_fraction": plant.seen.inside_fraction(),
-    });
-    tracked(set, plant.id, about)
+    })
 }

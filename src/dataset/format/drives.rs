@@ -39,7 +39,7 @@ pub(super) trait OfFields: Sync {
 }
 
 impl<T: OfFields> Format for T {
-    fn has_images(&self) -> bool {
+    fn has_images(&self, _recipe: &Recipe) -> bool {
         false
     }
 
@@ -128,7 +128,7 @@ pub(super) fn quaternion(axes: &DMat3) -> [f64; 4] {
 }
 
 /// A warning for formats that tell of several images of a field, where there is one: on each day, or on all of them together.
-pub(super) fn warnings(recipe: &Recipe, by_day: bool) -> Vec<String> {
+fn warnings(recipe: &Recipe, by_day: bool) -> Vec<String> {
     let (images, words) = if by_day {
         (recipe.captures_a_day(), "each field has one image a day; `drive` in a scene file takes several")
     } else {

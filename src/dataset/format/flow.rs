@@ -7,7 +7,8 @@
 //! | `CAMERA.x`, `.y`, `.visible` | the same to the other cameras of the same frame; of a stereo pair side by side, disparity is −x |
 //!
 //! Values are not numbers (NaN) where a pixel shows nothing, or what lies behind the other lens. A field's last frame has no `next`, and an
-//! image without any other has one channel, `none`, of zeros. Lens distortion and rolling shutters of both images are in it.
+//! image that leads to no other has one channel, `none`, of zeros. Where each field has one image a day there are no files. Lens distortion and rolling
+//! shutters of both images are in it.
 //!
 //! Source: the surface at each pixel's centre, as labels have it, and the cameras; nothing is matched.
 
@@ -23,7 +24,10 @@ pub(super) struct Writer;
 const FOLDER: &str = "flow";
 
 impl Format for Writer {
-    fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
+    fn image(&self, recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
+        if !self.has_images(recipe) {
+            return Ok(Vec::new());
+        }
         let record = &sample.record;
         let rendered = sample.rendered(FOLDER)?;
         let mut planes: Vec<(String, Vec<f32>)> = rendered.flows.iter().flat_map(planes).collect();
@@ -32,6 +36,10 @@ impl Format for Writer {
         }
         let bytes = output::encode_planes(record.width, record.height, planes)?;
         Ok(vec![File { path: format!("{FOLDER}/{}.exr", record.name), bytes }])
+    }
+
+    fn has_images(&self, recipe: &Recipe) -> bool {
+        recipe.captures_a_day() > 1
     }
 
     fn needs_film(&self) -> bool {
@@ -47,7 +55,8 @@ impl Format for Writer {
     }
 
     fn warnings(&self, recipe: &Recipe) -> Vec<String> {
-        super::drives::warnings(recipe, true)
+        let words = "each field has one image a day, so it leads nowhere and has no files; `drive` in a scene file takes several";
+        if self.has_images(recipe) { Vec::new() } else { vec![words.to_owned()] }
     }
 }
 

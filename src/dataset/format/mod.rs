@@ -16,8 +16,8 @@ pub trait Format: Sync {
         Ok(Vec::new())
     }
 
-    /// Whether [`Self::image`] makes files at all.
-    fn has_images(&self) -> bool {
+    /// Whether [`Self::image`] makes files at all of the images of this recipe.
+    fn has_images(&self, _recipe: &Recipe) -> bool {
         true
     }
 
@@ -77,6 +77,7 @@ mod conditions;
 mod drives;
 mod outline;
 mod picture;
+mod videos;
 
 macro_rules! formats {
     ($($name:literal => $file:ident: $words:literal, $read:literal;)*) => {

@@ -10,6 +10,7 @@
 //!
 //! Source: COCO data format, panoptic segmentation, <https://cocodataset.org/#format-data>; panopticapi's `rgb2id`.
 
+use super::videos::Videos;
 use super::{Format, Whole, coco, picture};
 use crate::dataset::labels::Labels;
 use crate::dataset::recipe::{Recipe, json};
@@ -50,12 +51,13 @@ impl Format for Writer {
     }
 
     fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+        let videos = Videos::of(set)?;
         for split in Split::ALL {
             if set.names(split).is_empty() {
                 continue;
             }
             out.file(&format!("{FOLDER}/annotations/panoptic_{}.json", split.name()), |w| {
-                coco::head(w, set, split)?;
+                coco::head(w, set, split, videos.as_ref())?;
                 w.put("\"categories\": ")?;
                 w.json(&categories(&Labels::of(&set.recipe)?))?;
                 w.put(",\n\"annotations\": [")?;

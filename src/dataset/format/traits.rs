@@ -9,6 +9,7 @@
 use super::{Format, Whole};
 use crate::dataset::index::leaves;
 use crate::dataset::index::origin::Origin;
+use crate::dataset::recipe::Recipe;
 use crate::dataset::record::{Grown, Leaf, Plant, Record};
 use crate::dataset::set::{Set, Stream};
 use crate::scene::tag::Class;
@@ -72,7 +73,7 @@ struct ImageRow {
 }
 
 impl Format for Writer {
-    fn has_images(&self) -> bool {
+    fn has_images(&self, _recipe: &Recipe) -> bool {
         false
     }
 

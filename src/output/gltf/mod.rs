@@ -47,7 +47,7 @@ pub fn write(folder: &Path, scene: &Scene, plants: &[PlantRecord], provenance: &
     let (bytes, warnings) = encode(scene, plants, provenance)?;
     let path = folder.join("scene.glb");
     write_atomically(&path, &bytes)?;
-    Ok(Export { paths: vec![path], warnings })
+    Ok(Export { paths: vec![path], warnings, amount: None })
 }
 
 /// The GLB file of a scene, and what it cannot hold.

@@ -110,7 +110,7 @@ pub fn write(folder: &Path, scene: &Scene, text: &str) -> Result<Export> {
     let paths = files.together.finish()?;
     let paths =
         paths.ok_or_else(|| Error::failed("its temporary files were removed while it was written").in_file(folder))?;
-    Ok(Export { paths, warnings })
+    Ok(Export { paths, warnings, amount: None })
 }
 
 /// One warning for each thing that is lost, with one surface's name and the number of others.

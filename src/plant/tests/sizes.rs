@@ -115,6 +115,33 @@ fn blades_fill_as_much_of_their_length_and_width_as_the_table_says() {
     }
 }
 
+/// Rationale: who measures leaves expects less area than length times width. Segments of a young divided leaf are as wide as those of a grown one and lie
+/// over each other, which `docs/guide/traits.md` says, with the length from which on a leaf fits. Expected: leaves of 6 mm and more have less, some that are
+/// shorter have more. Source: the meshes.
+#[test]
+fn divided_leaves_have_less_area_than_length_times_width_from_6_mm_on() {
+    let mut most_of_young = 0.0_f32;
+    for eppo in ["MATIN", "DAUCA"] {
+        let desc = page(eppo);
+        let mut long = 0;
+        for (seed, day) in (0..4).flat_map(|seed| [10.0, 14.0, 18.0, 22.0, 26.0].map(|day| (seed, day))) {
+            let plant = grow(&desc, Stage::Age(day), &stream(seed));
+            for organ in plant.organs.iter().filter(|o| o.kind == OrganKind::Blade) {
+                let size = organ.axis.as_ref().unwrap().size;
+                let share = organ.mesh.area() / (size.length * size.width);
+                if size.length < 6e-3 {
+                    most_of_young = most_of_young.max(share);
+                } else {
+                    assert!(share < 1.0, "{eppo} day {day} leaf {} of {} m: {share}", organ.leaf, size.length);
+                    long += 1;
+                }
+            }
+        }
+        assert!(long > 20, "{eppo}: {long}");
+    }
+    assert!(most_of_young > 1.0, "{most_of_young}");
+}
+
 /// Rationale: three leaflets tell soybean from peanut, which has four. Expected: the blade falls into as many sheets; with a leaflet at the
 /// rachis' tip the midrib reaches to the end of that leaflet, without one it ends with the rachis. Source: the species files.
 #[test]

@@ -5,6 +5,7 @@ use super::builder::{Builder, Floor};
 use super::earth::{BakedGrounds, Bed, Earth, Laid, Soil};
 use super::ground_view::{Onlooker, from_view};
 use super::preview::Under;
+use super::terrain::{GROUND_MARGIN, tilted_to};
 use super::view::View;
 use crate::bsdf::{Bsdf, OrenNayar};
 use crate::geometry::{Cost, Mesh};
@@ -19,14 +20,12 @@ use crate::scene::layer::Layer;
 use crate::scene::tag::Tag;
 use crate::scene::{Part, PartKind, PlantRecord};
 use crate::soil::{
-    self, Canopy, Clods, Debris, DebrisKind, Expected, Ground, InView, LayerDesc, Pile, Rect, SeedRows, Site, SoilDesc,
-    SoilRecord,
+    self, Canopy, Clods, Debris, DebrisKind, Envelope, Expected, Ground, InView, LayerDesc, Pile, Rect, SeedRows, Site,
+    SoilDesc, SoilRecord,
 };
 use crate::{Error, Result};
 use std::sync::Arc;
 
-/// Room around the view with fine ground.
-const GROUND_MARGIN: f32 = 0.04;
 /// How far the coarse ground goes on.
 const GROUND_REACH: f32 = 2.5;
 /// How far it goes on where the camera sees ground beyond the planted area: to what is nearly the horizon.
@@ -145,10 +144,6 @@ impl Builder<'_> {
     pub(super) fn site(&self, view: View) -> Site {
         let pixel = self.soil_pixel();
         let [cells, _, things] = coarser(view);
-        let rows = self.sown.clone().next().map(|k| {
-            let rows = Rows::draw(&self.desc.crops[k].rows, &self.stream(Purpose::Scatter, k as u64));
-            SeedRows { spacing_m: rows.spacing_m, azimuth: rows.azimuth, offset_m: rows.offset_m }
-        });
         let (coarsest, smallest_mm) = match self.desc.detail {
             Detail::Full => (soil::FULL_CELL_M, 0.0),
             Detail::ByPixel | Detail::Instanced => (f32::INFINITY, 1e3 * things * pixel),
@@ -158,14 +153,24 @@ impl Builder<'_> {
             grid_m: (2.5 * cells * pixel).clamp(8e-4, coarsest).max((view.near.area() / MOST_CELLS).sqrt()),
             margin_m: if view.open { OPEN_REACH } else { GROUND_REACH + beyond(view) },
             growth: if view.is_graded() { GROWTH_BY_PIXEL } else { GROWTH },
-            level_m: if view.is_graded() {
-                view.near.corners().map(Vec2::length).into_iter().fold(0.0, f32::max)
-            } else {
-                f32::INFINITY
-            },
+            level_m: if view.is_graded() { tilted_to(view.near) } else { f32::INFINITY },
             smallest_mm,
-            rows,
+            rows: self.seed_rows(),
         }
+    }
+
+    /// The seed rows that shape the ground.
+    fn seed_rows(&self) -> Option<SeedRows> {
+        self.sown.clone().next().map(|k| {
+            let rows = Rows::draw(&self.desc.crops[k].rows, &self.stream(Purpose::Scatter, k as u64));
+            SeedRows { spacing_m: rows.spacing_m, azimuth: rows.azimuth, offset_m: rows.offset_m }
+        })
+    }
+
+    /// Between which heights the ground lies.
+    pub(super) fn envelope(&self) -> Envelope {
+        let soil = self.desc.soil.as_ref();
+        soil.map_or(Envelope::LEVEL, |soil| Envelope::of(soil, self.seed_rows(), &self.stream(Purpose::Soil, 0)))
     }
 
     /// Side of a texel of the ground's maps, metres.

@@ -25,6 +25,7 @@ mod scanner;
 mod season;
 mod seedling;
 mod stand;
+mod terrain;
 mod today;
 mod unlikely;
 mod view;
@@ -204,7 +205,8 @@ impl<'a> Builder<'a> {
             lights.extend(drawn);
         }
         let mut warnings = page.renamed(RENAMED);
-        if lights.is_empty() {
+        // A LiDAR brings its own.
+        if lights.is_empty() && options.scan.is_none() {
             warnings.push("no light in the scene: the image will be black".into());
         }
         let scene = Scene { parts: Vec::new(), materials: Vec::new(), lights, camera, filter: desc.filter.footprint() };

@@ -3,6 +3,7 @@
 use super::builder::{Builder, FARTHEST, PLANT_MARGIN};
 use super::ground_view::GroundView;
 use super::options::Scanner;
+use super::terrain::{Look, Reach, Seen};
 use super::view::{LONGEST_REACH, View, meets};
 use crate::math::{Vec2, Vec3};
 use crate::ron_file::{RonFile, Step};
@@ -126,14 +127,19 @@ impl Builder<'_> {
         }
         let (lo, hi) = seen.iter().fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
         let area = Rect::new(lo.x, lo.y, hi.x, hi.y);
-        self.seen.push(GroundView::around(seen));
+        let near = self.nearest(looks(lidar), area);
+        let down = looks(lidar).filter(|(_, direction)| direction.z < 0.0);
+        let down: Vec<Look> = down.map(|(_, direction)| (lidar.position, direction)).collect();
+        let far = Reach { field_m: reach, ray_m: lidar.range[1], travel_m: 0.0 };
+        let Seen { area, near, met, .. } = Seen::of(self.envelope(), area, near, &down, &far);
+        self.seen.push(GroundView::around(seen.into_iter().chain(met)));
         let open = bare.count(lidar, area.grown(1e-3));
-        View { area, near: self.nearest(looks(lidar), area), open }
+        View { area, near, open }
     }
 }
 
 /// Pulses of all beams in some columns, evenly over the turn: where they start and where to.
-fn looks(lidar: &Lidar) -> impl Iterator<Item = (Vec3, Vec3)> {
+fn looks(lidar: &Lidar) -> impl Iterator<Item = Look> {
     let columns = lidar.columns();
     let some = columns.min(LOOKED_AT);
     let column = move |k: u32| (u64::from(k) * u64::from(columns - 1) / u64::from((some - 1).max(1))) as u32;

@@ -6,6 +6,7 @@
 
 use super::builder::{Builder, FARTHEST};
 use super::ground_view::{GroundView, Onlooker};
+use super::terrain::{Look, Near, Reach, Seen};
 use crate::math::{Vec2, Vec3, vec2};
 use crate::ron_file::Step;
 use crate::scene::desc::Detail;
@@ -32,7 +33,7 @@ const SIDEWAYS: f32 = 1.75;
 /// The ground that a camera sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct View {
-    /// What of it is planted, about the plane z = 0, metres.
+    /// What of it is planted, metres: about what is seen of the plane z = 0, and of the ground where it lies lower or higher.
     pub(super) area: Rect,
     /// What of that has ground of even cells, and things on it: all, unless detail is by pixel and much of it is far away.
     pub(super) near: Rect,
@@ -154,19 +155,19 @@ impl Builder<'_> {
         }
         let mut seen: Vec<Vec2> = Vec::new();
         let mut level: Vec<Vec2> = Vec::new();
+        let mut looks: Vec<Look> = Vec::new();
         // The corners and the middles of the sides: a barrel distortion bulges between corners.
         for (x, y) in [(0, 0), (1, 0), (2, 0), (0, 1), (2, 1), (0, 2), (1, 2), (2, 2)] {
             let (origin, direction) = camera.ray(vec2(w * x as f32 / 2.0, h * y as f32 / 2.0), [0.5; 2]);
             if direction.z < -HORIZON && origin.z > 0.0 {
                 seen.extend(meets(origin, direction));
+                looks.push((origin, direction));
             } else {
                 level.push(below + direction.truncate().normalize_or_zero() * reach);
             }
         }
         if seen.is_empty() {
-            let error = Error::input(format!("{} does not look at the ground", self.which(capture)))
-                .help("turn it down; its height is counted from the ground");
-            return Err(self.blame_capture(capture, error));
+            return Err(self.blame_capture(capture, blind(&self.which(capture), camera)));
         }
         // Some of the view is of the horizon: the ground is seen as far as it is planted.
         let hull = seen.iter().chain(&level).copied();
@@ -174,13 +175,16 @@ impl Builder<'_> {
         let (lo, hi) = (all[0].max(below - Vec2::splat(reach)), all[1].min(below + Vec2::splat(reach)));
         // Rows' corners are seen in the middle of their exposures.
         let area = Rect::new(lo.x, lo.y, hi.x, hi.y).grown(camera.travel());
-        let near = self.near(camera, area);
+        let near = self.nearest(raster(camera), area);
+        let far = Reach { field_m: reach, ray_m: f32::INFINITY, travel_m: camera.travel() };
+        let Seen { area, near, met, beyond: farther, terrain } = Seen::of(self.envelope(), area, near, &looks, &far);
         // What stands between the camera and the nearest ground that it sees may be tall.
-        self.seen.push(GroundView::around(seen.iter().chain(&level).copied().chain([below])));
-        if level.is_empty() && [lo, hi] == all {
+        let points = seen.iter().chain(&level).chain(&met).copied();
+        self.seen.push(GroundView::around(points.chain([below])));
+        if level.is_empty() && [lo, hi] == all && !farther {
             return Ok(View { area, near, open: false });
         }
-        let (bare, farthest) = beyond(camera, area, below);
+        let (bare, farthest) = beyond(raster(camera).filter_map(|look| terrain.meets(look, 0.0)), area, below);
         if bare <= 0.0 {
             return Ok(View { area, near, open: false });
         }
@@ -210,34 +214,23 @@ impl Builder<'_> {
 }
 
 impl Builder<'_> {
-    /// What of a camera's ground is made of even cells.
-    fn near(&self, camera: &Camera, area: Rect) -> Rect {
-        self.nearest(raster(camera), area)
-    }
-
-    /// The same of what rays see, each with its start and its direction.
-    pub(super) fn nearest(&self, rays: impl Iterator<Item = (Vec3, Vec3)>, area: Rect) -> Rect {
+    /// What of the ground that rays see is made of even cells; `None` where all of it is.
+    pub(super) fn nearest(&self, rays: impl Iterator<Item = Look>, area: Rect) -> Option<Near> {
         if self.desc.detail == Detail::Full {
-            return area;
+            return None;
         }
-        let seen: Vec<(Vec2, f32)> = rays
-            .filter_map(|(origin, direction)| Some((meets(origin, direction)?, origin.z / -direction.z)))
-            .filter(|(at, _)| area.contains(*at))
+        let seen: Vec<(Vec2, f32, Look)> = rays
+            .filter_map(|look @ (origin, direction)| Some((meets(origin, direction)?, origin.z / -direction.z, look)))
+            .filter(|(at, ..)| area.contains(*at))
             .collect();
-        let nearest = seen.iter().map(|(_, distance)| *distance).fold(f32::INFINITY, f32::min);
-        let (mut near, mut far) = (Vec::new(), false);
-        for (at, distance) in seen {
-            if distance <= NEAR * nearest {
-                near.push(at);
-            } else {
-                far = true;
-            }
+        let ray_m = NEAR * seen.iter().map(|(_, distance, _)| *distance).fold(f32::INFINITY, f32::min);
+        let (near, far): (Vec<_>, Vec<_>) = seen.into_iter().partition(|(_, distance, _)| *distance <= ray_m);
+        if far.is_empty() {
+            return None;
         }
-        if !far {
-            return area;
-        }
-        let (lo, hi) = near.into_iter().fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
-        Rect::new(lo.x, lo.y, hi.x, hi.y)
+        let (lo, hi) = near.iter().fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(l, h), (p, ..)| (l.min(*p), h.max(*p)));
+        let looks = near.into_iter().map(|(_, _, look)| look).collect();
+        Some(Near { area: Rect::new(lo.x, lo.y, hi.x, hi.y), looks, ray_m })
     }
 
     /// Whether a plant at a place may be seen, or may throw a shadow on what is; with `detail: Full`, whether it stands in the rectangle about the view is asked elsewhere.
@@ -248,19 +241,50 @@ impl Builder<'_> {
     }
 }
 
+/// The error about a camera, called `which`, none of whose image's edges meets the ground: it looks elsewhere, or its lens does.
+fn blind(which: &str, camera: &Camera) -> Error {
+    let pose = camera.pose();
+    if pose.axes.z_axis.z >= -HORIZON || pose.position.z <= 0.0 {
+        return Error::input(format!("{which} does not look at the ground"))
+            .help("turn it down; its height is counted from the ground");
+    }
+    let [_, _, cx, cy] = camera.intrinsics();
+    let (width, height) = (f64::from(camera.width()), f64::from(camera.height()));
+    if !((0.0..=width).contains(&cx) && (0.0..=height).contains(&cy)) {
+        // In the pixels that the scene file counts.
+        let [width, height, cx, cy] = [width, height, cx, cy].map(|pixels| pixels / f64::from(camera.scale()));
+        let words = format!(
+            "{which} points at the ground, and its image shows none: the principal point, cx {cx:.0} and cy {cy:.0}, lies beyond its \
+             {width:.0} × {height:.0} pixels"
+        );
+        let (cx, cy) = (0.5 * width, 0.5 * height);
+        return Error::input(words)
+            .help(format!("write cx and cy in pixels from the top left corner, about {cx:.0} and {cy:.0}"));
+    }
+    let angle = |axis: usize, from: [f64; 2], to: [f64; 2]| {
+        (camera.unproject(to)[axis].atan() - camera.unproject(from)[axis].atan()).to_degrees()
+    };
+    let words = format!(
+        "{which} points at the ground, and all edges of its image lie about the horizon: its angle of view is {:.1}° by {:.1}°",
+        angle(0, [0.0, 0.5 * height], [width, 0.5 * height]),
+        angle(1, [0.5 * width, 0.0], [0.5 * width, height])
+    );
+    Error::input(words).help("narrow it: write horizontal_deg: 60, or a focal length of about the image's width")
+}
+
 /// Rays through an even raster of an image's points, from corner to corner.
-fn raster(camera: &Camera) -> impl Iterator<Item = (Vec3, Vec3)> {
+fn raster(camera: &Camera) -> impl Iterator<Item = Look> {
     let size = vec2(camera.width() as f32, camera.height() as f32);
     (0..=RAYS * (RAYS + 2))
         .map(|n| vec2((n % (RAYS + 1)) as f32, (n / (RAYS + 1)) as f32))
         .map(move |at| camera.ray(size * at / RAYS as f32, [0.5; 2]))
 }
 
-/// Share of an image's ground that lies beyond an area, and how far from `below` the farthest of it is, metres.
-fn beyond(camera: &Camera, area: Rect, below: Vec2) -> (f32, f32) {
+/// Share of an image's ground that lies beyond an area, and how far from `below` the farthest of it is, metres; by places all over the image.
+fn beyond(places: impl Iterator<Item = Vec2>, area: Rect, below: Vec2) -> (f32, f32) {
     let area = area.grown(1e-3);
     let (mut ground, mut bare, mut farthest) = (0.0_f32, 0.0_f32, 0.0_f32);
-    for at in raster(camera).filter_map(|(origin, direction)| meets(origin, direction)) {
+    for at in places {
         ground += 1.0;
         if !area.contains(at) {
             bare += 1.0;

@@ -4,7 +4,7 @@ use crate::growing::Line;
 use furrow::cli;
 use furrow::cli::signal::Signals;
 use furrow::dataset::Order;
-use furrow::dataset::bill::{self, Bill};
+use furrow::dataset::bill::{self, Bill, Step};
 use furrow::job::Threads;
 use furrow::report::{count, number};
 use furrow::{Result, dataset};
@@ -35,9 +35,9 @@ pub(crate) fn run(
 ) -> Result<Vec<PathBuf>> {
     cli::check_folder(folder)?;
     let threads = Threads::new(threads)?;
-    let growing = Line::begin_among(quiet, "drawing images");
+    let growing = Line::begin(quiet);
     order.progress.clone_from(growing.progress());
-    let told = bill::bill(folder, &order, &threads, signals.heed());
+    let told = bill::bill(folder, &order, &threads, &|step| growing.say(&words(step)), signals.heed());
     growing.end();
     let (bill, warnings) = told?;
     for warning in warnings {
@@ -45,6 +45,18 @@ pub(crate) fn run(
     }
     cli::print_rows(&rows(folder, &bill, threads.count()))?;
     Ok(Vec::new())
+}
+
+/// What a bill is at, in words.
+fn words(step: Step) -> String {
+    match step {
+        Step::Image { number, least, most } if least == most => format!("drawing images, {number} of {most}"),
+        Step::Image { number, least, most } if number <= least => {
+            format!("drawing images, {number} of {least} to {most}")
+        }
+        Step::Image { number, most, .. } => format!("drawing images, {number} of {most} at most"),
+        Step::Lists => "writing lists and tables".into(),
+    }
 }
 
 /// The first of some images, and how many there are.

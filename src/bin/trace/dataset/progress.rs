@@ -9,9 +9,6 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-/// Between two lines of a log.
-const EVERY: Duration = Duration::from_secs(30);
-
 /// Images done, images per hour, time left.
 pub(crate) struct Progress {
     begin: Instant,
@@ -48,7 +45,7 @@ impl Progress {
     ) -> Self {
         let progress = Self { time_left: Some(Arc::clone(time_left)), ..Self::new(begin, quiet) };
         let template = "{bar:40} {pos} of {len} images  {growing}  {msg}";
-        progress.bar.set_style(growing::style(template, growing, "", |state| state.pos() == 0));
+        progress.bar.set_style(growing::style(template, growing, |state| state.pos() == 0));
         progress
     }
 
@@ -74,7 +71,7 @@ impl Progress {
         self.bar.inc(1);
         let Some(log) = &self.log else { return };
         let mut last = log.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        if last.elapsed() >= EVERY {
+        if last.elapsed() >= growing::LOGGED {
             *last = Instant::now();
             furrow::tell!("{done} of {} images; {}", self.total.load(Ordering::Relaxed), self.rate(done));
         }

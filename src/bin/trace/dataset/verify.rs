@@ -58,6 +58,9 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
             found.rendered,
             found.faults.len()
         );
+        if let Some(unchecked) = &found.unchecked {
+            furrow::tell!("not checked: {unchecked}");
+        }
     }
     found.verdict(&set, args.shards)?;
     Ok(Vec::new())
