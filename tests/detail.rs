@@ -79,7 +79,7 @@ fn coarse_ground_is_as_bright_as_the_clods_on_it() {
 }
 
 /// Rationale: what a front camera sees far away is seen at a grazing angle, where ground that only hides would go black. Expected: as bright as in full
-/// detail within 10 % at 20° and 8° above the horizon, under an even sky and under a sun beside and behind the camera, within 30 % where it stands
+/// detail within 20 % at 20° and 8° above the horizon, under an even sky and under a sun beside and behind the camera, within 40 % where it stands
 /// before it.
 #[test]
 fn coarse_ground_is_as_bright_at_a_slant() {
@@ -87,8 +87,8 @@ fn coarse_ground_is_as_bright_at_a_slant() {
         let camera = at_a_slant(degrees);
         for clods in ["over_5mm_per_m2: 0", "over_5mm_per_m2: 9000"] {
             let soil = format!("{}, clods: ({clods})", MOISTURES[1]);
-            compare(&camera, LIGHTS[0], &soil, 0.1);
-            for (azimuth, bound) in [(0, 0.3), (90, 0.1), (180, 0.1)] {
+            compare(&camera, LIGHTS[0], &soil, 0.2);
+            for (azimuth, bound) in [(0, 0.4), (90, 0.2), (180, 0.2)] {
                 let sun = format!("Daylight(sun: Angles(elevation_deg: 34, azimuth_deg: {azimuth}), turbidity: 3)");
                 compare(&camera, &sun, &soil, bound);
             }

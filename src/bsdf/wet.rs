@@ -25,24 +25,19 @@ pub struct Wet {
     film: f32,
     /// The coat's albedo at normal incidence.
     gloss: f32,
-    /// How far the film's facets face directions that graze the surface: mean square of their cosine there.
-    tilt: f32,
 }
 
 impl Wet {
     /// `reflectance` of the wet soil at normal incidence; `sigma` of its facets, radians; `film`: covered fraction 0–1;
     /// `alpha`: the film's roughness.
     pub fn new(reflectance: Spectrum, sigma: f32, film: f32, alpha: f32) -> Self {
-        Self { tilt: 0.0, ..Self::rougher(reflectance, sigma, film, alpha, F0) }
+        Self::rougher(reflectance, sigma, film, alpha, F0)
     }
 
-    /// [`Wet::new`] for a film so rough that its albedo at normal incidence, `gloss` of [`Wet::gloss`], is another than that of smooth water, and that what is
-    /// seen of it at a grazing angle are facets that lean towards the eye: of slopes s of the variance α² / 2 the cosine of the angle there is s / √(1 + s²).
+    /// [`Wet::new`] for a film so rough that its albedo at normal incidence, `gloss` of [`Wet::gloss`], is another than that of smooth water.
     pub fn rougher(reflectance: Spectrum, sigma: f32, film: f32, alpha: f32, gloss: f32) -> Self {
         let base = (reflectance - Spectrum::splat(film * gloss)).clamp(0.0, 1.0);
-        let variance = 0.5 * alpha * alpha;
-        let tilt = variance / (1.0 + variance);
-        Self { base: OrenNayar::new(base, sigma), coat: Ggx { alpha: [alpha; 2], ior: WATER }, film, gloss, tilt }
+        Self { base: OrenNayar::new(base, sigma), coat: Ggx { alpha: [alpha; 2], ior: WATER }, film, gloss }
     }
 
     /// Albedo at normal incidence of a film of the roughness `alpha`; of up to 0.3 that of smooth water, which it is but for a tenth. By quadrature: ask once.
@@ -86,18 +81,12 @@ impl Wet {
 }
 
 impl Wet {
-    /// What the film reflects of light at this cosine to the surface.
-    #[inline]
-    fn fresnel(&self, cos: f32) -> f32 {
-        let square = cos * cos;
-        fresnel::dielectric((square + (1.0 - square) * self.tilt).sqrt(), WATER)
-    }
-
     /// Value and density for directions that both lie above; the film reflects `fresnel` towards `wo`. What is below it is `open` to both.
     #[inline]
     fn upper(&self, wo: Vec3, wi: Vec3, fresnel: f32, open: f32) -> (Spectrum, f32) {
         let (coat, coat_pdf) = self.coat.eval_pdf(wo, wi);
-        let base = self.base.upper(wo, wi) * (self.through(fresnel) * self.through(self.fresnel(wi.z)) * open);
+        let base =
+            self.base.upper(wo, wi) * (self.through(fresnel) * self.through(fresnel::dielectric(wi.z, WATER)) * open);
         let p = self.chance(fresnel);
         (base + Spectrum::splat(self.film * coat), p * coat_pdf + (1.0 - p) * wi.z * FRAC_1_PI)
     }
@@ -109,7 +98,7 @@ impl Wet {
             return (Spectrum::ZERO, 0.0);
         }
         let s = wo.z.signum();
-        self.upper(facing(wo, s), facing(wi, s), self.fresnel(wo.z.abs()), open)
+        self.upper(facing(wo, s), facing(wi, s), fresnel::dielectric(wo.z.abs(), WATER), open)
     }
 
     /// [`Scatter::sample`] where relief leaves the share `open(wi)` of the soil below the film open to both directions.
@@ -120,7 +109,7 @@ impl Wet {
         if up.z == 0.0 {
             return None;
         }
-        let fresnel = self.fresnel(up.z);
+        let fresnel = fresnel::dielectric(up.z, WATER);
         let wi = if u[0] < self.chance(fresnel) { self.coat.sample(up, u[1], u[2]) } else { cosine(u[1], u[2]) };
         if wi.z <= 0.0 {
             return None;
