@@ -14,15 +14,6 @@ pub enum Rough {
     Wet(Wet),
 }
 
-macro_rules! each {
-    ($self:expr, $b:ident => $e:expr) => {
-        match $self {
-            Rough::Dry($b) => $e,
-            Rough::Wet($b) => $e,
-        }
-    };
-}
-
 /// A rough surface times the [`Shadowing`] of its relief, whose angles are measured from `up`. A film of water is not: its roughness
 /// has masking and shadowing of its own.
 #[derive(Clone, Copy, Debug)]
@@ -50,7 +41,10 @@ impl Shadowed {
 
     /// Reflectance at normal incidence under an even sky.
     pub fn albedo(&self) -> Spectrum {
-        each!(&self.base, b => b.albedo())
+        match &self.base {
+            Rough::Dry(base) => base.albedo(),
+            Rough::Wet(base) => base.albedo(),
+        }
     }
 
     #[inline]

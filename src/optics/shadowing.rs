@@ -1,12 +1,12 @@
 //! What relief that is too fine to be made hides of light that comes and goes at an angle.
 //!
-//! Such relief is told by a table: how bright the surface is from one direction under a light from another, over what it would be without its relief. As
-//! that is told of facets that both see, weighted by the area that each shows, both directions may be exchanged, and a surface seen at a grazing
-//! angle does not go dark: what is seen of it there are the facets that face the eye. Smith's masking and shadowing
-//! (Heitz 2014, "Understanding the masking-shadowing function in microfacet-based BRDFs") is the same of facets whose heights are independent; here they are
+//! Such relief is told by a table: its bidirectional reflectance over that of the same surface without relief, at pairs of zenith angles and at relative
+//! azimuths. As that is reckoned of facets that both directions see, weighted by the area that each shows, both may be exchanged, and a surface seen
+//! at a grazing angle does not go dark: what is seen of it there are the facets that face the eye. Smith's masking and shadowing (Heitz 2014,
+//! "Understanding the masking-shadowing function in microfacet-based BRDFs") is the same of facets whose heights are independent; here they are
 //! those of the surface.
 
-/// Angles from the normal, and turns between the azimuths of both directions, of the table.
+/// Zenith angles of the table, and relative azimuths of both directions: turns between them.
 pub const SLANTS: usize = 6;
 pub const TURNS: usize = 4;
 

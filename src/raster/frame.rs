@@ -349,7 +349,7 @@ fn sky(gpu: &Gpu, scene: &Scene, labels: &LabelMap) -> TextureView {
     let camera = &scene.camera;
     let radiance = |x: u32, y: u32| {
         let (_, direction) = camera.centre_ray(x, y);
-        scene.lights.iter().map(|l: &Light| l.le(direction)).fold(Spectrum::ZERO, |sum, l| sum + l).to_array()
+        scene.lights.iter().map(|l: &Light| l.seen(direction)).fold(Spectrum::ZERO, |sum, l| sum + l).to_array()
     };
     let seen = labels.parts.contains(&label::NONE);
     let size = if seen { (width, height) } else { (1, 1) };

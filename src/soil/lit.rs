@@ -80,8 +80,8 @@ impl Lit {
         let shape = facets(sigma);
         let (mut sky, mut reaching) = (0.0, 0.0);
         // Cosine to the normal of each direction that is seen; 0 of the others.
-        let mut seen = [[0.0; SLANTS]; AZIMUTHS];
-        for (a, seen) in seen.iter_mut().enumerate() {
+        let mut seen = [[0.0; AZIMUTHS]; SLANTS];
+        for a in 0..AZIMUTHS {
             let way = Vec2::from_angle((a as f32 + 0.5) / AZIMUTHS as f32 * TAU);
             let distances =
                 std::iter::successors(Some(reach.from), |d| Some(d * FARTHER)).take_while(|d| *d <= reach.to);
@@ -94,16 +94,15 @@ impl Lit {
                 reaching += incident * 2.0 * sin * step;
                 sky += facet(shape, normal.z, incident, cos) * incident * 2.0 * sin * step;
             }
-            for (k, seen) in seen.iter_mut().enumerate() {
-                let direction = DIRECTIONS.towards[a][k];
+            for (seen, direction) in seen.iter_mut().zip(DIRECTIONS.towards[a]) {
                 if horizon * direction.truncate().length() < direction.z {
-                    *seen = normal.dot(direction).max(0.0);
+                    seen[a] = normal.dot(direction).max(0.0);
                 }
             }
         }
         let n = AZIMUTHS as f32;
         let slope = normal.truncate() / normal.z.max(1.0 / STEEPEST);
-        let shown = |k: usize| seen.iter().map(|seen| seen[k]).sum::<f32>() / (n * normal.z * Shadowing::cosine(k));
+        let shown = |k: usize| seen[k].iter().sum::<f32>() / (n * normal.z * Shadowing::cosine(k));
         Self {
             sky: sky / (n * shape[0]),
             sent: sent(shape, normal, &seen),
@@ -114,25 +113,26 @@ impl Lit {
     }
 }
 
-/// [`Lit::sent`] of a surface of which each direction sees this cosine.
-fn sent(shape: [f32; 2], normal: Vec3, seen: &[[f32; SLANTS]; AZIMUTHS]) -> Table {
+/// [`Lit::sent`] of a surface of which each direction sees this cosine, 0 where it does not.
+fn sent(shape: [f32; 2], normal: Vec3, seen: &[[f32; AZIMUTHS]; SLANTS]) -> Table {
     let mut sent = [[0.0; TURNS]; PAIRS];
-    for k in 0..SLANTS {
-        for j in 0..=k {
-            let cosines = [Shadowing::cosine(j), Shadowing::cosine(k)];
-            let pair = Shadowing::pair(j, k);
-            for (turn, twelfths) in TWELFTHS.into_iter().enumerate() {
-                let between = DIRECTIONS.between[pair][turn];
-                let both = |eye: f32, light: f32| {
-                    if eye > 0.0 && light > 0.0 { facet(shape, eye, light, between) * eye * light } else { 0.0 }
-                };
-                let mut sum = 0.0;
-                for a in 0..AZIMUTHS {
-                    let b = (a + twelfths) % AZIMUTHS;
-                    sum += both(seen[a][j], seen[b][k]) + both(seen[a][k], seen[b][j]);
+    for (turn, twelfths) in TWELFTHS.into_iter().enumerate() {
+        let turned: [[f32; AZIMUTHS]; SLANTS] =
+            seen.map(|seen| std::array::from_fn(|a| seen[(a + twelfths) % AZIMUTHS]));
+        for k in 0..SLANTS {
+            for j in 0..=k {
+                let pair = Shadowing::pair(j, k);
+                if k == SLANTS - 1 && turn > 0 {
+                    // The zenith has no azimuth.
+                    sent[pair][turn] = sent[pair][0];
+                    continue;
                 }
-                let level = facet(shape, cosines[0], cosines[1], between) * cosines[0] * cosines[1];
-                sent[pair][turn] = sum / (2.0 * AZIMUTHS as f32 * normal.z * level);
+                let between = DIRECTIONS.between[pair][turn];
+                let both = |eye: f32, light: f32| facet(shape, eye, light, between) * eye * light;
+                let terms: [f32; AZIMUTHS] =
+                    std::array::from_fn(|a| both(seen[j][a], turned[k][a]) + both(seen[k][a], turned[j][a]));
+                let level = both(Shadowing::cosine(j), Shadowing::cosine(k));
+                sent[pair][turn] = terms.iter().sum::<f32>() / (2.0 * AZIMUTHS as f32 * normal.z * level);
             }
         }
     }
