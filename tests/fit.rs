@@ -125,12 +125,12 @@ fn a_training_that_is_stopped_or_killed_ends_with_the_same_bytes() {
     let scratch = tempfile::tempdir().unwrap();
     let folder = scratch.path();
     let set = set(folder, 8);
-    for (method, more) in [
-        ("adam", " --crop-size 40x32 --rare-crops 0.5 --class-weights annealed --ema 0.9 --accumulate 2"),
-        ("sgd", " --normalization fixed --loss entropy --class-weights median"),
+    for (network, method, more) in [
+        ("lite-unet", "adam", " --crop-size 40x32 --rare-crops 0.5 --class-weights annealed --ema 0.9 --accumulate 2"),
+        ("basic-segnet", "sgd", " --normalization fixed --loss entropy --class-weights median"),
     ] {
         let more = format!(
-            "--network unet --steps 24 --optimiser {method} --val {}@0..2 --validate-every 4 --patience 100{more}",
+            "--network {network} --steps 24 --optimiser {method} --val {}@0..2 --validate-every 4 --patience 100{more}",
             set.display()
         );
         let whole = folder.join(format!("{method}-whole"));
@@ -172,7 +172,7 @@ fn a_training_whose_disk_fails_ends_with_the_same_bytes() {
     let scratch = tempfile::tempdir().unwrap();
     let folder = scratch.path();
     let set = set(folder, 4);
-    let more = format!("--network unet --steps 4 --validate-every 2 --val {}@0..1", set.display());
+    let more = format!("--network basic-segnet --steps 4 --validate-every 2 --val {}@0..1", set.display());
     let begin = |out: &Path| fit(&set, out, &more);
     let whole = folder.join("whole");
     let undisturbed = crate::common::faults::run(begin(&whole), &whole, 0, false);
@@ -200,7 +200,7 @@ fn seeds_decide_and_their_runs_lie_beside_each_other() {
     let scratch = tempfile::tempdir().unwrap();
     let folder = scratch.path();
     let set = set(folder, 4);
-    let more = "--network unet --steps 3";
+    let more = "--network basic-segnet --steps 3";
     succeed(&mut fit(&set, &folder.join("both"), &format!("{more} --seed 1,2")));
     succeed(&mut fit(&set, &folder.join("two"), &format!("{more} --seed 2")));
     assert_eq!(weights(&folder.join("both/seed-2")), weights(&folder.join("two")));
@@ -208,7 +208,7 @@ fn seeds_decide_and_their_runs_lie_beside_each_other() {
     succeed(&mut fit(&set, &folder.join("on"), &format!("{more} --seed 2 --init {}", folder.join("two").display())));
     assert_ne!(weights(&folder.join("on")), weights(&folder.join("two")));
     // A budget of no time ends after no step.
-    succeed(&mut fit(&set, &folder.join("short"), "--network unet --steps 1000 --time 1s"));
+    succeed(&mut fit(&set, &folder.join("short"), "--network basic-segnet --steps 1000 --time 1s"));
     let short = results(&folder.join("short"));
     assert!(short.ended == "time" && short.steps < 1000, "{short:?}");
 }
@@ -219,7 +219,7 @@ fn what_cannot_be_gone_on_with_is_told() {
     let folder = scratch.path();
     let set = set(folder, 4);
     let out = folder.join("run");
-    let more = "--network unet --steps 200 --validate-every 2";
+    let more = "--network basic-segnet --steps 200 --validate-every 2";
     let mut child = fit(&set, &out, more).stderr(Stdio::null()).spawn().unwrap();
     let checkpoint = out.join("checkpoint.safetensors");
     let begin = Instant::now();
@@ -229,7 +229,7 @@ fn what_cannot_be_gone_on_with_is_told() {
     }
     child.kill().unwrap();
     child.wait().unwrap();
-    let error = refuse(&mut fit(&set, &out, "--network unet --steps 100 --validate-every 2"), 2);
+    let error = refuse(&mut fit(&set, &out, "--network basic-segnet --steps 100 --validate-every 2"), 2);
     assert!(
         error.contains("another training lies in this folder") && error.contains("steps is 200 there and 100 here"),
         "{error}"
@@ -535,7 +535,7 @@ fn adjusted_logits_are_other_biases_and_nothing_else() {
     let folder = scratch.path();
     let set = set(folder, 4);
     let (plain, adjusted) = (folder.join("plain"), folder.join("adjusted"));
-    let more = "--network unet --steps 3";
+    let more = "--network basic-segnet --steps 3";
     succeed(&mut fit(&set, &plain, more));
     succeed(&mut fit(&set, &adjusted, &format!("{more} --logit-adjustment 0.5")));
     let shape = Shape { bands: Band::RGB.to_vec(), width: W, height: H };

@@ -163,7 +163,7 @@ fn a_range_of_pixel_sizes_is_asked_for_and_refused_with_words() {
     let folder = scratch.path();
     let fit = |set: &Path, out: &str, more: &[&str]| {
         let set = format!("{}@0..2", path(set));
-        let how = ["--network", "unet", "--size", "64x48", "--steps", "2", "--batch", "2"];
+        let how = ["--network", "basic-segnet", "--size", "64x48", "--steps", "2", "--batch", "2"];
         let out = folder.join(out);
         train(&[&["fit", "--set", &set, "--out", path(&out)][..], &how, more].concat())
     };
