@@ -3,7 +3,6 @@
 use crate::common::program::{field, shoot};
 use furrow::light::Light;
 use furrow::math::Spectrum;
-use furrow::scene::Field;
 use furrow::scene::assemble::Options;
 
 /// Lights, moisture and aggregates of the grounds.
@@ -29,44 +28,41 @@ fn at_a_slant(degrees: f64) -> String {
     format!("size: (100, 24), intrinsics: Pixels(fx: 600, fy: 600, cx: 50, cy: 12), pose: {pose}")
 }
 
-/// A field of bare ground under the first of `lights`, and all of them: ground does not depend on its light, and takes longest to grow.
-struct Ground {
-    field: Field,
-    lights: Vec<Vec<Light>>,
+/// The lights of a scene file, from a field that is quickly grown.
+fn lit(lights: &str) -> Vec<Light> {
+    let camera = "size: (4, 3), intrinsics: Pixels(fx: 4, fy: 4, cx: 2, cy: 1.5), pose: Nadir(height_m: 0.1)";
+    field(&format!("Field(camera: Pinhole({camera}), lights: [{lights}])"), &Options::default()).scene.lights
 }
 
-impl Ground {
-    fn grow(camera: &str, lights: &[String], soil: &str, detail: &str) -> Self {
-        let grown = |lights: &str, soil: &str| {
-            let text = format!("Field(seed: 3, camera: Pinhole({camera}), lights: [{lights}], {soil})");
-            field(&text, &Options::default())
-        };
-        let soil = format!(
-            r#"detail: {detail}, soil: (
+/// Mean radiance of bare ground under each of the lights: ground does not depend on its light, and takes longest to grow.
+fn means(camera: &str, lights: &[Vec<Light>], soil: &str, detail: &str) -> Vec<Spectrum> {
+    let text = format!(
+        r#"Field(
+            seed: 3,
+            detail: {detail},
+            camera: Pinhole({camera}),
+            lights: [{}],
+            soil: (
                 layers: [(albedo: "textures/soil/dirt.png", height: "textures/soil/dirt.height.png", size_m: 0.5, height_mm: (-4, 8))],
                 relief: (rms_mm: 0), stones: [], litter: (bits_per_m2: 0, sticks_per_m2: 0, straw_cover: 0), {soil}
-            )"#
-        );
-        let lit = |lights: &String| grown(lights, "soil: (clods: (over_5mm_per_m2: 0))").scene.lights;
-        Self { field: grown(&lights[0], &soil), lights: lights.iter().map(lit).collect() }
-    }
-
-    /// Mean radiance under each of the lights.
-    fn means(mut self) -> Vec<Spectrum> {
-        let means = self.lights.into_iter().map(|lights| {
-            self.field.scene.lights = lights;
-            let (film, _) = shoot(&self.field, 16, 0);
-            film.pixels.iter().map(|pixel| pixel.mean).fold(Spectrum::ZERO, |sum, mean| sum + mean)
-                / film.pixels.len() as f32
-        });
-        means.collect()
-    }
+            ),
+        )"#,
+        LIGHTS[0]
+    );
+    let mut field = field(&text, &Options::default());
+    let mut mean = |lights: &Vec<Light>| {
+        field.scene.lights.clone_from(lights);
+        let (film, _) = shoot(&field, 16, 0);
+        let sum = film.pixels.iter().map(|pixel| pixel.mean).fold(Spectrum::ZERO, |sum, mean| sum + mean);
+        sum / film.pixels.len() as f32
+    };
+    lights.iter().map(&mut mean).collect()
 }
 
 /// Ratios of the mean radiance of bare ground made by pixel to that in full detail, in each band, printed and held to the bound of each light.
 fn compare(camera: &str, lights: &[(String, f32)], soil: &str) {
-    let names: Vec<String> = lights.iter().map(|(light, _)| light.clone()).collect();
-    let [coarse, full] = ["ByPixel", "Full"].map(|detail| Ground::grow(camera, &names, soil, detail).means());
+    let lit: Vec<Vec<Light>> = lights.iter().map(|(light, _)| lit(light)).collect();
+    let [coarse, full] = ["ByPixel", "Full"].map(|detail| means(camera, &lit, soil, detail));
     for (((light, bound), coarse), full) in lights.iter().zip(coarse).zip(full) {
         let ratio = (coarse / full).to_array();
         let name = format!("{soil}, {light}, {camera}: {ratio:.3?}");
